@@ -1,7 +1,6 @@
 """A recorded branch as few points: straight lines through its averaged flow, halved where they depart from it."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
@@ -80,7 +79,7 @@ def _points(u: np.ndarray, q: np.ndarray, tolerance: float) -> tuple[np.ndarray,
         flows = _least_squares(u, q, at)
         misses = np.abs(_averaged(q - np.interp(u, u[at], flows)))
         wide = np.diff(at) > 1
-        worst = np.array([misses[left : right + 1].max() for left, right in pairwise(at)])
+        worst = np.maximum.reduceat(misses, at[:-1])
         halved = np.flatnonzero(wide & (worst > allowed))
         room = MOST_POINTS - at.size
         if not halved.size or room <= 0:
@@ -91,21 +90,16 @@ def _points(u: np.ndarray, q: np.ndarray, tolerance: float) -> tuple[np.ndarray,
 
 def _least_squares(u: np.ndarray, q: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Return the flows at the points whose straight lines come nearest to the flow of all bins."""
-    segment = np.clip(np.searchsorted(at, np.arange(u.size), side="right") - 1, 0, at.size - 2)
-    left, right = u[at[segment]], u[at[segment + 1]]
-    share = (u - left) / (right - left)
-    size = at.size
-    normal = np.zeros((size, size))
-    for row, column, weight in (
-        (segment, segment, (1 - share) ** 2),
-        (segment, segment + 1, (1 - share) * share),
-        (segment + 1, segment, (1 - share) * share),
-        (segment + 1, segment + 1, share**2),
-    ):
-        np.add.at(normal, (row, column), weight)
-    wanted = np.zeros(size)
-    np.add.at(wanted, segment, (1 - share) * q)
-    np.add.at(wanted, segment + 1, share * q)
+    starts, stretches = at[:-1], at.size - 1
+    segment = np.repeat(np.arange(stretches), np.diff(np.append(starts, u.size)))
+    left = u[starts]
+    share = (u - left[segment]) / (u[at[1:]] - left)[segment]
+    before = 1 - share
+    # Each bin bears on the two points beside it: sums over the bins of a stretch.
+    own, other, both = (np.add.reduceat(each, starts) for each in (before * before, share * share, share * before))
+    normal = np.diag(np.append(own, 0.0) + np.append(0.0, other)) + np.diag(both, 1) + np.diag(both, -1)
+    wanted = np.append(np.add.reduceat(before * q, starts), 0.0)
+    wanted[1:] += np.add.reduceat(share * q, starts)
     return np.linalg.solve(normal, wanted)
 
 
