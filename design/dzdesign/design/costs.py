@@ -1,11 +1,11 @@
 """What a design costs, in a person's words: dead zone that remains, flow at the transition, drive at full command."""
 
-from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.law_corners import corners_of
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -57,7 +57,7 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     """Say what remains at one tested pressure drop."""
     signals, u_max = compensator.signals, float(compensator.u_max_V)
     code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-    corners = _corners(compensator, code, sign)
+    corners = corners_of(compensator, code, sign)
     left = remaining_dead_zone(compensator, test, sign)
     units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
     at = units.text(test.dp_MPa or 0.0, ".2f MPa")
@@ -93,45 +93,13 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
     share is 0 where flow passes at zero command.
     """
     code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
-    corners = _corners(compensator, code, sign)
+    corners = corners_of(compensator, code, sign)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     shares = {name: knee / float(compensator.u_max_V) for name, knee in knees.items() if knee is not None}
     found = {name: max(corners.command_at(knee), 0.0) for name, knee in shares.items()}
     if "opening" in found:  # from rest the drive leaves the zero band at its outer end
         found["opening"] = max(found["opening"], corners.leaves)
     return found
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Corners:
-    """The law at one pressure drop, two straight parts behind the zero band, all over full command and full drive."""
-
-    #: Drive in the zero band, at the transition's end and at full command.
-    offset: float
-    at_end: float
-    full: float
-    #: Command at the ends of zero band and transition, 0 without one; and beyond which the drive leaves its rest.
-    zero_band: float
-    end: float
-    leaves: float
-
-    def command_at(self, drive: float) -> float:
-        """Return the command at which the drive reaches a threshold."""
-        if drive <= self.at_end and self.end:
-            passed = (drive - self.offset) / (self.at_end - self.offset) if self.at_end > self.offset else 0.0
-            return self.zero_band + (self.end - self.zero_band) * passed
-        return self.end + (1 - self.end) * (drive - self.at_end) / (self.full - self.at_end)
-
-
-def _corners(compensator: Compensator, dp_code: int, sign: int) -> _Corners:
-    """Return the law's corners at a difference of pressure codes."""
-    command, end = compensator.signals.command, compensator.transition_end
-    span = command.span(sign)
-    at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, end, span))
-    offset, at_end, full = (float(compensator.drive(code, dp_code, sign)) for code in at)
-    leaves = compensator.drive_functions.leave_zero_codes / span if compensator.zero_band_codes else 0.0
-    zero_band = compensator.zero_band_codes / span
-    return _Corners(offset=offset, at_end=at_end, full=full, zero_band=zero_band, end=end / span, leaves=leaves)
 
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
