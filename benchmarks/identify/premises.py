@@ -100,7 +100,8 @@ def table(draws: int, seed: int = 1) -> Iterator[tuple[str, int]]:
             for shape in SHAPES:
                 if shape == "line" or tests > 2:
                     for premise, declared in (("line", False), ("smooth", True), ("smooth", False)):
-                        if (premise == "line" and shape != "line") or (premise == "smooth" and tests == 2 and not declared):
+                        unknown = premise == "smooth" and tests == 2 and not declared
+                        if unknown or (premise == "line" and shape != "line"):
                             continue
                         failed, refused = failures(premise, shape, tests, errors, draws, declared=declared, seed=seed)
                         what = f"{premise}{', M declared' if declared else ''}"

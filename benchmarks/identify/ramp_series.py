@@ -49,7 +49,7 @@ def _family(
     side = identify(
         recordings, IdentifyOptions(meter_lag=0.0, meter_lag_tolerance=0.0, repeatability=declared)
     ).positive
-    offset = side.reference.u_min_V * np.array(side.beta.beta)
+    offset = np.array(side.curve.u_offset_V)
     closing = truth + min(change, 0.0) + scatter * rng.standard_normal(truth.size)
     return bool(np.any(closing < offset)), side.trend != "flat"
 

@@ -130,7 +130,7 @@ def _held_against_truth(valve: ValveModel, bench: Bench, dp: np.ndarray) -> dict
     closing = np.array([test.u_knee_falling_V for test in side.tests])
     grid = np.linspace(dp[0], dp[-1], GRID)
     beta = np.interp(grid, side.beta.dp_MPa, side.beta.beta)
-    offset, true_closing = side.reference.u_min_V * beta, bench.closing_V(grid)
+    offset, true_closing = np.interp(grid, side.curve.offset_dp_MPa, side.curve.offset_V), bench.closing_V(grid)
     gain = beta * (side.k_x_max_over_u_max - 1) + 1  # Eq. (18)
     short = (true_closing - offset) / U_MAX_V
     middle = (opening + closing) / 2

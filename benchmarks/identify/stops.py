@@ -84,8 +84,7 @@ def _valve(
     model = identify(tests, IdentifyOptions(meter_lag=0.0))
     side = model.positive
     worst, losses = 0.0, []
-    for dp, beta, test in zip(PRESSURES_MPa, side.beta.beta, side.tests, strict=True):
-        offset = beta * side.reference.u_min_V
+    for dp, offset, test in zip(PRESSURES_MPa, side.curve.u_offset_V, side.tests, strict=True):
         top = rng.uniform(offset + 0.3, 10.0)
         stop = spool(np.concatenate([np.linspace(offset, top, 200), np.linspace(top, offset, 400)]))[-1]
         worst = max(worst, bench.gain * dp**0.5 * (stop - _edge(dp, rng)))

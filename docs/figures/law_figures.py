@@ -20,7 +20,7 @@ def over_compensation(example: Example) -> "Figure":
     side = example.side
     dp = np.array(side.beta.dp_MPa)
     closing = np.array([test.u_knee_falling_V for test in side.tests])
-    fixed = np.full(dp.size, side.reference.u_min_V)
+    fixed = np.full(dp.size, side.curve.u_min0_V)
     left.plot(dp, closing, "v-", color=ORANGE, label="closing threshold")
     left.plot(dp, fixed, "--", color=PURPLE, lw=1.8, label="offset without beta")
     fine = np.linspace(dp[0], dp[-1], 181)

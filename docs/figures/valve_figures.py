@@ -95,7 +95,7 @@ def beta(example: Example) -> "Figure":
     left.legend(title="bars: 3 standard errors", title_fontsize=8)
     right.plot(dp, side.beta.beta, "o-", color=PURPLE, label="beta, identified")
     fine = np.linspace(0.0, 6.0, 241)
-    held = example.offset_V(fine) / side.reference.u_min_V
+    held = example.offset_V(fine) / side.curve.u_min0_V
     right.plot(fine, held, color=BLACK, ls="--", lw=1.2, label="beta, as the firmware has it")
     right.axvline(side.reference.dp_MPa, color=GREY, ls=":", lw=1.2)
     note(right, "dP0", (side.reference.dp_MPa + 0.4, 0.9745))

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.beta_table import offset_ceiling
+from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import CommandSignal, Signals
+from dzdesign.identify.options import IdentifyOptions
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, signals_with_span, synthetic_ramp, with_side
 
@@ -104,16 +107,19 @@ def test_document_round_trip(example_compensator):
 def with_curve(side, **changes):
     """Return a side whose closing curve is changed."""
     curve = dataclasses.replace(side.certified["closing"], **changes)
-    reference = dataclasses.replace(side.reference, u_min_V=curve.u_min0_V)
-    return dataclasses.replace(side, certified={**side.certified, "closing": curve}, reference=reference)
+    return dataclasses.replace(side, certified={**side.certified, "closing": curve})
 
 
 def test_a_valve_file_that_contradicts_itself_is_refused(example_valve, wording):
     side = example_valve.positive
-    greedy = with_curve(side, u_min0_V=side.reference.u_min_V + 0.02)
-    with pytest.raises(RequirementError) as caught:
-        design(dataclasses.replace(example_valve, sides={"positive": greedy}))
+    higher = {"u_min0_V": side.curve.u_min0_V + 0.02, "offset_V": tuple(u + 0.02 for u in side.curve.offset_V)}
+    with pytest.raises(RuleError) as caught:
+        with_curve(side, **higher)
     wording("design: a valve that contradicts itself", str(caught.value))
+    greedy = dataclasses.replace(guarded_curve(side, "closing", "hold"), offset_V=(Fraction(6), Fraction(6)))
+    greedy = dataclasses.replace(greedy, dp_MPa=(greedy.dp_MPa[0], greedy.dp_MPa[-1]))
+    with pytest.raises(RequirementError):
+        offset_ceiling(greedy, DesignOptions().signals, Fraction(10))
 
 
 def test_span_must_reach_the_tested_pressures(example_valve, wording):
@@ -122,11 +128,13 @@ def test_span_must_reach_the_tested_pressures(example_valve, wording):
     wording("design: a short span", str(caught.value))
 
 
-def test_a_law_that_would_fall_with_command_is_refused(example_valve):
-    side = dataclasses.replace(example_valve.positive, k_x_max_over_u_max=1e-4, opening_curve=None)
-    side = with_curve(side, beta=(1.5, 1.5, 1.4, 1.4, 1.4, 1.4))
-    with pytest.raises((InputError, RequirementError)):
-        design(dataclasses.replace(example_valve, sides={"positive": side}))
+def test_a_law_that_would_fall_with_command_is_refused():
+    """Below dP0 of 3 MPa beta is 1.5, and a valve whose stroke takes next to no command leaves no gain there."""
+    tests = [synthetic_ramp(dp, Truth(knee_rising=6.5 - 1.0 * dp, slope=4 * dp**0.5)) for dp in (0.5, 1.0, 3.0)]
+    valve = identify(tests, IdentifyOptions(dp0=3e6))
+    side = dataclasses.replace(valve.positive, k_x_max_over_u_max=2e-3)
+    with pytest.raises(InputError, match="would fall with rising command"):
+        design(dataclasses.replace(valve, sides={"positive": side}), DesignOptions(below_dp0="extend"))
 
 
 def test_loss_against_the_certified_curve_is_small(example_valve, example_compensator):
@@ -136,8 +144,8 @@ def test_loss_against_the_certified_curve_is_small(example_valve, example_compen
     codes = np.arange(low, high + 1)
     table = np.array([float(c.drive(0, int(code))) for code in codes]) * 10
     dp = codes * 20 / 4095
-    curve = np.minimum(np.interp(dp, side.beta.dp_MPa, side.beta.beta), np.where(dp <= side.reference.dp_MPa, 1, 9))
-    loss = curve * side.reference.u_min_V - table
+    curve, held = np.interp(dp, side.curve.offset_dp_MPa, side.curve.offset_V), side.curve.u_min0_V
+    loss = np.minimum(curve, np.where(dp <= side.reference.dp_MPa, held, 99)) - table
     assert loss.min() > 0
     assert loss.mean() < 0.005
 

@@ -42,7 +42,8 @@ class LotSide:
             raise RuleError("the pressure drops of a valve do not rise from test to test")
         bends = 0 if self.premise == "monotone" else len(self.dp_MPa) - 1
         if len(self.curvature_V_MPa2) != bends:
-            raise RuleError(f"{len(self.curvature_V_MPa2)} values of M for the premise {self.premise}, expected {bends}")
+            found = len(self.curvature_V_MPa2)
+            raise RuleError(f"the premise {self.premise} has {found} values of M, expected {bends}")
 
     @classmethod
     def of(cls, side: SideModel, guard: str) -> "LotSide":

@@ -70,7 +70,7 @@ def _certify(
         opens_V=np.where(np.isnan(opens), guarding.free.knee[:, 1], opens),
         options=options,
     )
-    between, threshold = group.between(guarding.column), next(iter(guarding.thresholds.values())).free
+    between, threshold = group.between(guarding.column), next(iter(guarding.thresholds.values())).ordered
     _refuse_unlike_repeats(between, threshold)
     return certify_thresholds(guarding.thresholds, tested)
 
@@ -106,7 +106,7 @@ def _side_model(
     """Assemble one side: what was identified, the curves that may be certified, and k x_max."""
     described, trend = group.tests, guarding.trend
     guard = next(iter(certified))
-    curves = {name: certified[name].curve for name in GUARDS if name in certified}
+    curves: dict[str, CertifiedCurve] = {name: certified[name].curve for name in GUARDS if name in certified}
     joint = identify_curve(group, guarding.free, curves[guard].premise, reference, options)
     dp0 = described[reference].dp
     several = len(described) > 1

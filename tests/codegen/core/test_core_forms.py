@@ -24,8 +24,7 @@ def two_sided(example_valve):
         name: dataclasses.replace(
             curve,
             u_min0_V=curve.u_min0_V - 0.2,
-            beta=tuple((beta * curve.u_min0_V - 0.2) / (curve.u_min0_V - 0.2) for beta in curve.beta),
-            certified_steps_V=tuple(step - 0.2 for step in curve.certified_steps_V),
+            offset_V=tuple(offset - 0.2 for offset in curve.offset_V),
             u_lower_V=tuple(bound - 0.2 for bound in curve.u_lower_V),
             u_threshold_V=tuple(threshold - 0.2 for threshold in curve.u_threshold_V),
         )
@@ -36,8 +35,7 @@ def two_sided(example_valve):
         dataclasses.replace(test, u_guard_V=test.u_guard_V - 0.2, u_guard_lower_V=test.u_guard_lower_V - 0.2)
         for test in side.tests
     )
-    reference = dataclasses.replace(side.reference, u_min_V=lower[side.certificate.guard].u_min0_V)
-    negative = dataclasses.replace(side, guards=lower, reference=reference, opening_curve=opening, tests=tests)
+    negative = dataclasses.replace(side, certified=lower, opening_curve=opening, tests=tests)
     return dataclasses.replace(example_valve, sides={"positive": side, "negative": negative})
 
 

@@ -22,7 +22,6 @@ from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.identify.valve.staircase import staircase
 from tests.support.repeatable_valves import REPEATABLE, identify
 from tests.support.synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 

@@ -4,12 +4,16 @@ import dataclasses
 import re
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from dzdesign.command_line.cli import main
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.plots.frame import plot_style, pressure_names
+from dzdesign.identify.plots.valve_curves import BOUND_NAMES, draw_thresholds
 from dzdesign.identify.plots.valve_plots import MOST_POINTS, RESIDUAL_EDGE, draw_figures, plot_files
 from tests.support.repeatable_valves import identify_sides
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
@@ -171,24 +175,36 @@ class TestOverPressure:
     def test_staircase_and_offset_are_certified(self, found, figures):
         side = found.model.positive
         axes = figures["thresholds"].axes[0]
-        steps, edges, _ = labelled(axes, "certified staircase").get_data()
-        assert tuple(steps) == side.curve.certified_steps_V
-        assert tuple(edges) == side.beta.dp_MPa
+        dp, bound = labelled(axes, BOUND_NAMES[side.curve.premise]).get_xydata().T
+        assert bound.tolist() == side.curve.bound(side.trend).in_doubles(dp).tolist()
+        assert set(side.beta.dp_MPa) <= set(dp.tolist())
         offset = labelled(axes, "largest certified offset").get_xydata()
-        assert offset[:, 1] == pytest.approx(side.reference.u_min_V * np.array(side.beta.beta))
-        for left, right, step in zip(offset, offset[1:], steps, strict=False):
-            assert max(left[1], right[1]) <= step + 1e-9
+        assert offset.tolist() == np.column_stack([side.curve.offset_dp_MPa, side.curve.offset_V]).tolist()
+        assert np.all(np.interp(dp, *offset.T) <= bound + 1e-9)
+
+    def test_staircase_is_drawn_of_a_monotone_curve(self):
+        side = identify_sides([ramp_of(dp) for dp in PRESSURES], IdentifyOptions(curve="monotone")).model.positive
+        figure = Figure()
+        draw_thresholds(figure.subplots(), side, side.curve)
+        steps, edges, _ = labelled(figure.axes[0], "certified staircase").get_data()
+        assert tuple(edges) == side.curve.dp_MPa
+        for (left, right), step in zip(pairwise(side.curve.u_lower_V), steps, strict=True):
+            assert step == min(left, right)
 
     def test_beta_lies_under_its_bounds(self, found, figures):
         side = found.model.positive
         axes = figures["beta"].axes[0]
-        nodes = labelled(axes, "β(dP) of the valve").get_xydata()
-        assert nodes.tolist() == np.column_stack([side.beta.dp_MPa, side.beta.beta]).tolist()
+        bars = {container.get_label(): container for container in axes.containers}
+        for name, found_curve in side.identified.items():
+            points, _, (spread,) = bars[f"β(dP) {name} ± 2 s.e."]
+            nodes = np.column_stack([found_curve.dp_MPa, found_curve.beta])
+            assert points.get_xydata().tolist() == nodes.tolist()
+            ends = np.array(spread.get_segments())[:, :, 1]
+            assert np.diff(ends).ravel() == pytest.approx([4 * se for se in found_curve.beta_se])
         bound = labelled(axes, "lower bound / u_min0, at the test").get_ydata()
         assert bound * side.reference.u_min_V == pytest.approx([test.u_guard_lower_V for test in side.tests])
-        assert np.all(nodes[:, 1] <= bound + 1e-9)
-        steps = labelled(axes, "certified staircase / u_min0").get_data().values
-        assert steps * side.reference.u_min_V == pytest.approx(side.curve.certified_steps_V)
+        offset = labelled(axes, "largest certified offset / u_min0").get_ydata()
+        assert offset * side.reference.u_min_V == pytest.approx(side.curve.offset_V)
         assert labelled(axes, "dP0, where β = 1").get_xydata().tolist() == [[side.reference.dp_MPa, 1]]
 
 
@@ -202,7 +218,7 @@ class TestOneTest:
         axes = figures["thresholds"].axes[0]
         test = single.model.positive.tests[0]
         assert labelled(axes, "guarded threshold").get_ydata().tolist() == [test.u_guard_V]
-        assert labelled(axes, "largest certified offset").get_ydata() == [single.model.positive.reference.u_min_V]
+        assert labelled(axes, "largest certified offset").get_ydata() == [single.model.positive.curve.u_min0_V]
         assert axes.get_xticks().size == 0
         assert "not recorded" in axes.get_xlabel()
 

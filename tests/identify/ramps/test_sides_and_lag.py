@@ -81,6 +81,7 @@ class TestSides:
         both = identify([*mirrored, *tests])
         assert [test.source for test in both.sides["negative"].tests] == [test.source for test in mirrored]
         assert both.sides["negative"].reference.u_min_V == pytest.approx(both.positive.reference.u_min_V, abs=1e-6)
+        assert both.sides["negative"].curve.u_min0_V == pytest.approx(both.positive.curve.u_min0_V, abs=1e-6)
 
     def test_a_side_without_data_is_said_to_be_missing(self, valve, wording):
         assert valve.untested_sides == ()
@@ -202,8 +203,8 @@ class TestQualityGate:
         tests = [synthetic_ramp(dp, Truth(knee_rising=5.4 - 0.01 * dp, noise=0.02)) for dp in PRESSURES]
         assert identify(tests).positive.trend == "decreasing"
         flat = identify(tests, IdentifyOptions(flat_below=5e-3)).positive
-        assert flat.trend == "flat" and set(flat.beta.beta) == {1.0} and flat.trend_p < 0.01
-        assert max(flat.curve.certified_steps_V) <= min(test.u_guard_lower_V for test in flat.tests)
+        assert flat.trend == "flat" and np.ptp(flat.curve.offset_V) == 0 and flat.trend_p < 0.01
+        assert max(flat.curve.offset_V) <= min(test.u_guard_lower_V for test in flat.tests)
 
 
 def test_the_pressure_of_a_side_is_read_where_it_is_shut(recordings):

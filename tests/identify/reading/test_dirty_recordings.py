@@ -124,8 +124,8 @@ def test_the_knees_are_those_of_the_valve(name):
     found = test.u_knee_rising_V, test.u_knee_falling_V
     assert found == pytest.approx(KNEES, abs=max(4.5 * test.u_knee_se_V, 0.012))
     assert test.q_max_L_min == pytest.approx(18.6, rel=0.02)  # 18.4 rising, 18.8 falling
-    assert valve.positive.reference.u_min_V < KNEES[1]
-    assert valve.positive.reference.u_min_V > KNEES[1] - (0.35 if name == "staircase" else 0.15)
+    assert valve.positive.curve.u_min0_V < KNEES[1]
+    assert valve.positive.curve.u_min0_V > KNEES[1] - (0.35 if name == "staircase" else 0.15)
     assert "meter-zero" not in {warning.code for warning in valve.warnings}
 
 

@@ -234,7 +234,8 @@ def test_of_a_valves_own_setting_there_is_nothing_to_compare(batch):
 
 
 def valve_tested(common, name, *places):
-    bounds = LotSide(trend="flat", confidence=0.99, dp_MPa=places, u_lower_V=(5.0,) * len(places))
+    premise = {"premise": "monotone", "curvature_V_MPa2": ()}
+    bounds = LotSide(trend="flat", confidence=0.99, **premise, dp_MPa=places, u_lower_V=(5.0,) * len(places))
     return replace(common.compensator.lot[0], name=name, positive=bounds)
 
 
@@ -263,7 +264,8 @@ def test_a_pressure_between_two_tests_makes_the_bound_coarser_and_no_range_narro
     """Whatever the ends of its tests are: no bench sets a pressure drop to a per cent."""
     full = [valve_tested(common, name, 1.0, 2.0, 4.0) for name in "vwx"]
     low, _, high = bounds
-    side = LotSide(trend=trend, confidence=0.99, dp_MPa=(1.01, 3.99), u_lower_V=(low, high))
+    premise = {"premise": "monotone", "curvature_V_MPa2": ()}
+    side = LotSide(trend=trend, confidence=0.99, **premise, dp_MPa=(1.01, 3.99), u_lower_V=(low, high))
     coarse = replace(common.compensator.lot[0], name="V8", positive=side)
     (lacking,) = lacking_in([*full, valve_tested(common, "y", 1.0, 2.0, 4.0), replace(coarse, positive=side)][:5])
     assert (lacking.name, lacking.dp_MPa) == ("V8", (2.0,)) and lacking.coarser_V == pytest.approx(coarser, abs=3e-3)

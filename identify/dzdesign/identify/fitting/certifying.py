@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from dzdesign.identify.valve.certified_bound import CertifiedBound, Premise
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, OpeningCurve, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
 from dzdesign.identify.valve.staircase import Direction, staircase
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tested:
@@ -132,7 +134,7 @@ def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
     if taken not in offsets:
         raise failures[taken]
     bound, offset = bounds[taken], offsets[taken]
-    declared = "declared" if tested.options.curvature is not None else "estimated"
+    declared: Literal["declared", "estimated"] = "declared" if tested.options.curvature is not None else "estimated"
     with_dp = tested.dp_MPa.size > 0 and not np.isnan(tested.dp_MPa).any()
     curve = CertifiedCurve(
         premise=taken,

@@ -144,7 +144,10 @@ def fit_joint_curve(
         of_u[column] = parts @ inside @ parts.T
     k_x_max = top / (at @ slope)
     return JointCurve(
-        u=u, covariance=of_u, k_x_max=float(k_x_max * (1 + best[-1])), k_x_max_se=float(k_x_max * np.sqrt(covariance[-1, -1]))
+        u=u,
+        covariance=of_u,
+        k_x_max=float(k_x_max * (1 + best[-1])),
+        k_x_max_se=float(k_x_max * np.sqrt(covariance[-1, -1])),
     )
 
 

@@ -5,6 +5,7 @@ the bound allows, and runs the way of the trend. The bound is a constraint at ev
 it lacks between those points is taken off in closed form.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -76,12 +77,22 @@ def fit_offset_under(
         found = np.full(nodes.size, lowest)
     else:
         found = _solve(nodes, np.interp(nodes, dp_MPa, identified), ceiling, lowest, trend, u_max)
-    found = found - max(largest_excess(bound, nodes, found), 0.0) - ROUNDING_V
     slack = ceiling - np.interp(points, nodes, found)
-    active = tuple(f"offset at {at:.3f} MPa" for at in points[slack < ACTIVE * u_max])
+    found = found - max(largest_excess(bound, nodes, found), 0.0) - ROUNDING_V
     return OffsetUnderBound(
-        dp_MPa=nodes, offset=found, u_min0=float(np.interp(dp_MPa[reference], nodes, found)), active=active
+        dp_MPa=nodes,
+        offset=found,
+        u_min0=float(np.interp(dp_MPa[reference], nodes, found)),
+        active=tuple(_in_words(points, slack < ACTIVE * u_max)),
     )
+
+
+def _in_words(points: np.ndarray, active: np.ndarray) -> Iterator[str]:
+    """Yield the stretches of the interval on which the offset lies on the bound."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], active.astype(int), [0]])))
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        low, high = (f"{points[place]:.3f}" for place in (first, last))
+        yield f"offset at {low} MPa" if low == high else f"offset from {low} to {high} MPa"
 
 
 def _divided(dp_MPa: np.ndarray, parts: int) -> np.ndarray:

@@ -161,7 +161,7 @@ def critical_value(path: np.ndarray, degrees: float, confidence: float, tests: i
     from scipy.optimize import brentq
     from scipy.special import stdtr, stdtrit
 
-    tail = 1 - confidence
+    tail, degrees = 1 - confidence, min(degrees, LARGEST_DEGREES)
     bonferroni = float(stdtrit(degrees, 1 - tail / tests))
     scale = np.sqrt(np.diag(path))
     if not np.all(scale > 0):

@@ -26,13 +26,16 @@ class IdentifiedCurve:
     dp_MPa: Annotated[
         tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty where the pressure drop is unknown.")
     ]
-    u_V: Annotated[tuple[Voltage, ...], quantity("V", "u_min: the threshold, a knee, as the fit under the premise has it.")]
+    u_V: Annotated[
+        tuple[Voltage, ...], quantity("V", "u_min: the threshold, a knee, as the fit under the premise has it.")
+    ]
     u_se_V: Annotated[
         tuple[VoltageError, ...],
-        quantity("V", "Its standard error: noise, scatter from ramp to ramp, and how wide a straight part was taken."),
+        quantity("V", "Its standard error: noise, scatter from ramp to ramp, the width of the straight part."),
     ]
     beta: Annotated[
-        tuple[IdentifiedRatio, ...], quantity("1", "Eq. (5): the threshold over that at dP0; empty where dP is unknown.")
+        tuple[IdentifiedRatio, ...],
+        quantity("1", "Eq. (5): the threshold over that at dP0; empty where dP is unknown."),
     ]
     beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Its standard error; 0 at dP0.")]
 

@@ -138,7 +138,7 @@ class SideModel:
             )
         dp = self.curve.dp_MPa
         if dp and (self.reference.dp_MPa is None or any(test.dp_MPa is None for test in self.tests)):
-            raise RuleError("a pressure drop is missing beside the tested ones of a curve; expected one per test and dP0")
+            raise RuleError("a pressure drop is missing beside those of a curve; expected one per test and dP0")
         for guard in self.certified.values():
             self._check_nodes(guard.dp_MPa, len(guard.u_lower_V))
             guard.check_offset(self.trend or "flat", self.reference.dp_MPa)

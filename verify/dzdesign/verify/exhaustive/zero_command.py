@@ -157,9 +157,9 @@ def _margin_of_sagging(
     for row in near:
         ends = Fraction(int(drops.least[row]), drops.scale), Fraction(int(drops.most[row]), drops.scale)
         exact.append((bound.least(*ends) - unit_V * int(at_peak[row]), int(row)))
-    margin, row = min(exact)
+    margin, place = min(exact)
     exceeded = int(np.sum(left_V < -CLOSE_V)) + sum(value < 0 for value, at in exact if abs(left_V[at]) <= CLOSE_V)
-    middle = Fraction(int(drops.least[row]) + int(drops.most[row]), 2 * drops.scale)
+    middle = Fraction(int(drops.least[place]) + int(drops.most[place]), 2 * drops.scale)
     return ZeroCommandMargin(margin_V=margin, dp_MPa=round(float(middle), 4), exceeded=exceeded)
 
 
