@@ -119,7 +119,10 @@ def _commands_at(
     """Return the command at which the drive reaches each threshold that there is, at a test's pressure drop."""
     corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
     shares = {name: at / float(compensator.u_max_V) for name, at in thresholds_V.items() if at is not None}
-    found = {name: max(corners.command_at(at), 0.0) for name, at in shares.items()}
+    nodes = compensator.drive_functions.play_counts[0 if sign > 0 else 1] or (0,)
+    widths = (nodes[0] / compensator.signals.compare_max, nodes[-1] / compensator.signals.compare_max)
+    branches = {"opening": corners, "closing": corners.lowered(*widths)}
+    found = {name: max(branches[name].command_at(at), 0.0) for name, at in shares.items()}
     if "opening" in found:  # from rest the drive leaves the zero band at its outer end
         found["opening"] = max(found["opening"], corners.leaves)
     return found
@@ -168,6 +171,13 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
             "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
         )
     lines += _cost_of_zero_band(compensator)
+    if functions.has_play:
+        width = max(count for nodes in functions.play_counts for count in nodes) / signals.compare_max
+        turned = 2 * functions.play_noise_codes + functions.play_codes
+        lines.append(
+            f"inverse play: a falling command is driven lower by the recorded hysteresis, up to {width:.2%} of full "
+            f"drive, once it has turned by {turned} codes ({turned / signals.command.span(1):.2%} of command)"
+        )
     if functions.has_ramp:
         lines.append(
             f"ramps: {_ramp_text(compensator)}; they hold for zero command too: the valve closes no faster than they "

@@ -1,6 +1,6 @@
 """The law at one pressure drop as straight parts: what drive a command makes, and what command a drive needs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dzdesign.design.compensator import Compensator
 
@@ -17,6 +17,10 @@ class LawCorners:
     zero_band: float
     end: float
     leaves: float
+
+    def lowered(self, at_end: float, at_full: float) -> "LawCorners":
+        """Return the branch of a falling command: lower by so much at the transition's end, and at full command."""
+        return replace(self, at_end=self.at_end - at_end, full=self.full - at_full)
 
     def command_at(self, drive: float) -> float:
         """Return the command at which the drive reaches a threshold."""
