@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.constants import MPA
+from dzdesign.identify.constants import MPA, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import fit_offset
 from dzdesign.identify.fitting.guarding import GuardedThreshold, OrderedKnees
@@ -20,7 +20,7 @@ from dzdesign.identify.fitting.premises import (
     find_curvature,
 )
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.certified_bound import CertifiedBound, Premise
+from dzdesign.identify.valve.certified_bound import CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, OpeningCurve, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
 from dzdesign.identify.valve.staircase import Direction, staircase
