@@ -8,8 +8,6 @@ truth.json beside them.
 
 import json
 import sys
-import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +15,7 @@ from pathlib import Path
 import bench_loggers as loggers
 import numpy as np
 from bench_plant import duration, hold, ramp
+from corpus_faults import print_faults
 from corpus_plant import Bench, drifting, levels, pump_off, pump_on, steady, with_dip
 
 TOLERANCE_V, TOLERANCE_SE, LARGEST_SE_V = 0.015, 3.0, 0.03
@@ -285,28 +284,8 @@ KINDS: tuple[Callable[[], Iterator[Case]], ...] = (
 
 def print_corpus(*, quick: bool, seed: int) -> list:
     """Print and return the rows of part 11."""
-    from scoreboard import Row, print_rows, say
-
-    every = cases()[:: 4 if quick else 1]
-    counts = {kind: Counter() for kind in dict.fromkeys(case.kind for case in every)}
-    with tempfile.TemporaryDirectory() as folder:
-        for case in every:
-            fault = fault_of(case, seed, Path(folder))
-            counts[case.kind][fault.partition(":")[0]] += 1
-            if fault:
-                say(f"{case.name}: {fault}")
-    rows = [
-        Row(what=kind, value=float(found.total() - found[""]), limit=0.0, note=_note(found))
-        for kind, found in counts.items()
-    ]
-    total = sum(counts.values(), Counter())
-    rows.append(Row(what="all", value=float(total.total() - total[""]), limit=0.0, note=_note(total)))
-    print_rows(f"11. Recordings as benches make them: refused or misread (seed {seed})", rows)
-    return rows
-
-
-def _note(found: Counter) -> str:
-    return f"of {found.total()}: {found['refused']} refused, {found['misread']} misread"
+    title = f"11. Recordings as benches make them: refused or misread (seed {seed})"
+    return print_faults(title, cases()[:: 4 if quick else 1], lambda case, folder: fault_of(case, seed, folder))
 
 
 def main(folder: Path, seed: int = 909) -> None:

@@ -10,20 +10,17 @@ import io
 import json
 import re
 import sys
-import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from bench_loggers import PER_L_MIN, PRESSURE_OF, Rows, command_text, german, plain, table, with_units_below
-from bench_plant import Segment, commanded, lagged, ramp, staircase, with_play
+from bench_loggers import PER_L_MIN, PRESSURE_OF, command_text, german, plain, table, with_units_below
+from bench_plant import ramp, staircase
+from corpus_faults import print_faults
+from four_port_plant import BOTH_WAYS, CLOSES, OPENS, bench
 
 TOLERANCE_V, TOLERANCE_SE, LARGEST_SE_V, SAME_DP = 0.015, 3.0, 0.03, 0.02
-#: Volts at which the valve's sides open and close, whatever the unit of the command.
-OPENS, CLOSES = {"positive": 4.66, "negative": 3.26}, {"positive": 4.54, "negative": 3.14}
-GAIN, PLAY = 3.5, 0.12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,56 +45,6 @@ class Case:
     #: Units of command, pressure and flow that must be printed, and what the command reads at a voltage.
     shows: tuple[str, str, str] = ("V", "MPa", "L/min")
     reads: Callable[[float], float] = float
-
-
-# The bench.
-
-
-BOTH_WAYS = (*ramp(), *ramp(top=-10.0))
-
-
-def bench(
-    command: Sequence[Segment],
-    *,
-    edge: float = 1.0,
-    seed: int = 1,
-    rate_Hz: float = 50.0,
-    noise: float = 0.1,
-    command_noise: float = 0.003,
-    rise_s: float = 0.0,
-    floor: float = 0.0,
-    positive: bool = True,
-    load_MPa: float = 0.0,
-) -> Rows:
-    """Return what stands on a bench: time (s), command (V), pressures of the ports (MPa), flow (L/min).
-
-    Inlet and outlet edge of a side open alike; each takes `edge` MPa of the shut valve, and less under flow, when
-    supply and lines take their share. A load between the working ports takes `load_MPa`; with
-    none they are joined, as for a test of both directions. `rise_s` is
-    the time constant of the spool and the flow, `floor` the meter's.
-    """
-    rng = np.random.default_rng([seed, 77])
-    time, u = commanded(command, rate_Hz)
-    spool = with_play(u, PLAY)
-    if rise_s:
-        spool = lagged(spool, rise_s * rate_Hz)
-    right = np.maximum(spool - (OPENS["positive"] - PLAY / 2), 0)
-    left = np.maximum(-spool - (OPENS["negative"] - PLAY / 2), 0)
-    opened = np.minimum(right + left, 4.6)
-    drop = edge / (1 + 0.06 * (opened / 4) ** 2)
-    flow = GAIN * opened * np.sqrt(drop)
-    tank = 0.3 + 0.0005 * flow**2
-    load = load_MPa + 0.002 * flow**2
-    supply = tank + 2 * drop + load
-    inlet, outlet = supply - drop, tank + drop
-    forwards = u >= 0
-    read = (flow if positive else flow * np.where(forwards, 1, -1)) + noise * rng.standard_normal(u.size)
-    if floor:
-        read = np.where(np.abs(read) < floor, 0.0, read)
-    ports = {"P": supply, "A": np.where(forwards, inlet, outlet), "B": np.where(forwards, outlet, inlet), "T": tank}
-    noisy = {f"p{port}": value + 0.003 * rng.standard_normal(u.size) for port, value in ports.items()}
-    noisy["dP"] = drop + 0.004 * rng.standard_normal(u.size)
-    return {"t": time, "u": u + command_noise * rng.standard_normal(u.size), "Q": read, **noisy}
 
 
 # The cases.
@@ -387,25 +334,7 @@ def _misprinted(case: Case, valve: dict, printed: str) -> Iterator[str]:
 
 def print_corpus_of_units(*, quick: bool, seed: int) -> list:
     """Print and return the rows of part 12; each case has a seed of its own, whatever `seed` is."""
-    from scoreboard import Row, print_rows, say
-
-    every = cases()[:: 4 if quick else 1]
-    counts = {kind: Counter() for kind in dict.fromkeys(case.kind for case in every)}
-    with tempfile.TemporaryDirectory() as folder:
-        for case in every:
-            fault = fault_of(case, Path(folder))
-            counts[case.kind][fault.partition(":")[0]] += 1
-            if fault:
-                say(f"{case.name}: {fault}")
-    rows = [
-        Row(
-            what=kind, value=float(found.total() - found[""]), limit=0.0,
-            note=f"of {found.total()}: {found['refused']} refused, {found['misread']} misread",
-        )
-        for kind, found in counts.items()
-    ]  # fmt: skip
-    print_rows("12. Ports, units and staircases: refused or misread", rows)
-    return rows
+    return print_faults("12. Ports, units and staircases: refused or misread", cases()[:: 4 if quick else 1], fault_of)
 
 
 def main(folder: Path) -> None:

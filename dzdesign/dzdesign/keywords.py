@@ -63,6 +63,9 @@ def _in_keywords(message: str, declared: Mapping[str, Argument]) -> str:
     """Return a message with options as keywords: stages name them as the command line does, by which most call them."""
     keywords = {argument.flag: argument.name for argument in declared.values()}
     keywords |= {argument.option.short: argument.name for argument in declared.values() if argument.option.short}
+    for argument in (each for each in declared.values() if each.is_table):  # [from] of the options file is from_ too
+        table = re.escape(f"[{argument.flag.removeprefix('--')}]")
+        message = re.sub(rf"(?:{argument.flag} or )?{table}(?: or {argument.flag}\b)?", argument.name, message)
     return re.sub(r"(?<![\w-])--?[a-z][\w-]*", lambda found: keywords.get(found[0], found[0]), message)
 
 

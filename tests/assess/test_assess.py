@@ -28,7 +28,7 @@ from tests.support.synthetic import SHARED, needs_compiler
 LEVEL = 1.0
 #: Of full command, per volt.
 PERCENT = 100 / 10
-OPTIONS = AssessOptions(reading=IdentifyOptions(meter_lag=0.0), level=LEVEL * L_MIN)
+OPTIONS = AssessOptions(reading=IdentifyOptions(meter_lag=0.0), reading_flow=LEVEL * L_MIN)
 
 
 def readings(before=BEFORE, after=AFTER, options=OPTIONS, **how):
@@ -190,17 +190,29 @@ def test_a_leak_at_zero_command_is_not_taken_for_the_meters_zero_error():
 
 def test_below_the_meters_floor_nothing_is_observable():
     floored = [replace(valve, floor=0.6) for valve in (BEFORE, AFTER)]
-    options = replace(OPTIONS, level=0.2 * L_MIN, reading=IdentifyOptions(meter_lag=0.0, meter_floor=0.6 * L_MIN))
+    reading = IdentifyOptions(meter_lag=0.0, meter_floor=0.6 * L_MIN)
+    options = replace(OPTIONS, reading_flow=0.2 * L_MIN, reading=reading)
     found = readings(*floored, options=options)["after"]
-    for key, bound in (("flow_at_zero", 0.6), ("dead_zone_opening", (0.5 + 0.6 / 1.9) * PERCENT)):
+    passed = (0.5 + 0.6 / 1.9) * PERCENT
+    for key, bound in (("flow_at_zero", 0.6), ("dead_zone_opening", passed), ("onset_opening", passed)):
         assert found[key].value is None and "shows nothing below 0.6 L/min" in found[key].not_observable
         assert found[key].at_most == pytest.approx(bound, rel=0.02)
     by_itself = assess([record(floored[0], seed=1)], [record(floored[1], seed=2)])
     assert by_itself.meter.floor_L_min == pytest.approx(0.6, rel=0.25)
 
 
+def test_an_onset_is_read_where_the_meter_has_no_floor_and_an_ideal_line_beside_every_reading():
+    found = readings()
+    for name, valve in (("before", BEFORE), ("after", AFTER)):
+        assert found[name]["onset_opening"].value == pytest.approx(valve.opening * PERCENT, abs=0.7)
+        assert found[name]["onset_closing"].value == pytest.approx(valve.closing * PERCENT, abs=0.7)
+        assert found[name]["onset_opening"].value < found[name]["dead_zone_opening"].value
+        largest = found[name]["largest_flow"].value
+        assert found[name]["ideal_line"].value == pytest.approx(100 * LEVEL / largest, rel=1e-6)
+
+
 def test_a_level_inside_the_noise_is_refused_as_a_dead_zone():
-    found = readings(replace(BEFORE, noise=0.5), replace(AFTER, noise=0.5), replace(OPTIONS, level=0.05 * L_MIN))
+    found = readings(replace(BEFORE, noise=0.5), replace(AFTER, noise=0.5), replace(OPTIONS, reading_flow=0.05 * L_MIN))
     assert "does not stand out of the noise" in found["after"]["dead_zone_opening"].not_observable
 
 
@@ -208,7 +220,11 @@ def test_a_level_inside_the_noise_is_refused_as_a_dead_zone():
     ("how", "missing", "why"),
     [
         ({"hold_s": 0.0}, {"flow_at_zero"}, "no recording holds zero command"),
-        ({"falling": False}, {"flow_at_zero", "dead_zone_closing", "knee_closing", "hysteresis"}, "no falling branch"),
+        (
+            {"falling": False},
+            {"flow_at_zero", "dead_zone_closing", "onset_closing", "knee_closing", "hysteresis"},
+            "no falling branch",
+        ),
         ({"top": 8.0}, {"linearity"}, "do not cover the window"),
     ],
 )
@@ -365,7 +381,7 @@ def test_the_dead_zones_of_the_closed_loop_are_found_in_its_records(example_comp
 
         result = compared.result
         level = FLOW_SHARE * result.q_max_direct_L_min * L_MIN
-        options = replace(OPTIONS, level=level)
+        options = replace(OPTIONS, reading_flow=level)
         sets = ([recorded(compared.direct, "a")], [recorded(compared.compensated, "b")])
         item = assess(*sets, options).pressures[0]
         keys = ("dead_zone_opening", "dead_zone_closing")
@@ -401,7 +417,7 @@ def test_a_limit_that_can_not_be_read_is_refused(text, wording):
 
 
 def test_every_limit_is_one_of_a_quantity_with_a_formula():
-    assert set(LIMITED) ^ set(QUANTITIES) == {"largest_flow_loss", "gain", "largest_flow"}
+    assert set(LIMITED) ^ set(QUANTITIES) == {"largest_flow_loss", "gain", "largest_flow", "ideal_line"}
     assert all(item.formula and item.unit for item in (QUANTITIES | LIMITED).values())
 
 
@@ -440,7 +456,7 @@ def run(capsys, *argv):
 
 
 def test_the_command_prints_tables_formulas_and_writes_the_artefact(bench, capsys):
-    status, out, _ = run(capsys, *SETS, "--level", "1 L/min")
+    status, out, _ = run(capsys, *SETS, "--reading-flow", "1 L/min")
     assert status == 0
     for words in ("1.00 MPa, positive", "4.00 MPa", "hysteresis = largest |u_r(Q) - u_f(Q)|", "no conformity",
                   "No limits were given", "Written: assessment.json"):  # fmt: skip
@@ -473,7 +489,7 @@ def test_same_recordings_same_bytes(bench, capsys):
 def test_limits_in_the_file_of_options_decide_the_exit_status(bench, capsys):
     config = bench / "dzdesign.toml"
     for opening, status, words in (("12 %", 0, "Every limit holds."), ("6 %", 1, "DOES NOT HOLD  dead zone, opening")):
-        config.write_text(f'meter-lag = "0 s"\nlevel = "1 L/min"\n[limits]\ndead_zone_opening = "{opening}"\n')
+        config.write_text(f'meter-lag = "0 s"\nreading-flow = "1 L/min"\n[limits]\ndead_zone_opening = "{opening}"\n')
         found, out, _ = run(capsys, *SETS[:3], "--config", "dzdesign.toml")
         assert found == status and words in out
     assert "more than the limit of 6 %" in out and "DOES NOT HOLD: 2 of 2 limits" in out
@@ -556,9 +572,9 @@ REFUSED = {
     "nothing after": ["before_1.csv"],
     "no file": ["before_1.csv", "--after", "none_*.csv"],
     "no partner": ["before_1.csv", "--after", "after_4.csv"],
-    "level's unit": [*SETS, "--level", "0.6"],
-    "no level": [*SETS, "--level", "0 L/min"],
-    "level too high": [*SETS, "--level", "100 %"],
+    "level's unit": [*SETS, "--reading-flow", "0.6"],
+    "no level": [*SETS, "--reading-flow", "0 L/min"],
+    "level too high": [*SETS, "--reading-flow", "100 %"],
     "window": [*SETS, "--linearity-window", "90-10"],
     "window's text": [*SETS, "--linearity-window", "wide"],
     "full command": [*SETS, "--after-u-max", "0 V"],
@@ -604,7 +620,7 @@ def test_dead_zones_at_a_level_on_recordings_that_the_project_did_not_make():
     folders = {"before": SHARED / "valve_a", "after": SHARED / "valve_e"}
     sets = [[read_ramp_file(folders[key] / f"{name}.csv.gz") for name in names[key]] for key in folders]
     reading = IdentifyOptions(meter_lag=0.125)  # 0.1 s of one bench, 0.15 s of the other: 2.5 mV
-    found = assess(*sets, replace(OPTIONS, reading=reading, level=1.0 * L_MIN))
+    found = assess(*sets, replace(OPTIONS, reading=reading, reading_flow=1.0 * L_MIN))
     for row, item in enumerate(found.pressures):
         for key in folders:
             readings = item.readings(key)

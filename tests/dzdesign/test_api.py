@@ -115,7 +115,10 @@ def test_bad_input_is_one_sentence(call, words, ramps):
         (lambda: api.design(5), "valve: expected a path, got 5"),
         (lambda: api.generate(None), "compensator: expected a path, got None"),
         (lambda: api.verify(5), "firmware: expected a path, got 5"),
-        (lambda: api.assess("x", "y", level=0.6), "level: expected text with a unit such as '0.6 L/min', got 0.6"),
+        (
+            lambda: api.assess("x", "y", reading_flow=0.6),
+            "reading_flow: expected text with a unit such as '0.6 L/min', got 0.6",
+        ),
         (lambda: api.assess("x", "y", limits={"z": 5}), "limits['z']: expected text with a unit such as '5 %', got 5"),
         (lambda: api.init(5), "ramps: expected a path, got 5"),
         (lambda: api.init(b"x"), "ramps: expected a path, got b'x'"),
@@ -218,7 +221,7 @@ def test_a_compensator_whose_certificate_does_not_follow_is_not_generated(exampl
 
 def test_what_a_notebook_shows_is_escaped(example_valve, example_compensator, example_firmware):
     side = example_valve.positive
-    tests = (replace(side.tests[0], source=HOSTILE), *side.tests[1:])
+    tests = (replace(side.tests[0], source=HOSTILE, ramps=(HOSTILE,)), *side.tests[1:])
     valve = replace(
         example_valve,
         sides={"positive": replace(side, tests=tests)},

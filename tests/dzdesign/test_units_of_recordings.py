@@ -116,14 +116,15 @@ def test_warnings_carry_the_units_in_the_file_too(valve):
 )
 def test_refusals_speak_of_what_was_recorded(options, said, tmp_path):
     dp = options.pop("dp", 1.0)
-    status, text = run("identify", write_ramp(tmp_path, "bad.csv", dp, 5, **options), "--columns", COLUMNS)
+    path = write_ramp(tmp_path, "bad.csv", dp, 5, **options)
+    status, text = run("identify", path, "--columns", COLUMNS, "-o", tmp_path / "valve.json")
     assert status == 2 and re.search(said, text), text
     assert not numbers_as_computed(text)
 
 
 def test_u_max_is_said_in_the_unit_of_the_command(tmp_path):
     path = write_ramp(tmp_path, "high.csv", 1.0, 6)
-    status, text = run("identify", path, "--columns", COLUMNS, "--u-max", "5 V")
+    status, text = run("identify", path, "--columns", COLUMNS, "--u-max", "5 V", "-o", tmp_path / "valve.json")
     assert status == 2 and re.search(r"reaches 20\.\d\d mA, above u_max = 12 mA", text), text
 
 

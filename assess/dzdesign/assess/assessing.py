@@ -44,10 +44,10 @@ def assess(before: Sequence[RampTest], after: Sequence[RampTest], options: Asses
 def assess_curves(comparison: Comparison) -> Assessment:
     """Read every quantity of both sets, and check the limits."""
     options, units = comparison.options, comparison.units
-    levels = [_level(pair, options) for pair in comparison.pairs]
-    readings = [_read(pair, level, comparison) for pair, level in zip(comparison.pairs, levels, strict=True)]
+    flows = [_reading_flow(pair, options) for pair in comparison.pairs]
+    readings = [_read(pair, flow, comparison) for pair, flow in zip(comparison.pairs, flows, strict=True)]
     _add_symmetry(comparison.pairs, readings)
-    pressures = tuple(map(_pressure, comparison.pairs, levels, readings))
+    pressures = tuple(map(_pressure, comparison.pairs, flows, readings))
     return Assessment(
         tool=THIS_TOOL,
         made_from=tuple(
@@ -78,26 +78,26 @@ def _request(options: AssessOptions) -> Request:
         after_u_max_V=options.of_set("after").u_max,
         knee_window=options.reading.knee_window,
         linearity_window=options.window,
-        level_L_min=None if options.level is None else options.level / L_MIN,
-        level_share=options.level_share,
+        reading_flow_L_min=None if options.reading_flow is None else options.reading_flow / L_MIN,
+        reading_share=options.reading_share,
         same_pressure_within=SAME_PRESSURE,
     )
 
 
-def _level(pair: CurvePair, options: AssessOptions) -> float:
-    """Return the flow that ends the dead zone of both sets, m³/s."""
-    if options.level is not None:
-        return options.level
-    return pair.first.counts if options.level_share is None else options.level_share * pair.first.y_max
+def _reading_flow(pair: CurvePair, options: AssessOptions) -> float:
+    """Return the flow at which the dead zones of both sets are read, m³/s."""
+    if options.reading_flow is not None:
+        return options.reading_flow
+    return pair.first.counts if options.reading_share is None else options.reading_share * pair.first.y_max
 
 
-def _read(pair: CurvePair, level: float, comparison: Comparison) -> Readings:
-    """Read all quantities at one pressure drop, of both sets at one level and over one rated flow."""
+def _read(pair: CurvePair, reading_flow: float, comparison: Comparison) -> Readings:
+    """Read all quantities at one pressure drop, of both sets at one reading flow and over one rated flow."""
     options = comparison.options
     return {
         name: read_quantities(
-            curves, u_max=options.of_set(name).u_max, level=level, rated=pair.first.y_max, window=options.window,
-            units=comparison.of_set(name, pair.side),
+            curves, u_max=options.of_set(name).u_max, reading_flow=reading_flow, rated=pair.first.y_max,
+            window=options.window, units=comparison.of_set(name, pair.side),
         )
         for name, curves in pair.sets.items()
     }  # fmt: skip
@@ -116,13 +116,13 @@ def _add_symmetry(pairs: Sequence[CurvePair], readings: Sequence[Readings]) -> N
                 found[name]["symmetry"] = symmetry(*(gains.get(side) for side in BOTH_SIDES))
 
 
-def _pressure(pair: CurvePair, level: float, readings: Readings) -> PressureAssessment:
+def _pressure(pair: CurvePair, reading_flow: float, readings: Readings) -> PressureAssessment:
     old, new = (readings.get(name, {}) for name in SETS)
     keys = next(iter(readings.values()))
     return PressureAssessment(
         side=pair.side,
         dp_MPa=_in_MPa(pair.first.dp),
-        level_L_min=level / L_MIN,
+        reading_flow_L_min=reading_flow / L_MIN,
         rated_flow_L_min=pair.first.y_max / L_MIN,
         before=_ramp_set(pair.before),
         after=_ramp_set(pair.after),

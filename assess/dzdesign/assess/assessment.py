@@ -44,9 +44,10 @@ class Request:
     linearity_window: Annotated[
         tuple[Share, Share], quantity("1", "Shares of full command between which linearity was judged.")
     ]
-    level_L_min: Annotated[Flow | None, Meta(description="--level as a flow.")]
-    level_share: Annotated[
-        Share | None, Meta(description="--level as a share of the largest flow.", extra_json_schema={"unit": "1"})
+    reading_flow_L_min: Annotated[Flow | None, Meta(description="--reading-flow as a flow.")]
+    reading_share: Annotated[
+        Share | None,
+        Meta(description="--reading-flow as a share of the largest flow.", extra_json_schema={"unit": "1"}),
     ]
     same_pressure_within: Annotated[
         Share, quantity("1", "Pressure drops that differ by less, as a share, are compared.")
@@ -90,7 +91,7 @@ class PressureAssessment:
 
     side: Annotated[Side, Meta(description="Side of the valve.")]
     dp_MPa: Annotated[PressureDrop | None, Meta(description="Pressure drop: of BEFORE where there is one.")]
-    level_L_min: Annotated[Flow, Meta(description="Flow that ends the dead zone.")]
+    reading_flow_L_min: Annotated[Flow, Meta(description="Reading flow: that at which the dead zones are read.")]
     rated_flow_L_min: Annotated[Flow, Meta(description="Largest flow BEFORE, brought to this pressure drop.")]
     before: Annotated[RampSet | None, Meta(description="Recordings without the compensator; null: none here.")]
     after: Annotated[RampSet | None, Meta(description="Recordings with it; null: none here.")]

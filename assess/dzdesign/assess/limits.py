@@ -23,13 +23,16 @@ from dzdesign.core.units import parse_quantity
 
 #: Quantities for which there is a largest value; a gain and a flow at full command have none.
 LIMITED: dict[str, Quantity] = {
-    **{key: quantity for key, quantity in QUANTITIES.items() if key not in ("gain", "largest_flow")},
+    **{key: quantity for key, quantity in QUANTITIES.items() if key not in ("gain", "largest_flow", "ideal_line")},
     LOSS: LOSS_OF_FLOW,
 }
 #: Unit of a quantity -> what `parse_quantity` calls the quantity of its limit.
 KINDS = {"%": "ratio", "L/min": "flow"}
 #: Of these a limit may also be a command in volts.
-OF_COMMAND = ("dead_zone_opening", "dead_zone_closing", "knee_opening", "knee_closing", "hysteresis")
+OF_COMMAND = (
+    "dead_zone_opening", "dead_zone_closing", "onset_opening", "onset_closing", "knee_opening", "knee_closing",
+    "hysteresis",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

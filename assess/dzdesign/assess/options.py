@@ -22,22 +22,25 @@ class AssessOptions:
     reading: IdentifyOptions = field(default_factory=IdentifyOptions)
     #: Full command of the recordings with the compensator, V; None: the same.
     after_u_max: float | None = None
-    #: Flow that ends the dead zone, m³/s, or as a share of the largest flow BEFORE at that pressure drop; None takes
-    #: what counts as flow BEFORE: the meter's floor, its noise or 0.5 % of the largest flow.
-    level: float | None = None
-    level_share: float | None = None
+    #: Reading flow, at which dead zones are read, m³/s, or as a share of the largest flow BEFORE at that pressure drop;
+    #: None takes what counts as flow BEFORE: the meter's floor, unless its noise or 0.5 % of the largest flow is more.
+    reading_flow: float | None = None
+    reading_share: float | None = None
     #: Commands between which linearity is taken, over u_max.
     window: tuple[float, float] = (0.1, 0.9)
     #: Of `parse_limits`.
     limits: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.level is not None and self.level_share is not None:
-            raise InputError("the level is given both as a flow and as a share; keep one")
-        if not (self.level or self.level_share or 1.0) > 0 or 0.0 in (self.level, self.level_share):
-            raise InputError("the level is zero or negative, expected a flow such as '0.6 L/min', or a share of it")
-        if not (self.level_share or 0.0) < 1:
-            raise InputError(f"the level is {self.level_share:.0%} of the largest flow, expected less than all of it")
+        flow, share = self.reading_flow, self.reading_share
+        if flow is not None and share is not None:
+            raise InputError("the reading flow is given both as a flow and as a share; keep one")
+        if not (flow or share or 1.0) > 0 or 0.0 in (flow, share):
+            raise InputError(
+                "the reading flow is zero or negative, expected a flow such as '0.6 L/min', or a share of the largest"
+            )
+        if not (share or 0.0) < 1:
+            raise InputError(f"the reading flow is {share:.0%} of the largest flow, expected less than all of it")
         if not 0 <= self.window[0] < self.window[1] <= 1:
             raise InputError(f"the linearity window is {self.window}, expected two rising shares such as '10-90 %'")
 

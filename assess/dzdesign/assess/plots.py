@@ -28,9 +28,9 @@ def plot_files(comparison: Comparison, assessment: Assessment) -> dict[str, byte
 
 
 def _figure(pair: CurvePair, item: PressureAssessment, comparison: Comparison) -> "Figure":
-    """Draw the averaged curves of both sets over the whole command, and the level beside its crossings."""
+    """Draw the averaged curves of both sets over the whole command, and the reading flow beside its crossings."""
     options, units = comparison.options, comparison.units
-    level = units.convert(item.level_L_min, "L/min")
+    reading_flow = units.convert(item.reading_flow_L_min, "L/min")
     sources = "; ".join(f"{name}: {curves.source}" for name, curves in pair.sets.items())
     figure = new_figure(5.0, f"Flow over command, {item.place(units)}", sources)
     axes = figure.subplots()
@@ -44,10 +44,10 @@ def _figure(pair: CurvePair, item: PressureAssessment, comparison: Comparison) -
         for _, direction, marker, *_ in BRANCHES:
             at = readings[f"dead_zone_{direction}"].value
             if at is not None:
-                axes.plot(at, level, marker, ms=7, color=COLOURS[name], mec=HUES["ink"], mew=0.8,
+                axes.plot(at, reading_flow, marker, ms=7, color=COLOURS[name], mec=HUES["ink"], mew=0.8,
                           label=f"{name}, dead zone {direction}", zorder=5)  # fmt: skip
-    shown = units.text(item.level_L_min, ".3g L/min")
-    axes.axhline(level, color=HUES["ink"], lw=0.9, ls=":", label=f"level {shown}")
+    shown = units.text(item.reading_flow_L_min, ".3g L/min")
+    axes.axhline(reading_flow, color=HUES["ink"], lw=0.9, ls=":", label=f"reading flow {shown}")
     flow_axis = f"flow at the nominal pressure drop ({units.label('L/min')})"
     axes.set(xlabel="command (% of full)", ylabel=flow_axis, xlim=(0, 100))
     return finish(figure, 3)

@@ -31,9 +31,14 @@ QUANTITIES: dict[str, Quantity] = {
     key: Quantity(name=name, unit=unit, formula=formula)
     for key, name, unit, formula in (
         ("dead_zone_opening", "dead zone, opening", "%",
-         "u_r(Q_L) / u_max: command at which the rising branch passes the level Q_L"),
+         "u_r(Q_L) / u_max: command at which the rising branch passes the reading flow Q_L"),
         ("dead_zone_closing", "dead zone, closing", "%",
-         "u_f(Q_L) / u_max: command at which the falling branch passes the level Q_L"),
+         "u_f(Q_L) / u_max: command at which the falling branch passes the reading flow Q_L"),
+        ("ideal_line", "ideal line at the reading flow", "%",
+         "Q_L / largest flow: what a straight line from zero command to the largest flow would read"),
+        ("onset_opening", "onset, opening", "%",
+         "command at which the rising branch's first flow stands out of the meter's noise, over u_max"),
+        ("onset_closing", "onset, closing", "%", "the same of the falling branch's last flow"),
         ("knee_opening", "knee, opening", "%",
          "zero of the line through the straight part of Q/sqrt(dP) on the rising branch, over u_max"),
         ("knee_closing", "knee, closing", "%", "the same on the falling branch"),

@@ -11,6 +11,7 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.gated_line import GATE, fit_line
 from dzdesign.identify.knees.noise import median
 from dzdesign.identify.knees.profile import crossing
+from dzdesign.identify.valve.reading_flow import ideal_line
 
 #: Shares of the largest flow at which the branches' distance is taken, and the fewest of them.
 WIDTH_LEVELS, FEWEST_LEVELS = np.arange(5, 91, 5) / 100, 3
@@ -27,18 +28,21 @@ FEWEST_CELLS = 10
 
 
 def read_quantities(
-    curves: PressureCurves, *, u_max: float, level: float, rated: float, window: tuple[float, float],
+    curves: PressureCurves, *, u_max: float, reading_flow: float, rated: float, window: tuple[float, float],
     units: RecordedUnits = AS_COMPUTED,
 ) -> dict[str, Reading]:  # fmt: skip
     """Read every quantity of one set at one pressure drop, in its unit; symmetry, which needs both sides, is missing.
 
-    The flow `level` ends the dead zone, linearity is a share of the flow `rated` (m³/s); `window` is over u_max (V).
+    Dead zones are read at `reading_flow`, linearity is a share of the flow `rated` (m³/s); `window` is over u_max (V).
     Reasons are in `units`.
     """
     rising, falling = curves.rising, curves.falling
     si = {
-        "dead_zone_opening": _dead_zone(rising, "rising", level, u_max, units),
-        "dead_zone_closing": _dead_zone(falling, "falling", level, u_max, units),
+        "dead_zone_opening": _dead_zone(rising, "rising", reading_flow, u_max, units),
+        "dead_zone_closing": _dead_zone(falling, "falling", reading_flow, u_max, units),
+        "ideal_line": observed(ideal_line(reading_flow, curves.q_max)),
+        "onset_opening": _onset(rising, "rising", u_max, units),
+        "onset_closing": _onset(falling, "falling", u_max, units),
         "knee_opening": _knee(rising, "rising", u_max),
         "knee_closing": _knee(falling, "falling", u_max),
         "hysteresis": _hysteresis(rising, falling, u_max, units),
@@ -64,16 +68,27 @@ def _dead_zone(
     asked, shown = (units.text(flow / L_MIN, ".3g L/min") for flow in (level, floor))
     if level < floor:
         bound = _passing(curve, floor, noise, u_max, units)
-        reason = f"the meter shows nothing below {shown}, and the level is {asked}"
+        reason = f"the meter shows nothing below {shown}, and the reading flow is {asked}"
         return hidden(reason, at_most=_bound_of(bound))
     if level < STANDS_OUT * noise:
         bound = _passing(curve, STANDS_OUT * noise, noise, u_max, units)
         return hidden(
-            f"the level of {asked} does not stand out of the noise, of which {units.text(noise / L_MIN, '.2g L/min')} "
-            "are left in the averaged flow",
+            f"the reading flow of {asked} does not stand out of the noise, of which "
+            f"{units.text(noise / L_MIN, '.2g L/min')} are left in the averaged flow",
             at_most=_bound_of(bound),
         )
     return _passing(curve, level, noise, u_max, units)
+
+
+def _onset(curve: FlowCurve | None, direction: str, u_max: float, units: RecordedUnits) -> Reading:
+    """Return where a branch begins to flow, as far as the meter shows it: below its floor no onset is seen."""
+    if curve is None:
+        return _no_branch(direction)
+    floor, noise = curve.read.floor, _noise_of_course(curve)
+    seen = _passing(curve, max(floor, STANDS_OUT * noise), noise, u_max, units)
+    if not floor:
+        return seen
+    return hidden(f"the meter shows nothing below {units.text(floor / L_MIN, '.3g L/min')}", at_most=_bound_of(seen))
 
 
 def _bound_of(reading: Reading) -> float | None:

@@ -16,10 +16,14 @@ def quantity(kind: str) -> Callable[[str, str], float]:
 def with_tolerance(kind: str) -> Callable[[str, str], tuple[float, float | None]]:
     """Return what reads a quantity and, after ± or +-, its tolerance, such as ``0.1 s +- 0.02 s``; None without one.
 
+    The tolerance may be a percentage of the quantity.
+
     Examples
     --------
     >>> with_tolerance("time")("0.1 s ± 20 ms", "--lag"), with_tolerance("time")("0.1 s", "--lag")
     ((0.1, 0.02), (0.1, None))
+    >>> with_tolerance("time")("0.1 s +- 30 %", "--lag")
+    (0.1, 0.03)
     """
 
     def read(text: str, option: str) -> tuple[float, float | None]:
@@ -28,8 +32,16 @@ def with_tolerance(kind: str) -> Callable[[str, str], tuple[float, float | None]
         value, *tolerance = re.split(r"\+/?-|±", text)
         if len(tolerance) > 1:
             raise InputError(f"{option} is {quoted(text)}, expected one tolerance, such as '0.1 s +- 0.02 s'")
-        found = [parse_quantity(each.strip(), kind, option) for each in (value, *tolerance)]
-        return found[0], (found[1] if tolerance else None)
+        read_value = parse_quantity(value.strip(), kind, option)
+        if not tolerance:
+            return read_value, None
+        stated = tolerance[0].strip()
+        if stated.endswith("%"):
+            return read_value, percent("20 %")(stated, option) * read_value
+        if re.fullmatch(r"[\d.,]*[1-9][\d.,]*", stated):
+            example = f"'{stated} {EXAMPLES[kind].split(',')[0]}' or '{stated} %'"
+            raise InputError(f"{option}: the tolerance {quoted(stated)} has no unit; write {example}")
+        return read_value, parse_quantity(stated, kind, option)
 
     return read
 
@@ -58,14 +70,18 @@ def whole_number(expected: str, least: int = 0, digits: int = 6) -> Callable[[st
     return read
 
 
-def percent(example: str) -> Callable[[str, str], float]:
-    """Return what reads a percentage such as ``0.1 %`` as a share; the sign must stand there."""
+def percent(example: str, *, signed: bool = False) -> Callable[[str, str], float]:
+    """Return what reads a percentage such as ``0.1 %`` as a share; the sign % must stand there, but for zero."""
 
     def read(text: str, option: str) -> float:
-        found = re.fullmatch(r"(\d{1,9}(?:\.\d{0,15})?)\s?%", text, re.ASCII)
+        found = re.fullmatch(rf"({'-?' if signed else ''}\d{{1,9}}(?:\.\d{{0,15}})?)\s?(%?)", text, re.ASCII)
         if found is None:
             raise InputError(f'{option} is {quoted(text)}, expected a percentage such as "{example}"')
-        return float(found[1]) / 100
+        number = float(found[1])
+        if number and not found[2]:
+            meant = "" if abs(number) > 1 else f', or "{100 * number:.10g} %" if it is a share'
+            raise InputError(f'{option} is {quoted(text)} without %; write "{found[1]} %"{meant}')
+        return number / 100
 
     return read
 

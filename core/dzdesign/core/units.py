@@ -141,6 +141,8 @@ def refuse_thousands(text: str, what: str, *, points: bool = False) -> None:
 def parse_quantity(text: str, quantity: str, option: str) -> float:
     """Read a number with its unit, such as ``"0.6 L/min"``, and return it in SI; a message names the `option`.
 
+    Zero needs no unit.
+
     Examples
     --------
     >>> parse_quantity("1 MPa", "pressure", "--dp0")
@@ -157,6 +159,8 @@ def parse_quantity(text: str, quantity: str, option: str) -> float:
     unit = words[number.end() :].strip() if number else ""
     if number is None or unit[:1] == ".":
         raise InputError(f"{option} is '{text}', expected a number and a unit such as '1 {example}'")
+    if not unit and float(number.group()) == 0:
+        return 0.0
     if not unit:
         raise InputError(f"{option} is '{text}' without a unit; write for example '{text} {example}'")
     try:

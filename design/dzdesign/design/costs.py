@@ -1,14 +1,17 @@
 """What a design costs, in a person's words: dead zone that remains, flow at the transition, drive at full command."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.reading_flow import ideal_line
 from dzdesign.identify.valve.side_model import SideModel
 
 
@@ -71,6 +74,7 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     if corners.end and test.u_knee_falling_V is not None:
         flow = test.slope_L_min_V * max(corners.at_end * u_max - test.u_knee_falling_V, 0.0)
         parts.append(f"flow on closing at the transition's end {units.text(flow, '.2f L/min')}")
+    parts.append(_reading(compensator, test, sign, units))
     limit = compensator.drive_functions.compare_limit / signals.compare_max
     if limit <= corners.offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
         raise InputError(
@@ -92,14 +96,42 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
     The test need not be of the valve that the law was designed for. A branch that was not recorded is left out; the
     share is 0 where flow passes at zero command.
     """
-    code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
-    corners = _corners(compensator, code, sign)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
-    shares = {name: knee / float(compensator.u_max_V) for name, knee in knees.items() if knee is not None}
-    found = {name: max(corners.command_at(knee), 0.0) for name, knee in shares.items()}
+    return _commands_at(compensator, test, sign, knees)
+
+
+def read_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
+    """Return the command at which the compensated valve passes the reading flow, as a share of full, by branch.
+
+    It is read from the recorded flow; a branch that was not recorded, or never comes to that flow, is left out.
+    """
+    flow, recorded = compensator.reading_flow_L_min, test.recorded
+    thresholds = {
+        "opening": recorded.rising.command_at(flow) if recorded.rising else None,
+        "closing": recorded.falling.command_at(flow) if recorded.falling else None,
+    }
+    return _commands_at(compensator, test, sign, thresholds)
+
+
+def _commands_at(
+    compensator: Compensator, test: TestResult, sign: int, thresholds_V: Mapping[str, float | None]
+) -> dict[str, float]:
+    """Return the command at which the drive reaches each threshold that there is, at a test's pressure drop."""
+    corners = _corners(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+    shares = {name: at / float(compensator.u_max_V) for name, at in thresholds_V.items() if at is not None}
+    found = {name: max(corners.command_at(at), 0.0) for name, at in shares.items()}
     if "opening" in found:  # from rest the drive leaves the zero band at its outer end
         found["opening"] = max(found["opening"], corners.leaves)
     return found
+
+
+def _reading(compensator: Compensator, test: TestResult, sign: int, units: RecordedUnits) -> str:
+    """Say what is read at the reading flow, beside what an ideal line to the largest flow would read."""
+    flow = compensator.reading_flow_L_min
+    read = [f"{share:.2%} on {name}" for name, share in read_dead_zone(compensator, test, sign).items()]
+    ideal = ideal_line(flow, test.recorded.q_max_L_min)
+    words = " and ".join(read) or "nothing: the valve never passes it"
+    return f"read at {units.text(flow, '.2f L/min')} {words} (ideal line {ideal:.2%})"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

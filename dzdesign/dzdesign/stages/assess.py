@@ -43,11 +43,11 @@ class AssessArguments(RampArguments):
     """File to write."""
     limits: Annotated[Table, Option("L", example="5 %")] = None
     """Largest values AFTER, such as "dead_zone_opening = 5 %, flow_at_zero = 0.1 L/min", also of dead_zone_closing,
-    knee_opening, knee_closing, hysteresis, linearity, symmetry, largest_flow_loss. In the options file a table
-    [limits]."""
-    level: Annotated[Text, Option("Q", example="0.6 L/min", read=_flow_or_share)] = None
-    """Flow that ends the dead zone, such as "0.6 L/min", or "1 %" of the largest flow before (default: what counts as
-    flow, which is the meter's floor, its noise or 0.5 % of the largest flow)."""
+    onset_opening, onset_closing, knee_opening, knee_closing, hysteresis, linearity, symmetry, largest_flow_loss. In
+    the options file a table [limits]."""
+    reading_flow: Annotated[Text, Option("Q", example="0.6 L/min", read=_flow_or_share)] = None
+    """Flow at which dead zones are read beside the onset, such as "0.6 L/min", or "1 %" of the largest flow before
+    (default: the meter's floor, unless its noise or 0.5 % of the largest flow is more)."""
     linearity_window: Annotated[str, Option("A-B", FIT, read=percent_range("full command such as '10-90'"))] = "10-90"
     """Range of the linearity, in percent of full command."""
     after_columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
@@ -112,17 +112,17 @@ def assess_options(arguments: AssessArguments) -> "AssessOptions":
     from dzdesign.identify.options import IdentifyOptions
 
     reading = IdentifyOptions(**meter_choices(arguments, ["u_max", "meter_floor", "meter_lag", "knee_window"]))
-    read = read_options(arguments, ["after_u_max", "level", "linearity_window"])
+    read = read_options(arguments, ["after_u_max", "reading_flow", "linearity_window"])
     after_u_max = read["after_u_max"]
     if after_u_max is not None and not after_u_max > 0:
         raise InputError(f"--after-u-max is '{arguments.after_u_max}', expected a positive command")
-    level, share = read["level"] or (None, None)
+    flow, share = read["reading_flow"] or (None, None)
     limits = arguments.limits
     return AssessOptions(
         reading=reading,
         after_u_max=after_u_max,
-        level=level,
-        level_share=share,
+        reading_flow=flow,
+        reading_share=share,
         window=read["linearity_window"],
         limits=parse_limits(limits, after_u_max or reading.u_max) if limits is not None else {},
     )

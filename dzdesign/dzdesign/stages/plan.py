@@ -32,6 +32,8 @@ class PlanArguments:
     """valve.json of a quick series of this valve: noise, thresholds, flow gain and repeatability are then taken from
     it."""
     _: KW_ONLY
+    side: Annotated[Text, Option("SIDE", choices=("positive", "negative"))] = None
+    """Side of the pilot series' valve that is to be recorded (default: its only one, or the positive one)."""
     budget: Annotated[str, Option("T", example="30 min", read=quantity("time"))] = "30 min"
     """Time for the whole series, pauses included."""
     loss: Annotated[Text, Option("U", example="150 mV", read=quantity("voltage"))] = None
@@ -45,8 +47,9 @@ class PlanArguments:
     """Lowest and highest pressure drop to be certified; one value plans a series at that pressure drop."""
     dead_zone: Annotated[Text, Option("S", EXPECTED, "50 %", "50 %", percent("50 %"))] = None
     """Closing threshold at the lowest pressure drop, in percent of full command."""
-    threshold_change: Annotated[Text, Option("S", EXPECTED, "2 %", "2 %", percent("2 %"))] = None
-    """Fall of the threshold from the lowest to the highest pressure drop, in percent of full command."""
+    threshold_change: Annotated[Text, Option("S", EXPECTED, "2 %", "2 %", percent("2 %", signed=True))] = None
+    """Fall of the threshold from the lowest to the highest pressure drop, in percent of full command; of a threshold
+    that rises a negative one, --threshold-change=-2%."""
     max_flow: Annotated[Text, Option("Q", EXPECTED, "15 L/min", "15 L/min", quantity("flow"))] = None
     """Flow at full command and the lowest pressure drop."""
     repeatability: Annotated[Text, Option("S", EXPECTED, "0.25 %", "0.1 %", percent("0.1 %"))] = None
@@ -101,37 +104,30 @@ def _read_pilot(arguments: PlanArguments) -> "Pilot | None":
     from dzdesign.identify.valve.model import ValveModel
 
     if arguments.pilot is None:
+        if arguments.side is not None:
+            raise InputError("--side is a side of the pilot series' valve; leave it out, or give VALVE.json")
         return None
     answered = [flag_of(name) for name in OF_PILOT if getattr(arguments, name) is not None]
     if answered:
         raise InputError(f"{answered[0]} is answered by the pilot series; leave out the option, or VALVE.json")
     if isinstance(arguments.pilot, ValveModel):
-        return read_pilot(arguments.pilot)
+        return read_pilot(arguments.pilot, arguments.side)
     content = read_bytes(Path(arguments.pilot), "valve file")
-    return read_pilot(read_artefact(content, ValveModel, os.fspath(arguments.pilot)))
+    return read_pilot(read_artefact(content, ValveModel, os.fspath(arguments.pilot)), arguments.side)
 
 
 def _premises(
     arguments: PlanArguments, read: dict[str, Any], pilot: "Pilot | None"
 ) -> "tuple[ExpectedValve, Bench, Request]":
     """Return the expected valve, the bench and the request: what is given, else the pilot's, else the defaults."""
-    from dzdesign.identify.knees.meter_lag import find_lag
-    from dzdesign.identify.options import IdentifyOptions
-    from dzdesign.identify.planning.premises import Bench, straight_valve
     from dzdesign.identify.planning.search import Request
 
-    def of(name: str) -> Any:
-        told = getattr(pilot, name) if pilot and getattr(arguments, name) is None else None
-        return read[name] if told is None else told
-
-    u_max, (lag, tolerance) = of("u_max"), read["meter_lag"]
-    if pilot is not None and arguments.meter_lag is None and pilot.meter_lag is not None:
-        lag, tolerance = pilot.meter_lag, None
-    scatter = read["repeatability"] * u_max
+    u_max = read["u_max"] if pilot is None else pilot.u_max
     if pilot is not None and arguments.dp_range is None:
         dp_range = (float(pilot.valve.dp[0]), float(pilot.valve.dp[-1]))
     else:
         dp_range = read["dp_range"]
+    valve = _expected_valve(arguments, read, pilot, dp_range, u_max)
     request = Request(
         dp_range=dp_range,
         budget=read["budget"],
@@ -139,17 +135,40 @@ def _premises(
         wanted=read["loss"],
         seed=read["seed"],
     )
-    if pilot is None:
-        valve = straight_valve(
-            dp_range,
-            threshold=read["dead_zone"] * u_max,
-            change=read["threshold_change"] * u_max,
-            max_flow=read["max_flow"],
-            u_max=u_max,
-            scatter=scatter,
-        )
-    else:
-        valve = pilot.valve if arguments.repeatability is None else replace(pilot.valve, scatter=scatter)
+    return valve, _bench(arguments, read, pilot, u_max, valve.scatter / u_max), request
+
+
+def _expected_valve(
+    arguments: PlanArguments, read: dict[str, Any], pilot: "Pilot | None", dp_range: tuple[float, float], u_max: float
+) -> "ExpectedValve":
+    from dzdesign.identify.planning.premises import straight_valve
+
+    scatter = read["repeatability"] * u_max
+    if pilot is not None:
+        return pilot.valve if arguments.repeatability is None else replace(pilot.valve, scatter=scatter)
+    return straight_valve(
+        dp_range,
+        threshold=read["dead_zone"] * u_max,
+        change=read["threshold_change"] * u_max,
+        max_flow=read["max_flow"],
+        u_max=u_max,
+        scatter=scatter,
+    )
+
+
+def _bench(
+    arguments: PlanArguments, read: dict[str, Any], pilot: "Pilot | None", u_max: float, repeatability: float
+) -> "Bench":
+    from dzdesign.identify.knees.meter_lag import find_lag
+    from dzdesign.identify.options import IdentifyOptions
+    from dzdesign.identify.planning.premises import Bench
+
+    def of(name: str) -> Any:
+        return getattr(pilot, name) if pilot is not None and getattr(arguments, name) is None else read[name]
+
+    lag, tolerance = read["meter_lag"]
+    if pilot is not None and arguments.meter_lag is None and pilot.meter_lag is not None:
+        lag, tolerance = pilot.meter_lag, None
     options = IdentifyOptions(
         u_max=u_max,
         meter_floor=of("meter_floor"),
@@ -157,9 +176,9 @@ def _premises(
         meter_lag_tolerance=tolerance,
         meter_zero=of("meter_zero"),
         confidence=read["confidence"],
-        repeatability=valve.scatter / u_max,
+        repeatability=repeatability,
     )
-    bench = Bench(
+    return Bench(
         u_max=u_max,
         noise=of("noise"),
         noise_inflation=1.0 if pilot is None else pilot.noise_inflation,
@@ -171,7 +190,6 @@ def _premises(
         confidence=options.confidence,
         flat_below=options.flat_below,
     )
-    return valve, bench, request
 
 
 def _stated(

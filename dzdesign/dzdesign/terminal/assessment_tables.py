@@ -17,7 +17,9 @@ DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
 
 def print_assessment(assessment: "Assessment") -> None:
     """Print each pressure drop, the reasons of what is not observable, formulas, notes and limits."""
-    page, units = new_console(), assessment.recorded_units
+    from dzdesign.identify.valve.model import lag_in_words
+
+    page, units, meter = new_console(), assessment.recorded_units, assessment.meter
     for item in _shown_pressures(assessment):
         put_table(page, _table_of(item, units))
     lines = [
@@ -25,7 +27,7 @@ def print_assessment(assessment: "Assessment") -> None:
         *_remarks(assessment),
         f"{assessment.terms[0].upper()}{assessment.terms[1:]}:",
         *(f"  {text}" for text in _formulas(assessment)),
-        meter_line(assessment.meter, units),
+        meter_line(meter.floor_L_min, lag_in_words(meter.lag_s, meter.lag_is), units),
         *(f"note [{each.code}] {f'{each.source}: ' if each.source else ''}{each.text}" for each in assessment.notes),
         *_limits(assessment),
     ]
@@ -38,8 +40,8 @@ def _table_of(item: "PressureAssessment", units: "RecordedUnits") -> Table:
     from dzdesign.assess.quantities import QUANTITIES
 
     where = "pressure drop unknown" if item.dp_MPa is None else units.text(item.dp_MPa, ".2f MPa")
-    level, rated = (units.text(flow, ".3g L/min") for flow in (item.level_L_min, item.rated_flow_L_min))
-    flows = f"level {level}, rated flow {rated}"
+    reading, rated = (units.text(flow, ".3g L/min") for flow in (item.reading_flow_L_min, item.rated_flow_L_min))
+    flows = f"reading flow {reading}, rated flow {rated}"
     rows = Table(f"{where}, {item.side} commands; {flows}", "quantity", "unit", "before", "after", "change", "± s.e.")
     for key, found in item.quantities.items():
         quantity, change, both = QUANTITIES[key], found.change, (found.before, found.after)

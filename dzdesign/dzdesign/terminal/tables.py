@@ -1,25 +1,29 @@
 """Results as tables on stdout, by rich; plain where stdout is no terminal."""
 
 import json
+import os
+import re
 from typing import TYPE_CHECKING
 
 from dzdesign.core.units import chance
 from dzdesign.terminal.page import new_console, put_line, put_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from fractions import Fraction
 
     from rich.console import Console
 
-    from dzdesign.assess.assessment import MeterTaken
     from dzdesign.codegen.project import Firmware
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.derivation.account.mutation import AccountMutants, StatementMutants
     from dzdesign.design.compensator import Compensator
-    from dzdesign.identify.valve.model import Meter, ValveModel
+    from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.ramp_result import TestResult
     from dzdesign.identify.valve.side_model import SideModel
+
+#: Files of a test that its row names, and characters by which their names may differ.
+NAMED_FILES, LONGEST_DIFFERENCE = 6, 12
 
 
 def _rational(value: "Fraction") -> str:
@@ -39,7 +43,7 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
             put_line(console, line)
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
-    put_line(console, meter_line(valve.meter, valve.recorded_units))
+    put_line(console, meter_line(valve.meter.floor_L_min, valve.meter.lag_in_words(), valve.recorded_units))
     put_units(console, valve.recorded_units, "valve.json")
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
@@ -53,11 +57,9 @@ def put_units(console: "Console", units: "RecordedUnits", file: str) -> None:
         put_line(console, f"units: {units.in_words()}{falls}; {file} holds V, MPa and L/min")
 
 
-def meter_line(meter: "Meter | MeterTaken", units: "RecordedUnits") -> str:
-    """Return what is known of the flow meter of recordings."""
-    how = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
-    floor = units.text(meter.floor_L_min, ".2f L/min")
-    return f"meter floor: {floor}; lag taken as {meter.lag_s:.3g} s ({how[meter.lag_is]})"
+def meter_line(floor_L_min: float, lag: str, units: "RecordedUnits") -> str:
+    """Return what is known of the flow meter of recordings; its lag is in words."""
+    return f"meter floor: {units.text(floor_L_min, '.2f L/min')}; {lag}"
 
 
 def _put_thresholds(console: "Console", side: "SideModel", title: str, units: "RecordedUnits") -> None:
@@ -66,7 +68,7 @@ def _put_thresholds(console: "Console", side: "SideModel", title: str, units: "R
 
     betas = dict(zip((test.source for test in side.tests), side.beta.beta, strict=False))  # none without a known dP
     columns: dict[str, Callable[[TestResult], str]] = {
-        "ramp test": lambda test: test.source,
+        "ramp test": lambda test: short_source(test.source, test.ramps),
         f"dP ({units.label('MPa')})": lambda test: "?" if test.dp_MPa is None else units.number(test.dp_MPa, ".3f MPa"),
         "knee opening": lambda test: command(test.u_knee_rising_V),
         "knee closing": lambda test: command(test.u_knee_falling_V),
@@ -77,6 +79,27 @@ def _put_thresholds(console: "Console", side: "SideModel", title: str, units: "R
         f"Q max ({units.label('L/min')})": lambda test: units.number(test.q_max_L_min, ".2f L/min"),
     }
     put_rows(console, title, side.tests, columns)
+
+
+def short_source(source: str, ramps: "Sequence[str]") -> str:
+    """Return the files of a test for a narrow column: what their names share stands once; several ramps of one as is.
+
+    Examples
+    --------
+    >>> short_source("", ["ramp_dP1_1.csv", "ramp_dP1_2.csv", "ramp_dP1_10.csv"])
+    'ramp_dP1_{1,2,10}.csv'
+    """
+    names = list(dict.fromkeys(ramps))
+    if len(names) < 2 or any(name.endswith(" s)") for name in names):
+        return source
+    start = re.sub(r"\d+$", "", os.path.commonprefix(names))  # noqa: RUF071 (of characters)
+    rests = [name[len(start) :] for name in names]
+    end = re.sub(r"^\d+", "", os.path.commonprefix([rest[::-1] for rest in rests])[::-1])  # noqa: RUF071
+    middles = [rest[: len(rest) - len(end)] for rest in rests]
+    if not start or not all(middles) or max(map(len, middles)) > LONGEST_DIFFERENCE:
+        return source
+    shown = middles[:NAMED_FILES] + ["..."] * (len(middles) > NAMED_FILES)
+    return f"{start}{{{','.join(shown)}}}{end}"
 
 
 def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:

@@ -113,7 +113,6 @@ def test_two_rates_tell_the_lag(here):
         ("t_s,u_V,Q1 [L/min],Q2 [L/min]", "Q: 'Q1 [L/min]' and 'Q2 [L/min]' could each be it"),
         ("t_s,AO0,p [bar],Q_Lmin", "u: no column has a unit of voltage"),
         ("t_s,I_valve [mA],dP [bar],Q_Lmin", "u: no column has a unit of voltage; if 'I_valve [mA]' is it, say"),
-        ("t_s,u,dP [bar],Q_Lmin", "u: 'u' has no unit; give it after a colon, such as V"),
     ],
 )
 def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels, reason):
@@ -124,6 +123,35 @@ def test_what_can_not_be_told_is_left_open_with_the_reason(here, capsys, labels,
     text = Path("dzdesign.toml").read_text()
     assert f"# OPEN: column of {reason}" in text and f'# {reason[0]} = "LABEL:UNIT"' in text
     assert reason[0] not in tomllib.loads(text).get("columns", {})
+
+
+@pytest.mark.parametrize(
+    ("label", "full", "range_form"),
+    [
+        ("duty", 0.9, "duty:0..0.9 = 0..100 %"),
+        ("Duty cycle [-]", 1.0, "Duty cycle [-]:0..1 = 0..100 %"),
+        ("PWM", 4095, "PWM:0..4095 = 0..100 %"),
+        ("Tastverhaeltnis", 1.0, "Tastverhaeltnis:0..1 = 0..100 %"),
+        ("u", 0.9, "u:0..0.9 = 0..100 %"),
+    ],
+)
+def test_of_a_duty_cycle_the_range_form_is_proposed(here, capsys, label, full, range_form):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", f"t_s,{label},dP [bar],Q_Lmin", time, full * u / 10, dp, q)
+    assert main(["init", "ramp.csv"]) == 1
+    assert f'--columns "u={range_form}"' in capsys.readouterr().out
+    text = Path("dzdesign.toml").read_text()
+    assert f'# u = "{range_form}"' in text and "(in ;" not in text
+    Path("dzdesign.toml").write_text(text.replace("# [columns]", "[columns]").replace("# u = ", "u = "))
+    assert main(["identify", "ramp.csv", "--config", "dzdesign.toml"]) == 0
+
+
+def test_a_duty_cycle_of_both_signs_and_one_that_may_be_two(here, capsys):
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,duty,dP [bar],Q_Lmin", [*time, 1000.0], [*u / 10, -1.0], [*dp, dp[0]], [*q, 0.0])
+    assert main(["init", "ramp.csv"]) == 1 and "u=duty:-1..1 = -100..100 %" in capsys.readouterr().out
+    write("ramp.csv", "t_s,duty A,dP [bar],Q_Lmin,duty B", time, u / 10, dp, q, u / 10)
+    assert main(["init", "ramp.csv", "-o", "second.toml"]) == 1 and "= 0..100 %" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

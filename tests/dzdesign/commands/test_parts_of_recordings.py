@@ -82,6 +82,21 @@ def test_what_leaves_nothing_is_refused(options, file, says, recording, capsys):
     assert all(words in error for words in says) and not Path("valve.json").exists()
 
 
+@pytest.mark.parametrize(
+    ("from_", "says"),
+    [
+        ("600 s", ": from_ 600 s leaves 0 rows"),
+        ("60", "from_ is '60' without a unit"),
+        ({"rest.csv": "60 s"}, "from_ names 'rest.csv'"),
+        ({"rest*.csv": "60"}, "from_ 'rest*.csv' is '60' without a unit"),
+    ],
+)
+def test_messages_in_python_name_its_keyword(recording, from_, says):
+    with pytest.raises(api.InputError) as caught:
+        api.identify(recording, from_=from_)
+    assert says in str(caught.value) and "[from]" not in str(caught.value) and "--" not in str(caught.value)
+
+
 def cut_ramps(capsys) -> list[str]:
     capsys.readouterr()
     warnings = json.loads(Path("valve.json").read_text())["warnings"]

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -92,6 +93,27 @@ def test_a_pilot_replaces_the_assumptions_and_options_replace_the_pilots(capsys,
     assert any("the pilot series ran from 1.00 to 5.00 MPa" in note for note in wider["notes"])
 
 
+def test_a_threshold_that_rises_is_planned_as_one_that_falls(capsys):
+    """What the steps of the staircase cost is the same either way."""
+    _, falls = planned(capsys, *QUICK, "--threshold-change", "3 %")
+    _, rises = planned(capsys, *QUICK, "--threshold-change=-3%")
+    assert {each["name"]: each["value"] for each in rises["premises"]}["threshold"] == "50 to 53 % of 10 V"
+    assert rises["chosen"]["of_staircase_mV"] == pytest.approx(falls["chosen"]["of_staircase_mV"], rel=1e-3)
+    assert rises["chosen"]["loss_mV"] == pytest.approx(falls["chosen"]["loss_mV"], rel=0.1)
+
+
+def test_the_side_of_a_pilot(pilot, wording):
+    half = tuple(replace(test, q_max_L_min=test.q_max_L_min / 2) for test in pilot.positive.tests)
+    both = replace(pilot, sides={"positive": pilot.positive, "negative": replace(pilot.positive, tests=half)})
+    known = {"ramp_times": "20 s", "budget": "10 min"}
+    flows = {side: api.plan(both, side=side, **known).premises[1].value for side in (None, "positive", "negative")}
+    assert flows[None] == flows["positive"]
+    positive, negative = (float(flows[side].split()[0]) for side in ("positive", "negative"))
+    assert negative == pytest.approx(positive / 2, rel=0.01)
+    with wording.refusal(InputError, "plan: a side that the pilot lacks"):
+        api.plan(pilot, side="negative")
+
+
 def test_a_pilot_with_too_few_repeats_leaves_the_repeatability_assumed():
     tests = PlannedBench().record([1, 5], 20.0, 20.0, np.random.default_rng(3))
     plan = api.plan(identify(tests, IdentifyOptions()), ramp_times="20 s", budget="10 min")
@@ -123,6 +145,9 @@ def test_options_of_a_file(capsys, tmp_path):
         {"budget": "1 min"},
         {"repeatability": "20 %"},
         {"pause": "-1 s"},
+        {"side": "negative"},
+        {"threshold_change": "-51 %"},
+        {"threshold_change": "2"},
     ],
     ids=lambda options: " ".join(f"{name} {value}" for name, value in options.items()),
 )

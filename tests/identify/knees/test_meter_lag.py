@@ -77,7 +77,9 @@ class TestTolerance:
         paid = [without - with_it for with_it, without in zip(some, none, strict=True)]
         assert paid == pytest.approx([0.1 * 0.05, 0.5 * 0.05], rel=0.02)
 
-    @pytest.mark.parametrize("text", ["0.1 s +- 0.02 s", "0.1 s ± 20 ms", "100ms +/- 0.02s"])
+    @pytest.mark.parametrize(
+        "text", ["0.1 s +- 0.02 s", "0.1 s ± 20 ms", "100ms +/- 0.02s", "0.1 s +- 20 %", "0.1s±20.0%"]
+    )
     def test_it_is_read_beside_the_lag(self, text):
         assert with_tolerance("time")(text, "--meter-lag") == pytest.approx((0.1, 0.02))
 
@@ -88,7 +90,11 @@ class TestTolerance:
         plain = identify_options(IdentifyArguments(["a.csv"], meter_lag="0.1 s"))
         assert (plain.meter_lag, plain.meter_lag_tolerance) == (0.1, None)
 
-    @pytest.mark.parametrize("text", ["0.1 s +- 0.02", "0.1 s +-", "± 0.02 s", "0.1 s ± 1 ms ± 1 ms", "0.1 s ± 1 V"])
+    @pytest.mark.parametrize(
+        "text",
+        ["0.1 s +- 0.02", "0.1 s +-", "± 0.02 s", "0.1 s ± 1 ms ± 1 ms", "0.1 s ± 1 V",
+         "0.1 s ± -3 %", "0.1 s +- 20"],
+    )  # fmt: skip
     def test_half_a_tolerance_is_refused(self, text):
         with pytest.raises(InputError, match="--meter-lag"):
             with_tolerance("time")(text, "--meter-lag")

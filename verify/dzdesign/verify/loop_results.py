@@ -41,7 +41,7 @@ class PressureResult:
     reading_opening: Annotated[Share, about("Command at which it is reached on opening, with compensator.")]
     reading_closing: Annotated[Share, about("The same on closing.")]
     ideal_line: Annotated[
-        Share, about("The same of an ideal line from zero to the largest flow: no dead zone is read lower.")
+        Share, about("Command at which an ideal line from zero command to the largest flow reaches it.")
     ]
     unseen_below_L_min: Annotated[
         Flow | None,

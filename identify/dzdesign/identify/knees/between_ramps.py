@@ -16,7 +16,7 @@ refuse one variance for all, that of the pressure drop with the largest scatter 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -76,8 +76,10 @@ class BetweenRamps:
     no_drift: NoDrift
     #: By how much each ramp of each test stands off the middle of the series and of its test's ramps, V.
     shifts: tuple[np.ndarray, ...]
-    #: What the repeats say against the premises. Where one scatter is the largest, `sd`, `degrees` and `noise` are its.
+    #: What the repeats say against the premises, and whether `sd`, `degrees` and `noise` are those of the largest
+    #: scatter for that reason.
     checks: ScatterChecks
+    of_largest: bool = False
 
     def covariance_of_mean(self, noise_se: np.ndarray) -> np.ndarray:
         """Return the covariance of the thresholds in the middle of the series, V² (T, T).
@@ -148,11 +150,7 @@ class BetweenRamps:
         Bonferroni; but the largest of several scatters counts for all tests, and is large enough for all of them where
         it is for one that scatters alone: with more that do, the largest of theirs is less often found too small.
         """
-        return confidence if self._largest_counts else 1 - (1 - confidence) / tests
-
-    @property
-    def _largest_counts(self) -> bool:
-        return self.origin == "repeats" and self.checks.largest is not None
+        return confidence if self.of_largest else 1 - (1 - confidence) / tests
 
     def _noise(self, noise_se: np.ndarray) -> np.ndarray:
         """Return what the noise adds, V²: all of it, or what exceeds the average ramp's where `sd` has that in it."""
@@ -176,7 +174,18 @@ class RampKnees:
 
 
 def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
-    """Compare the ramps of one branch.
+    """Compare the ramps of one branch, as `pool_scatter`; the largest scatter counts where the repeats refuse one."""
+    pooled = pool_scatter(known, counts, declared=declared, u_max=u_max)
+    largest, drift = pooled.checks.largest, pooled.drift
+    if largest is None or pooled.origin != "repeats":
+        return pooled
+    if drift:
+        drift = replace(drift, change_se=drift.change_se * largest.sd / pooled.sd)
+    return replace(pooled, sd=largest.sd, degrees=largest.degrees, noise=largest.noise, drift=drift, of_largest=True)
+
+
+def pool_scatter(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
+    """Compare the ramps of one branch, on the premise that they scatter alike.
 
     Parameters
     ----------
@@ -204,9 +213,6 @@ def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | 
     least = known.noise + (FINEST * u_max) ** 2
     checks = check_scatter(residual, design, known.test, known.number, least, known.when)
     sd = math.sqrt(squares / degrees) if measured else ASSUMED_REPEATABILITY * u_max if declared is None else declared
-    of_sd = (float(degrees), noise) if measured else (math.inf, 0.0)
-    if measured and checks.largest:
-        sd, of_sd = checks.largest.sd, (checks.largest.degrees, checks.largest.noise)
     rows = told if no_drift else np.ones(count + 1, dtype=bool)
     # A test without a ramp that tells its knee counts as one ramp.
     covariance = np.eye(rows.size)
@@ -225,9 +231,9 @@ def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | 
         shifts[row][number] = shift
     return BetweenRamps(
         sd=sd,
-        degrees=of_sd[0],
+        degrees=float(degrees) if measured else math.inf,
         origin=origin,
-        noise=of_sd[1],
+        noise=noise if measured else 0.0,
         covariance=covariance,
         drift=drift,
         no_drift=no_drift,

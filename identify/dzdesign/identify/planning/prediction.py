@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, excess_departure, find_trend, lower_bounds
-from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, compare_ramps
+from dzdesign.identify.knees.between_ramps import BetweenRamps, RampKnees, pool_scatter
 from dzdesign.identify.planning.premises import Bench, ExpectedValve
 from dzdesign.identify.planning.series import Series
 from dzdesign.identify.valve.staircase import Direction, staircase
@@ -109,7 +109,8 @@ def _certified(
 ) -> tuple[np.ndarray, Direction]:
     """Return the offset that the ramps' knees certify at each pressure drop, V (T,), and the direction found."""
     counts = np.bincount(known.test)
-    between = compare_ramps(known, counts.tolist(), declared=declared, u_max=bench.u_max)
+    # On the premise that the valve scatters alike: a test that refuses that by chance is answered by more ramps.
+    between = pool_scatter(known, counts.tolist(), declared=declared, u_max=bench.u_max)
     mean, mean_se = _brought_together(known, between, counts), ramp_se / np.sqrt(counts)
     covariance = between.covariance_of_mean(mean_se)
     degrees = float(between.degrees_of_freedom(mean_se, DEGREES_OF_FREEDOM).min())

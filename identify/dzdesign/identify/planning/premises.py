@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.knees.linear_region import ABOVE_LEVEL, NOISE_LEVEL, USEFUL_FLOW, WIDER
@@ -177,17 +177,23 @@ class Pilot:
     recorded_units: RecordedUnits
 
 
-def read_pilot(model: ValveModel) -> Pilot:
+def read_pilot(model: ValveModel, wanted: str | None = None) -> Pilot:
     """Take noise, slopes, thresholds and repeatability from the valve.json of a quick series.
 
-    Of a valve with two sides the first one is taken.
+    None takes the first of its sides.
 
     Raises
     ------
     InputError
-        If its pressure drops are not known.
+        If its pressure drops are not known, or it lacks the side.
     """
-    name, side = next(iter(model.sides.items()))
+    if wanted is not None and wanted not in model.sides:
+        raise InputError(
+            f"--side is '{wanted}'{nearest(wanted, model.sides)}, expected {' or '.join(model.sides)}, which the pilot "
+            "series has"
+        )
+    name = wanted or next(iter(model.sides))
+    side = model.sides[name]
     if any(test.dp_MPa is None for test in side.tests):
         raise InputError(
             "the pilot series was recorded without a pressure drop, and a plan needs it; record it, or declare it by "

@@ -35,6 +35,10 @@ PRESSURE_LIKE = re.compile(
     r"(?:[dΔδ]|delta|diff)?[\s_.-]?p[\s_.-]?(?:[abpst]|in|out|\d{1,2})?|[^\[(]{0,20}(?:press|druck)[^\[(]{0,20}",
     re.IGNORECASE,
 )
+#: A label that may be of a command as a share: duty, Duty_cycle, PWM, Tastgrad, Tastverhältnis.
+DUTY_LIKE = re.compile(r"\bduty|_duty|pwm|tast(?:grad|verh)", re.IGNORECASE)
+#: Counts of a command that has no unit are fewer.
+LARGEST_COMMAND = 1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +57,8 @@ class ProposedColumns:
         Quantity -> why it could not be told.
     bare_pressures : tuple of str
         Labels that look like a pressure and have no unit, where no pressure drop is known.
+    command_range : str
+        Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct.
     """
 
     labels: tuple[str, ...]
@@ -60,6 +66,7 @@ class ProposedColumns:
     proposed: dict[str, Column]
     unclear: dict[str, str]
     bare_pressures: tuple[str, ...]
+    command_range: str = ""
 
     @property
     def has_dp(self) -> bool:
@@ -105,12 +112,34 @@ def propose_columns(
                 taken.add(label)
             elif why := _why_none(table, quantity, candidates):
                 unclear[quantity] = why
+        command_range = _command_range(table, known, taken) if "u" in unclear else ""
+    if command_range:
+        unclear["u"] += f"; or say what its numbers mean, for example --columns \"u={command_range}\""
     has_pressure = bool(edge.quantities) or "dP" in proposed
     bare = (label for label in table.labels if label not in taken and not table.units.get(label))
     return ProposedColumns(
         labels=table.labels, known=known, proposed=proposed, unclear=unclear,
         bare_pressures=() if has_pressure else tuple(label for label in bare if PRESSURE_LIKE.fullmatch(label)),
+        command_range=command_range,
     )  # fmt: skip
+
+
+def _command_range(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:
+    """Return the range form of a command without a unit, or of the only column that is named like a duty cycle."""
+    labels = [known["u"].label] if "u" in known and not known["u"].unit else []
+    labels = labels or [label for label in table.labels if label not in taken and DUTY_LIKE.search(label)]
+    if len(labels) != 1 or not labels[0]:
+        return ""
+    try:
+        numbers = table.numbers(labels[0])
+    except InputError:
+        return ""
+    lowest, highest = np.fmin.reduce(numbers, initial=0.0), np.fmax.reduce(numbers, initial=0.0)
+    if not 0 < highest < LARGEST_COMMAND:
+        return ""
+    top = f"{highest:.3g}" if highest < 1000 else f"{highest:.0f}"
+    both = bool(lowest < -0.5 * highest)
+    return f"{labels[0]}:{f'-{top}' if both else '0'}..{top} = {'-100' if both else '0'}..100 %"
 
 
 def _is_unused(quantity: str, column: Column, edge: MeteringEdge) -> bool:

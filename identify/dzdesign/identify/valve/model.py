@@ -16,6 +16,9 @@ from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST
 
 #: Both sides, and the sign of the command that opens each.
 SIDES = {"positive": 1, "negative": -1}
+#: How the lag of a flow meter is known, for people.
+KNOWN_BY = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
+LagOrigin = Literal["declared", "identified", "unknown"]
 #: Decimals of every number in valve.json: below every error here, and the same bytes on every machine.
 DECIMALS = 7
 
@@ -27,7 +30,7 @@ class Meter:
     floor_L_min: Annotated[Flow, Meta(description="Flow below which it reads zero, declared or found.")]
     lag_s: Annotated[float, quantity("s", "Its lag.", ge=0, le=1e6)]
     lag_is: Annotated[
-        Literal["declared", "identified", "unknown"],
+        LagOrigin,
         Meta(description="Where the lag is from; unknown: it was taken as zero."),
     ]
     lag_longer_s: Annotated[
@@ -37,6 +40,25 @@ class Meter:
         float, quantity("s", "By how much it may be shorter: lowers the bounds of the closing.", ge=0, le=1e6)
     ]
     zero_L_min: Annotated[Flow, Meta(description="Bound of its zero error, by which all bounds are lowered.")]
+
+    def lag_in_words(self) -> str:
+        """Return the lag with its tolerance and how it is known."""
+        return lag_in_words(self.lag_s, self.lag_is, longer=self.lag_longer_s, shorter=self.lag_shorter_s)
+
+
+def lag_in_words(seconds: float, origin: LagOrigin, *, longer: float = 0.0, shorter: float = 0.0) -> str:
+    """Return the lag of a flow meter that was taken out, by how much it may be wrong, and how it is known.
+
+    Examples
+    --------
+    >>> lag_in_words(0.1, "declared", longer=0.05, shorter=0.05), lag_in_words(0.0, "unknown", longer=0.2)
+    ('lag taken as 0.1 s ± 0.05 s (declared)', 'lag taken as 0 s, at most 0.2 s longer (none declared)')
+    """
+    ways = {"longer": longer, "shorter": shorter}
+    alike = f"{longer:.2g}" == f"{shorter:.2g}"
+    each = [f"{value:.2g} s {way}" for way, value in ways.items() if value > 0]
+    tolerance = f" ± {longer:.2g} s" if alike and longer > 0 else f", at most {' or '.join(each)}" if each else ""
+    return f"lag taken as {seconds:.3g} s{tolerance} ({KNOWN_BY[origin]})"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

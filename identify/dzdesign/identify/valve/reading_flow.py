@@ -2,7 +2,7 @@
 
 A bench reads where its meter starts, not where the edge opens. Even a valve without any dead zone, whose flow rises in
 a straight line from zero command to the largest flow, shows one there: the reading flow over the largest flow. That
-value stands beside every reading, for below it no valve comes without flow at zero command.
+value stands beside every reading.
 """
 
 import numpy as np

@@ -16,7 +16,6 @@ from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import (
     Cell,
     Table,
-    from_to,
     in_number_font,
     number,
     recorded,

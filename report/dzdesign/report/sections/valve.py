@@ -12,7 +12,8 @@ from dzdesign.report.figures.valve import beta_figure, lines_figure, thresholds_
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, counted, recorded, table_of
 
-LAG = {"declared": "declared", "identified": "from ramps of two rates", "unknown": "none declared"}
+#: Warnings about the order of the recordings, which bear on the bounds.
+ORDER = ("order", "time-stamps")
 
 
 def valve_sections(valve: ValveModel | None, compensator: Compensator | None) -> dict[str, Section]:
@@ -38,8 +39,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
                 f"{counted(sum(len(side.tests) for side in valve.sides.values()), 'ramp test')}; full command "
                 f"{units.text(valve.u_max_V, 'g V')}.",
                 *([f"Units: {shown}; the files and the curves as CSV are in V, MPa and L/min."] if shown else []),
-                f"Flow meter: floor {units.text(meter.floor_L_min, '.2f L/min')}; lag taken as {meter.lag_s:.3g} s "
-                f"({LAG[meter.lag_is]}).",
+                f"Flow meter: floor {units.text(meter.floor_L_min, '.2f L/min')}; {meter.lag_in_words()}.",
                 *(_trend(name, side, units.of_side(name)) for name, side in valve.sides.items()),
                 *(
                     f"{name.capitalize()} commands, from ramp to ramp: "
@@ -54,7 +54,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             tables=tables,
             lines=(
                 *(f"Premise, {name} commands: {side.premise}." for name, side in valve.sides.items()),
-                *(f"{warning.text}." for warning in valve.warnings if warning.code == "order"),
+                *(f"{warning.text}." for warning in valve.warnings if warning.code in ORDER),
             ),
         ),
         "beta": Section(
