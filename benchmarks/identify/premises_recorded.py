@@ -2,8 +2,8 @@
 
     python -m benchmarks.identify.premises_recorded [recordings of each kind]
 
-As `premises.py`, but with what a logger would write: ramps of a valve with that threshold on a meter with a floor, a lag
-that is declared, and noise from white to AR 0.99. Failures of the closing and of the opening guard are counted apart.
+As `premises.py`, but with what a logger would write: ramps of a valve with that threshold on a meter with a floor, a
+lag that is declared, and noise from white to AR 0.99. Failures of the closing and of the opening guard are counted apart.
 """
 
 import sys
@@ -53,7 +53,8 @@ def table(count: int) -> Iterator[str]:
             taken = {name: sum(row[2] == name for row in rows) for name in {row[2] for row in rows}}
             yield (
                 f"{tests} tests, --curve {curve or 'default':8} {shape:8} above the closing threshold "
-                f"{sum(row[0] for row in rows)} of {count}, the opening one {sum(row[1] for row in rows)}; taken {taken}"
+                f"{sum(row[0] for row in rows)} of {count}, the opening one {sum(row[1] for row in rows)}; "
+                f"taken {taken}"
             )
 
 
