@@ -3,7 +3,8 @@
     python -m benchmarks.identify.premises_recorded [recordings of each kind]
 
 As `premises.py`, but with what a logger would write: ramps of a valve with that threshold on a meter with a floor, a
-lag that is declared, and noise from white to AR 0.99. Failures of the closing and of the opening guard are counted apart.
+lag that is declared, and noise from white to AR 0.99. Failures of the closing and of the opening guard are counted
+apart.
 """
 
 import sys
