@@ -17,6 +17,7 @@ import numpy as np
 from dzdesign.identify.fitting.bounds import lower_bounds
 from dzdesign.identify.fitting.premises import bound_line, confidence_at_tests, find_curvature
 from dzdesign.identify.knees.between_ramps import BetweenRamps
+from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 
 CONFIDENCE, U_MAX, GRID = 0.99, 10.0, 401
@@ -66,7 +67,7 @@ def failures(
     dp, (noise, scatter) = np.array(PRESSURES[tests]), errors
     between = BetweenRamps(
         sd=scatter, degrees=np.inf, origin="declared", noise=0.0, covariance=np.eye(tests), drift=None,
-        no_drift="order unknown", shifts=(),
+        no_drift="order unknown", shifts=(), checks=ScatterChecks(largest=None, outlying=None, serial=None),
     )  # fmt: skip
     grid = np.linspace(dp[0], dp[-1], GRID)
     failed = refused = 0

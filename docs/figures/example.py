@@ -43,9 +43,9 @@ class Example:
         return design(self.found.model)
 
     @cached_property
-    def with_transition(self) -> Compensator:
-        """The same with a transition over 1 % of command."""
-        return design(self.found.model, DesignOptions(transition=Fraction(1, 100)))
+    def without_transition(self) -> Compensator:
+        """The same with neither zero band nor transition."""
+        return design(self.found.model, DesignOptions(transition=Fraction(0)))
 
     @cached_property
     def loop(self) -> ClosedLoop:

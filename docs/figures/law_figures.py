@@ -81,8 +81,8 @@ def transition(example: Example) -> "Figure":
     test = example.side.tests[1]
     command = np.arange(0, 130)
     for compensator, colour, line, name in (
-        (example.compensator, BLUE, "--", "without a transition"),
-        (example.with_transition, GREEN, "-", 'with --transition "1 %"'),
+        (example.without_transition, BLUE, "--", "--transition off"),
+        (example.compensator, GREEN, "-", "with zero band and transition"),
     ):
         code = int(compensator.signals.dp_code(Fraction(test.dp_MPa)))
         drive = 10 * np.array([float(compensator.drive(int(each), code)) for each in command])
@@ -92,10 +92,11 @@ def transition(example: Example) -> "Figure":
         axes.annotate(
             f"{name}, {height:.3f} V", (3.15, height), (0, -11), textcoords="offset points", ha="right", fontsize=8
         )
-    codes = example.with_transition.transition_codes
+    codes = example.compensator.transition_end
     end = 100 * codes / 4095
+    axes.axvline(100 * example.compensator.zero_band_codes / 4095, color=GREY, ls=":", lw=1.2)
     axes.axvline(end, color=GREY, ls=":", lw=1.2)
-    note(axes, f"transition's end: {codes} codes,\n{end:.2f} % of command", (1.55, 5.27), (end, 5.3))
+    note(axes, f"transition's end: code {codes},\n{end:.2f} % of command", (1.55, 5.27), (end, 5.3))
     axes.set(xlabel="command (% of full)", ylabel="drive at 1 MPa (V)", xlim=(0, 3.17))
     axes.legend(loc="upper left", bbox_to_anchor=(0.27, 0.95))
     return figure

@@ -57,6 +57,8 @@ VARIANTS = {
     },
     "inverted": {"signals": {"command": _command("0..10 V x 0.3", inverted=True)}, **DRIVE_FUNCTIONS},
     "bipolar": {"signals": {"command": BOTH}},
+    "play": {"play": True},
+    "bipolar, play": {"signals": {"command": BOTH}, "play": True, "ramp_up_s": (0.5, 0.8)},
     "bipolar, no transition": {"signals": {"command": BOTH}, "transition": Fraction(0), **DRIVE_FUNCTIONS},
     "bipolar, all options": {"signals": UNLIKE | {"command": BOTH, "swapped": True}, "transition": Fraction(1, 100)}
     | DRIVE_FUNCTIONS,

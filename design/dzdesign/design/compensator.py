@@ -138,12 +138,23 @@ class Compensator(ShownInNotebooks, Artefact):
         if bool(self.transition_codes) != bool(self.zero_band_codes):
             raise RuleError("a zero band and a transition belong together, expected both or neither")
         if self.transition_codes and self.drive_functions.leave_zero_codes <= self.zero_band_codes:
-            raise RuleError("the drive must leave its rest beyond the zero band, so that noise at its end does not show")
+            raise RuleError("the drive must leave its rest beyond the zero band, so that noise at its end is not seen")
+        if self.drive_functions.has_play:
+            self._check_play(sign)
         if (taken := self.transition_end) > self.signals.command.span(sign) // 10:
             raise RuleError(
                 f"zero band and transition take {taken} codes, expected at most a tenth of the command, "
                 f"{self.signals.command.span(sign)} codes"
             )
+
+    def _check_play(self, sign: int) -> None:
+        functions = self.drive_functions
+        nodes = functions.play_counts[0 if sign > 0 else 1]
+        needed = self.signals.command.span(sign) // functions.play_step_codes + 2
+        if not self.transition_codes or len(nodes) != needed:
+            raise RuleError(f"a play has {len(nodes)} nodes, expected {needed} for every command, and a transition")
+        if max(nodes) * functions.play_codes * self.transition_codes >= 2**31:
+            raise RuleError("the play's width over its codes and the transition's needs more than 31 bits")
 
     @property
     def positive(self) -> SideLaw:

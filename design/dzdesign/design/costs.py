@@ -1,13 +1,13 @@
 """What a design costs, in a person's words: dead zone that remains, flow at the transition, drive at full command."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.law_corners import corners_of
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -60,7 +60,7 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     """Say what remains at one tested pressure drop."""
     signals, u_max = compensator.signals, float(compensator.u_max_V)
     code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-    corners = _corners(compensator, code, sign)
+    corners = corners_of(compensator, code, sign)
     left = remaining_dead_zone(compensator, test, sign)
     units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
     at = units.text(test.dp_MPa or 0.0, ".2f MPa")
@@ -117,9 +117,12 @@ def _commands_at(
     compensator: Compensator, test: TestResult, sign: int, thresholds_V: Mapping[str, float | None]
 ) -> dict[str, float]:
     """Return the command at which the drive reaches each threshold that there is, at a test's pressure drop."""
-    corners = _corners(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+    corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
     shares = {name: at / float(compensator.u_max_V) for name, at in thresholds_V.items() if at is not None}
-    found = {name: max(corners.command_at(at), 0.0) for name, at in shares.items()}
+    nodes = compensator.drive_functions.play_counts[0 if sign > 0 else 1] or (0,)
+    widths = (nodes[0] / compensator.signals.compare_max, nodes[-1] / compensator.signals.compare_max)
+    branches = {"opening": corners, "closing": corners.lowered(*widths)}
+    found = {name: max(branches[name].command_at(at), 0.0) for name, at in shares.items()}
     if "opening" in found:  # from rest the drive leaves the zero band at its outer end
         found["opening"] = max(found["opening"], corners.leaves)
     return found
@@ -132,38 +135,6 @@ def _reading(compensator: Compensator, test: TestResult, sign: int, units: Recor
     ideal = ideal_line(flow, test.recorded.q_max_L_min)
     words = " and ".join(read) or "nothing: the valve never passes it"
     return f"read at {units.text(flow, '.2f L/min')} {words} (ideal line {ideal:.2%})"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Corners:
-    """The law at one pressure drop, two straight parts behind the zero band, all over full command and full drive."""
-
-    #: Drive in the zero band, at the transition's end and at full command.
-    offset: float
-    at_end: float
-    full: float
-    #: Command at the ends of zero band and transition, 0 without one; and beyond which the drive leaves its rest.
-    zero_band: float
-    end: float
-    leaves: float
-
-    def command_at(self, drive: float) -> float:
-        """Return the command at which the drive reaches a threshold."""
-        if drive <= self.at_end and self.end:
-            passed = (drive - self.offset) / (self.at_end - self.offset) if self.at_end > self.offset else 0.0
-            return self.zero_band + (self.end - self.zero_band) * passed
-        return self.end + (1 - self.end) * (drive - self.at_end) / (self.full - self.at_end)
-
-
-def _corners(compensator: Compensator, dp_code: int, sign: int) -> _Corners:
-    """Return the law's corners at a difference of pressure codes."""
-    command, end = compensator.signals.command, compensator.transition_end
-    span = command.span(sign)
-    at = (command.zero_code + command.direction(sign) * from_zero for from_zero in (0, end, span))
-    offset, at_end, full = (float(compensator.drive(code, dp_code, sign)) for code in at)
-    leaves = compensator.drive_functions.leave_zero_codes / span if compensator.zero_band_codes else 0.0
-    zero_band = compensator.zero_band_codes / span
-    return _Corners(offset=offset, at_end=at_end, full=full, zero_band=zero_band, end=end / span, leaves=leaves)
 
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
@@ -200,6 +171,13 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
             "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
         )
     lines += _cost_of_zero_band(compensator)
+    if functions.has_play:
+        width = max(count for nodes in functions.play_counts for count in nodes) / signals.compare_max
+        turned = 2 * functions.play_noise_codes + functions.play_codes
+        lines.append(
+            f"inverse play: a falling command is driven lower by the recorded hysteresis, up to {width:.2%} of full "
+            f"drive, once it has turned by {turned} codes ({turned / signals.command.span(1):.2%} of command)"
+        )
     if functions.has_ramp:
         lines.append(
             f"ramps: {_ramp_text(compensator)}; they hold for zero command too: the valve closes no faster than they "

@@ -50,12 +50,14 @@ class DriveFunctions:
     ] = 0
     dither_ticks: Annotated[int, Meta(description="PWM periods of half a wave.", ge=1, le=32767)] = 1
     play_counts: Annotated[
-        tuple[Counts, Counts],
+        tuple[tuple[Counts, ...], tuple[Counts, ...]],
         Meta(
-            description="Counts by which a falling command is driven lower than a rising one, the valve's hysteresis: of "
-            "positive, then of negative command. 0: no difference is made."
+            description="Counts by which a falling command is driven lower than a rising one, the valve's hysteresis: "
+            "of positive, then of negative commands, nodes every `play_step_codes` codes of command from zero on, "
+            "straight between them. Empty: no difference is made."
         ),
-    ] = (0, 0)
+    ] = ((), ())
+    play_step_codes: Annotated[int, Meta(description="Codes between the nodes, a power of two.", ge=1, le=4096)] = 256
     play_codes: Annotated[
         int,
         Meta(
@@ -75,7 +77,7 @@ class DriveFunctions:
             ("dither_counts", self.dither_counts, 65535),
             ("compare_limit", self.compare_limit, 65535),
             ("play_noise_codes", self.play_noise_codes, 4095),
-            *(("play_counts", value, 65535) for value in self.play_counts),
+            *(("play_counts", value, 65535) for nodes in self.play_counts for value in nodes),
             *(("ramp_up", value, 2**30) for value in self.ramp_up),
             *(("ramp_down", value, 2**30) for value in self.ramp_down),
         ):
@@ -86,8 +88,12 @@ class DriveFunctions:
                 f"dither_ticks is {self.dither_ticks}, expected 1 to 32767 PWM periods: a wave is twice that"
             )
 
-        if not 1 <= self.play_codes <= 32 or self.play_codes & (self.play_codes - 1):
-            raise RuleError(f"play_codes is {self.play_codes}, expected a power of two from 1 to 32")
+        for name, value, limit in (
+            ("play_codes", self.play_codes, 32),
+            ("play_step_codes", self.play_step_codes, 4096),
+        ):
+            if not 1 <= value <= limit or value & (value - 1):
+                raise RuleError(f"{name} is {value}, expected a power of two from 1 to {limit}")
 
     @property
     def has_play(self) -> bool:

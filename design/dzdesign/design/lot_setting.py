@@ -34,7 +34,10 @@ from dzdesign.identify.valve.side_model import SideModel
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
 CLEAR = 1e-6
 #: What all compensators of a batch must have in common.
-SHARED = ("law", "below_dp0", "signals", "u_max_V", "beta_denominator", "transition_codes", "command_error", "drive_functions")
+SHARED = (
+    "law", "below_dp0", "signals", "u_max_V",
+    "beta_denominator", "transition_codes", "command_error", "drive_functions",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,8 +13,8 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.identify.constants import L_MIN
 from dzdesign.design.zero_band import command_error_of
+from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import DECIMALS
 

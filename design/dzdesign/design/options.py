@@ -115,7 +115,7 @@ class DesignOptions:
                 f"the dither's frequency is {self.dither_Hz:g} Hz, expected {DITHER_HZ[0]:g} to {DITHER_HZ[1]:g} Hz"
             )
         if self.play and self.transition == 0:
-            raise InputError("--hysteresis play begins in the transition, but --transition is off; leave one of them out")
+            raise InputError("--hysteresis play begins in the transition, but --transition is off; leave out one")
         if self.play and self.dither_Hz:
             raise InputError("--hysteresis play and --dither both take the hysteresis out; give one of them")
         for seconds in self.ramp_up_s + self.ramp_down_s:

@@ -5,11 +5,13 @@ from dzdesign.stages.design import DesignArguments, design
 from dzdesign.terminal.page import print_json
 
 Arguments = DesignArguments
-EXAMPLES = ("dzdesign design valve.json", 'dzdesign design valve.json --transition "1 %" --target cortex-m4')
+EXAMPLES = ("dzdesign design valve.json", "dzdesign design valve.json --hysteresis play --target cortex-m4")
 
 
 def run(arguments: Arguments, json: bool) -> int:
     """Design a compensator and print its law, certificate and costs."""
+    from dzdesign.design.hysteresis_choices import hysteresis_choices
+    from dzdesign.terminal.choices_table import print_choices
     from dzdesign.terminal.tables import print_compensator
 
     compensator = design(arguments)
@@ -17,5 +19,6 @@ def run(arguments: Arguments, json: bool) -> int:
         print_json(compensator)
     else:
         print_compensator(compensator)
+        print_choices(hysteresis_choices(compensator))
         print(one_line(f"Written: {arguments.output}"))
     return 0

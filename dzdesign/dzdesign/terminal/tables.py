@@ -185,9 +185,12 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             "flow) counts as none",
         ]
     if compensator.transition_codes:
-        share = compensator.transition_codes / compensator.signals.command.span(1)
-        guard = compensator.positive.certificate.guard
-        lines.append(f"transition: from the {guard} to the opening threshold over the first {share:.2%} of command")
+        span, guard = compensator.signals.command.span(1), compensator.positive.certificate.guard
+        band, end = compensator.zero_band_codes / span, compensator.transition_end / span
+        lines.append(
+            f"zero band: commands up to {band:.2%} count as zero; transition: from the {guard} to the opening threshold "
+            f"over those from there to {end:.2%}"
+        )
     hidden = hidden_failures(compensator)
     costs = [line for line in compensator.costs if line not in hidden]
     console = console or new_console()

@@ -1,8 +1,9 @@
 """The numbers of the interface and of the drive functions: `#define`s of dz_comp.h, dz_drive.h and dz_drive.c."""
 
-from dzdesign.codegen.core.constants import Define
+from dzdesign.codegen.core.constants import Define, Table
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.signals import SIDE_NAMES
 
 HERE = "codegen/dzdesign/codegen/core/drive_constants.py"
 OPTIONS, SIGNALS = "design/dzdesign/design/options.py", "design/dzdesign/design/signals.py"
@@ -111,7 +112,7 @@ def _leave_zero(compensator: Compensator) -> Define:
 
 def _play(compensator: Compensator) -> list[Define]:
     signals, functions = compensator.signals, compensator.drive_functions
-    codes, band = functions.play_codes, compensator.transition_codes
+    codes, band, u_max_V = functions.play_codes, compensator.transition_codes, float(compensator.u_max_V)
     found = [
         Define(symbol="TRANSITION_CODES", value=band, literal="int32",
                equation="codes of command behind the zero band over which the play comes in, the law's transition",
@@ -130,15 +131,39 @@ def _play(compensator: Compensator) -> list[Define]:
                engineering=f"1/({codes} * {band})", data=("drive_functions.play_codes", "transition_codes"),
                rounding="the share is rounded down to a count", generator=HERE),
     ]  # fmt: skip
+    step = functions.play_step_codes
+    found += [
+        Define(symbol="PLAY_STEP", value=step, equation="codes of command between two nodes of the play's width",
+               engineering=_share(compensator, step), rounding="a power of two", generator=PLAY,
+               data=("drive_functions.play_step_codes", "signals.command", "u_max_V")),
+        Define(symbol="PLAY_STEP_SHIFT", value=step.bit_length() - 1, equation="the power of two in PLAY_STEP",
+               engineering=f"1/{step}", data=("drive_functions.play_step_codes",),
+               rounding="the width is rounded down to a count", generator=HERE),
+        *(
+            Define(symbol=f"SPAN_{SIDE_NAMES[sign].upper()}", value=signals.command.span(sign), literal="int32",
+                   equation="Eq. (29), codes from zero to full command", engineering=f"{sign * u_max_V:g} V",
+                   data=("signals.command", "u_max_V"), generator=SIGNALS)
+            for sign in signals.signs
+        ),
+    ]  # fmt: skip
+    return found
+
+
+def play_tables(compensator: Compensator) -> list[Table]:
+    """Return the play's width over the command, a table for each sign; none without a play."""
+    functions, signals = compensator.drive_functions, compensator.signals
+    if not functions.has_play:
+        return []
+    found = []
     for place, sign in enumerate(signals.signs):
-        counts = functions.play_counts[place]
-        share = counts / signals.compare_max
+        nodes = functions.play_counts[place]
+        volts = [float(compensator.u_max_V) * end(nodes) / signals.compare_max for end in (min, max)]
         found.append(
-            Define(symbol=f"PLAY_{'POSITIVE' if sign > 0 else 'NEGATIVE'}", value=counts, literal="int32",
-                   equation="counts by which a falling command is driven lower than a rising one",
-                   engineering=f"{share:.3%} of full drive, {share * float(compensator.u_max_V):.4g} V",
-                   rounding="rounded to nearest", generator=PLAY,
-                   data=("drive_functions.play_counts", "signals.compare_max", "u_max_V"))
+            Table(symbol=f"play_{SIDE_NAMES[sign]}", value=tuple((count, 0) for count in nodes),
+                  equation="counts by which a falling command is driven lower than a rising one, every PLAY_STEP codes",
+                  engineering=f"the recorded hysteresis, {volts[0]:.4g} to {volts[1]:.4g} V",
+                  rounding="rounded to nearest", generator=PLAY,
+                  data=("drive_functions.play_counts", "signals.compare_max", "u_max_V"))
         )  # fmt: skip
     return found
 

@@ -10,6 +10,7 @@ from dzdesign.codegen.core.drive_constants import (
     drive_constants,
     drive_interface_constants,
     interface_constants,
+    play_tables,
     status_constants,
 )
 from dzdesign.codegen.core.integer_form import integer_form
@@ -112,9 +113,14 @@ def _law_header(compensator: Compensator) -> CoreFile:
 
 def _drive_source(compensator: Compensator) -> CoreFile:
     """Return dz_drive.c, the drive functions around the law."""
-    constants = tuple(drive_constants(compensator))
-    values = {**_drive_words(compensator), "misra_lines": misra_lines(), "drive_defines": defines(constants)}
-    return CoreFile(template="dz_drive.c.jinja", values=values, constants=constants)
+    constants, tables = drive_constants(compensator), play_tables(compensator)
+    values = {
+        **_drive_words(compensator),
+        "misra_lines": misra_lines(),
+        "drive_defines": defines(constants),
+        "play_tables": tables,
+    }
+    return CoreFile(template="dz_drive.c.jinja", values=values, constants=(*constants, *tables))
 
 
 def _drive_header(compensator: Compensator) -> CoreFile:

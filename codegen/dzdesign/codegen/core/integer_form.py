@@ -6,7 +6,8 @@ on, the law (18) in counts, lowered inside the transition of E codes behind a ze
     compare = B_law (p X + o) + l X - (B_law - B) e (E - r),    r = min(max(c - Z, 0), E),
 
 p, o, l and e rational. X is the command that the law is given, in codes over E: (Z + E) r within the transition and E c
-beyond it, together E max(c - Z, 0) + Z r; without a transition it is c. Times the common denominator every term is an integer; cancelling powers of two leaves
+beyond it, together E max(c - Z, 0) + Z r; without a transition it is c. Times the common denominator every term is an
+integer; cancelling powers of two leaves
 ``total / (divisor 2^shift)`` with an integer `total` of 64 bits, so one shift and one division by a small constant give
 the exactly rounded law. The division is a multiplication by a reciprocal that is proved exact for every dividend that
 can occur; where the target has 32-bit arithmetic only, it is an estimate and a proved number of corrections.
@@ -45,7 +46,8 @@ class Estimate:
 class IntegerForm:
     """Constants of the core; see the module's text for the algebra.
 
-    ``total = B_law * (slope * X + offset) + (linear * X << linear_shift) + half - (B_law - B) * transition * (E - r)``
+    ``total = B_law * (slope * X + offset) + (linear * X << linear_shift) + half
+    - (B_law - B) * transition * (E - r)``
     with B_law and B the tables interpolated without rounding;
     ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
     ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.

@@ -184,6 +184,8 @@ class GuardedThreshold:
     between: BetweenRamps
     #: By how much systematic errors may make it differ from test to test, V.
     allowance: float
+    #: Whether it departs from one direction beyond its error: then a threshold that runs one way is contradicted.
+    departs: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -232,6 +234,7 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
             ordered=bound_threshold(group, ordered, options),
             between=group.between(ordered.column),
             allowance=systematic_change(group, ordered.column, options),
+            departs=bool(ordered.departure.max() > 0),
         )
     departure = guarded_departure(thresholds[guard], trend.direction)
     thresholds = {name: _lowered(each, trend.direction) for name, each in thresholds.items()}
@@ -291,19 +294,24 @@ def guarded_departure(guarded: GuardedThreshold, direction: Direction) -> np.nda
     from scipy.optimize import isotonic_regression
 
     value, se = guarded.ordered.value, guarded.ordered.se
-    if direction == "flat" or value.size < 2:
+    if value.size < 2:
         return np.zeros(value.size)
     error = np.sqrt(np.diag(guarded.between.covariance_of_mean(se)))
+    if direction == "flat":
+        return excess_departure(np.abs(value - value.mean()), error, guarded.allowance)
     weights = error**-2.0 if np.all(error > 0) else None
     nearest = isotonic_regression(value, weights=weights, increasing=direction == "increasing").x
     return excess_departure(np.abs(value - nearest), error, guarded.allowance)
 
 
 def _lowered(guarded: GuardedThreshold, direction: Direction) -> GuardedThreshold:
-    """Lower the bounds under one direction by what the guarded threshold departs from it."""
-    departure = guarded_departure(guarded, direction).max()
-    ordered = replace(guarded.ordered, bound=guarded.ordered.bound - departure)
-    return replace(guarded, ordered=ordered)
+    """Lower the bounds under one direction by what the guarded threshold departs from it.
+
+    Without a direction the lowest bound of all tests holds everywhere, whatever the others do.
+    """
+    departure = float(guarded_departure(guarded, direction).max())
+    lowered = guarded.ordered.bound - (0.0 if direction == "flat" else departure)
+    return replace(guarded, ordered=replace(guarded.ordered, bound=lowered), departs=guarded.departs or departure > 0)
 
 
 def _mean_of(group: DescribedTests, thresholds: dict[Guard, GuardedThreshold]) -> GuardedThreshold:
@@ -314,4 +322,5 @@ def _mean_of(group: DescribedTests, thresholds: dict[Guard, GuardedThreshold]) -
         ordered=mean_threshold(group, opening.ordered, closing.ordered),
         between=max(opening.between, closing.between, key=lambda each: each.sd),
         allowance=max(opening.allowance, closing.allowance),
+        departs=opening.departs or closing.departs,
     )

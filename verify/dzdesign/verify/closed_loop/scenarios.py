@@ -230,10 +230,11 @@ def _converter_off_at_zero(scene: Scene) -> ScenarioResult:
 
     Judged while it lasts, once the spool has had the time to follow. Without a zero band flow is to be expected.
     """
-    error, before = scene.command_error, scene.opened_and_closed()
-    count = scene.held(0, 2).size
+    error, count = scene.command_error, scene.held(0, 2).size
     noise = np.random.default_rng(SEED).integers(-error.noise_codes, error.noise_codes, count, endpoint=True)
     wrong = scene.loop.command_of_codes(error.offset_codes + noise)
+    # The valve closes onto the wrong zero: from a true one the spool would have to open first.
+    before = np.concatenate([_ramp(0, 1), scene.held(1), _ramp(1, float(np.mean(wrong)))])
     run = scene.run(np.concatenate([before, wrong]))
     flow = run.q_largest_L_min[before.size + round(scene.settle_s / STEP_S) :]
     return ScenarioResult(

@@ -79,15 +79,18 @@ class DriveModel:
         """Return by how many counts the law is lowered, for a command of so many codes towards full.
 
         The play operator drags a point along that stays within the noise's peak of the command; its travel, held to the
-        play's codes, says how far the command rises. Of the valve's hysteresis a falling command takes the share of
-        the transition that lies behind it.
+        play's codes, says how far the command rises. Of the valve's hysteresis, whole counts of it straight
+        between the nodes, a falling command takes the share of the transition that lies behind it.
         """
         functions, compensator = self.compensator.drive_functions, self.compensator
         before = self.played
         if abs(towards - self.played) > functions.play_noise_codes:
             self.played = towards - functions.play_noise_codes * (1 if towards > self.played else -1)
         self.rising = min(max(self.rising + self.played - before, 0), functions.play_codes)
-        width = functions.play_counts[0 if self.side > 0 else 1]
+        nodes = functions.play_counts[0 if self.side > 0 else 1]
+        place = Fraction(min(max(towards, 0), compensator.signals.command.span(self.side)), functions.play_step_codes)
+        left, right = nodes[floor(place)], nodes[floor(place) + 1]
+        width = floor(left + (right - left) * (place - floor(place)))
         past = min(max(towards - compensator.zero_band_codes, 0), compensator.transition_codes)
         falling = Fraction(functions.play_codes - self.rising, functions.play_codes)
         return width * falling * Fraction(past, compensator.transition_codes)
@@ -158,4 +161,5 @@ class DriveModel:
     def state(self) -> tuple[int, ...]:
         """Everything that `struct dz_drive` holds, in its order."""
         ramped = self.position * STEP_UNIT
-        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(self.at_rest), self.rising, self.played, int(ramped))
+        play = (self.rising, self.played)
+        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(self.at_rest), *play, int(ramped))

@@ -1,8 +1,8 @@
 """The exactly rounded law at every code pair, computed without the firmware's arithmetic.
 
 Starts from the rationals in compensator.json and the law of `dzdesign.derivation`; along a row of constant pressure the
-law is straight in the command code over the zero band, over the transition and beyond. No multiplication, shift or reciprocal is
-shared with the generated C.
+law is straight in the command code over the zero band, over the transition and beyond. No multiplication, shift or
+reciprocal is shared with the generated C.
 """
 
 from fractions import Fraction

@@ -1,0 +1,37 @@
+"""The table of what each way with the valve's hysteresis leaves, as `dzdesign design` prints it."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from dzdesign.terminal.page import new_console, put_line, put_rows
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dzdesign.design.hysteresis_choices import HysteresisChoice
+
+DITHER = (
+    "A dither takes the hysteresis out too, but moves the thresholds: give one only with ramps recorded under it."
+)
+
+
+def print_choices(choices: "Sequence[HysteresisChoice]", console: "Console | None" = None) -> None:
+    """Print the choices, nothing where there are none; the recommended one is marked."""
+    if not choices:
+        return
+    console = console or new_console()
+
+    def share(value: float | None) -> str:
+        return "-" if value is None else f"{value:.2%}"
+
+    columns: dict[str, Callable[[HysteresisChoice], str]] = {
+        "choice": lambda each: each.given + (" (recommended)" if each.recommended else ""),
+        "dead zone on opening, onset": lambda each: share(each.onset),
+        "at the reading flow": lambda each: share(each.reading),
+        "hysteresis": lambda each: share(each.hysteresis),
+    }
+    put_rows(console, "What is left of command, the worst of all tests", choices, columns)
+    for each in choices:
+        if each.refused:
+            put_line(console, f"{each.given}: {each.refused}")
+    put_line(console, DITHER)

@@ -1,0 +1,118 @@
+"""Zero band and inverse play in the closed loop with the plant of the example's recordings: what they promise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.verify.closed_loop.firmware_loop import scenes_of
+from dzdesign.verify.closed_loop.plant import read_plant
+from dzdesign.verify.closed_loop.scenarios import run_scenarios
+from tests.support.synthetic import needs_compiler
+
+pytestmark = [needs_compiler, pytest.mark.slow]
+#: Loops within loops: full, half, and small ones, back to zero at the end.
+CORNERS = (0, 1, 0, 0.5, 0.4, 0.5, 0.3, 0.35, 0.1, 0.2, 0)
+RECORDS = 10_000  # of a ramp over the whole command
+
+
+@pytest.fixture(scope="module")
+def plant(example_folder):
+    return read_plant(example_folder / "plant.toml")
+
+
+@pytest.fixture(scope="module")
+def with_play(example_valve):
+    return design(example_valve, options_of({"hysteresis": "play"}, target_named("f28335").inputs()))
+
+
+def folder_of(compensator, folder, edit=None):
+    made = generate(compensator, "f28335")
+    files = dict(made.files) if edit is None else edit(dict(made.files))
+    write_folder(folder, files, made.manifest)
+    return folder
+
+
+def widest(scene, corners=CORNERS):
+    """The largest distance of neighbouring branches over the command, from 5 % to 100 % of flow, and the last flow."""
+    parts = [np.linspace(a, b, round(abs(b - a) * RECORDS)) for a, b in zip(corners, corners[1:], strict=False)]
+    run = scene.loop.run(np.concatenate([*parts, np.zeros(100)]), scene.dp_MPa, "compensated")
+    ends = np.cumsum([0, *(part.size for part in parts)])
+    branches = [(run.command[a:b], run.q_mean_L_min[a:b]) for a, b in zip(ends, ends[1:], strict=False)]
+    found = []
+    for (u, q), (other_u, other_q) in zip(branches, branches[1:], strict=False):
+        low = max(q.min(), other_q.min(), 0.05 * run.q_mean_L_min.max())
+        flows = np.linspace(low, min(q.max(), other_q.max()), 400)[1:-1]
+        if flows[-1] > flows[0]:
+            at, other_at = (np.interp(flows, *sorted_by_flow(each)) for each in ((u, q), (other_u, other_q)))
+            found.append(np.abs(at - other_at).max())
+    return max(found), run.q_largest_L_min[-1]
+
+
+def sorted_by_flow(branch):
+    u, q = branch
+    order = np.argsort(q, kind="stable")
+    return q[order], u[order]
+
+
+def test_the_play_takes_the_hysteresis_out_and_nothing_flows_at_zero(example_valve, with_play, plant, tmp_path):
+    kept = design(example_valve, options_of({}, target_named("f28335").inputs()))
+    for name, compensator, least, most in (("kept", kept, 0.03, 0.05), ("play", with_play, 0.0, 0.005)):
+        folder = folder_of(compensator, tmp_path / name)
+        for scene in scenes_of(folder, compensator, plant):
+            width, last = widest(scene)
+            assert least <= width <= most and last == 0.0, (name, scene.dp_MPa, width)
+
+
+@pytest.mark.parametrize("times", [0.5, 2.0])
+def test_a_wrong_play_makes_no_flow_at_zero(with_play, plant, tmp_path, times):
+    """Half and double of the width that the firmware counts on, in what it has and in the valve that it drives."""
+    nodes = tuple(round(times * count) for count in with_play.drive_functions.play_counts[0])
+    wrong = replace(with_play, drive_functions=replace(with_play.drive_functions, play_counts=(nodes, ())))
+    folder = folder_of(wrong, tmp_path / "wrong")
+    for scene in scenes_of(folder, wrong, plant):
+        assert widest(scene)[1] == 0.0
+        for result in run_scenarios(scene):
+            assert not result.must_shut or result.q_zero_L_min == 0.0, result.name
+
+
+def test_noise_on_a_standing_command_does_not_chatter(example_valve, with_play, plant, tmp_path):
+    rng = np.random.default_rng(3)
+    kept = design(example_valve, options_of({}, target_named("f28335").inputs()))
+    folders = {name: folder_of(c, tmp_path / name) for name, c in (("kept", kept), ("play", with_play))}
+    scenes = {
+        "kept": scenes_of(folders["kept"], kept, plant)[3],
+        "play": scenes_of(folders["play"], with_play, plant)[3],
+    }
+    for code in (60, 300, 1500, 3000):
+        for before in (0.0, 1.0):  # come from below, and from above
+            codes = np.concatenate([np.linspace(4095 * before, code, 2000).round(), code + rng.integers(-4, 5, 6000)])
+            rms = {}
+            for name, scene in scenes.items():
+                command = scene.loop.command_of_codes(codes)
+                run = scene.loop.run(command, scene.dp_MPa, "compensated", periods_per_record=2)
+                rms[name] = run.compare[4000:].std()
+            assert 0 < rms["play"] <= 2 * rms["kept"], (code, before, rms)
+
+
+def test_a_core_without_its_zero_band_is_seen_by_the_zero_command_that_is_read_too_high(example_valve, plant, tmp_path):
+    """The seeded fault: the band is one code wide, and the drive leaves its rest at once."""
+    compensator = design(example_valve, options_of({}, target_named("f28335").inputs()))
+
+    def edit(files):
+        files["core/dz_comp.c"] = files["core/dz_comp.c"].replace("#define ZERO_BAND 19u", "#define ZERO_BAND 1u")
+        text = files["core/dz_drive.c"].replace("#define ZERO_BAND INT32_C(19)", "#define ZERO_BAND INT32_C(1)")
+        files["core/dz_drive.c"] = text.replace("#define LEAVE_ZERO INT32_C(24)", "#define LEAVE_ZERO INT32_C(2)")
+        return files
+
+    leaks = {}
+    for name, change in (("right", None), ("wrong", edit)):
+        scenes = scenes_of(folder_of(compensator, tmp_path / name, change), compensator, plant)
+        results = [each for scene in scenes for each in run_scenarios(scene) if "codes too high" in each.name]
+        assert len(results) == len(scenes) and all(each.must_shut for each in results)
+        leaks[name] = max(each.q_zero_L_min for each in results)
+    assert leaks["right"] == 0.0 < leaks["wrong"]
