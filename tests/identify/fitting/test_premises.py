@@ -6,9 +6,9 @@ from fractions import Fraction
 import cvxpy as cp
 import numpy as np
 import pytest
+from curve_premises import failures
 from scipy.special import ndtr
 
-from benchmarks.identify.premises import failures
 from dzdesign.core.errors import InputError
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.identify.fitting import premises

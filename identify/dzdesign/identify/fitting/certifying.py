@@ -10,7 +10,8 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import MPA, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import fit_offset
-from dzdesign.identify.fitting.guarding import GuardedThreshold, OrderedKnees
+from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
+from dzdesign.identify.fitting.guarding import OrderedKnees
 from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
 from dzdesign.identify.fitting.premises import (
     FEWEST_FOR_CURVATURE,
