@@ -146,7 +146,7 @@ def examine(valve: Drawn, guard: Guard, rng: np.random.Generator) -> tuple[bool,
         repeatability=valve.scatter / 10 if valve.repeats == 1 else None,
     )
     side = identify(tests, options).positive
-    curve, up = side.guards[guard], PLAY_V if guard == "opening" else 0.0
+    curve, up = side.certified[guard], PLAY_V if guard == "opening" else 0.0
     level = side.certificate.level_L_min
     flows, losses = [], []
     for dp, offset in zip(PRESSURES_MPa, curve.u_offset_V, strict=True):

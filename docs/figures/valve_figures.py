@@ -1,5 +1,6 @@
 """Figures of the valve and of what is identified: dead zone, thresholds, beta, staircase."""
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -109,15 +110,18 @@ def beta(example: Example) -> "Figure":
 
 
 def _steps(axes: "Axes", side: object) -> None:
-    """Draw the staircase: between two tests the lower of their bounds."""
-    dp, steps = side.beta.dp_MPa, side.curve.certified_steps_V
-    for index, step in enumerate(steps):
-        label = "staircase: certain between the tests" if index == 0 else None
-        axes.plot(dp[index : index + 2], (step, step), color=GREEN, lw=3, solid_capstyle="butt", label=label)
+    """Draw what is certified between the tests, and the staircase: between two of them the lower of their bounds."""
+    dp, lower = side.curve.dp_MPa, side.curve.u_lower_V
+    for index, step in enumerate(min(pair) for pair in pairwise(lower)):
+        label = "staircase, of --curve monotone" if index == 0 else None
+        axes.plot(dp[index : index + 2], (step, step), color=GREY, lw=2, solid_capstyle="butt", label=label)
+    fine = np.unique([*dp, *np.linspace(dp[0], dp[-1], 901)])
+    bound = side.curve.bound(side.trend).in_doubles(fine)
+    axes.plot(fine, bound, color=GREEN, lw=2.5, label=f"certified bound, --curve {side.curve.premise}")
 
 
 def staircase(example: Example) -> "Figure":
-    """Thresholds, bounds, the staircase and the offset that stays below all of it; right enlarged."""
+    """Thresholds, bounds, what is certified between the tests and the offset below that; right enlarged."""
     figure, axes = panels(3.9, 2, width_ratios=(3, 2))
     side = example.side
     fine = np.linspace(side.beta.dp_MPa[0], side.beta.dp_MPa[-1], 1801)
@@ -133,6 +137,6 @@ def staircase(example: Example) -> "Figure":
         panel.set(xlabel="pressure drop (MPa)")
     axes[0].set(ylabel="command (V)", title="the tested interval")
     axes[1].set(title="two tests, enlarged", xlim=(1.85, 3.15), ylim=(5.085, 5.175))
-    note(axes[1], "between two tests only\nthe lower bound is certain", (2.55, 5.140), (2.55, 5.1048))
+    note(axes[1], "between two tests the bound\nsags by the curvature", (2.45, 5.145), (2.5, 5.098))
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure

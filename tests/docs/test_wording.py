@@ -1,8 +1,8 @@
 """What the outputs say, in words that an engineer has, each of them in the glossary."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -12,6 +12,7 @@ from dzdesign.terminal.notebook import html_of
 from dzdesign.terminal.page import new_console
 from dzdesign.terminal.tables import print_compensator, print_valve
 from dzdesign.terminal.verification_tables import print_scenarios
+from dzdesign.verify.loop_results import ScenarioResult
 from tests.support.paths import ROOT
 
 GLOSSARY = (ROOT / "docs/concepts/glossary.md").read_text("utf-8")
@@ -22,9 +23,10 @@ FIGURES = {
 
 
 def scenario(name, **figures):
-    return SimpleNamespace(
-        name=name, dp_MPa=5.0, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0, must_shut=True, figures=figures
-    )
+    return ScenarioResult(
+        name=name, side="positive", dp_MPa=5.0, leak_L_min=0.0, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0, unseen_below_L_min=None,
+        must_shut=True, figures=figures,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("width", [80, 100, 140])
@@ -39,6 +41,13 @@ def test_scenarios_are_a_table_of_short_rows_and_lines(monkeypatch, capsys, widt
     assert lines == (
         "with the compensator flow 12.9 L/min, rise 4 ms, settling 9.6 ms, overshoot 6.31 %; without it flow 0 L/min\n"
     )
+
+
+def test_a_flow_that_the_recordings_can_not_show_is_no_zero(capsys):
+    hidden = replace(scenario("step", **FIGURES), unseen_below_L_min=0.63, q_peak_at_zero_L_min=0.7)
+    print_scenarios([hidden], new_console())
+    out = capsys.readouterr().out
+    assert re.search(r"5\.00 +below 0\.63 +0\.70", out) and "without it flow below 0.63 L/min" in out
 
 
 def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensator, capsys):

@@ -205,14 +205,14 @@ def test_a_missed_limit_of_recordings_does_not_hold(copied):
         tool=THIS_TOOL,
         made_from=tuple(Recording(source=each.source, sha256=each.sha256, set="before") for each in valve.made_from),
         options=Request(
-            u_max_V=10.0, after_u_max_V=10.0, knee_window=(0.1, 0.5), linearity_window=(0.1, 0.9), level_L_min=None,
-            level_share=0.01, same_pressure_within=0.05,
+            u_max_V=10.0, after_u_max_V=10.0, knee_window=(0.1, 0.5), linearity_window=(0.1, 0.9),
+            reading_flow_L_min=None, reading_share=0.01, same_pressure_within=0.05,
         ),
         meter=MeterTaken(floor_L_min=0.1, lag_s=0.0, lag_is="unknown"),
         quantities={"hysteresis": Quantity(name="hysteresis", unit="%", formula="f")},
         pressures=(
             PressureAssessment(
-                side="positive", dp_MPa=1.0, level_L_min=0.1, rated_flow_L_min=15.0, before=ramps, after=ramps,
+                side="positive", dp_MPa=1.0, reading_flow_L_min=0.1, rated_flow_L_min=15.0, before=ramps, after=ramps,
                 quantities={"hysteresis": BeforeAfter(before=None, after=after, change=None)},
             ),
         ),
@@ -621,7 +621,7 @@ def test_of_how_many_runs_a_figure_is_the_worst(sides, said):
         side="positive", dp_MPa=1.0, dead_zone_opening=0.5, dead_zone_closing=0.5, residual_opening=0.1,
         residual_closing=0.1, reading_flow_L_min=0.6, reading_opening_without=0.5, reading_closing_without=0.5,
         reading_opening=0.1, reading_closing=0.1, ideal_line=0.04, unseen_below_L_min=None, flow_miss=0.0,
-        q_zero_L_min=0.0, q_zero_without_beta_L_min=0.0, q_max_direct_L_min=1.0, q_max_L_min=1.0,
+        leak_L_min=0.0, q_zero_L_min=0.0, q_zero_without_beta_L_min=0.0, q_max_direct_L_min=1.0, q_max_L_min=1.0,
     )  # fmt: skip
     runs = [replace(one, side=side, dp_MPa=1.0 + n) for side, count in sides.items() for n in range(count)]
     assert worst_of(runs, AS_COMPUTED) == said

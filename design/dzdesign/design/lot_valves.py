@@ -12,7 +12,8 @@ from typing import Annotated
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, Sha256, quantity
-from dzdesign.identify.valve.certified_bound import CertifiedBound, Premise
+from dzdesign.identify.constants import Premise
+from dzdesign.identify.valve.certified_bound import CertifiedBound
 from dzdesign.identify.valve.quantity_types import PressureDrop, SecondDifference, Voltage
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.identify.valve.staircase import Direction

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
 
 #: Of the threshold between the tests.
-PREMISES = "dzdesign.identify.valve.certified_bound:PREMISES"
+PREMISES = "dzdesign.identify.constants:PREMISES"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,10 @@
-"""Units and limits that several rooms of identify share; all numbers inside are SI."""
+"""Units, limits and words that several rooms of identify share; all numbers inside are SI."""
 
+from typing import Literal, get_args
+
+#: What is taken of the threshold between the tests, from the strongest on.
+Premise = Literal["line", "smooth", "monotone"]
+PREMISES: tuple[Premise, ...] = get_args(Premise)
 MPA = 1e6
 L_MIN = 1e-3 / 60
 #: Pressure drops beyond these, Pa, are a wrong unit.

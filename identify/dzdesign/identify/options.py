@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.identify.valve.certified_bound import PREMISES, Premise
+from dzdesign.identify.constants import PREMISES, Premise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -111,10 +111,8 @@ def _dead_zone(loops: Sequence[PressureResult], branch: str, units: RecordedUnit
 def _read(loops: Sequence[PressureResult], branch: str, units: RecordedUnits) -> str:
     """Say what is read at the reading flow, where it is most, and what an ideal line would read there."""
     worst = max(loops, key=lambda each: float(getattr(each, f"reading_{branch}")))
-    return (
-        f". Read at {units.text(worst.reading_flow_L_min, '.2f L/min')}: {100 * getattr(worst, f'reading_{branch}'):.1f} "
-        f"%, of which {100 * worst.ideal_line:.1f} % an ideal line's"
-    )
+    flow, read = units.text(worst.reading_flow_L_min, ".2f L/min"), 100 * getattr(worst, f"reading_{branch}")
+    return f". Read at {flow}: {read:.1f} % at most, where an ideal line reads {100 * worst.ideal_line:.1f} %"
 
 
 def worst_of(loops: Sequence[PressureResult], units: RecordedUnits) -> str:

@@ -174,7 +174,7 @@ def test_pressures_without_a_unit_are_seen_and_can_be_declared_as_said(here, cap
         assert f'declare by --columns "{declared}"' in said
         Path("dzdesign.toml").unlink()
         init_then_identify("ramp.csv", more=("--columns", declared))
-        assert "at 1 MPa" in capsys.readouterr().out
+        assert "at 10 bar" in capsys.readouterr().out
 
 
 FOREIGN = ("Druckdifferenz [bar]", "Delta P (bar)", "p_diff/bar", "p1 [bar]", "Druck in bar", "Diff. pressure (bar)")

@@ -6,9 +6,9 @@ from fractions import Fraction
 import cvxpy as cp
 import numpy as np
 import pytest
+from curve_premises import failures
 from scipy.special import ndtr
 
-from benchmarks.identify.premises import failures
 from dzdesign.core.errors import InputError
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.identify.fitting import premises
@@ -21,6 +21,7 @@ from dzdesign.identify.fitting.premises import (
     second_differences,
 )
 from dzdesign.identify.knees.between_ramps import BetweenRamps
+from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.certified_bound import CertifiedBound
@@ -41,7 +42,7 @@ def between(tests: int, sd: float = 0.0) -> BetweenRamps:
     """What differs from ramp to ramp, of tests with one ramp each and a declared scatter."""
     return BetweenRamps(
         sd=sd, degrees=np.inf, origin="declared", noise=0.0, covariance=np.eye(tests), drift=None,
-        no_drift="order unknown", shifts=(),
+        no_drift="order unknown", shifts=(), checks=ScatterChecks(largest=None, outlying=None, serial=None),
     )  # fmt: skip
 
 

@@ -28,8 +28,9 @@ def plant(example_folder):
 def scene_of(folder, compensator, plant, dp_MPa=1.0, **changes) -> Scene:
     loop = ClosedLoop(plant, folder, compensator)
     return Scene(
-        loop=loop, plant=plant, side="positive", dp_MPa=dp_MPa, reference_MPa=1.0, tested_MPa=(0.5, 5.0), **changes
-    )
+        loop=loop, plant=plant, side="positive", dp_MPa=dp_MPa, reference_MPa=1.0, tested_MPa=(0.5, 5.0),
+        command_error=compensator.command_error, has_zero_band=bool(compensator.zero_band_codes), **changes,
+    )  # fmt: skip
 
 
 def by_name(scene: Scene) -> dict:

@@ -47,7 +47,8 @@ class PressureResult:
         Flow | None,
         about("Flow below which the recordings show none, so that the plant's is not known; null of a given plant."),
     ]
-    q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing, with compensator.")]
+    leak_L_min: Annotated[Flow, about("Flow without any drive, which no compensator can stop.")]
+    q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing, with compensator; a leak is in it.")]
     q_zero_without_beta_L_min: Annotated[Flow, about("The same with beta held at 1: what over-compensation would do.")]
     flow_miss: Annotated[
         float,
@@ -61,6 +62,11 @@ class PressureResult:
     ]
     q_max_direct_L_min: Annotated[Flow, about("Largest flow without compensator.")]
     q_max_L_min: Annotated[Flow, about("Largest flow with it.")]
+
+    @property
+    def q_opened_L_min(self) -> float:
+        """Flow at zero command beyond the leak: what the compensator lets through."""
+        return self.q_zero_L_min - self.leak_L_min
 
     def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
         """Return a flow to two decimals of a L/min; what the recordings can't show is no 0.00."""
@@ -111,7 +117,8 @@ class ScenarioResult:
     name: Annotated[str, about("What happens.")]
     side: Side
     dp_MPa: PressureDrop
-    q_zero_L_min: Annotated[Flow, about("Flow at zero command at the end.")]
+    leak_L_min: Annotated[Flow, about("Flow without any drive at the end, which no compensator can stop.")]
+    q_zero_L_min: Annotated[Flow, about("Flow at zero command at the end; a leak is in it.")]
     q_peak_at_zero_L_min: Annotated[
         Flow, about("Largest flow while the command was zero and the valve had closed before.")
     ]
@@ -128,6 +135,11 @@ class ScenarioResult:
     def is_load_step(self) -> bool:
         """Whether the pressure drop jumps in it."""
         return "pressure_drop_then_MPa" in self.figures
+
+    @property
+    def q_opened_L_min(self) -> float:
+        """Flow at zero command beyond the leak: what the compensator lets through."""
+        return self.q_zero_L_min - self.leak_L_min
 
     def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
         """Return a flow to two decimals of a L/min; what the recordings can't show is no 0.00."""

@@ -7,10 +7,11 @@ from typing import Literal
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.constants import MPA
+from dzdesign.identify.constants import MPA, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import fit_offset
-from dzdesign.identify.fitting.guarding import GuardedThreshold, OrderedKnees
+from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
+from dzdesign.identify.fitting.guarding import OrderedKnees
 from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
 from dzdesign.identify.fitting.premises import (
     FEWEST_FOR_CURVATURE,
@@ -20,7 +21,7 @@ from dzdesign.identify.fitting.premises import (
     find_curvature,
 )
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.certified_bound import CertifiedBound, Premise
+from dzdesign.identify.valve.certified_bound import CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, OpeningCurve, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
 from dzdesign.identify.valve.staircase import Direction, staircase
@@ -130,7 +131,7 @@ def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
         except InputError as error:
             failures[premise] = error
     checks = {premise: _check(bound, offsets.get(premise), tested) for premise, bound in bounds.items()}
-    taken, refused = _take(bounds, offsets, tested.options.curve)
+    taken, refused = _take(bounds, offsets, tested.options.curve, one_way=not guarded.departs)
     if taken not in offsets:
         raise failures[taken]
     bound, offset = bounds[taken], offsets[taken]
@@ -152,12 +153,17 @@ def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
 
 
 def _take(
-    bounds: Mapping[Premise, BoundUnderPremise], offsets: Mapping[Premise, OffsetUnderBound], asked: Premise | None
+    bounds: Mapping[Premise, BoundUnderPremise],
+    offsets: Mapping[Premise, OffsetUnderBound],
+    asked: Premise | None,
+    *,
+    one_way: bool,
 ) -> tuple[Premise, Premise | None]:
     """Return the premise to take, and the one that was asked for but that the tests refuse.
 
     By default `smooth`, where its curvature can be told or is declared and it certifies more, on average, than
-    `monotone`: a curvature that the tests know too badly supports nothing.
+    `monotone`: a curvature that the tests know too badly supports nothing. Where the tests do not run `one_way`, it is
+    `smooth` whatever it certifies.
     """
     refused = asked if asked in bounds and asked is not None and bounds[asked].refused else None
     if asked is not None and asked not in bounds:
@@ -170,7 +176,7 @@ def _take(
     smooth = bounds.get("smooth")
     if refused == "smooth" or smooth is None or smooth.refused or "smooth" not in offsets:
         return "monotone", refused
-    better = "monotone" not in offsets or offsets["smooth"].mean > offsets["monotone"].mean
+    better = not one_way or "monotone" not in offsets or offsets["smooth"].mean > offsets["monotone"].mean
     return ("smooth" if better else "monotone"), refused
 
 

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.constants import MPA
+from dzdesign.identify.constants import MPA, Premise
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.joint_curve import fit_joint_curve
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.certified_bound import Premise
 from dzdesign.identify.valve.identified_curve import IdentifiedCurve
 
 

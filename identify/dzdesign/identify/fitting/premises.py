@@ -67,7 +67,7 @@ def find_curvature(
     Only a threshold that bends upwards lies below its chords. Estimated, M is four times the largest second divided
     difference at the tests; in the first and the last interval at least 32 times that of the one test that tells of it
     (64 with three tests). Its error needs no allowance: what M lacks by it is small beside the distance of the bounds
-    from the thresholds, which the same errors set (benchmarks/identify/premises.py).
+    from the thresholds, which the same errors set (benchmarks/identify/curve_premises.py).
 
     Parameters
     ----------

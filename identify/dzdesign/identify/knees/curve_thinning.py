@@ -1,11 +1,11 @@
 """A recorded branch as few points: straight lines through its averaged flow, halved where they depart from it."""
 
 import math
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.constants import L_MIN, MPA, SMALLEST_DP
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.noise import robust_sigma
@@ -18,29 +18,72 @@ from dzdesign.identify.valve.recorded_curve import MOST_POINTS, SAG_STEPS, Recor
 AVERAGED, TOLERANCE, NOISE_ERRORS = 5, 2.5e-3, 4.0
 #: Readings within this share of a step of the flow tell the pressure drop there.
 NEAR_STEP = 0.1
-#: Decimals of a point, V and L/min: far below what a recording tells.
-COMMAND_DIGITS, FLOW_DIGITS = 4, 4
+#: Share by which a pressure drop is another than the flow's usual one: more than straight lines between the steps miss
+#: of a supply whose pump reaches its limit.
+OFF_THE_USUAL = 0.15
+#: Digits of a point, of the largest command and flow, and decimals of any number of the file.
+DIGITS, DECIMALS = 5, 7
 
 
 def recorded_curve(item: DescribedTest, leak: float, noise_level: float, u_max: float) -> RecordedCurve:
     """Return the characteristic that the ramps of a test show; leak and noise level in m³/s."""
-    profiles = [_profile(shape, leak, u_max) if shape else None for shape in item.shapes]
+    supply = _Supply.of([shape.prepared.branch for shape in item.branches], leak, item.q_max + leak)
+    profiles = [_profile(shape, supply, leak, u_max) if shape else None for shape in item.shapes]
     tolerance = TOLERANCE * max(float(profile[1].max()) for profile in profiles if profile)
     rising, falling = (
         profile and _thinned(*profile, leak=leak, level=noise_level, tolerance=tolerance) for profile in profiles
     )
     curve = RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=None)
-    branches = [shape.prepared.branch for shape in item.branches]
-    return RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=_sag(branches, leak, curve.q_max_L_min))
+    if supply is None:
+        return curve
+    dp = supply.at(np.linspace(0, curve.q_max_L_min * L_MIN, SAG_STEPS + 1)) / MPA
+    nodes = tuple(round(value, _decimals(dp.max())) for value in dp.tolist())
+    return RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=nodes)
 
 
-def _profile(shape: BranchShape, leak: float, u_max: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return command and flow in bins of the command, as recorded, and where flow begins: no later than the knee.
+@dataclass(frozen=True, slots=True)
+class _Supply:
+    """How the bench's pressure drop sags over the flow: m³/s and Pa, straight between."""
+
+    q: np.ndarray
+    dp: np.ndarray
+
+    @classmethod
+    def of(cls, branches: list[Branch], leak: float, q_max: float) -> "_Supply | None":
+        """Return the medians of the pressure drop about equal steps of the flow; None where it is not known."""
+        known = [branch.dp for branch in branches if branch.dp is not None]
+        if len(known) < len(branches):
+            return None
+        dp, steps = np.concatenate(known), np.concatenate([branch.q + leak for branch in branches]) / q_max * SAG_STEPS
+        about = {step: dp[np.abs(steps - step) < NEAR_STEP] for step in range(SAG_STEPS + 1)}
+        found = {step: float(np.median(near)) for step, near in about.items() if near.size}
+        return cls(np.array(list(found)) * q_max / SAG_STEPS, np.array(list(found.values())))
+
+    def at(self, q: np.ndarray) -> np.ndarray:
+        """Return the pressure drop at flows."""
+        sagged: np.ndarray = np.maximum(np.interp(q, self.q, self.dp), SMALLEST_DP)
+        return sagged
+
+    def brought_to(self, q: np.ndarray, dp: np.ndarray) -> np.ndarray:
+        """Return flows as they would be had the supply sagged as usual, where it was on its way up, or gone."""
+        usual = self.at(q)
+        off = np.abs(dp - usual) > OFF_THE_USUAL * usual
+        # Eq. (1), as at_nominal_pressure has it: below a tenth of the pressure the ratio would only carry noise.
+        return np.where(off, q * np.sqrt(usual / np.maximum(dp, 0.1 * usual)), q)
+
+
+def _profile(
+    shape: BranchShape, supply: _Supply | None, leak: float, u_max: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return command and flow in bins of the command, and where flow begins: no later than the knee.
 
     Of a noisy meter the first flow that stands out comes after the knee, and the valve is no sharper for that.
     """
-    flow = shape.prepared.branch.q + leak
-    return *smooth_profile(shape.prepared.branch.u, flow, u_max), min(shape.onset, shape.knee)
+    branch = shape.prepared.branch
+    flow = branch.q + leak
+    if supply and branch.dp is not None:
+        flow = supply.brought_to(flow, branch.dp)
+    return *smooth_profile(branch.u, flow, u_max), min(shape.onset, shape.knee)
 
 
 def _thinned(
@@ -48,26 +91,30 @@ def _thinned(
 ) -> RecordedBranch:
     """Return the points of a branch whose flow q (m³/s) was averaged in bins of the command."""
     at, q_at = _points(u, q, tolerance)
-    u_seen = _first_seen(u[at], q_at, level)
+    u_seen = _first_seen(u[at], q_at, leak + level)
     lowest, seen = float(u[0]), u[at] > u_seen
-    points = [(u_seen, level), *zip(u[at][seen].tolist(), np.maximum(q_at[seen], 0.0).tolist(), strict=True)]
+    points = [(u_seen, leak + level), *zip(u[at][seen].tolist(), np.maximum(q_at[seen], 0.0).tolist(), strict=True)]
     if u_seen > lowest:
-        base = min(leak, level)
-        # What lies below the level comes to the leak at the onset, which no recorded flow contradicts.
-        zero = min(max(onset, lowest), u_seen)
-        points = [(lowest, base), (zero, base), *points]
+        # Flow beyond the leak is seen from the level on; below, it comes to none where no recorded flow contradicts it.
+        points = [(lowest, leak), (min(max(onset, lowest), u_seen), leak), *points]
     else:
         points = list(zip(u[at].tolist(), np.maximum(q_at, 0.0).tolist(), strict=True))
+    fine_V, fine_L_min = _decimals(float(u[-1])), _decimals(float(q_at.max()) / L_MIN)
     # Of two points at one command, as of an onset at the first flow seen, the later one stands for both.
-    kept = {round(command, COMMAND_DIGITS): round(flow / L_MIN, FLOW_DIGITS) for command, flow in points}
+    kept = {round(command, fine_V): round(flow / L_MIN, fine_L_min) for command, flow in points}
     commands, flows = np.array(list(kept)), np.array(list(kept.values()))
     misses = _averaged(np.where(u >= u_seen, q / L_MIN - np.interp(u, commands, flows), 0.0))
     return RecordedBranch(
         u_V=tuple(commands.tolist()),
         q_L_min=tuple(flows.tolist()),
-        u_seen_V=round(u_seen, COMMAND_DIGITS),
-        error_L_min=round(float(np.abs(misses).max()), FLOW_DIGITS),
+        u_seen_V=round(u_seen, fine_V),
+        error_L_min=round(float(np.abs(misses).max()), fine_L_min),
     )
+
+
+def _decimals(largest: float) -> int:
+    """Return the decimals that leave a quantity so many digits as a recording tells, and a few more."""
+    return min(max(DIGITS - math.ceil(math.log10(largest)), 0), DECIMALS)
 
 
 def _points(u: np.ndarray, q: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
@@ -80,7 +127,7 @@ def _points(u: np.ndarray, q: np.ndarray, tolerance: float) -> tuple[np.ndarray,
         flows = _least_squares(u, q, at)
         misses = np.abs(_averaged(q - np.interp(u, u[at], flows)))
         wide = np.diff(at) > 1
-        worst = np.array([misses[left : right + 1].max() for left, right in pairwise(at)])
+        worst = np.maximum.reduceat(misses, at[:-1])
         halved = np.flatnonzero(wide & (worst > allowed))
         room = MOST_POINTS - at.size
         if not halved.size or room <= 0:
@@ -91,21 +138,16 @@ def _points(u: np.ndarray, q: np.ndarray, tolerance: float) -> tuple[np.ndarray,
 
 def _least_squares(u: np.ndarray, q: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Return the flows at the points whose straight lines come nearest to the flow of all bins."""
-    segment = np.clip(np.searchsorted(at, np.arange(u.size), side="right") - 1, 0, at.size - 2)
-    left, right = u[at[segment]], u[at[segment + 1]]
-    share = (u - left) / (right - left)
-    size = at.size
-    normal = np.zeros((size, size))
-    for row, column, weight in (
-        (segment, segment, (1 - share) ** 2),
-        (segment, segment + 1, (1 - share) * share),
-        (segment + 1, segment, (1 - share) * share),
-        (segment + 1, segment + 1, share**2),
-    ):
-        np.add.at(normal, (row, column), weight)
-    wanted = np.zeros(size)
-    np.add.at(wanted, segment, (1 - share) * q)
-    np.add.at(wanted, segment + 1, share * q)
+    starts, stretches = at[:-1], at.size - 1
+    segment = np.repeat(np.arange(stretches), np.diff(np.append(starts, u.size)))
+    left = u[starts]
+    share = (u - left[segment]) / (u[at[1:]] - left)[segment]
+    before = 1 - share
+    # Each bin bears on the two points beside it: sums over the bins of a stretch.
+    own, other, both = (np.add.reduceat(each, starts) for each in (before * before, share * share, share * before))
+    normal = np.diag(np.append(own, 0.0) + np.append(0.0, other)) + np.diag(both, 1) + np.diag(both, -1)
+    wanted = np.append(np.add.reduceat(before * q, starts), 0.0)
+    wanted[1:] += np.add.reduceat(share * q, starts)
     return np.linalg.solve(normal, wanted)
 
 
@@ -126,15 +168,3 @@ def _first_seen(u: np.ndarray, q: np.ndarray, level: float) -> float:
     if last + 1 == u.size:
         return float(u[-1])
     return float(np.interp(level, q[last : last + 2], u[last : last + 2]))
-
-
-def _sag(branches: list[Branch], leak: float, q_max_L_min: float) -> tuple[float, ...] | None:
-    """Return the pressure drop at equal steps of the flow, MPa: medians about them, straight between those."""
-    if any(branch.dp is None for branch in branches):
-        return None
-    dp = np.concatenate([branch.dp for branch in branches if branch.dp is not None])
-    steps = np.concatenate([branch.q + leak for branch in branches]) / (q_max_L_min * L_MIN) * SAG_STEPS
-    about = {step: dp[np.abs(steps - step) < NEAR_STEP] for step in range(SAG_STEPS + 1)}
-    found = {step: float(np.median(near)) for step, near in about.items() if near.size}
-    nodes = np.interp(np.arange(SAG_STEPS + 1), list(found), list(found.values()))
-    return tuple(round(float(node) / MPA, FLOW_DIGITS) for node in nodes)

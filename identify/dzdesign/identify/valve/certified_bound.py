@@ -5,15 +5,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Literal, get_args
 
 import numpy as np
 
+from dzdesign.identify.constants import Premise
 from dzdesign.identify.valve.staircase import Direction, staircase
 
-#: What is taken of the threshold between the tests, from the strongest on.
-Premise = Literal["line", "smooth", "monotone"]
-PREMISES: tuple[Premise, ...] = get_args(Premise)
 #: Pressure drops closer than this are one to a double, MPa.
 NEAR_MPa = 1e-9
 

@@ -9,7 +9,8 @@ import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound, Premise
+from dzdesign.identify.constants import Premise
+from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.quantity_types import (
     PressureDrop,
     Probability,

@@ -28,13 +28,23 @@ if TYPE_CHECKING:
 NEAR_ZERO = 15.0
 
 
-def loop_figure(curves: Curves, side: str, both: bool, units: RecordedUnits) -> ReportFigure:
-    """Draw flow over command without and with the compensator, whole and near zero, from closed_loop_<side>.csv."""
+def loop_figure(
+    curves: Curves, side: str, both: bool, units: RecordedUnits, unseen_below_L_min: float | None = None
+) -> ReportFigure:
+    """Draw flow over command without and with the compensator, whole and near zero, from closed_loop_<side>.csv.
+
+    Below `unseen_below_L_min` nothing of the flow was recorded: the lines go on there as the first flows do.
+    """
     ends = [name.removeprefix("q_with_") for name in curves.columns if name.startswith("q_with_")]
     figure = new_figure(3.9, top=0.3, right=0.5)
     wide, near = figure.subplots(1, 2, width_ratios=(1.35, 1), gridspec_kw={"wspace": 0.36})
     _draw_whole(wide, curves, ends, units)
     _draw_near_zero(near, curves, ends, units)
+    hidden = ""
+    if unseen_below_L_min is not None:
+        near.axhspan(0, units.convert(unseen_below_L_min, "L/min"), color=LIGHT["soft"], alpha=0.15, lw=0, zorder=0)
+        shown = units.text(unseen_below_L_min, ".2f L/min")
+        hidden = f" Shaded: below {shown} the recordings show no flow, and the first flows are continued."
     starts = {
         which: [_first_flow(curves, f"q_{which}_{end}") for end in ends] for which in ("without", "with")
     }
@@ -42,7 +52,7 @@ def loop_figure(curves: Curves, side: str, both: bool, units: RecordedUnits) -> 
         figure,
         f"loop-{side}",
         f"Closed loop: a ramp up and down, the generated C driving the simulated valve{side_words(side, both)}. Of "
-        "two branches the one at lower commands is closing; what lies between is the valve's hysteresis.",
+        f"two branches the one at lower commands is closing; what lies between is the valve's hysteresis.{hidden}",
         f"Flow over command at {len(ends)} pressure drops. First flow on the ramp up: without the "
         f"compensator at {_percents(starts['without'])}, with it at {_percents(starts['with'])} of full command.",
         curves.text,

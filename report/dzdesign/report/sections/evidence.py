@@ -95,7 +95,8 @@ def loop_section(chain: Chain) -> Section:
         if curves is None:
             missing = f"{closed_loop_name(side)} is missing, so the ramps are not drawn; `dzdesign verify` makes it."
         else:
-            figures.append(loop_figure(curves, side, len(sides) > 1, units))
+            unseen = max((each.unseen_below_L_min for each in of_side if each.unseen_below_L_min), default=None)
+            figures.append(loop_figure(curves, side, len(sides) > 1, units, unseen))
     return Section(
         figures=figures,
         tables=(

@@ -47,7 +47,8 @@ def compare_at_pressure(
     # Only the flow at zero command is asked of this one, so it may open and close the valve quickly.
     quick = RampSequence(rest=sequence.rest, ramp=5.0, top=0.5).no_faster_than(loop.slowest_ramp_s).command()
     without_beta = loop.run(quick, dp_MPa, "without beta", dp_frozen_MPa=dp0_MPa)
-    level, reading = FLOW_SHARE * float(direct.q_L_min.max()), reading_flow_L_min
+    leak, reading = loop.leak_L_min(dp_MPa), reading_flow_L_min
+    level = leak + FLOW_SHARE * float(direct.q_L_min.max())
     largest = float(with_core.q_mean_L_min.max())
     result = PressureResult(
         side=side,
@@ -63,6 +64,7 @@ def compare_at_pressure(
         reading_closing=dead_zone(with_core, reading, rising=False),
         ideal_line=ideal_line(reading, largest),
         unseen_below_L_min=loop.unseen_below_L_min(dp_MPa),
+        leak_L_min=leak,
         q_zero_L_min=float(with_core.q_largest_L_min[-1]),
         q_zero_without_beta_L_min=float(without_beta.q_largest_L_min[-1]),
         flow_miss=largest_miss(direct, loop.u_max_V, recorded),

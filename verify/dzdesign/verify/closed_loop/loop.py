@@ -129,6 +129,10 @@ class ClosedLoop:
         self.u_max_V = plant.parameters.u_max_V
         self._stand_in = plant if isinstance(plant, StandIn) else None
 
+    def leak_L_min(self, dp_MPa: float) -> float:
+        """Return what the valve passes without any drive at a pressure drop: no compensator can stop it."""
+        return float(self.run(np.zeros(1), dp_MPa, periods_per_record=1).q_mean_L_min[0])
+
     def unseen_below_L_min(self, dp_MPa: float) -> float | None:
         """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""
         return None if self._stand_in is None else self._stand_in.unseen_below_L_min(dp_MPa)

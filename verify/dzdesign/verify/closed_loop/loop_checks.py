@@ -76,7 +76,7 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
 
     A stand-in closes where the recorded flow, continued below the noise level, comes to none.
     """
-    worst = max(ramps, key=lambda ramp: (ramp.q_zero_L_min, ramp.unseen_below_L_min or 0.0))
+    worst = max(ramps, key=_zero_flow)
     leakiest = max(ramps, key=lambda ramp: ramp.q_zero_without_beta_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
     sides = compensator.valve.sides
@@ -96,9 +96,25 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
             "they open, and flow at zero command after closing is to be expected. Record the falling branch",
         )
     return ZERO_FLOW.check(
-        holds=worst.q_zero_L_min <= NO_FLOW_L_MIN,
+        holds=worst.q_opened_L_min <= NO_FLOW_L_MIN,
         text=f"{_flow(worst, worst.q_zero_L_min)} after closing (at {worst.dp_MPa:.2f} MPa), "
-        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min)} without beta",
+        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min)} without beta{_leak(ramps)}",
+    )
+
+
+def _zero_flow(result: PressureResult | ScenarioResult) -> tuple[float, float]:
+    """Return what passes at zero command beyond the leak, and below what it is not known: the worst is the largest."""
+    return result.q_opened_L_min, result.unseen_below_L_min or 0.0
+
+
+def _leak(ramps: Sequence[PressureResult]) -> str:
+    """Say what leaks without any drive: it is in every flow at zero command, and no failure of the compensator."""
+    worst = max(ramps, key=lambda ramp: ramp.leak_L_min)
+    if worst.leak_L_min <= NO_FLOW_L_MIN:
+        return ""
+    return (
+        f"; of it {worst.leak_L_min:.2g} L/min (at {worst.dp_MPa:.2f} MPa) leak through the shut valve, which no "
+        "compensator can stop"
     )
 
 
@@ -107,7 +123,8 @@ def _flow(where: PressureResult | ScenarioResult, flow_L_min: float) -> str:
     unseen = where.unseen_below_L_min
     if unseen is None or flow_L_min >= unseen:
         return f"at most {flow_L_min:.4g} L/min"
-    more = f": {flow_L_min:.2g} L/min if the first flow seen goes on below" if flow_L_min > NO_FLOW_L_MIN else ""
+    opened = flow_L_min - where.leak_L_min
+    more = f": {opened:.2g} L/min if the first flow seen goes on below" if opened > NO_FLOW_L_MIN else ""
     return f"below {unseen:.2f} L/min (less than the recordings show{more})"
 
 
@@ -117,7 +134,7 @@ def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, 
     Where the flow at zero command could not be checked, this can't be; a plant that is given sees all scenarios.
     """
     required = [each for each in scenarios if each.must_shut]
-    worst = max(required, key=lambda each: (each.q_zero_L_min, each.unseen_below_L_min or 0.0))
+    worst = max(required, key=_zero_flow)
     text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: "
     text += f"{_flow(worst, worst.q_zero_L_min)} ({worst.name}, at {worst.dp_MPa:.2f} MPa)"
     if hidden := [each for each in scenarios if not each.must_shut]:
@@ -130,4 +147,4 @@ def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, 
         text += "; load steps and frozen sensors were not tried: that needs ramps at two pressure drops, or --plant"
     if zero_flow.holds is None:
         return ZERO_FLOW_AFTER_SCENARIOS.check(holds=None, text=f"{text}; see the ramps")
-    return ZERO_FLOW_AFTER_SCENARIOS.check(holds=worst.q_zero_L_min <= NO_FLOW_L_MIN, text=text)
+    return ZERO_FLOW_AFTER_SCENARIOS.check(holds=worst.q_opened_L_min <= NO_FLOW_L_MIN, text=text)

@@ -75,14 +75,24 @@ class Scene:
         return self.loop.run(command, supply, mode, seen_MPa=seen_MPa, periods_per_record=PERIODS)
 
     def result(
-        self, name: str, run: LoopRun, *, must_shut: bool = True, figures: Mapping[str, float] = NO_FIGURES
+        self,
+        name: str,
+        run: LoopRun,
+        *,
+        must_shut: bool = True,
+        figures: Mapping[str, float] = NO_FIGURES,
+        end_MPa: float | None = None,
     ) -> ScenarioResult:
-        """Return the result; zero command counts once the valve has had the time to come to rest."""
+        """Return the result; zero command counts once the valve has had the time to come to rest.
+
+        It ended at this pressure drop unless told otherwise.
+        """
         shut = np.flatnonzero(_held_for(run.command <= 0, round(self.settle_s / STEP_S)))
         return ScenarioResult(
             name=name,
             side=self.side,
             dp_MPa=self.dp_MPa,
+            leak_L_min=self.loop.leak_L_min(self.dp_MPa if end_MPa is None else end_MPa),
             q_zero_L_min=float(run.q_largest_L_min[-1]),
             q_peak_at_zero_L_min=float(run.q_largest_L_min[shut].max(initial=0.0)),
             unseen_below_L_min=self.loop.unseen_below_L_min(self.dp_MPa),
@@ -165,7 +175,7 @@ def _load_step_in_motion(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     run, jump = _changed_in_mid_ramp(scene, np.nan, then_MPa)
     change = run.q_L_min[jump + round(SETTLE_S / STEP_S)] - run.q_L_min[jump - 1]
     figures = {"pressure_drop_then_MPa": then_MPa, "flow_change_L_min": change}
-    return scene.result("load step in the middle of a ramp", run, figures=figures)
+    return scene.result("load step in the middle of a ramp", run, figures=figures, end_MPa=then_MPa)
 
 
 def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
@@ -182,7 +192,7 @@ def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The sensors freeze, then the pressure drop rises. The codes are sound: what it costs is stated, not required."""
     low, high = tested_MPa
     name = f"sensors frozen at {low:.2f} MPa, then {high:.2f} MPa"
-    return scene.result(name, _changed_in_mid_ramp(scene, low, high)[0], must_shut=False)
+    return scene.result(name, _changed_in_mid_ramp(scene, low, high)[0], must_shut=False, end_MPa=high)
 
 
 def _changed_in_mid_ramp(scene: Scene, seen_MPa: float, supply_MPa: float) -> tuple[LoopRun, int]:
@@ -231,6 +241,7 @@ def _converter_off_at_zero(scene: Scene) -> ScenarioResult:
         name=f"zero command read {error.offset_codes} codes too high, with ±{error.noise_codes} codes of noise",
         side=scene.side,
         dp_MPa=scene.dp_MPa,
+        leak_L_min=scene.loop.leak_L_min(scene.dp_MPa),
         q_zero_L_min=float(flow.max()),
         q_peak_at_zero_L_min=float(flow.max()),
         unseen_below_L_min=scene.loop.unseen_below_L_min(scene.dp_MPa),
