@@ -23,7 +23,11 @@ def zero_band_goals(results: Sequence[Measured]) -> list[Row]:
     spread = sum(counts.most - counts.least for counts in counted)
     return [
         Row(what="with zero band and transition: wrong compare values, all machines", value=wrong, limit=0),
-        Row(what="with zero band and transition: spread over inputs, x86-64, Cortex-M4, and AVR where it is fastest", value=spread, limit=0),
+        Row(
+            what="with zero band and transition: spread over inputs, x86-64, Cortex-M4, and AVR where it is fastest",
+            value=spread,
+            limit=0,
+        ),
         Row(
             what=f"{fastest.contender.name}: Cortex-M4 instructions",
             value=fastest.cortex_m4.most,

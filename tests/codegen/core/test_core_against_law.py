@@ -19,7 +19,8 @@ DIGITS = 50
 U_MAX_V, X_MAX_M = sympy.Integer(10), sympy.Rational(18, 10_000)
 #: The nearest a value that is no tie comes to one is 1/(2 * 2^62); the 50 digits err by far less.
 TIE = sympy.Float("1e-30", DIGITS)
-CORNERS = [(command, dp) for command in (0, 1, 19, 20, 35, 50, 51, 52, 4094, 4095) for dp in (-4095, -41, -40, 0, 1, 63, 64, 4094, 4095)]
+COMMANDS = (0, 1, 19, 20, 35, 50, 51, 52, 4094, 4095)
+CORNERS = [(command, dp) for command in COMMANDS for dp in (-4095, -41, -40, 0, 1, 63, 64, 4094, 4095)]
 
 
 def rational(value) -> sympy.Rational:
