@@ -13,6 +13,7 @@ import numpy as np
 
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR
 from dzdesign.identify.knees.between_ramps import BetweenRamps
+from dzdesign.identify.valve.staircase import Direction
 
 #: Probability, if a premise were true, of data as unlike it as these, below which it is refused.
 REFUSED = 0.01
@@ -101,6 +102,25 @@ def find_curvature(
 def confidence_at_tests(confidence: float) -> float:
     """Return the confidence of the bounds at the tests with which the whole curve has the given one."""
     return 1 - (1 - SHARE_OF_PREMISE) * (1 - confidence)
+
+
+def one_way_p(
+    threshold: np.ndarray, covariance: np.ndarray, degrees: float, direction: Direction
+) -> float | None:
+    """Return the probability of steps against the direction as large as the largest, if the threshold ran that way.
+
+    Of all pairs of tests, with Bonferroni; None without a direction.
+    """
+    from scipy.special import stdtr
+
+    first, last = np.triu_indices(threshold.size, 1)
+    if direction == "flat" or not first.size:
+        return None
+    step = (threshold[last] - threshold[first]) * (1 if direction == "decreasing" else -1)
+    variance = np.diag(covariance)
+    error = np.sqrt(variance[first] + variance[last] - 2 * covariance[first, last])
+    largest = float(np.max(step / np.maximum(error, np.finfo(float).tiny)))
+    return min(1.0, float(first.size * stdtr(min(degrees, LARGEST_DEGREES), -largest)))
 
 
 def second_differences(dp_MPa: np.ndarray) -> np.ndarray:
