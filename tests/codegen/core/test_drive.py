@@ -37,6 +37,8 @@ class Drive(ctypes.Structure):
         ("side", ctypes.c_int16),
         ("ticks", ctypes.c_uint16),
         ("at_rest", ctypes.c_uint16),
+        ("rising", ctypes.c_uint16),
+        ("played", ctypes.c_int16),
         ("ramped", ctypes.c_int32),
     ]
 
@@ -89,6 +91,7 @@ def options_named(name: str) -> DesignOptions:
         "quick ramps, small error": full_options(
             command_error=CommandError(offset_codes=0, noise_codes=1), ramp_up_s=(0.001, 0.02), ramp_down_s=(0.0, 0.003)
         ),
+        "two solenoids, play": DesignOptions(signals=full.signals, play=True, ramp_up_s=(0.01, 0.02)),
         "two solenoids, no transition": DesignOptions(signals=full.signals, transition=Fraction(0)),
     }[name]
 
@@ -96,6 +99,7 @@ def options_named(name: str) -> DesignOptions:
 SETS = (
     "everything", "two solenoids alone", "turned, same pressures", "one solenoid, ramps",
     "one solenoid, turned, live zero, dither", "quick ramps, small error",
+    "two solenoids, play",
     "two solenoids, no transition",
 )  # fmt: skip
 
@@ -138,6 +142,13 @@ FAULTS = [
     ("(drive->side < 0) ? -command : command", "command", "two solenoids alone"),
     ("(drive->at_rest != 0u) ? (uint16_t)COMMAND_ZERO : ", "", "two solenoids alone"),
     ("(command <= ZERO_BAND)", "(command <= LEAVE_ZERO)", "one solenoid, ramps"),
+    ("towards - PLAY_NOISE,", "towards,", "two solenoids, play"),
+    ("(PLAY_CODES - rising)", "rising", "two solenoids, play"),
+    ("0, PLAY_CODES);", "0, PLAY_CODES - 1);", "two solenoids, play"),
+    ("towards - ZERO_BAND", "towards", "two solenoids, play"),
+    ("(drive->side < 0) ? play_negative : play_positive", "play_positive", "two solenoids, play"),
+    ("place & (PLAY_STEP - 1u)", "0u", "two solenoids, play"),
+    (" || (drive->side != driven)", "", "two solenoids, play"),
     ("drive->ticks < DITHER_TICKS", "drive->ticks <= DITHER_TICKS", "everything"),
     ("(drive->side < 0) ? (uint16_t)compare : 0u", "(uint16_t)compare", "everything"),
     ("RAMP_UP_NEGATIVE, RAMP_DOWN_NEGATIVE)", "RAMP_UP_POSITIVE, RAMP_DOWN_NEGATIVE)", "everything"),

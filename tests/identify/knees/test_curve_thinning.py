@@ -116,3 +116,22 @@ def test_points_are_found_in_few_rounds(monkeypatch):
     monkeypatch.setattr(curve_thinning, "_least_squares", lambda u, q, at: calls.append(at.size) or kept(u, q, at))
     identify([bent_ramp(2.0)[0]])
     assert len(calls) <= 2 * 9 and max(calls) <= MOST_POINTS
+
+
+def test_a_ramp_that_began_without_pressure_does_not_bend_the_curve(tmp_path):
+    """Of two ramps the first began before the pump: the flow of its way up is brought to the usual pressure drop.
+
+    The recording and its truth are of a plant that shares no code with the product.
+    """
+    import corpus
+
+    from dzdesign.identify.reading.ramp_files import read_ramp_file
+
+    (case,) = [case for case in corpus.cases() if case.name == "pump_on_in_ramp_1_of_2"]
+    (test,) = identify([read_ramp_file(path) for path in corpus.write(case, 909, tmp_path)]).positive.tests
+    valve, bench = case.benches[0].valve, case.benches[0]
+    for branch, knee in zip(test.recorded.branches, valve.knees(test.dp_MPa, "positive"), strict=True):
+        u = np.linspace(0.5, 9.9, 400)
+        opening = np.clip(u - knee, 0, valve.stroke_V)
+        true = valve.gain * opening * np.sqrt(test.dp_MPa / (1 + bench.sag * (opening / 4) ** 2))
+        assert np.abs(branch.flow_at(u) - true).max() < 0.03 * true.max()

@@ -1,6 +1,7 @@
 """A recorded branch as few points: straight lines through its averaged flow, halved where they depart from it."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,29 +18,72 @@ from dzdesign.identify.valve.recorded_curve import MOST_POINTS, SAG_STEPS, Recor
 AVERAGED, TOLERANCE, NOISE_ERRORS = 5, 2.5e-3, 4.0
 #: Readings within this share of a step of the flow tell the pressure drop there.
 NEAR_STEP = 0.1
+#: Share by which a pressure drop is another than the flow's usual one: more than straight lines between the steps miss
+#: of a supply whose pump reaches its limit.
+OFF_THE_USUAL = 0.15
 #: Digits of a point, of the largest command and flow, and decimals of any number of the file.
 DIGITS, DECIMALS = 5, 7
 
 
 def recorded_curve(item: DescribedTest, leak: float, noise_level: float, u_max: float) -> RecordedCurve:
     """Return the characteristic that the ramps of a test show; leak and noise level in m³/s."""
-    profiles = [_profile(shape, leak, u_max) if shape else None for shape in item.shapes]
+    supply = _Supply.of([shape.prepared.branch for shape in item.branches], leak, item.q_max + leak)
+    profiles = [_profile(shape, supply, leak, u_max) if shape else None for shape in item.shapes]
     tolerance = TOLERANCE * max(float(profile[1].max()) for profile in profiles if profile)
     rising, falling = (
         profile and _thinned(*profile, leak=leak, level=noise_level, tolerance=tolerance) for profile in profiles
     )
     curve = RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=None)
-    branches = [shape.prepared.branch for shape in item.branches]
-    return RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=_sag(branches, leak, curve.q_max_L_min))
+    if supply is None:
+        return curve
+    dp = supply.at(np.linspace(0, curve.q_max_L_min * L_MIN, SAG_STEPS + 1)) / MPA
+    nodes = tuple(round(value, _decimals(dp.max())) for value in dp.tolist())
+    return RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=nodes)
 
 
-def _profile(shape: BranchShape, leak: float, u_max: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return command and flow in bins of the command, as recorded, and where flow begins: no later than the knee.
+@dataclass(frozen=True, slots=True)
+class _Supply:
+    """How the bench's pressure drop sags over the flow: m³/s and Pa, straight between."""
+
+    q: np.ndarray
+    dp: np.ndarray
+
+    @classmethod
+    def of(cls, branches: list[Branch], leak: float, q_max: float) -> "_Supply | None":
+        """Return the medians of the pressure drop about equal steps of the flow; None where it is not known."""
+        known = [branch.dp for branch in branches if branch.dp is not None]
+        if len(known) < len(branches):
+            return None
+        dp, steps = np.concatenate(known), np.concatenate([branch.q + leak for branch in branches]) / q_max * SAG_STEPS
+        about = {step: dp[np.abs(steps - step) < NEAR_STEP] for step in range(SAG_STEPS + 1)}
+        found = {step: float(np.median(near)) for step, near in about.items() if near.size}
+        return cls(np.array(list(found)) * q_max / SAG_STEPS, np.array(list(found.values())))
+
+    def at(self, q: np.ndarray) -> np.ndarray:
+        """Return the pressure drop at flows."""
+        sagged: np.ndarray = np.maximum(np.interp(q, self.q, self.dp), SMALLEST_DP)
+        return sagged
+
+    def brought_to(self, q: np.ndarray, dp: np.ndarray) -> np.ndarray:
+        """Return flows as they would be had the supply sagged as usual, where it was on its way up, or gone."""
+        usual = self.at(q)
+        off = np.abs(dp - usual) > OFF_THE_USUAL * usual
+        # Eq. (1), as at_nominal_pressure has it: below a tenth of the pressure the ratio would only carry noise.
+        return np.where(off, q * np.sqrt(usual / np.maximum(dp, 0.1 * usual)), q)
+
+
+def _profile(
+    shape: BranchShape, supply: _Supply | None, leak: float, u_max: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return command and flow in bins of the command, and where flow begins: no later than the knee.
 
     Of a noisy meter the first flow that stands out comes after the knee, and the valve is no sharper for that.
     """
-    flow = shape.prepared.branch.q + leak
-    return *smooth_profile(shape.prepared.branch.u, flow, u_max), min(shape.onset, shape.knee)
+    branch = shape.prepared.branch
+    flow = branch.q + leak
+    if supply and branch.dp is not None:
+        flow = supply.brought_to(flow, branch.dp)
+    return *smooth_profile(branch.u, flow, u_max), min(shape.onset, shape.knee)
 
 
 def _thinned(
@@ -124,15 +168,3 @@ def _first_seen(u: np.ndarray, q: np.ndarray, level: float) -> float:
     if last + 1 == u.size:
         return float(u[-1])
     return float(np.interp(level, q[last : last + 2], u[last : last + 2]))
-
-
-def _sag(branches: list[Branch], leak: float, q_max_L_min: float) -> tuple[float, ...] | None:
-    """Return the pressure drop at equal steps of the flow, MPa: medians about them, straight between those."""
-    if any(branch.dp is None for branch in branches):
-        return None
-    dp = np.concatenate([branch.dp for branch in branches if branch.dp is not None])
-    steps = np.concatenate([branch.q + leak for branch in branches]) / (q_max_L_min * L_MIN) * SAG_STEPS
-    about = {step: dp[np.abs(steps - step) < NEAR_STEP] for step in range(SAG_STEPS + 1)}
-    found = {step: float(np.median(near)) for step, near in about.items() if near.size}
-    nodes = np.interp(np.arange(SAG_STEPS + 1), list(found), list(found.values()))
-    return tuple(round(max(float(node), SMALLEST_DP) / MPA, _decimals(dp.max() / MPA)) for node in nodes)
