@@ -109,12 +109,12 @@ def one_way_p(
 ) -> float | None:
     """Return the probability of steps against the direction as large as the largest, if the threshold ran that way.
 
-    Of all pairs of tests, with Bonferroni; None without a direction.
+    Of all pairs of tests, with Bonferroni; None without a direction, and from two tests, which gave it.
     """
     from scipy.special import stdtr
 
     first, last = np.triu_indices(threshold.size, 1)
-    if direction == "flat" or not first.size:
+    if direction == "flat" or threshold.size < 3:
         return None
     step = (threshold[last] - threshold[first]) * (1 if direction == "decreasing" else -1)
     variance = np.diag(covariance)
