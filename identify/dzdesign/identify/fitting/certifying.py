@@ -82,7 +82,7 @@ def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Pre
         confidence = confidence_at_tests(options.confidence)
         statistical = lower_bounds(free.value, free.se, between, confidence, np.zeros(dp.size))
         budget = np.maximum(statistical - free.bound, 0.0)
-        fit = bound_line(dp, free.value, free.se, budget, between, confidence=confidence, u_max=options.u_max)
+        fit = bound_line(dp, free.value, free.se, budget, between, confidence=options.confidence, u_max=options.u_max)
         line = BoundUnderPremise(
             premise="line", value=fit.value, se=free.se, lower=fit.bound, curvature=np.zeros(dp.size - 1),
             p_value=fit.p_value,
