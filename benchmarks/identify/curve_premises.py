@@ -75,7 +75,7 @@ def failures(
         threshold = truth.at(dp) + np.hypot(noise, scatter) * rng.standard_normal(tests)
         confidence = confidence_at_tests(CONFIDENCE)
         if premise == "line":
-            line = bound_line(dp, threshold, se, np.zeros(tests), between, confidence=confidence, u_max=U_MAX)
+            line = bound_line(dp, threshold, se, np.zeros(tests), between, confidence=CONFIDENCE, u_max=U_MAX)
             lower, bends, p_value = line.bound, np.zeros(tests - 1), line.p_value
         else:
             lower = lower_bounds(threshold, se, between, confidence, np.zeros(tests))

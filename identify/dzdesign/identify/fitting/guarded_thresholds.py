@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, Trend, excess_departure, find_trend
+from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, Trend, excess_departure, find_trend
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.guarding import (
     OrderedKnees,
@@ -17,7 +17,7 @@ from dzdesign.identify.fitting.guarding import (
     order_knees,
     systematic_change,
 )
-from dzdesign.identify.fitting.premises import confidence_at_tests
+from dzdesign.identify.fitting.premises import REFUSED, confidence_at_tests, one_way_p
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
@@ -36,6 +36,8 @@ class GuardedThreshold:
     allowance: float
     #: Whether it departs from one direction beyond its error: then a threshold that runs one way is contradicted.
     departs: bool = False
+    #: Probability of steps against the direction as large as these, if it ran one way; None without a direction.
+    one_way_p: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +89,9 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
             departs=bool(ordered.departure.max() > 0),
         )
     departure = guarded_departure(thresholds[guard], trend.direction)
-    thresholds = {name: _lowered(each, trend.direction) for name, each in thresholds.items()}
+    finest = FINEST_ERROR * options.u_max
+    thresholds = {name: _lowered(each, trend.direction, finest) for name, each in thresholds.items()}
+    departure = _said(thresholds[guard], trend.direction, departure)
     if other in thresholds:
         thresholds["mean"] = _mean_of(group, thresholds)
     return Guarding(
@@ -154,14 +158,40 @@ def guarded_departure(guarded: GuardedThreshold, direction: Direction) -> np.nda
     return excess_departure(np.abs(value - nearest), error, guarded.allowance)
 
 
-def _lowered(guarded: GuardedThreshold, direction: Direction) -> GuardedThreshold:
-    """Lower the bounds under one direction by what the guarded threshold departs from it.
+def _lowered(guarded: GuardedThreshold, direction: Direction, finest: float) -> GuardedThreshold:
+    """Lower the bounds under one direction by what the guarded threshold departs from it, and test the direction.
 
-    Without a direction the lowest bound of all tests holds everywhere, whatever the others do.
+    Errors below `finest`, V, weigh alike. Without a direction the lowest bound of all tests holds everywhere, whatever
+    the others do.
     """
     departure = float(guarded_departure(guarded, direction).max())
     lowered = guarded.ordered.bound - (0.0 if direction == "flat" else departure)
-    return replace(guarded, ordered=replace(guarded.ordered, bound=lowered), departs=guarded.departs or departure > 0)
+    free, between = guarded.free, guarded.between
+    p_value = one_way_p(
+        free.value,
+        between.covariance_of_mean(free.se) + finest**2 * np.eye(free.value.size),
+        float(between.degrees_of_freedom(free.se, DEGREES_OF_FREEDOM).min()),
+        direction,
+    )
+    return replace(
+        guarded,
+        ordered=replace(guarded.ordered, bound=lowered),
+        departs=guarded.departs or departure > 0,
+        one_way_p=p_value,
+    )
+
+
+def _said(guarded: GuardedThreshold, direction: Direction, departure: np.ndarray) -> np.ndarray:
+    """Return what is to be said of departures, V: where steps against the direction are significant, all of them."""
+    from scipy.optimize import isotonic_regression
+
+    if guarded.one_way_p is None or guarded.one_way_p >= REFUSED:
+        return departure
+    value = guarded.free.value
+    nearest = isotonic_regression(value, increasing=direction == "increasing").x
+    apart = np.abs(value - nearest)
+    said: np.ndarray = np.maximum(departure, np.where(apart >= apart.max() / 2, apart, 0.0))
+    return said
 
 
 def _mean_of(group: DescribedTests, thresholds: dict[Guard, GuardedThreshold]) -> GuardedThreshold:
@@ -173,4 +203,5 @@ def _mean_of(group: DescribedTests, thresholds: dict[Guard, GuardedThreshold]) -
         between=max(opening.between, closing.between, key=lambda each: each.sd),
         allowance=max(opening.allowance, closing.allowance),
         departs=opening.departs or closing.departs,
+        one_way_p=min((each.one_way_p for each in (opening, closing) if each.one_way_p is not None), default=None),
     )
