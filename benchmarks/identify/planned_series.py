@@ -59,7 +59,9 @@ def distances(
 ) -> Iterator[tuple[float, bool]]:
     """Yield of each of many valves the mean distance, V, and whether a next closing at a test lies below the offset."""
     series = planned.series
-    options = IdentifyOptions(meter_lag=bench.lag, repeatability=bench.scatter / 10 if series.rounds == 1 else None)
+    declared = bench.scatter / 10 if series.rounds == 1 else None
+    # `plan` predicts what the weakest premise certifies.
+    options = IdentifyOptions(meter_lag=bench.lag, repeatability=declared, curve="monotone")
     order, dp_MPa = series.dp[series.order] / MPA, series.dp / MPA
     for _ in range(count):
         valve = identify(bench.record(order, series.ramp_time, series.pause, rng), options)

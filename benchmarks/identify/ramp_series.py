@@ -47,7 +47,8 @@ def _family(
     dated = how not in in_order
     recordings = [_ramp(at, int(test), closes[at], dated, rng) for at, test in enumerate(order)]
     side = identify(
-        recordings, IdentifyOptions(meter_lag=0.0, meter_lag_tolerance=0.0, repeatability=declared)
+        recordings,
+        IdentifyOptions(meter_lag=0.0, meter_lag_tolerance=0.0, repeatability=declared, curve="monotone"),
     ).positive
     offset = np.array(side.curve.u_offset_V)
     closing = truth + min(change, 0.0) + scatter * rng.standard_normal(truth.size)

@@ -61,9 +61,12 @@ class Outcomes:
 
 
 def options_for(bench: Bench, **changes: object) -> IdentifyOptions:
-    """Return what an engineer declares: the meter's floor and lag, both exact, and a valve that repeats exactly."""
+    """Return what an engineer declares: the meter's floor and lag, both exact, and a valve that repeats exactly.
+
+    The limits are those of the weakest premise; `curve_premises` has the others.
+    """
     known = {"meter_floor": bench.floor_L_min * L_MIN, "meter_lag": bench.lag_s}
-    known |= {"meter_lag_tolerance": 0.0, "repeatability": 0.0}
+    known |= {"meter_lag_tolerance": 0.0, "repeatability": 0.0, "curve": "monotone"}
     return IdentifyOptions(**(known | changes))
 
 

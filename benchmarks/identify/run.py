@@ -18,12 +18,14 @@ from between_ramps import print_between_ramps  # noqa: E402
 from bound_coverage import print_coverage, print_over_compensation, print_residual  # noqa: E402
 from corpus import print_corpus  # noqa: E402
 from corpus_units import print_corpus_of_units  # noqa: E402
+from curve_premises import print_curve_premises  # noqa: E402
 from measured import print_measured  # noqa: E402
 from meters import print_meters  # noqa: E402
 from planned_series import print_planned_series  # noqa: E402
 from ramp_series import print_ramp_series  # noqa: E402
 from random_valves import print_random_valves  # noqa: E402
 from reading import print_reading  # noqa: E402
+from recorded_premises import print_recorded_premises  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 from soft_edges import print_soft_edges  # noqa: E402
 from stops import print_stops  # noqa: E402
@@ -42,6 +44,8 @@ PARTS = {
     "corpus": (print_corpus, 909),
     "corpus-units": (print_corpus_of_units, 0),
     "soft-edges": (print_soft_edges, 1313),
+    "premises": (print_curve_premises, 1414),
+    "recorded-premises": (print_recorded_premises, 1515),
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),
     "timing": (print_timing, 0),

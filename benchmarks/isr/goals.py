@@ -10,7 +10,30 @@ FLOAT32, PW_LIN = "float32 slope table", "casadi pw_lin"
 TIMES_FLOAT32 = 1.25
 SHARE_OF_CASADI = 0.01
 AVR_SHARE = 0.15
+ZERO_BAND_INSTRUCTIONS = 60
 ISR_HZ = 2500
+
+
+def zero_band_goals(results: Sequence[Measured]) -> list[Row]:
+    """Return the goals of the core with zero band and transition, as it is by default."""
+    fastest = min(results, key=lambda result: result.cortex_m4.most)
+    wrong = sum(each.wrong_host + (each.wrong_cortex_m4 or 0) + sum(each.wrong_tried) for each in results)
+    on_avr_fastest = min((each.avr for each in results), key=lambda counts: counts.most)
+    counted = [machine for each in results for machine in (each.x86, each.cortex_m4)] + [on_avr_fastest]
+    spread = sum(counts.most - counts.least for counts in counted)
+    return [
+        Row(what="with zero band and transition: wrong compare values, all machines", value=wrong, limit=0),
+        Row(
+            what="with zero band and transition: spread over inputs, x86-64, Cortex-M4, and AVR where it is fastest",
+            value=spread,
+            limit=0,
+        ),
+        Row(
+            what=f"{fastest.contender.name}: Cortex-M4 instructions",
+            value=fastest.cortex_m4.most,
+            limit=ZERO_BAND_INSTRUCTIONS,
+        ),
+    ]
 
 
 def goals(results: Sequence[Measured]) -> list[Row]:

@@ -9,6 +9,8 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from time import perf_counter
 
@@ -18,7 +20,7 @@ import on_avr
 import on_cortex_m4
 import on_x86
 from contender import our_forms
-from goals import goals
+from goals import goals, zero_band_goals
 from measuring import Measured, measure
 from rival_cores import rivals
 from scoreboard import keep_rows, markdown, markdown_rows, say
@@ -26,6 +28,8 @@ from tried_inputs import RANDOM_INPUTS, SEED, Codes, expected_compares, tried_in
 
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
 
 KNOWN_LENGTHS = (0, 7, 300)
 
@@ -51,16 +55,17 @@ def main(arguments: list[str] | None = None) -> int:
         for index, contender in enumerate(contenders):
             say(f"{contender.name} ...")
             results.append(measure(contender, compensator, inputs, expected, Path(folder) / str(index)))
+        with_band = _with_zero_band(compensator, Path(folder))
     nodes, compare_max = len(compensator.positive.beta), compensator.signals.compare_max
     print(
         f"\nLaw `{compensator.law}`, {nodes} nodes of beta, compare 0..{compare_max}. Counts from its first "
         f"instruction to its return, least-most over {len(inputs)} inputs: corners, edges of nodes, impossible codes, "
         f"{RANDOM_INPUTS} random (seed {SEED}). All compiled with -std=c99 -O2.\n"
     )
-    print(markdown(Measured.HEADINGS, [result.cells() for result in results]))
+    print(markdown(Measured.HEADINGS, [result.cells() for result in (*results, *with_band)]))
     print("\nHow each was made:\n")
     print("\n".join(f"- {contender.name}: {contender.made}" for contender in contenders))
-    rows = goals(results)
+    rows = [*goals(results), *zero_band_goals(with_band)]
     keep_rows(rows, chosen.rows)
     print("\n" + markdown_rows(rows))
     missed = sum(row.verdict == "MISSES" for row in rows)
@@ -68,16 +73,29 @@ def main(arguments: list[str] | None = None) -> int:
     return 1 if missed else 0
 
 
+def _with_zero_band(plain: Compensator, folder: Path) -> list[Measured]:
+    """Measure the product's core as it is by default, with zero band and transition: what the rivals do not have."""
+    default = design(plain.valve)
+    inputs = tried_inputs(default)
+    expected = expected_compares(default, inputs)
+    found = []
+    for contender in our_forms(default):
+        named = replace(contender, name=f"{contender.name}, zero band and transition")
+        say(f"{named.name} ...")
+        found.append(measure(named, default, inputs, expected, folder / f"band{len(found)}"))
+    return found
+
+
 def _compensator(path: Path | None) -> Compensator:
     if path:
         return read_artefact(path.read_bytes(), Compensator, str(path))
-    from dzdesign.design.designing import design
     from dzdesign.example import example_folder
     from dzdesign.identify.identification import identify
     from dzdesign.identify.reading.ramp_files import read_ramp_file
 
     ramps = example_folder() / "ramps"
-    return design(identify([read_ramp_file(ramp) for ramp in sorted(ramps.glob("*.csv.gz"))]))
+    valve = identify([read_ramp_file(ramp) for ramp in sorted(ramps.glob("*.csv.gz"))])
+    return design(valve, DesignOptions(transition=Fraction(0)))  # as the rivals: the paper's law alone
 
 
 def _validate(inputs: Sequence[Codes], folder: Path) -> None:

@@ -63,21 +63,26 @@ def inputs_header(inputs: Sequence[Codes], repeats: int, *, program_memory: bool
 
 
 def exact_rows_header(compensator: Compensator) -> str:
-    """Return ``exact_rows.h``: start and slope of every row of constant pressure difference, as exact integers."""
+    """Return ``exact_rows.h``: start and slope of each straight part of every row of constant pressure difference."""
     from fractions import Fraction
+    from itertools import pairwise
     from math import lcm
 
     exact = ExactLaw(compensator)
     # Half a count more, so that the floor rounds to nearest, a half up.
     lines = {}
     for dp in range(-exact.code_max, exact.code_max + 1):
-        (_, start), (full, end) = exact.corners(exact.betas(dp))
-        lines[dp] = (start + Fraction(1, 2), (end - start) / full)
-    denominator = lcm(*(value.denominator for line in lines.values() for value in line))
+        corners = exact.corners(exact.betas(dp))
+        lines[dp] = [
+            (start + Fraction(1, 2), (end - start) / (last - first))
+            for (first, start), (last, end) in pairwise(corners)
+        ]
+    places = [first for first, _ in corners[:-1]]
+    denominator = lcm(*(value.denominator for parts in lines.values() for line in parts for value in line))
     if denominator >= 2**62:
         raise ValueError(f"the rows' common denominator needs {denominator.bit_length()} bits, expected at most 62")
     rows = []
-    for start, slope in lines.values():
+    for start, slope in (line for parts in lines.values() for line in parts):
         numbers = [*divmod(int(start * denominator), denominator), *divmod(int(slope * denominator), denominator)]
         rows.append(f"    {{{numbers[0]}, INT64_C({numbers[1]}), {numbers[2]}, INT64_C({numbers[3]})}},")
     return f"""\
@@ -92,6 +97,9 @@ struct exact_row {{
     int32_t slope_quotient;
     int64_t slope_remainder;
 }};
+#define PARTS {len(places)}
+/* Commands at which the parts of a row begin, the first at zero. */
+static const int32_t part_from[PARTS] = {{{", ".join(map(str, places))}}};
 static const struct exact_row rows[{len(rows)}] = {{
 {chr(10).join(rows)}
 }};

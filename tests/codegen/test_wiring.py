@@ -199,7 +199,8 @@ def test_one_output_is_tried_where_there_is_one(firmware, target):
 
 @pytest.mark.parametrize("polarity", ["normal", "inverted"])
 def test_the_ramp_through_the_zero_band_changes_pins_where_the_drive_does(firmware, polarity):
-    folder = firmware("f28335", "--command-signal", BOTH, "--command-error", "2 % + 0.1 %", "--polarity", polarity, both=True)
+    options = ("--command-signal", BOTH, "--command-error", "2 % + 0.1 %", "--polarity", polarity)
+    folder = firmware("f28335", *options, both=True)
     compensator = compensator_of(folder)
     window, zero = compensator.drive_functions.leave_zero_codes, compensator.signals.command.zero_code
     assert window == 41 + 3 + 3 + 1

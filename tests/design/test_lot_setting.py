@@ -5,12 +5,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import _limit, lot_setting
+from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.signals import Signals
@@ -27,8 +29,8 @@ def valve(knee, pressures=(1.0, 2.5, 5.0), *, seed=0):
     return identify(tests)
 
 
-def designed(valve, options=None):
-    return design(valve, options)
+def designed(valve, options=None, **texts):
+    return design(valve, options or options_of(texts, target_named("f28335").inputs()))
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +62,7 @@ def test_valves_of_opposite_trends_have_one_setting_under_both(falling, rising):
 
 def test_of_valves_that_are_alike_it_is_their_own(falling):
     common = lot_setting({"a": falling, "b": falling}).compensator
-    off = designed(falling.valve, DesignOptions(transition=Fraction(0)))
+    off = designed(falling.valve, transition="off")
     assert common.positive == off.positive and not common.transition_codes
 
 
@@ -69,7 +71,7 @@ def test_both_signs():
     content = BOTH_SIDES.read_bytes()
     signals = Signals()
     command = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "command"), _converter(signals), inverted=False)
-    options = DesignOptions(signals=_with_command(signals, command))
+    options = DesignOptions(transition=Fraction(0), signals=_with_command(signals, command))
     each = designed(read_artefact(content, ValveModel, "valve.json"), options)
     common = lot_setting({"a": each, "b": each}).compensator
     assert (common.positive, common.negative) == (each.positive, each.negative)
@@ -108,11 +110,11 @@ def test_what_has_no_common_setting_is_told_why(falling, rising, wording):
     with pytest.raises(InputError) as caught:
         lot_setting({"low": low})
     wording("a lot setting: one valve", str(caught.value))
-    other = designed(rising.valve, DesignOptions(law="target"))
+    other = designed(rising.valve, law="target")
     with pytest.raises(InputError) as caught:
         lot_setting({"a": falling, "b": other})
     wording("a lot setting: another law", str(caught.value))
-    with_transition = designed(falling.valve, DesignOptions(transition=Fraction(1, 50)))
+    with_transition = designed(falling.valve, transition="2 %")
     with pytest.raises(InputError) as caught:
         lot_setting({"a": with_transition, "b": with_transition})
     wording("a lot setting: a transition", str(caught.value))

@@ -134,7 +134,8 @@ def test_below_the_reference_beta_is_held_or_extended(example_valve):
 
 def test_a_dither_stands_under_the_certified_bound_at_its_top(example_valve):
     plain = design(example_valve, DesignOptions(transition=Fraction(0)))
-    dithered = design(example_valve, DesignOptions(transition=Fraction(0), dither_Hz=150.0, dither_peak=Fraction(1, 100)))
+    dither = {"dither_Hz": 150.0, "dither_peak": Fraction(1, 100)}
+    dithered = design(example_valve, DesignOptions(transition=Fraction(0), **dither))
     peak = dithered.drive_functions.dither_counts
     assert peak == 600
     for dp_code in range(150, 1000, 10):

@@ -53,7 +53,8 @@ def test_a_flow_that_the_recordings_can_not_show_is_no_zero(capsys):
 def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensator, capsys):
     print_valve(example_valve)
     valve = capsys.readouterr().out
-    assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4}: command from the knee to full stroke", valve)
+    number = r"0\.\d{4} ± 0\.\d{4}"
+    assert re.search(rf"drive range of the valve k x_max/u_max = {number}: command from the knee to full stroke", valve)
     print_compensator(example_compensator)
     design = capsys.readouterr().out
     # What the signals hide is no cost among others: it comes first.
@@ -63,7 +64,7 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensato
     nodes = len(example_compensator.positive.beta)
     assert f"beta(dP): straight between {nodes} nodes, each a whole number of 1/32768" in design
     assert "both as shares of full command" in design
-    assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4}: command", html_of(example_valve))
+    assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4} ± 0\.\d{4}: command", html_of(example_valve))
 
 
 def test_no_output_calls_a_code_sound():

@@ -1,6 +1,6 @@
 /* Every pair of command code and pressure-difference code against the exactly rounded law.
  *
- * Along a row of constant pressure the law is start + slope * u; both are given as quotient and remainder over one
+ * Along a part of a row of constant pressure the law is start + slope * u; both are given as quotient and remainder over one
  * denominator, so the law's rounded value comes from addition with carry. Nothing is shared with the code under test.
  */
 #include "exact_rows.h"
@@ -19,11 +19,18 @@ int main(void)
     uint32_t inputs = 0u, wrong = 0u, largest = 0u;
 
     for (int32_t dp = -PRESSURE_MAX; dp <= PRESSURE_MAX; dp++) {
-        const struct exact_row *row = &rows[dp + PRESSURE_MAX];
+        const struct exact_row *row = &rows[(dp + PRESSURE_MAX) * PARTS];
+        int32_t part = 0;
         int64_t remainder = row->start_remainder;
         int32_t quotient = row->start_quotient;
 
         for (int32_t u = 0; u <= COMMAND_MAX; u++) {
+            if (part + 1 < PARTS && u == part_from[part + 1]) { /* the law's parts meet: each begins where it says */
+                part++;
+                row++;
+                remainder = row->start_remainder;
+                quotient = row->start_quotient;
+            }
             const int32_t expected = quotient < 0 ? 0 : quotient > COMPARE_MAX ? COMPARE_MAX : quotient;
             /* The pair of pressures stands low in its range for even commands, high for odd ones. */
             const int32_t spare = PRESSURE_MAX - (dp < 0 ? -dp : dp);

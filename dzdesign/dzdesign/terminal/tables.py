@@ -188,8 +188,8 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         span, guard = compensator.signals.command.span(1), compensator.positive.certificate.guard
         band, end = compensator.zero_band_codes / span, compensator.transition_end / span
         lines.append(
-            f"zero band: commands up to {band:.2%} count as zero; transition: from the {guard} to the opening threshold "
-            f"over those from there to {end:.2%}"
+            f"zero band: commands up to {band:.2%} count as zero; transition: from the {guard} to the opening "
+            f"threshold over those from there to {end:.2%}"
         )
     hidden = hidden_failures(compensator)
     costs = [line for line in compensator.costs if line not in hidden]

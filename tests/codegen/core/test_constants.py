@@ -15,6 +15,7 @@ from tests.support.paths import ROOT
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 TABLE = re.compile(r"static const struct segment\w* (\w+)\[(\d+)\] = \{(.*?)\n    \};", re.DOTALL)
+PLAY = re.compile(r"static const uint16_t (play_\w+)\[(\d+)\] = \{(.*?)\};", re.DOTALL)
 DEFINE = re.compile(r"^#define (\w+)[ \t]+(\S.*)$", re.MULTILINE)
 ROW = re.compile(r"\{UINT32_C\((\d+)\), (-?\d+)u?\}")
 NUMBER = r"(?:U?INT(?:32|64)_C\((\d+)\)|(0x[0-9A-Fa-f]+|\d+)u?)"
@@ -34,6 +35,10 @@ def constants_in(text: str) -> dict[str, object]:
     """Read every `#define` and every constant table of a file of C."""
     code = COMMENT.sub("", text)
     found: dict[str, object] = {name: number(value) for name, value in DEFINE.findall(code)}
+    for name, size, body in PLAY.findall(code):
+        found[name] = tuple((int(count), 0) for count in re.findall(r"(\d+)u", body))
+        assert len(found[name]) == int(size)
+    code = PLAY.sub("", code)
     tables = TABLE.findall(code)
     assert len(tables) == len(re.findall(r"\[\w*\]\s*=", code)), "a table of another form"
     for name, size, body in tables:
@@ -57,6 +62,7 @@ def differences(files, manifest) -> list[str]:
 def bare_numbers(text: str) -> set[str]:
     """Return the literals in the code itself, outside `#define`s, tables and names."""
     code = re.sub(r"^#.*$", "", TABLE.sub("", COMMENT.sub("", text)), flags=re.MULTILINE)
+    code = PLAY.sub("", code)
     return set(re.findall(r"\b(0x[0-9A-Fa-f]+|\d+)(?=[uUlL]*\b)", code))
 
 
@@ -87,7 +93,7 @@ def test_every_form_of_the_core_has_the_constants_of_its_manifest(name, arithmet
     ],
 )
 def test_a_constant_that_is_not_the_manifests_is_seen(right, wrong):
-    made = firmware("plain", "wide")
+    made = firmware("no transition", "wide")
     text = made.files["core/dz_comp.c"]
     assert right in text
     files = {**made.files, "core/dz_comp.c": text.replace(right, wrong)}
@@ -95,7 +101,7 @@ def test_a_constant_that_is_not_the_manifests_is_seen(right, wrong):
 
 
 def test_an_entry_without_a_constant_and_a_bare_number_are_seen():
-    made = firmware("plain", "wide")
+    made = firmware("no transition", "wide")
     (first, *_), text = made.manifest.constants, made.files["core/dz_comp.c"]
     manifest = replace(made.manifest, constants=(*made.manifest.constants, replace(first, symbol="NOBODY")))
     assert differences(made.files, manifest) == [f"{first.file}: NOBODY is None in C and {first.value} in the manifest"]
@@ -123,7 +129,7 @@ def test_every_entry_leads_to_its_datum(name, arithmetic):
                 found = found[part]
             assert found is not None, key
         assert (ROOT / entry.generator).is_file()
-        comments = " ".join(made.files[entry.file].replace("\n * ", " ").split()).lower()
+        comments = " ".join(re.sub(r"\n *\* ", " ", made.files[entry.file]).split()).lower()
         said = f"{entry.equation}: {entry.engineering} ({entry.rounding}). */"
         assert f"/* {said.lower()}" in comments
 
@@ -143,9 +149,9 @@ def test_a_datum_is_the_constants_value():
 
 def test_the_engineering_values_are_those_of_the_constants():
     """By numbers typed here: 10 V over 60000 counts and 4095 codes, 20 MPa over 4095 codes."""
-    manifest = firmware("plain", "wide").manifest
+    manifest = firmware("no transition", "wide").manifest
     said = {(entry.file, entry.symbol): entry.engineering for entry in manifest.constants}
-    side = variant("plain", "wide").positive
+    side = variant("no transition", "wide").positive
     core = "core/dz_comp.c"
     assert said[core, "REVERSE"].startswith(f"{40 * 20 / 4095:.3f} MPa")
     assert said[core, "STEP_CODES"] == f"{64 * 20 / 4095:.4f} MPa"

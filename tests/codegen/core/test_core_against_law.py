@@ -19,7 +19,8 @@ DIGITS = 50
 U_MAX_V, X_MAX_M = sympy.Integer(10), sympy.Rational(18, 10_000)
 #: The nearest a value that is no tie comes to one is 1/(2 * 2^62); the 50 digits err by far less.
 TIE = sympy.Float("1e-30", DIGITS)
-CORNERS = [(command, dp) for command in (0, 1, 4094, 4095) for dp in (-4095, -41, -40, 0, 1, 63, 64, 4094, 4095)]
+COMMANDS = (0, 1, 19, 20, 35, 50, 51, 52, 4094, 4095)
+CORNERS = [(command, dp) for command in COMMANDS for dp in (-4095, -41, -40, 0, 1, 63, 64, 4094, 4095)]
 
 
 def rational(value) -> sympy.Rational:
@@ -37,18 +38,27 @@ def test_the_scaling_is_anchored_at_numbers():
 
 
 def stated_compare(compensator, command: int, dp_code: int) -> int:
-    """Go the way of the signal in volts: code -> u_i -> law -> u_O -> compare value, nearest count, limited."""
+    """Go the way of the signal in volts: code -> u_i -> law -> u_O -> compare value, nearest count, limited.
+
+    In the zero band u_O is the certified offset, and over the transition it runs straight from there to the law.
+    """
     signals = compensator.signals
     volts = U_MAX_V * command / signals.code_max
+    ends = (compensator.zero_band_codes, compensator.transition_end)
+    begin, end = (U_MAX_V * codes / signals.code_max for codes in ends)
     values = {
-        u_i: volts,
-        beta: rational(compensator.beta(dp_code)),
+        u_i: max(volts, end),
+        beta: rational(compensator.law_beta(dp_code)),
         k: rational(compensator.positive.drive_range_over_u_max) * U_MAX_V / X_MAX_M,
         x_max: X_MAX_M,
         u_max: U_MAX_V,
         u_min0: rational(compensator.positive.u_min0_over_u_max) * U_MAX_V,
     }
-    output = sympy.N(law(compensator.law).output.subs(values), DIGITS)
+    output = law(compensator.law).output.subs(values)
+    if volts < end:
+        offset = rational(compensator.beta(dp_code)) * values[u_min0]
+        output = offset + (output - offset) * max(volts - begin, sympy.Integer(0)) / (end - begin)
+    output = sympy.N(output, DIGITS)
     counts = sympy.N(COMPARE_VALUE.subs({u_O: output, u_max: U_MAX_V, n_full: signals.compare_max}), DIGITS)
     nearest = int(sympy.floor(counts + sympy.Rational(1, 2) + TIE))  # a half goes up
     return min(max(nearest, 0), signals.compare_max)

@@ -6,9 +6,9 @@ from fractions import Fraction
 import cvxpy as cp
 import numpy as np
 import pytest
+from curve_premises import failures
 from scipy.special import ndtr
 
-from benchmarks.identify.premises import failures
 from dzdesign.core.errors import InputError
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.identify.fitting import premises
@@ -18,6 +18,7 @@ from dzdesign.identify.fitting.premises import (
     confidence_at_tests,
     critical_value,
     find_curvature,
+    one_way_p,
     second_differences,
 )
 from dzdesign.identify.knees.between_ramps import BetweenRamps
@@ -220,6 +221,27 @@ class TestChoice:
     def test_a_curvature_beside_another_premise_is_refused(self):
         with pytest.raises(InputError, match="curvature"):
             IdentifyOptions(curve="line", curvature=1e-14)
+
+
+class TestOneWay:
+    def test_steps_the_wrong_way_by_three_margins_are_seen(self):
+        """Ten standard errors of a test: three times the distance of its bound."""
+        rng, covariance, seen = np.random.default_rng(8), 0.003**2 * np.eye(6), []
+        for draw in range(200):
+            truth = 5 - 0.08 * SIX
+            row = draw % 5
+            truth[row + 1] = truth[row] + 10 * 0.003
+            p_value = one_way_p(truth + 0.003 * rng.standard_normal(6), covariance, 14.0, "decreasing")
+            seen.append(p_value < premises.REFUSED)
+        assert np.mean(seen) > 0.95
+        flat = [one_way_p(5 + 0.003 * rng.standard_normal(6), covariance, 1e6, "decreasing") for _ in range(1000)]
+        assert np.mean(np.array(flat) < premises.REFUSED) < 0.02
+
+    @pytest.mark.parametrize("curve", [None, "monotone"])
+    def test_it_is_said_and_by_default_not_relied_on(self, curve):
+        dips = {1.0: 0.0, 2.0: 0.0, 3.0: -0.15, 4.0: 0.0, 5.0: 0.0}
+        valve = identify(ramps(lambda dp: 5.6 - 0.06 * dp + dips[dp]), replace(QUIET, curve=curve))
+        assert valve.positive.curve.premise == (curve or "smooth") and "not-monotone" in codes(valve)
 
 
 def soft_ramp(dp: float, knee: float, width: float, seed: int) -> RampTest:

@@ -26,7 +26,7 @@ def written(folder: Path, name: str, arithmetic: str) -> Path:
 
 @pytest.mark.slow
 @needs_frama_c
-@pytest.mark.parametrize(("name", "arithmetic"), [("plain", "wide"), ("bipolar, all options", "narrow")])
+@pytest.mark.parametrize(("name", "arithmetic"), [("default", "wide"), ("bipolar, all options", "narrow")])
 def test_no_place_of_the_core_and_the_drive_is_left_in_doubt(name, arithmetic, tmp_path):
     found = prove(written(tmp_path, name, arithmetic), FEW)
     assert found.alarms == ()
@@ -48,7 +48,7 @@ def test_no_place_of_the_core_and_the_drive_is_left_in_doubt(name, arithmetic, t
     ],
 )  # fmt: skip
 def test_a_fault_is_seen(file, right, wrong, function, tmp_path):
-    folder = written(tmp_path, "plain", "wide")
+    folder = written(tmp_path, "default", "wide")
     path = folder / "core" / file
     text = path.read_text()
     assert text.count(right) == 1
@@ -68,7 +68,7 @@ def test_without_frama_c_the_requirement_is_not_checked(firmware_folder, tmp_pat
 @pytest.mark.slow
 @needs_frama_c
 def test_c_that_frama_c_refuses_is_not_checked(tmp_path):
-    folder = written(tmp_path, "plain", "wide")
+    folder = written(tmp_path, "default", "wide")
     (folder / "core" / "dz_comp.c").write_text("this is no C")
     found = proof_check(folder)
     assert found.holds is None and "frama-c" in found.text

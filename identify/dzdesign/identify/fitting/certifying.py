@@ -10,7 +10,8 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.constants import MPA, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import fit_offset
-from dzdesign.identify.fitting.guarding import GuardedThreshold, OrderedKnees
+from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
+from dzdesign.identify.fitting.guarding import OrderedKnees
 from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
 from dzdesign.identify.fitting.premises import (
     FEWEST_FOR_CURVATURE,
@@ -63,8 +64,9 @@ def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Pre
     free, between, dp, options = guarded.free, guarded.between, tested.dp_MPa, tested.options
     ordered = guarded.ordered
     monotone = BoundUnderPremise(
-        premise="monotone", value=ordered.value, se=ordered.se, lower=ordered.bound, curvature=np.zeros(0), p_value=None
-    )
+        premise="monotone", value=ordered.value, se=ordered.se, lower=ordered.bound, curvature=np.zeros(0),
+        p_value=guarded.one_way_p,
+    )  # fmt: skip
     found = [monotone]
     declared = None if options.curvature is None else options.curvature * MPA**2
     if dp.size > 1 and (dp.size >= FEWEST_FOR_CURVATURE or options.curvature is not None):
@@ -80,7 +82,7 @@ def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Pre
         confidence = confidence_at_tests(options.confidence)
         statistical = lower_bounds(free.value, free.se, between, confidence, np.zeros(dp.size))
         budget = np.maximum(statistical - free.bound, 0.0)
-        fit = bound_line(dp, free.value, free.se, budget, between, confidence=confidence, u_max=options.u_max)
+        fit = bound_line(dp, free.value, free.se, budget, between, confidence=options.confidence, u_max=options.u_max)
         line = BoundUnderPremise(
             premise="line", value=fit.value, se=free.se, lower=fit.bound, curvature=np.zeros(dp.size - 1),
             p_value=fit.p_value,
@@ -130,7 +132,8 @@ def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
         except InputError as error:
             failures[premise] = error
     checks = {premise: _check(bound, offsets.get(premise), tested) for premise, bound in bounds.items()}
-    taken, refused = _take(bounds, offsets, tested.options.curve, one_way=not guarded.departs)
+    one_way = not (guarded.departs or bounds["monotone"].refused)
+    taken, refused = _take(bounds, offsets, tested.options.curve, one_way=one_way)
     if taken not in offsets:
         raise failures[taken]
     bound, offset = bounds[taken], offsets[taken]
@@ -164,7 +167,8 @@ def _take(
     `monotone`: a curvature that the tests know too badly supports nothing. Where the tests do not run `one_way`, it is
     `smooth` whatever it certifies.
     """
-    refused = asked if asked in bounds and asked is not None and bounds[asked].refused else None
+    # One that runs the wrong way has paid for it: its bounds are lowered.
+    refused = asked if asked in ("line", "smooth") and asked in bounds and bounds[asked].refused else None
     if asked is not None and asked not in bounds:
         raise InputError(
             f"--curve {asked} with {next(iter(bounds.values())).lower.size} pressure drop(s): a curvature is estimated "

@@ -1,26 +1,18 @@
 """The thresholds that a certificate may guard, of both branches and their mean, with their bounds at the tests."""
 
 import math
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting.bounds import (
-    DEGREES_OF_FREEDOM,
-    Trend,
     excess_departure,
-    find_trend,
     lower_bounds,
 )
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
-from dzdesign.identify.fitting.premises import confidence_at_tests
 from dzdesign.identify.fitting.soft_edges import find_softness
-from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.staircase import Direction
 
 #: Standard errors by which the tail's zero must lie below the knee, in one test or in all together, to be taken for a
@@ -172,155 +164,4 @@ def mean_threshold(group: DescribedTests, opening: Threshold, closing: Threshold
         (opening.se + closing.se) / 2,
         (opening.bound + closing.bound) / 2 + credit,
         lag_budget,
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GuardedThreshold:
-    """The threshold of one guard, without a premise and with knees brought in the order of their trend."""
-
-    free: Threshold
-    ordered: Threshold
-    between: BetweenRamps
-    #: By how much systematic errors may make it differ from test to test, V.
-    allowance: float
-    #: Whether it departs from one direction beyond its error: then a threshold that runs one way is contradicted.
-    departs: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Guarding:
-    """All that one side's tests say of what may be guarded."""
-
-    #: Branch that is guarded by default: 0 rising, 1 falling.
-    column: int
-    #: How its guarded threshold runs with the pressure drop.
-    trend: Trend
-    #: Without a direction, and with the knees of that branch in the order of their own trend.
-    free: KneeFit
-    knees: KneeFit
-    #: How far the knees, and the guarded thresholds, depart from one direction at each test, V.
-    departure: np.ndarray
-    guarded_departure: np.ndarray
-    #: Of every guard that the branches allow, the default one first.
-    thresholds: dict[Guard, GuardedThreshold]
-    #: Knees of the rising branch that run the way of the trend.
-    opening: OrderedKnees | None
-
-
-def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOptions) -> Guarding:
-    """Return the thresholds that may be guarded, and which way the guarded one runs.
-
-    The trend is the guarded threshold's: a soft edge whose leak grows with the pressure drop may run against the knees.
-    One edge opens and closes, so it is that of the default guard for all. A branch that runs otherwise departs from it,
-    and its bounds are lowered by the departure.
-    """
-    column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
-    guard: Guard = "closing" if column else "opening"
-    other: Guard = "opening" if column else "closing"
-    single = {guard: _unordered(group, free, column, options)}
-    trend = _trend_of(group, column, single[guard].value, single[guard].se, options)
-    of_knees = _trend_of(group, column, free.knee[:, column], free.knee_se[:, column], options).direction
-    knees = {guard: order_knees(group, free, of_knees, column, options)}
-    # Where the solver finds no order of the other branch's knees, that guard is not on offer, and `design` says so.
-    with suppress(InputError):
-        if group.tests[0].shapes[1 - column]:
-            knees[other] = order_knees(group, free, of_knees, 1 - column, options, alone=True)
-            single[other] = _unordered(group, free, 1 - column, options)
-    thresholds: dict[Guard, GuardedThreshold] = {}
-    for name, ordered in knees.items():
-        thresholds[name] = GuardedThreshold(
-            free=single[name],
-            ordered=bound_threshold(group, ordered, options),
-            between=group.between(ordered.column),
-            allowance=systematic_change(group, ordered.column, options),
-            departs=bool(ordered.departure.max() > 0),
-        )
-    departure = guarded_departure(thresholds[guard], trend.direction)
-    thresholds = {name: _lowered(each, trend.direction) for name, each in thresholds.items()}
-    if other in thresholds:
-        thresholds["mean"] = _mean_of(group, thresholds)
-    return Guarding(
-        column=column,
-        trend=trend,
-        free=free,
-        knees=knees[guard].fit,
-        departure=knees[guard].departure,
-        guarded_departure=departure,
-        thresholds=thresholds,
-        opening=_opening(group, free, knees, of_knees, trend.direction, options),
-    )
-
-
-def _unordered(group: DescribedTests, free: KneeFit, column: int, options: IdentifyOptions) -> Threshold:
-    """Return a branch's threshold for a premise that is no direction."""
-    alone = OrderedKnees(column=column, fit=free, departure=np.zeros(len(group.tests)))
-    return bound_threshold(group, alone, replace(options, confidence=confidence_at_tests(options.confidence)))
-
-
-def _trend_of(
-    group: DescribedTests, column: int, value: np.ndarray, se: np.ndarray, options: IdentifyOptions
-) -> Trend:
-    """Test which way the thresholds (V) of a branch run with the pressure drop."""
-    between = group.between(column)
-    return find_trend(
-        np.array([item.dp or math.nan for item in group.tests]),
-        value,
-        between.covariance_of_mean(se),
-        float(between.degrees_of_freedom(se, DEGREES_OF_FREEDOM).min()),
-        options.u_max,
-        systematic_change(group, column, options),
-    )
-
-
-def _opening(
-    group: DescribedTests,
-    free: KneeFit,
-    knees: dict[Guard, OrderedKnees],
-    of_knees: Direction,
-    direction: Direction,
-    options: IdentifyOptions,
-) -> OrderedKnees | None:
-    """Return the rising knees that run the way of the guarded threshold's trend."""
-    if "opening" not in knees or of_knees == direction:
-        return knees.get("opening")
-    with suppress(InputError):
-        return order_knees(group, free, direction, 0, options, alone=True)
-    return None
-
-
-def guarded_departure(guarded: GuardedThreshold, direction: Direction) -> np.ndarray:
-    """Return how far a guarded threshold departs from the direction of the trend at each test, V, beyond its error."""
-    from scipy.optimize import isotonic_regression
-
-    value, se = guarded.ordered.value, guarded.ordered.se
-    if value.size < 2:
-        return np.zeros(value.size)
-    error = np.sqrt(np.diag(guarded.between.covariance_of_mean(se)))
-    if direction == "flat":
-        return excess_departure(np.abs(value - value.mean()), error, guarded.allowance)
-    weights = error**-2.0 if np.all(error > 0) else None
-    nearest = isotonic_regression(value, weights=weights, increasing=direction == "increasing").x
-    return excess_departure(np.abs(value - nearest), error, guarded.allowance)
-
-
-def _lowered(guarded: GuardedThreshold, direction: Direction) -> GuardedThreshold:
-    """Lower the bounds under one direction by what the guarded threshold departs from it.
-
-    Without a direction the lowest bound of all tests holds everywhere, whatever the others do.
-    """
-    departure = float(guarded_departure(guarded, direction).max())
-    lowered = guarded.ordered.bound - (0.0 if direction == "flat" else departure)
-    return replace(guarded, ordered=replace(guarded.ordered, bound=lowered), departs=guarded.departs or departure > 0)
-
-
-def _mean_of(group: DescribedTests, thresholds: dict[Guard, GuardedThreshold]) -> GuardedThreshold:
-    """Return the mean of both branches' thresholds; from ramp to ramp it scatters no more than the worse of the two."""
-    opening, closing = thresholds["opening"], thresholds["closing"]
-    return GuardedThreshold(
-        free=mean_threshold(group, opening.free, closing.free),
-        ordered=mean_threshold(group, opening.ordered, closing.ordered),
-        between=max(opening.between, closing.between, key=lambda each: each.sd),
-        allowance=max(opening.allowance, closing.allowance),
-        departs=opening.departs or closing.departs,
     )

@@ -104,28 +104,39 @@ def fit_joint_curve(
     scales = [expected_errors(shape) for shape in branches]
     numbers = [branch_numbers(shape, scale, floor, u_max) for shape, scale in zip(branches, scales, strict=True)]
     layout = _layout(placed, knees, scatter, dp_MPa)
-    at_dp0 = [index for index, (row, _, _) in enumerate(placed) if row == reference]
-    top = float(np.mean([branches[index].y_max for index in at_dp0]))
-    top_se = float(np.sqrt(sum(_top_error(branches[index]) ** 2 for index in at_dp0))) / len(at_dp0)
+    of_dp0 = _largest_flow(placed, reference)
     slope = np.array([knees.slope[row, column] for row, column, _ in placed])
-    begin = np.concatenate([
-        (slope / [shape.slope for shape in branches] - 1) / [scale[0] for scale in scales],
-        np.zeros(layout.parts.shape[1]),
-        [0.0],
-    ])  # fmt: skip
+    own_slope = np.array([shape.slope for shape in branches])
+    start = (slope / own_slope - 1) / [scale[0] for scale in scales]
+    k_x_max = of_dp0.flow / float(of_dp0.weights @ slope)
     rows = censored_rows([censored for _, censored in numbers])
-    at = np.zeros(len(placed))
-    at[at_dp0] = 1 / len(at_dp0)
-    knee0 = np.array([shape.knee for shape in branches])
     known = np.concatenate([
         np.array([row for row, _ in numbers]).ravel("F"), *(part.ravel("F") for part in rows),
-        (layout.start - knee0) / u_max, (layout.parts / u_max).ravel("F"), layout.prior_sd,
-        [1 / shape.variance_inflation for shape in branches], at * [shape.slope for shape in branches] * u_max / top,
-        [top / (at @ slope) / u_max, top_se / top],
+        (layout.start - [shape.knee for shape in branches]) / u_max, (layout.parts / u_max).ravel("F"),
+        layout.prior_sd, [1 / shape.variance_inflation for shape in branches],
+        of_dp0.weights * own_slope * u_max / of_dp0.flow, [k_x_max / u_max, of_dp0.flow_se / of_dp0.flow],
     ])  # fmt: skip
+    best, covariance = _solve(len(placed), rows[0].shape[0], layout.parts.shape[1], start, known)
+    unknown, inside = best[len(placed) : -1], covariance[len(placed) : -1, len(placed) : -1]
+    u, of_u = np.full((len(shapes), 2), np.nan), np.full((2, len(shapes), len(shapes)), np.nan)
+    for column, (level, parts) in layout.reported.items():
+        u[:, column] = level + parts @ unknown
+        of_u[column] = parts @ inside @ parts.T
+    return JointCurve(
+        u=u,
+        covariance=of_u,
+        k_x_max=float(k_x_max * (1 + best[-1])),
+        k_x_max_se=float(k_x_max * np.sqrt(covariance[-1, -1])),
+    )
+
+
+def _solve(
+    branches: int, room: int, parts: int, start: np.ndarray, known: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the unknowns at the optimum and their covariance; the knees start where the layout has them."""
     with SOLVER_LOCK:
-        solver = _curve_solver(len(placed), rows[0].shape[0], layout.parts.shape[1])
-        solution = solver(x0=begin, p=known)
+        solver = _curve_solver(branches, room, parts)
+        solution = solver(x0=np.concatenate([start, np.zeros(parts + 1)]), p=known)
         outcome = solver.stats()
         best = np.asarray(solution["x"]).ravel()
         hessian = hessian_of_cost(solver, best, known)
@@ -137,17 +148,27 @@ def fit_joint_curve(
             f"the joint fit of the curve did not converge ({outcome['return_status']}); "
             "look at the ramp tests, and leave out the one that is unlike the others"
         )
-    unknown, inside = best[len(placed) : -1], covariance[len(placed) : -1, len(placed) : -1]
-    u, of_u = np.full((len(shapes), 2), np.nan), np.full((2, len(shapes), len(shapes)), np.nan)
-    for column, (start, parts) in layout.reported.items():
-        u[:, column] = start + parts @ unknown
-        of_u[column] = parts @ inside @ parts.T
-    k_x_max = top / (at @ slope)
-    return JointCurve(
-        u=u,
-        covariance=of_u,
-        k_x_max=float(k_x_max * (1 + best[-1])),
-        k_x_max_se=float(k_x_max * np.sqrt(covariance[-1, -1])),
+    return best, covariance
+
+
+@dataclass(frozen=True, slots=True)
+class _LargestFlow:
+    """The largest flow at dP0, the mean of its branches, with its standard error, m³/s, and each branch's weight."""
+
+    flow: float
+    flow_se: float
+    weights: np.ndarray
+
+
+def _largest_flow(placed: Sequence[tuple[int, int, BranchShape]], reference: int) -> _LargestFlow:
+    at_dp0 = [index for index, (row, _, _) in enumerate(placed) if row == reference]
+    weights = np.zeros(len(placed))
+    weights[at_dp0] = 1 / len(at_dp0)
+    shapes = [placed[index][2] for index in at_dp0]
+    return _LargestFlow(
+        flow=float(np.mean([shape.y_max for shape in shapes])),
+        flow_se=float(np.sqrt(sum(_top_error(shape) ** 2 for shape in shapes))) / len(shapes),
+        weights=weights,
     )
 
 

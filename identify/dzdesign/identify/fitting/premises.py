@@ -13,12 +13,15 @@ import numpy as np
 
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR
 from dzdesign.identify.knees.between_ramps import BetweenRamps
+from dzdesign.identify.valve.staircase import Direction
 
 #: Probability, if a premise were true, of data as unlike it as these, below which it is refused.
 REFUSED = 0.01
 #: Share of the error probability that the bounds at the tests leave to the premise: for a curvature that is estimated,
 #: and for degrees of freedom that are effective ones.
 SHARE_OF_PREMISE = 0.25
+#: The same of a line, whose weights come from errors that are estimated too.
+SHARE_OF_LINE = 0.5
 #: A curvature that is estimated: so many times the largest second divided difference at the tests. A kink half way
 #: between two tests shows as half of its change of slope at each, and over the distance of two tests instead of one.
 INNER_FACTOR = 4.0
@@ -67,7 +70,7 @@ def find_curvature(
     Only a threshold that bends upwards lies below its chords. Estimated, M is four times the largest second divided
     difference at the tests; in the first and the last interval at least 32 times that of the one test that tells of it
     (64 with three tests). Its error needs no allowance: what M lacks by it is small beside the distance of the bounds
-    from the thresholds, which the same errors set (benchmarks/identify/premises.py).
+    from the thresholds, which the same errors set (benchmarks/identify/curve_premises.py).
 
     Parameters
     ----------
@@ -98,9 +101,28 @@ def find_curvature(
     return Curvature(at_tests=found, se=se, allowed=allowed, declared=declared is not None, p_value=p_value)
 
 
-def confidence_at_tests(confidence: float) -> float:
+def confidence_at_tests(confidence: float, share: float = SHARE_OF_PREMISE) -> float:
     """Return the confidence of the bounds at the tests with which the whole curve has the given one."""
-    return 1 - (1 - SHARE_OF_PREMISE) * (1 - confidence)
+    return 1 - (1 - share) * (1 - confidence)
+
+
+def one_way_p(
+    threshold: np.ndarray, covariance: np.ndarray, degrees: float, direction: Direction
+) -> float | None:
+    """Return the probability of steps against the direction as large as the largest, if the threshold ran that way.
+
+    Of all pairs of tests, with Bonferroni; None without a direction, and from two tests, which gave it.
+    """
+    from scipy.special import stdtr
+
+    first, last = np.triu_indices(threshold.size, 1)
+    if direction == "flat" or threshold.size < 3:
+        return None
+    step = (threshold[last] - threshold[first]) * (1 if direction == "decreasing" else -1)
+    variance = np.diag(covariance)
+    error = np.sqrt(variance[first] + variance[last] - 2 * covariance[first, last])
+    largest = float(np.max(step / np.maximum(error, np.finfo(float).tiny)))
+    return min(1.0, float(first.size * stdtr(min(degrees, LARGEST_DEGREES), -largest)))
 
 
 def second_differences(dp_MPa: np.ndarray) -> np.ndarray:
@@ -123,11 +145,13 @@ def bound_line(
 ) -> Line:
     """Bound the next closing (or opening) under a straight threshold, of a valve in any state of the series.
 
-    The bounds at the tests hold at once with the given confidence, and with them their chords. Of two critical values,
+    The bounds at the tests hold at once with the given confidence, and with them their chords; `SHARE_OF_LINE` of the
+    error probability is kept for what the bounds do not count. Of two critical values,
     both known before a threshold is, the smaller is taken: Bonferroni's over the tests, and the tube formula's for the
     whole interval. Systematic errors of the tests, the `budget` (V), reach the line by its weights.
     """
     rounding = (FINEST_ERROR * u_max) ** 2 * np.eye(dp_MPa.size)
+    confidence = confidence_at_tests(confidence, SHARE_OF_LINE)
     covariance = between.covariance_of_mean(noise_se) + rounding
     weights_of = _line_weights(dp_MPa, covariance)
     at_tests, along = weights_of(dp_MPa), weights_of(np.linspace(dp_MPa[0], dp_MPa[-1], PATH_POINTS))

@@ -161,7 +161,8 @@ class CertifiedCurve:
             )
         return (
             "Premise monotone: between two tests the bound is the lower one's, on the premise that the threshold runs "
-            "one way there, which no test checks: a threshold that is lowest between two tests would lie below it"
+            f"one way there ({tested}), which no test checks between them: a threshold lowest between two tests "
+            "would lie below it"
         )
 
     def bound(self, trend: Direction) -> CertifiedBound:

@@ -1,18 +1,16 @@
-"""How often a certified bound lies above the true threshold, by premise: thresholds drawn with a fit's errors.
-
-    python -m benchmarks.identify.premises [draws]
+"""14. Bounds under a premise: how often they lie above the true threshold anywhere on the interval.
 
 The thresholds at the tests are drawn about a truth (straight, convex, concave, kinked within M; falling and rising)
 with errors and degrees of freedom as ramp tests give them, and go through identify's own bounds and premises. A draw
-fails where the bound exceeds the threshold at the next closing anywhere on the interval. Each truth has random size: a
-bend from a third to a hundred times the errors.
+fails where the bound exceeds the threshold at the next closing anywhere on the interval. Each bend is drawn from a
+third to a hundred times the errors.
 """
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scoreboard import Row, print_rows, say
 
 from dzdesign.identify.fitting.bounds import lower_bounds
 from dzdesign.identify.fitting.premises import bound_line, confidence_at_tests, find_curvature
@@ -77,7 +75,7 @@ def failures(
         threshold = truth.at(dp) + np.hypot(noise, scatter) * rng.standard_normal(tests)
         confidence = confidence_at_tests(CONFIDENCE)
         if premise == "line":
-            line = bound_line(dp, threshold, se, np.zeros(tests), between, confidence=confidence, u_max=U_MAX)
+            line = bound_line(dp, threshold, se, np.zeros(tests), between, confidence=CONFIDENCE, u_max=U_MAX)
             lower, bends, p_value = line.bound, np.zeros(tests - 1), line.p_value
         else:
             lower = lower_bounds(threshold, se, between, confidence, np.zeros(tests))
@@ -94,29 +92,33 @@ def failures(
     return failed, refused
 
 
-def table(draws: int, seed: int = 1) -> Iterator[tuple[str, int]]:
-    """Yield a line and the failures of every premise, shape and number of tests."""
-    for errors in ERRORS:
-        for tests in PRESSURES:
-            for shape in SHAPES:
-                if shape == "line" or tests > 2:
-                    for premise, declared in (("line", False), ("smooth", True), ("smooth", False)):
-                        unknown = premise == "smooth" and tests == 2 and not declared
-                        if unknown or (premise == "line" and shape != "line"):
-                            continue
-                        failed, refused = failures(premise, shape, tests, errors, draws, declared=declared, seed=seed)
-                        what = f"{premise}{', M declared' if declared else ''}"
-                        yield (
-                            f"{what:20} {tests} tests, {shape:8} noise {1e3 * errors[0]:.1f}, scatter "
-                            f"{1e3 * errors[1]:.1f} mV: above {100 * failed / draws:.2f} %, refused "
-                            f"{100 * refused / draws:.2f} %",
-                            failed,
-                        )
-                elif tests == 2:
-                    failed, refused = failures("smooth", shape, tests, errors, draws, declared=True, seed=seed)
-                    yield (f"smooth, M declared   2 tests, {shape:8}: above {100 * failed / draws:.2f} %", failed)
+def kinds() -> Iterator[tuple[str, bool, int, str]]:
+    """Yield premise, whether M is declared, the number of tests and the shape."""
+    for tests in PRESSURES:
+        yield "line", False, tests, "line"
+        for shape in SHAPES:
+            yield "smooth", True, tests, shape
+            if tests > 2:
+                yield "smooth", False, tests, shape
 
 
-if __name__ == "__main__":
-    for line, _ in table(int(sys.argv[1]) if len(sys.argv) > 1 else 3000):
-        print(line, flush=True)
+def most(draws: int) -> float:
+    """Return how many of so many draws may fail by chance if one in a hundred does (99.9 %)."""
+    from scipy.stats import binom
+
+    return float(binom.ppf(0.999, draws, 1 - CONFIDENCE))
+
+
+def print_curve_premises(*, quick: bool, seed: int) -> list[Row]:
+    """Print and return the rows of part 14."""
+    draws, rows = 300 if quick else 3000, []
+    for errors in ERRORS[:1] if quick else ERRORS:
+        say(f"premises: noise {1e3 * errors[0]:.1f} mV, scatter {1e3 * errors[1]:.1f} mV")
+        for premise, declared, tests, shape in kinds():
+            failed, refused = failures(premise, shape, tests, errors, draws, declared=declared, seed=seed)
+            how = ", M declared" if declared else ""
+            what = f"{premise}{how}, {tests} tests, {shape}, {1e3 * errors[0]:.1f} and {1e3 * errors[1]:.1f} mV"
+            note = f"of {draws}, 1 % and chance; refused {100 * refused / draws:.2f} %"
+            rows.append(Row(what=what, value=failed, limit=most(draws), note=note))
+    print_rows(f"14. Bounds above the true threshold, by premise (seed {seed})", rows)
+    return rows
