@@ -115,7 +115,7 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         "or 0.5 % of the largest flow) counts as none",
         f"from ramp to ramp: {certificate.repeatability.in_words(units)}",
         f"identified: u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
-        f"{units.text(side.reference.u_min_se_V, '.4f dV')}{at}, the knee on {certificate.guard}{_betas(side)}",
+        f"{units.text(side.reference.u_min_se_V, '.4f dV')}{at}, the knee on {certificate.guard}{_betas(side, units)}",
         f"certified: an offset of {units.text(side.curve.u_min0_V, '.4f V')}{at}, the largest under the bounds; more "
         "tests raise it",
         f"premise: {side.premise}",
@@ -135,14 +135,15 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
     )
 
 
-def _betas(side: "SideModel") -> str:
+def _betas(side: "SideModel", units: "RecordedUnits") -> str:
     """Say beta at the highest pressure drop, of each branch."""
     found = [
         f"{each.beta[-1]:.4f} ± {each.beta_se[-1]:.4f} on {name}"
         for name, each in side.identified.items()
         if len(each.beta) > 1
     ]
-    return f"; beta({side.tests[-1].dp_MPa:.3g} MPa) = {', '.join(found)}" if found else ""
+    at = units.text(side.tests[-1].dp_MPa or 0.0, ".3g MPa")
+    return f"; beta({at}) = {', '.join(found)}" if found else ""
 
 
 def _premise_lines(side: "SideModel") -> tuple[str, ...]:
