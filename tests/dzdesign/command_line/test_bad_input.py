@@ -393,7 +393,7 @@ COMPENSATORS = [
     ((*POSITIVE, "beta", 3), 0, "'sides.positive.beta[3]' is 0"),
     ((*POSITIVE, "beta", 3), 1.5, "'sides.positive.beta[3]' is 1.5, expected a whole number"),
     ((*POSITIVE, "transition_beta"), [1, 2], "the transition's beta must have as many nodes"),
-    (("transition_codes",), 32, "a transition needs the opening threshold's beta"),
+    (("transition_codes",), 0, "a transition needs the opening threshold's beta"),
     (("beta_denominator",), 3, "beta_denominator is 3, expected a power of two"),
     (("beta_step_codes",), 0, "'beta_step_codes' is 0"),
     (("below_dp0",), "held", "'below_dp0' is 'held', expected 'extend' or 'hold'"),
