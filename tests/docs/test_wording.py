@@ -24,8 +24,8 @@ FIGURES = {
 
 def scenario(name, **figures):
     return ScenarioResult(
-        name=name, side="positive", dp_MPa=5.0, leak_L_min=0.0, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0, unseen_below_L_min=None,
-        must_shut=True, figures=figures,
+        name=name, side="positive", dp_MPa=5.0, leak_L_min=0.0, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0,
+        unseen_below_L_min=None, must_shut=True, figures=figures,
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """Zero band and inverse play in the closed loop with the plant of the example's recordings: what they promise."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -39,12 +40,12 @@ def folder_of(compensator, folder, edit=None):
 
 def widest(scene, corners=CORNERS):
     """The largest distance of neighbouring branches over the command, from 5 % to 100 % of flow, and the last flow."""
-    parts = [np.linspace(a, b, round(abs(b - a) * RECORDS)) for a, b in zip(corners, corners[1:], strict=False)]
+    parts = [np.linspace(a, b, round(abs(b - a) * RECORDS)) for a, b in pairwise(corners)]
     run = scene.loop.run(np.concatenate([*parts, np.zeros(100)]), scene.dp_MPa, "compensated")
     ends = np.cumsum([0, *(part.size for part in parts)])
-    branches = [(run.command[a:b], run.q_mean_L_min[a:b]) for a, b in zip(ends, ends[1:], strict=False)]
+    branches = [(run.command[a:b], run.q_mean_L_min[a:b]) for a, b in pairwise(ends)]
     found = []
-    for (u, q), (other_u, other_q) in zip(branches, branches[1:], strict=False):
+    for (u, q), (other_u, other_q) in pairwise(branches):
         low = max(q.min(), other_q.min(), 0.05 * run.q_mean_L_min.max())
         flows = np.linspace(low, min(q.max(), other_q.max()), 400)[1:-1]
         if flows[-1] > flows[0]:
