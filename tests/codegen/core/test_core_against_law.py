@@ -107,11 +107,16 @@ FAULTS = {
 @needs_compiler
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.slow
-def test_a_fault_in_the_scaling_is_seen_in_the_core(fault, example_compensator, tmp_path, monkeypatch):
+def test_a_fault_in_the_scaling_is_seen_in_the_core(fault, example_valve, tmp_path, monkeypatch):
     """Design, codegen and verify share the scaling, so they agree on a wrong one; the way in volts does not."""
+    from dzdesign.design.designing import design
+    from dzdesign.design.options import DesignOptions
+
+    # With a zero band a drive below zero is refused before there is a core.
+    compensator = design(example_valve, DesignOptions(transition=Fraction(0)))
     true_line = scaling.law_in_counts
     monkeypatch.setattr(scaling, "law_in_counts", lambda each: FAULTS[fault](true_line(each)))
-    assert wrong_codes(example_compensator, tmp_path / "fw", seed=33) > 100
+    assert wrong_codes(compensator, tmp_path / "fw", seed=33) > 100
 
 
 # --- the law in counts and the pressures, in doubles of every kind ------------------------------------------
