@@ -371,7 +371,7 @@ def test_bipolar_valves_through_the_command(tmp_path, capsys):
         for name, content in recordings(number, 7).items():
             (folder / name).write_bytes(content)
             (folder / f"negative_{name}").write_bytes(mirrored(content))
-    signal = ["--command-signal", "-10..10 V x 0.15 + 1.5 V", "--zero-window", "1 %"]
+    signal = ["--command-signal", "-10..10 V x 0.15 + 1.5 V"]
     assert main(["batch", str(tmp_path / "lot"), "-o", str(tmp_path / "out"), *OPTIONS, *signal]) == 0
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "2 of 2 valves calibrated" in head(html) and "Negative side: it leaves" in html

@@ -120,7 +120,7 @@ def beta_figure(
     figure, axes = titled_axes(3.6, name, both, legend_rows=2)
     draw_beta(axes, side, curve, units)
     rows: list[list[str | float | None]] = [
-        [f"identified, {branch}", at, value, se, volts]
+        [f"identified {branch}", at, value, se, volts]
         for branch, found in side.identified.items()
         for at, value, se, volts in zip(found.dp_MPa, found.beta, found.beta_se, found.u_V, strict=True)
     ]
