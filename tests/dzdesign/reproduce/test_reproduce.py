@@ -101,7 +101,7 @@ def test_the_page_shows_what_is_printed(reproduced, monkeypatch, tmp_path, capsy
     assert [row for row in rows if row not in printed] == []
     assert "39 numbers, of which 31 must agree: all do." in printed
     onsets = [each.runs.onset_percent(Drive(PRODUCT), dp_MPa) for each in reproduced[1] for dp_MPa in (1.0, 5.0)]
-    assert max(onsets) < 0.6, "the page says so"
+    assert max(onsets) < 0.8, "the page says so"
 
 
 def test_same_valve_same_bytes(reproduced):

