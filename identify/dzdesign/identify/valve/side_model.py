@@ -22,6 +22,8 @@ from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.staircase import Direction
 
+#: valve.json has seven decimals, L/min.
+ROUNDING_L_MIN = 1e-6
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
 
@@ -64,6 +66,10 @@ class BoundsBasis:
         Meta(
             description="Flow below which there is none: the largest noise level of the tests."
         ),
+    ]
+    zero_flow_L_min: Annotated[
+        Flow | None,
+        Meta(description="Flow at zero command, a leak included, that --zero-flow declared as allowed; null: none."),
     ]
     repeatability: Annotated[Repeatability, Meta(description="What differs from ramp to ramp.")]
 
@@ -143,6 +149,7 @@ class SideModel:
             self._check_nodes(guard.dp_MPa, len(guard.u_lower_V))
             guard.check_offset(self.trend or "flat", self.reference.dp_MPa)
         self._check_guarded()
+        self._check_zero_flow()
         self._check_identified()
         if self.opening_curve is not None:
             self._check_nodes(self.opening_curve.dp_MPa, len(self.opening_curve.u_V))
@@ -166,6 +173,17 @@ class SideModel:
         for test, threshold, bound in zip(self.tests, curve.u_threshold_V, curve.u_lower_V, strict=True):
             if abs(test.u_guard_V - threshold) > ROUNDING_V or abs(test.u_guard_lower_V - bound) > ROUNDING_V:
                 raise RuleError(f"the tests' guarded thresholds and bounds are not those of the {guard} curve")
+
+    def _check_zero_flow(self) -> None:
+        """Check that every test answers for the declared flow at zero, or none does."""
+        declared = self.certificate.zero_flow_L_min
+        for test in self.tests:
+            allowed = test.zero_flow_L_min
+            if (allowed is None) != (declared is None) or (allowed or 0.0) < (declared or 0.0) - ROUNDING_L_MIN:
+                raise RuleError(
+                    f"a test answers for a flow at zero of {allowed} L/min beside a declared one of {declared} L/min, "
+                    "expected as much or more, and none where none is declared"
+                )
 
     def _check_identified(self) -> None:
         """Check that there is a curve for the guarded branch, one node a test, and that the reference repeats it."""
@@ -192,6 +210,12 @@ class SideModel:
         if len(self.tests) < 2:
             return "one pressure drop was tested: the bound holds there, and nothing is certified at another"
         return f"{len(self.tests)} pressure drops were tested. {self.curve.premise_in_words}"
+
+    @property
+    def zero_flow_L_min(self) -> float | None:
+        """Largest flow at zero command that the bounds answer for, a leak included; None where none was declared."""
+        allowed = [test.zero_flow_L_min for test in self.tests if test.zero_flow_L_min is not None]
+        return max(allowed, default=None)
 
     @property
     def curve(self) -> CertifiedCurve:
