@@ -55,8 +55,13 @@ def allowed_at_zero(group: DescribedTests, options: IdentifyOptions) -> tuple[fl
     """
     if options.zero_flow is None:
         return None
-    confident = [flow + _errors(options, len(group.tests)) * error for flow, error in group.at_rest]
-    return tuple(max(options.zero_flow, flow + options.meter_zero + group.noise_level) for flow in confident)
+    return tuple(max(options.zero_flow, flow + group.noise_level) for flow in largest_at_rest(group, options))
+
+
+def largest_at_rest(group: DescribedTests, options: IdentifyOptions) -> list[float]:
+    """Return what the shut valve passes at most of the flow that was subtracted from each test, m³/s."""
+    errors = _errors(options, len(group.tests))
+    return [flow + errors * error + options.meter_zero for flow, error in group.at_rest]
 
 
 def refuse_a_large_zero_flow(group: DescribedTests, options: IdentifyOptions) -> None:
@@ -83,31 +88,35 @@ def with_zero_flow(
     """Return a threshold moved up to where the valve passes the flow that is allowed at zero, where the data support it.
 
     `found` is the threshold without such a flow, `budget` (V, (T,)) what is taken off a bound beside noise and scatter.
-    Tests whose allowed flow is less than leak and noise level keep theirs.
     """
-    if options.zero_flow is None:
+    allowed = allowed_at_zero(group, options)
+    if allowed is None:
         return found
     refuse_a_large_zero_flow(group, options)
     shapes = [item.branch(column) for item in group.tests]
     readings = [_readings(shape, group.floor) for shape in shapes]
-    targets = _targets(group, options)
-    room = [confident for _, confident in targets]
-    safe = np.full(found.value.size, -math.inf)
-    value, se = found.value.copy(), found.se.copy()
-    open_to = [row for row, flow in enumerate(room) if flow >= group.noise_level]
-    crossings = {row: _crossing(shapes[row], readings[row], targets[row][0], options.u_max) for row in open_to}
-    scatter = _scatter([(shapes[row], readings[row], crossings[row][0]) for row in open_to], options)
-    for row in open_to:
-        errors = _errors(options, len(STRETCHES) * len(shapes))
-        of_rest = group.zero_se[row] * math.sqrt(shapes[row].variance_inflation)
-        most = room[row] - scatter
-        safe[row] = _highest_safe(shapes[row], readings[row], most, errors, of_rest, options.u_max)
+    # What the flow in the readings may be: as estimated, and less what leak and zero error may be more for certain.
+    rest = [flow for flow, _ in group.at_rest]
+    crossings = [
+        _crossing(shape, each, flow - at_rest, options.u_max)
+        for shape, each, flow, at_rest in zip(shapes, readings, allowed, rest, strict=True)
+    ]
+    scatter = _scatter([(*each, at) for *each, (at, _) in zip(shapes, readings, crossings, strict=True)], options)
+    errors = _errors(options, len(STRETCHES) * len(shapes))
+    safe = np.array([
+        _highest_safe(
+            shape, each, flow - at_rest - scatter, errors, se * math.sqrt(shape.variance_inflation), options.u_max
+        )
+        for shape, each, flow, at_rest, se in zip(
+            shapes, readings, allowed, largest_at_rest(group, options), group.zero_se, strict=True
+        )
+    ])  # fmt: skip
     bound = _with_scatter(safe, group.between(column), options.confidence, budget)
-    for row in open_to:
-        if bound[row] > found.bound[row]:
-            value[row], se[row] = crossings[row]
-    bound = np.maximum(bound, found.bound)
-    return replace(found, value=np.maximum(value, bound), se=se, bound=bound)
+    moved = bound > found.bound
+    at, at_se = np.array(crossings).T
+    bound = np.where(moved, bound, found.bound)
+    value = np.where(moved, np.maximum(at, bound), found.value)
+    return replace(found, value=value, se=np.where(moved, at_se, found.se), bound=bound)
 
 
 def _errors(options: IdentifyOptions, count: int) -> float:
@@ -115,12 +124,6 @@ def _errors(options: IdentifyOptions, count: int) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(DEGREES_OF_FREEDOM, 1 - (1 - options.confidence) / count))
-
-
-def _targets(group: DescribedTests, options: IdentifyOptions) -> list[tuple[float, float]]:
-    """Return what the flow in the readings of each test may be, m³/s: as estimated, and what is left for certain."""
-    allowed, errors = options.zero_flow or 0.0, _errors(options, len(group.tests))
-    return [(allowed - flow, allowed - flow - errors * error - options.meter_zero) for flow, error in group.at_rest]
 
 
 def _readings(shape: BranchShape, floor: float) -> _Readings:
