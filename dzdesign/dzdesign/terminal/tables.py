@@ -110,9 +110,7 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
     return (
         f"pressure drop: {', '.join(made_of)}",
         f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
-        "threshold (the knee, or the tail's zero where the edge is soft); flow below "
-        f"{units.text(certificate.level_L_min, '.2f L/min')} (noise level: the meter's floor, what averages resolve, "
-        "or 0.5 % of the largest flow) counts as none",
+        f"threshold {_guarded(side, units)}",
         f"from ramp to ramp: {certificate.repeatability.in_words(units)}",
         f"identified: u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
         f"{units.text(side.reference.u_min_se_V, '.4f dV')}{at}, the knee on {certificate.guard}{_betas(side, units)}",
@@ -132,6 +130,21 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         if side.trend_change_V is None or side.trend_change_se_V is None
         else f"trend with dP: {side.trend} ({units.number(1e3 * side.trend_change_V, '+.1f mV')} ± "
         f"{units.text(1e3 * side.trend_change_se_V, '.1f mV')} over the tested range, {chance(side.trend_p or 0.0)})",
+    )
+
+
+def _guarded(side: "SideModel", units: "RecordedUnits") -> str:
+    """Say which threshold is bounded, and what counts as no flow."""
+    declared, allowed = side.certificate.zero_flow_L_min, side.zero_flow_L_min
+    if declared is None or allowed is None:
+        return (
+            "(the knee, or the tail's zero where the edge is soft); flow below "
+            f"{units.text(side.certificate.level_L_min, '.2f L/min')} (noise level: the meter's floor, what averages "
+            "resolve, or 0.5 % of the largest flow) counts as none"
+        )
+    more = f"; the bounds answer for {units.text(allowed, '.3g L/min')}" if allowed > 1.001 * declared else ""
+    return (
+        f"(the command that passes {units.text(declared, '.3g L/min')}, the declared zero flow, a leak included{more})"
     )
 
 
@@ -181,9 +194,14 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate: the offset stays below the {100 * certificate.confidence:.6g}% lower bound of the "
-            f"{certificate.guard} threshold {units.span(low, high, '.3f MPa')}, at every pressure code; flow below "
-            f"{units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of the largest "
-            "flow) counts as none",
+            f"{certificate.guard} threshold {units.span(low, high, '.3f MPa')}, at every pressure code; "
+            + (
+                f"flow below {units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of "
+                "the largest flow) counts as none"
+                if certificate.zero_flow_L_min is None
+                else f"up to {units.text(certificate.zero_flow_L_min, '.3g L/min')} flow there, a leak included, as "
+                "--zero-flow allows"
+            ),
         ]
     if compensator.transition_codes:
         span, guard = compensator.signals.command.span(1), compensator.positive.certificate.guard

@@ -176,7 +176,11 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         f"{units.text(1e3 * float(worst.smallest_margin_V), '.3f mV')} of the exact law under "
         "the certified offset, half a count kept for the rounding"
         + (f"; {units.text(least, '.3f mV')} of the C's compare values under the threshold's bound" if inputs else "")
-        + f". Flow below {units.text(worst.level_L_min, '.2f L/min')} counts as none"
+        + (
+            f". Flow below {units.text(worst.level_L_min, '.2f L/min')} counts as none"
+            if worst.zero_flow_L_min is None
+            else f". Up to {units.text(worst.zero_flow_L_min, '.3g L/min')} flow there, a leak included, as was declared"
+        )
         + _premise(compensator),
     )
 

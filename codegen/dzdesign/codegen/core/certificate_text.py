@@ -26,7 +26,12 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
         f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold, by "
         f"{1e3 * float(certificate.smallest_margin_V):.3g} mV at the least beyond {_counted(compensator)}"
     )
-    if certificate.guard == "closing":
+    if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:
+        text += (
+            f", so that at most {certificate.zero_flow_L_min:.3g} L/min flows, a leak included: what was declared as "
+            "allowed at zero, or what leak and noise level come to."
+        )
+    elif certificate.guard == "closing":
         text += f", so that less than {certificate.level_L_min:.2f} L/min flows: what the recordings can't show."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, get_args
 
+import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
@@ -216,6 +217,15 @@ class SideModel:
         """Largest flow at zero command that the bounds answer for, a leak included; None where none was declared."""
         allowed = [test.zero_flow_L_min for test in self.tests if test.zero_flow_L_min is not None]
         return max(allowed, default=None)
+
+    def zero_flow_at(self, dp_MPa: float) -> float | None:
+        """Return the flow at zero command that the bounds answer for at a pressure drop, L/min; None: not declared."""
+        if self.zero_flow_L_min is None:
+            return None
+        if len(self.tests) == 1:
+            return self.zero_flow_L_min
+        places, flows = ([getattr(test, key) for test in self.tests] for key in ("dp_MPa", "zero_flow_L_min"))
+        return float(np.interp(dp_MPa, places, flows))
 
     @property
     def curve(self) -> CertifiedCurve:

@@ -1,4 +1,5 @@
-"""What the closed loop must show: the plant opens where the valve does, and nothing flows at zero command."""
+"""What the closed loop must show: the plant opens where the valve does, and at zero command nothing flows, or no more
+than was declared."""
 
 from collections.abc import Sequence
 
@@ -7,7 +8,14 @@ from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.loop_results import PressureResult, ScenarioResult
-from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, Check
+from dzdesign.verify.requirements import (
+    PLANT_IS_THE_VALVE,
+    PLANT_OPENS,
+    ZERO_FLOW,
+    ZERO_FLOW_AFTER_SCENARIOS,
+    Check,
+    Requirement,
+)
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03
@@ -96,15 +104,27 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
             "they open, and flow at zero command after closing is to be expected. Record the falling branch",
         )
     return ZERO_FLOW.check(
-        holds=worst.q_opened_L_min <= NO_FLOW_L_MIN,
+        holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN,
         text=f"{_flow(worst, worst.q_zero_L_min)} after closing (at {worst.dp_MPa:.2f} MPa), "
-        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min)} without beta{_leak(ramps)}",
+        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min)} without beta{_allowed(worst)}{_leak(ramps)}",
+        name=_name(ZERO_FLOW, worst),
     )
 
 
 def _zero_flow(result: PressureResult | ScenarioResult) -> tuple[float, float]:
-    """Return what passes at zero command beyond the leak, and below what it is not known: the worst is the largest."""
-    return result.q_opened_L_min, result.unseen_below_L_min or 0.0
+    """Return what passes at zero command beyond what is allowed, and below what it is not known: the worst is the largest."""
+    return result.q_beyond_L_min, result.unseen_below_L_min or 0.0
+
+
+def _name(requirement: Requirement, worst: PressureResult | ScenarioResult) -> str:
+    """Return what is required: no flow, or no more than the declared one."""
+    return requirement.title.replace("no flow", "the declared zero flow at most", 1) if worst.allowed_at_zero_L_min else ""
+
+
+def _allowed(worst: PressureResult | ScenarioResult) -> str:
+    """Say which flow is allowed at zero command, where one was declared."""
+    allowed = worst.allowed_at_zero_L_min
+    return f"; {allowed:.3g} L/min are allowed there, a leak included (--zero-flow)" if allowed else ""
 
 
 def _leak(ramps: Sequence[PressureResult]) -> str:
@@ -136,7 +156,7 @@ def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, 
     required = [each for each in scenarios if each.must_shut]
     worst = max(required, key=_zero_flow)
     text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: "
-    text += f"{_flow(worst, worst.q_zero_L_min)} ({worst.name}, at {worst.dp_MPa:.2f} MPa)"
+    text += f"{_flow(worst, worst.q_zero_L_min)} ({worst.name}, at {worst.dp_MPa:.2f} MPa){_allowed(worst)}"
     if hidden := [each for each in scenarios if not each.must_shut]:
         leak = max(hidden, key=lambda each: each.q_zero_L_min)
         text += (
@@ -147,4 +167,6 @@ def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, 
         text += "; load steps and frozen sensors were not tried: that needs ramps at two pressure drops, or --plant"
     if zero_flow.holds is None:
         return ZERO_FLOW_AFTER_SCENARIOS.check(holds=None, text=f"{text}; see the ramps")
-    return ZERO_FLOW_AFTER_SCENARIOS.check(holds=worst.q_opened_L_min <= NO_FLOW_L_MIN, text=text)
+    return ZERO_FLOW_AFTER_SCENARIOS.check(
+        holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN, text=text, name=_name(ZERO_FLOW_AFTER_SCENARIOS, worst)
+    )
