@@ -142,7 +142,8 @@ def print_worn_valves(*, quick: bool, seed: int) -> list[Row]:
             f"of {count}; {lost:.1f} % of command lost, {before:.1f} % without --zero-flow; "
             f"{declared:.0%} of the tests answer for the declared flow"
         )
-        rows.append(Row(what=f"{name}: too much at zero", value=sum(e.excess > 1 for e in found), limit=LIMIT, note=note))
+        opened = sum(each.excess > 1 for each in found)
+        rows.append(Row(what=f"{name}: too much at zero", value=opened, limit=LIMIT, note=note))
     print_rows(f"16. Flow above the declared one at zero command, worn valves (seed {seed})", rows)
     return rows
 

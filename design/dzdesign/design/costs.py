@@ -70,7 +70,10 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
             parts.append(f"dead zone that remains on {name} {left[name]:.2%} of command (knee)")
         elif knee is not None:
             above = units.text(corners.offset * u_max - knee, ".3f dV")
-            parts.append(f"flow at zero command on {name}: the offset lies {above} above the knee")
+            parts.append(
+                f"flow at zero command on {name}{_allowed(compensator, test, name, sign)}: the offset lies {above} "
+                "above the knee"
+            )
     if corners.end and test.u_knee_falling_V is not None:
         flow = test.slope_L_min_V * max(corners.at_end * u_max - test.u_knee_falling_V, 0.0)
         parts.append(f"flow on closing at the transition's end {units.text(flow, '.2f L/min')}")
@@ -88,6 +91,14 @@ def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
     else:
         parts.append(f"drive at full command {corners.full:.2%}")
     return ", ".join(parts)
+
+
+def _allowed(compensator: Compensator, test: TestResult, branch: str, sign: int) -> str:
+    """Say how much flow at zero command is allowed on the guarded branch, where some was declared."""
+    allowed, units = test.zero_flow_L_min, compensator.valve.recorded_units
+    if allowed is None or compensator.side(sign).certificate.guard != branch:
+        return ""
+    return f", of which {units.text(allowed, '.3g L/min')} are allowed"
 
 
 def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:

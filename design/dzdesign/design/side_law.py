@@ -28,8 +28,8 @@ class Certificate:
         float,
         quantity(
             "L/min",
-            "Flow at zero command, a leak included, that the bounds allow: what was declared as zero flow, or what leak "
-            "and noise level come to. Null: none was declared, and no flow above `level_L_min` is allowed.",
+            "Flow at zero command, a leak included, that the bounds allow: the declared zero flow, or what leak and "
+            "noise level come to. Null: none was declared, and no flow above `level_L_min` is allowed.",
             ge=0,
             le=1e6,
         ),

@@ -135,16 +135,12 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
 
 def _guarded(side: "SideModel", units: "RecordedUnits") -> str:
     """Say which threshold is bounded, and what counts as no flow."""
-    declared, allowed = side.certificate.zero_flow_L_min, side.zero_flow_L_min
-    if declared is None or allowed is None:
-        return (
-            "(the knee, or the tail's zero where the edge is soft); flow below "
-            f"{units.text(side.certificate.level_L_min, '.2f L/min')} (noise level: the meter's floor, what averages "
-            "resolve, or 0.5 % of the largest flow) counts as none"
-        )
-    more = f"; the bounds answer for {units.text(allowed, '.3g L/min')}" if allowed > 1.001 * declared else ""
+    if declared := side.zero_flow_in_words(units):
+        return f"(the command that passes the flow allowed at zero); below, {declared}"
     return (
-        f"(the command that passes {units.text(declared, '.3g L/min')}, the declared zero flow, a leak included{more})"
+        "(the knee, or the tail's zero where the edge is soft); flow below "
+        f"{units.text(side.certificate.level_L_min, '.2f L/min')} (noise level: the meter's floor, what averages "
+        "resolve, or 0.5 % of the largest flow) counts as none"
     )
 
 
@@ -177,6 +173,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     from dzdesign.derivation.law import law
     from dzdesign.design.costs import hidden_failures
     from dzdesign.design.signal_descriptions import signals_in_words
+    from dzdesign.design.signals import SIDE_NAMES
 
     chosen, units = law(compensator.law), compensator.valve.recorded_units
     lines = [
@@ -199,8 +196,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
                 f"flow below {units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of "
                 "the largest flow) counts as none"
                 if certificate.zero_flow_L_min is None
-                else f"up to {units.text(certificate.zero_flow_L_min, '.3g L/min')} flow there, a leak included, as "
-                "--zero-flow allows"
+                else compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)
             ),
         ]
     if compensator.transition_codes:

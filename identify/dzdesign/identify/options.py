@@ -27,8 +27,8 @@ class IdentifyOptions:
         Flow below which there is none, m³/s, if the recordings resolve it; None takes what their averages over the
         dead zone resolve, and at least 0.5 % of the largest flow.
     zero_flow : float or None
-        Flow that is allowed at zero command, a leak included, m³/s: the command at which the valve passes it is guarded.
-        None guards the first flow seen.
+        Flow that is allowed at zero command, a leak included, m³/s: the command that passes it is guarded. None guards
+        the first flow seen.
     meter_zero : float
         Bound of the meter's zero error, m³/s, against which the certificate guards.
     x_max : float or None

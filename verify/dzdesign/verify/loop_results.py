@@ -50,7 +50,7 @@ class PressureResult:
     leak_L_min: Annotated[Flow, about("Flow without any drive, which no compensator can stop.")]
     allowed_at_zero_L_min: Annotated[
         Flow | None,
-        about("Flow that is allowed at zero command, a leak included, as declared by --zero-flow; null: none but the leak."),
+        about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
     ]
     q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing, with compensator; a leak is in it.")]
     q_zero_without_beta_L_min: Annotated[Flow, about("The same with beta held at 1: what over-compensation would do.")]
@@ -124,7 +124,7 @@ class ScenarioResult:
     leak_L_min: Annotated[Flow, about("Flow without any drive at the end, which no compensator can stop.")]
     allowed_at_zero_L_min: Annotated[
         Flow | None,
-        about("Flow that is allowed at zero command, a leak included, as declared by --zero-flow; null: none but the leak."),
+        about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
     ]
     q_zero_L_min: Annotated[Flow, about("Flow at zero command at the end; a leak is in it.")]
     q_peak_at_zero_L_min: Annotated[
@@ -174,7 +174,9 @@ class Scatter:
     side: Side
     dp_MPa: PressureDrop
     plants: Annotated[int, Meta(description="How many plants.", ge=1, le=10**6)]
-    leaking: Annotated[Count, about("How many pass flow at zero command after closing, or more than was declared as allowed.")]
+    leaking: Annotated[
+        Count, about("How many pass flow at zero command after closing, or more than was declared as allowed.")
+    ]
     residual_opening: Annotated[Spread, about("Dead zone on opening, share of full command.")]
     residual_closing: Annotated[Spread, about("Dead zone on closing, share of full command.")]
     q_zero_L_min: Annotated[Spread, about("Flow at zero command, L/min.")]

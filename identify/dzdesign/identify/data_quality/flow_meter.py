@@ -9,7 +9,7 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.identify.valve.side_model import PROMISED, SideModel
 
 #: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
 LARGE_LAG = 1e-2
@@ -19,8 +19,6 @@ LIKELY_LAG = 0.1
 COARSE_STEP = 5e-4
 #: The same where it is more than the bounds' distance from the threshold: a certificate that counts on less is none.
 SMALL_SHIFT = 5e-5
-#: What a bound answers for over the declared flow at zero, above which it is another.
-PROMISED = 1.001
 #: Readings a level, from which on a flow is one of steps.
 READINGS_A_LEVEL = 5
 

@@ -85,7 +85,7 @@ def refuse_a_large_zero_flow(group: DescribedTests, options: IdentifyOptions) ->
 def with_zero_flow(
     group: DescribedTests, column: int, found: Threshold, budget: np.ndarray, options: IdentifyOptions
 ) -> Threshold:
-    """Return a threshold moved up to where the valve passes the flow that is allowed at zero, where the data support it.
+    """Return a threshold moved up to where the valve passes the flow allowed at zero, as far as the data support it.
 
     `found` is the threshold without such a flow, `budget` (V, (T,)) what is taken off a bound beside noise and scatter.
     """
@@ -101,7 +101,8 @@ def with_zero_flow(
         _crossing(shape, each, flow - at_rest, options.u_max)
         for shape, each, flow, at_rest in zip(shapes, readings, allowed, rest, strict=True)
     ]
-    scatter = _scatter([(*each, at) for *each, (at, _) in zip(shapes, readings, crossings, strict=True)], options)
+    at, at_se = np.array(crossings).T
+    scatter = _scatter(list(zip(shapes, readings, at.tolist(), strict=True)), options)
     errors = _errors(options, len(STRETCHES) * len(shapes))
     safe = np.array([
         _highest_safe(
@@ -113,7 +114,6 @@ def with_zero_flow(
     ])  # fmt: skip
     bound = _with_scatter(safe, group.between(column), options.confidence, budget)
     moved = bound > found.bound
-    at, at_se = np.array(crossings).T
     bound = np.where(moved, bound, found.bound)
     value = np.where(moved, np.maximum(at, bound), found.value)
     return replace(found, value=value, se=np.where(moved, at_se, found.se), bound=bound)
@@ -127,7 +127,7 @@ def _errors(options: IdentifyOptions, count: int) -> float:
 
 
 def _readings(shape: BranchShape, floor: float) -> _Readings:
-    """Return the readings up to the straight part, outliers left out; below the meter's floor they count as the floor."""
+    """Return the readings, outliers left out; those below the meter's floor count as the floor."""
     read = shape.prepared
     u, y = read.branch.u, read.y
     residual = y - np.interp(u, *read.profile)

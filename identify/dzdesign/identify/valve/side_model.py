@@ -8,6 +8,7 @@ import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, CertifiedCurve, Guard, OpeningCurve
 from dzdesign.identify.valve.identified_curve import BETA_ROUNDING, IDENTIFIED, IdentifiedCurve
 from dzdesign.identify.valve.quantity_types import (
@@ -23,6 +24,8 @@ from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.staircase import Direction
 
+#: What bounds answer for over the declared zero flow, above which it is said to be more.
+PROMISED = 1.001
 #: valve.json has seven decimals, L/min.
 ROUNDING_L_MIN = 1e-6
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -217,6 +220,17 @@ class SideModel:
         """Largest flow at zero command that the bounds answer for, a leak included; None where none was declared."""
         allowed = [test.zero_flow_L_min for test in self.tests if test.zero_flow_L_min is not None]
         return max(allowed, default=None)
+
+    def zero_flow_in_words(self, units: RecordedUnits) -> str:
+        """Say what flows at zero command at most, and what was declared; nothing where nothing was declared."""
+        declared, allowed = self.certificate.zero_flow_L_min, self.zero_flow_L_min
+        if declared is None or allowed is None:
+            return ""
+        text = f"up to {units.text(allowed, '.3g L/min')} may flow, a leak included: "
+        if allowed <= PROMISED * declared:
+            return f"{text}the declared zero flow"
+        zero_flow = units.text(declared, ".3g L/min")
+        return f"{text}leak and noise level come to more than the declared zero flow of {zero_flow}"
 
     def zero_flow_at(self, dp_MPa: float) -> float | None:
         """Return the flow at zero command that the bounds answer for at a pressure drop, L/min; None: not declared."""

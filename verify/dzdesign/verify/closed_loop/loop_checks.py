@@ -112,19 +112,23 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
 
 
 def _zero_flow(result: PressureResult | ScenarioResult) -> tuple[float, float]:
-    """Return what passes at zero command beyond what is allowed, and below what it is not known: the worst is the largest."""
+    """Return what passes at zero beyond what is allowed, and below what it is not known: the worst is the largest."""
     return result.q_beyond_L_min, result.unseen_below_L_min or 0.0
 
 
 def _name(requirement: Requirement, worst: PressureResult | ScenarioResult) -> str:
     """Return what is required: no flow, or no more than the declared one."""
-    return requirement.title.replace("no flow", "the declared zero flow at most", 1) if worst.allowed_at_zero_L_min else ""
+    if worst.allowed_at_zero_L_min is None:
+        return requirement.title
+    return requirement.title.replace("no flow", "no more than the declared zero flow", 1)
 
 
 def _allowed(worst: PressureResult | ScenarioResult) -> str:
     """Say which flow is allowed at zero command, where one was declared."""
     allowed = worst.allowed_at_zero_L_min
-    return f"; {allowed:.3g} L/min are allowed there, a leak included (--zero-flow)" if allowed else ""
+    if not allowed:
+        return ""
+    return f"; allowed there are {allowed:.3g} L/min, a leak included: the declared zero flow, or leak and noise level"
 
 
 def _leak(ramps: Sequence[PressureResult]) -> str:
