@@ -175,6 +175,7 @@ def _test_result(
     """Return one row of valve.json's tests."""
     item, u_max = group.tests[row], options.u_max
     allowed = allowed_at_zero(group, options)
+    at_zero = None if allowed is None else allowed[row]
     rising, falling = item.shapes
     noise_level = max(shape.dead_zone.noise_level for shape in item.branches)
     return TestResult(
@@ -192,12 +193,12 @@ def _test_result(
         saturates=all(shape.saturates for shape in item.branches),
         leak_L_min=group.leak[row] / L_MIN,
         noise_level_L_min=noise_level / L_MIN,
-        zero_flow_L_min=None if allowed is None else allowed[row] / L_MIN,
+        zero_flow_L_min=None if at_zero is None else at_zero / L_MIN,
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
         spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
-        recorded=recorded_curve(item, group.leak[row], noise_level, u_max),
+        recorded=recorded_curve(item, group.leak[row], noise_level, u_max, at_zero),
         ramps=item.ramps,
         left_out=item.left_out,
     )
