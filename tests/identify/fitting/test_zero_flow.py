@@ -1,5 +1,6 @@
 """A declared flow at zero: true flows of worn valves of a plant of its own, and what each part of the bound is for."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from worn_valves import PRESSURES_MPa, Worn, examine
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting import zero_flow
 from dzdesign.identify.identification import identify
+from dzdesign.identify.knees.readings_at_rest import RestFlows
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.stages.identify import IdentifyArguments, identify_options
 
@@ -75,6 +77,18 @@ class TestWhatCounts:
         assert true_flows(valve, sound).max() <= valve.zero_flow
         monkeypatch.setattr(zero_flow, "largest_at_rest", lambda group, options: [0.0] * len(group.tests))
         assert true_flows(valve, identified(valve)).max() > valve.zero_flow
+
+    def test_a_leak_that_a_floor_hides_at_low_pressure_drops(self, monkeypatch):
+        """Zeros there are no readings: a straight line through them would take the rest for the meter's zero."""
+        rng = np.random.default_rng([1616, 4, 48])
+        valve = worn_valves.floored(rng)
+        assert examine(valve, "closing", rng).excess <= 1
+        found = RestFlows.passed_by_the_valve
+        monkeypatch.setattr(
+            RestFlows, "passed_by_the_valve", lambda rest, *at: found(replace(rest, least=math.inf), *at)
+        )
+        rng = np.random.default_rng([1616, 4, 48])
+        assert examine(worn_valves.floored(rng), "closing", rng).excess > 1
 
     def test_what_a_meters_floor_hides(self, monkeypatch):
         valve = replace(WORN, floor=0.3, zero_flow=0.5)

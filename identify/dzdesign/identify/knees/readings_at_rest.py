@@ -41,20 +41,26 @@ class RestFlows:
     leak_per_Pa: float
     #: The same whether or not it stands out, and its standard error; None where one pressure drop can't tell it.
     growth_per_Pa: tuple[float, float] | None
+    #: By source: what was subtracted beside the leak, whether or not it stands out; and the least reading at rest of
+    #: all recordings, m³/s.
+    beside: dict[str, float]
+    least: float
 
     def passed_by_the_valve(self, sources: Sequence[str], dp: float | None) -> tuple[float, float]:
         """Return what the shut valve itself may pass of the flow that was subtracted, and its standard error, m³/s.
 
         A meter's zero and a leak are told apart by the pressure drop alone: at a single one all that was read is
-        counted.
+        counted. One meter has one zero, and no leak flows backwards, so what a recording reads beyond the least of all
+        is a leak however it grows: a meter with a floor shows that of high pressure drops only.
         """
-        zeros = [self.zero.get(source, 0.0) for source in sources]
-        if not self.leak_per_Pa and not any(zeros):
+        beside = max(self.beside.get(source, 0.0) for source in sources)
+        if not self.leak_per_Pa and not any(self.beside.get(source, 0.0) for source in sources):
             return 0.0, 0.0  # nothing was subtracted, so all of it is in the readings
+        se = max(self.se.get(source, 0.0) for source in sources)
         if self.growth_per_Pa is None or dp is None:
-            return max(0.0, *zeros), max(self.se.get(source, 0.0) for source in sources)
+            return max(0.0, beside), se
         growth, error = self.growth_per_Pa
-        return max(growth, 0.0) * dp, error * dp
+        return max(growth * dp, beside + self.leak_per_Pa * dp - self.least, 0.0), max(error * dp, se)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +83,7 @@ def find_rest_flows(tests: Sequence[RampTest], u_max: float) -> RestFlows:
     leak = _leak(growth, levels, largest)
     flows: list[float | np.ndarray] = []
     zeros: dict[str, float] = {}
+    beside: dict[str, float] = {}
     errors: dict[str, float] = {}
     for number, test in enumerate(tests):
         own = [level for level in levels if level.recording == number]
@@ -85,10 +92,12 @@ def find_rest_flows(tests: Sequence[RampTest], u_max: float) -> RestFlows:
         # Beside a leak the zero is what a line extrapolates to no pressure, about twice as far off.
         told = abs(zero) > max(2 * ZERO_ERRORS * se, ZERO_SHARE * float(np.abs(test.q).max()))
         zeros[test.source] = zero if told or not leak else 0.0
+        beside[test.source] = zero
         flows.append(zero if leak == 0 or test.dp is None else zero + leak * test.dp)
     return RestFlows(
         flows=tuple(flows), zero=zeros, se=errors, leak_per_Pa=leak,
         growth_per_Pa=(growth.per_Pa, growth.error) if growth else None,
+        beside=beside, least=min((level.flow for level in levels), default=0.0),
     )  # fmt: skip
 
 
