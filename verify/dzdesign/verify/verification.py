@@ -105,10 +105,9 @@ def verify(
         valve_follows(folder, compensator),
         *board.checks,
     )
-    digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     evidence = Evidence(
         tool=THIS_TOOL,
-        made_from=(SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=digest),),
+        made_from=(_manifest_source(folder),),
         target=manifest.target,
         changed_board_files=tuple(changed_board_files(folder, manifest)),
         user_files=tuple(user_files(folder, manifest)),
@@ -122,6 +121,12 @@ def verify(
     )
     derived = compensator if law.holds else None
     return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=derived)
+
+
+def _manifest_source(folder: Path) -> SourceFile:
+    """Return name and hash of the manifest, which has the hashes of all other files."""
+    digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
+    return SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=digest)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
