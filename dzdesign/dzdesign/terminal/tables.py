@@ -162,8 +162,9 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
     """Print the law, the certificate and what the choices cost."""
     from dzdesign.derivation.law import law
-    from dzdesign.design.costs import hidden_failures
+    from dzdesign.design.costs import hidden_failures, lines_of_tests
     from dzdesign.design.signal_descriptions import signals_in_words
+    from dzdesign.terminal.cost_table import print_costs_at_tests
 
     chosen, units = law(compensator.law), compensator.valve.recorded_units
     lines = [
@@ -193,10 +194,14 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"threshold over those from there to {end:.2%}"
         )
     hidden = hidden_failures(compensator)
-    costs = [line for line in compensator.costs if line not in hidden]
+    elsewhere = {*hidden, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
     console = console or new_console()
-    for line in (*(f"warning: {line}" for line in hidden), *lines, *(f"cost: {line}" for line in costs)):
+    for line in (*(f"warning: {line}" for line in hidden), *lines):
         put_line(console, line)
+    print_costs_at_tests(compensator, console)
+    for line in compensator.costs:
+        if line not in elsewhere:
+            put_line(console, f"cost: {line}")
 
 
 def print_firmware(firmware: "Firmware", console: "Console | None" = None, folder: str = "") -> None:
