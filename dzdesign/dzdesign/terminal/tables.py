@@ -118,7 +118,7 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         f"{units.text(side.reference.u_min_se_V, '.4f dV')}{at}, the knee on {certificate.guard}{_betas(side, units)}",
         f"certified: an offset of {units.text(side.curve.u_min0_V, '.4f V')}{at}, the largest under the bounds; more "
         "tests raise it",
-        f"premise: {side.premise}",
+        f"premise: {side.premise_in_words(units)}",
         *_premise_lines(side),
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f}: "
         "command from the knee to full stroke, as a share of full command; the law's counts from its offset, which "

@@ -144,7 +144,7 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
     if not compiles.holds:
         return _Core(checks=(compiles,))
     say("comparing every input with the exact law")
-    signs = compensator.signals.signs
+    signs, units = compensator.signals.signs, compensator.valve.recorded_units
     try:
         inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
     except RequirementError as error:
@@ -152,7 +152,7 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
     return _Core(
         checks=(
             compiles,
-            *(check for each in inputs for check in input_checks(each, both_signs=len(inputs) > 1)),
+            *(check for each in inputs for check in input_checks(each, units, both_signs=len(inputs) > 1)),
             *lot_checked(inputs, compensator),
             drive_follows(folder, compensator),
         ),
