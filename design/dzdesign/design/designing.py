@@ -51,12 +51,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     options = options or DesignOptions()
     signals = options.signals
     law(options.law)
-    u_max = Fraction(repr(valve.u_max_V))
-    if options.full_command_V not in (None, u_max):
-        raise InputError(
-            f"the command signal's upper end stands for {float(options.full_command_V or 0):g} V, but the valve was "
-            f"identified with a full command of {valve.u_max_V:g} V; write the signal's range up to that"
-        )
+    u_max = _full_command(valve, options)
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
@@ -93,6 +88,17 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     if options.play:
         compensator = with_play(compensator)
     return replace(compensator, costs=costs_of(compensator))
+
+
+def _full_command(valve: ValveModel, options: DesignOptions) -> Fraction:
+    """Return the full command that the valve was identified with, V, which a signal that states one must end at."""
+    u_max = Fraction(repr(valve.u_max_V))
+    if options.full_command_V not in (None, u_max):
+        raise InputError(
+            f"the command signal's upper end stands for {float(options.full_command_V or 0):g} V, but the valve was "
+            f"identified with a full command of {valve.u_max_V:g} V; write the signal's range up to that"
+        )
+    return u_max
 
 
 def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:

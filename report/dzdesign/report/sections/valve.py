@@ -53,7 +53,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             figures=thresholds,
             tables=tables,
             lines=(
-                *(f"Premise, {name} commands: {side.premise}." for name, side in valve.sides.items()),
+                *(f"Premise, {name} commands: {side.premise_in_words(units)}." for name, side in valve.sides.items()),
                 *(f"{warning.text}." for warning in valve.warnings if warning.code in ORDER),
             ),
         ),
