@@ -37,6 +37,9 @@ class IdentifyChoices(RampArguments):
     noise_level: Annotated[Text, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = None
     """Flow below which there is none, if averages over the dead zone resolve it (default: what they resolve, and at
     least 0.5 % of the largest flow)."""
+    zero_flow: Annotated[Text, Option("Q", FIT, example="0.1 L/min", read=quantity("flow"))] = None
+    """Flow allowed at zero command, a leak included: the command at which the valve passes it is guarded (default:
+    none is declared, the first flow seen is guarded)."""
     dp0: Annotated[Text, Option("P", FIT, example="1 MPa", read=quantity("pressure"))] = None
     """Reference pressure drop (default: the test nearest to "1 MPa")."""
     x_max: Annotated[Text, Option("X", FIT, example="1.8 mm", read=quantity("length"))] = None

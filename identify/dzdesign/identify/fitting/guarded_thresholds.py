@@ -11,13 +11,13 @@ from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, T
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.guarding import (
     OrderedKnees,
-    Threshold,
     bound_threshold,
     mean_threshold,
     order_knees,
     systematic_change,
 )
 from dzdesign.identify.fitting.premises import REFUSED, confidence_at_tests, one_way_p
+from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
