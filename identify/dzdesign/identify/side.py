@@ -175,7 +175,12 @@ def _repeatability(found: BetweenRamps) -> Repeatability:
 
 
 def _test_result(
-    group: DescribedTests, knees: KneeFit, row: int, guarded: CertifiedCurve, options: IdentifyOptions, units: RecordedUnits
+    group: DescribedTests,
+    knees: KneeFit,
+    row: int,
+    guarded: CertifiedCurve,
+    options: IdentifyOptions,
+    units: RecordedUnits,
 ) -> TestResult:
     """Return one row of valve.json's tests."""
     item, u_max = group.tests[row], options.u_max
