@@ -44,6 +44,8 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
     put_line(console, meter_line(valve.meter.floor_L_min, valve.meter.lag_in_words(), valve.recorded_units))
+    if valve.dither is not None:
+        put_line(console, f"recorded under {valve.dither_in_words}: all of this is of the dithered valve")
     put_units(console, valve.recorded_units, "valve.json")
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
