@@ -55,9 +55,9 @@ class IdentifyChoices(RampArguments):
     """Standard deviation of the threshold from ramp to ramp, in percent of full command, such as "0.1 %" (default:
     measured where ramps are repeated, otherwise 0.25 %)."""
     curve: Annotated[Text, Option("PREMISE", FIT, choices=PREMISES)] = None
-    """Premise about the threshold between the tests (default: smooth, where three or more pressure drops support it,
-    otherwise monotone). line: straight over the pressure drop. smooth: curvature at most M. monotone: it runs one
-    way."""
+    """Premise about the threshold between the tests (default: smooth where a curvature is declared, or three or more
+    pressure drops support it, otherwise monotone). line: straight over the pressure drop. smooth: curvature at most M.
+    monotone: it runs one way."""
     curvature: Annotated[Text, Option("M", FIT, example="20 mV/MPa^2", read=quantity("curvature"))] = None
     """M of the premise smooth, such as "20 mV/MPa^2": bound of the threshold's second divided difference, kinks
     included (default: estimated from the tests)."""

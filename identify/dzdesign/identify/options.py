@@ -46,8 +46,8 @@ class IdentifyOptions:
         Standard deviation of the threshold from ramp to ramp, as a share of u_max; None measures it where ramps are
         repeated, and takes 0.25 % elsewhere.
     curve : {"line", "smooth", "monotone"} or None
-        Premise about the threshold between the tests; None takes `smooth` where its curvature can be told from the
-        tests and certifies more than `monotone`.
+        Premise about the threshold between the tests; None takes `smooth` where its curvature is declared, and where
+        it can be told from the tests and certifies more than `monotone`, or these contradict `monotone`.
     curvature : float or None
         M of `smooth`: the largest second divided difference of the threshold, V/Pa²; None estimates it from the tests.
     dithered : DeclaredDither or None

@@ -53,12 +53,11 @@ def identify_side(
     knees = guarding.knees if curve.premise == "monotone" else free
     model = _side_model(group, guarding, certified, knees, reference, options, units)
     departure = np.maximum(guarding.departure, guarding.guarded_departure)
-    refused = next(iter(certified.values())).refused
     return SideIdentification(
         model=model,
         described=group,
         knees=knees,
-        warnings=find_warnings(model, group, departure, refused, options),
+        warnings=find_warnings(model, group, departure, next(iter(certified.values())), options),
     )
 
 
