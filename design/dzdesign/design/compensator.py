@@ -179,6 +179,11 @@ class Compensator(ShownInNotebooks, Artefact):
         return side
 
     @property
+    def dither_reserve_counts(self) -> int:
+        """Counts by which the offset stays lower for the dither; next to none where the ramps were recorded with it."""
+        return self.drive_functions.dither(self.signals).reserve(self.valve.dither)
+
+    @property
     def transition_end(self) -> int:
         """Codes of command at which zero band and transition are over."""
         return self.zero_band_codes + self.transition_codes

@@ -84,12 +84,7 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
     signals, functions = compensator.signals, compensator.drive_functions
     lines = []
     if functions.dither_counts:
-        peak = functions.dither_counts / signals.compare_max
-        frequency = signals.tick_Hz / (2 * functions.dither_ticks)
-        lines.append(
-            f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full "
-            "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
-        )
+        lines.append(_cost_of_dither(compensator))
     lines += _cost_of_zero_band(compensator)
     if functions.has_play:
         width = max(count for nodes in functions.play_counts for count in nodes) / signals.compare_max
@@ -110,6 +105,22 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
             "much dead zone remains then, if the lines above say less"
         )
     return lines
+
+
+def _cost_of_dither(compensator: Compensator) -> str:
+    """Say what the dither is, and by how much the offset stands lower for it."""
+    signals, functions, recorded = compensator.signals, compensator.drive_functions, compensator.valve.dither
+    frequency = signals.tick_Hz / (2 * functions.dither_ticks)
+    peak, kept = (
+        counts / signals.compare_max for counts in (functions.dither_counts, compensator.dither_reserve_counts)
+    )
+    what = f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full drive"
+    if recorded is None:
+        return f"{what}: the offset stands lower by that much, so that zero command stays shut at the wave's top"
+    return (
+        f"{what}: the ramps were recorded with {recorded.in_words()}, so the bounds hold under it; the offset stands "
+        f"lower by {kept:.3%} only, for what the two waves differ in"
+    )
 
 
 def _cost_of_zero_band(compensator: Compensator) -> list[str]:
@@ -141,11 +152,12 @@ def _lift_V(compensator: Compensator) -> float:
 
 
 def _of_which_dither(compensator: Compensator) -> str:
-    counts = compensator.drive_functions.dither_counts
+    counts = compensator.dither_reserve_counts
     if not counts:
         return ""
-    peak = counts / compensator.signals.compare_max * float(compensator.u_max_V)
-    return f", of which {compensator.valve.recorded_units.text(1e3 * peak, '.2f mV')} are the dither's peak"
+    kept = 1e3 * counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    whose = "the dither's peak" if compensator.valve.dither is None else "for the dither"
+    return f", of which {compensator.valve.recorded_units.text(kept, '.2f mV')} are {whose}"
 
 
 def _ramp_text(compensator: Compensator) -> str:

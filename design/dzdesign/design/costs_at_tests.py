@@ -24,6 +24,8 @@ class CostAtTest:
     onset: Mapping[str, float]
     #: By how much the offset lies above the knee, so that flow passes at zero command.
     above_knee_V: Mapping[str, float]
+    #: Flow that was declared to be allowed at zero command, of the guarded branch; empty if none was.
+    allowed_L_min: Mapping[str, float]
     #: Flow on closing at the transition's end, None without one.
     at_end_L_min: float | None
     reading_flow_L_min: float
@@ -46,7 +48,9 @@ class CostAtTest:
                 parts.append(f"dead zone that remains on {name} {self.onset[name]:.2%} of command (knee)")
             elif name in self.above_knee_V:
                 above = units.text(self.above_knee_V[name], ".3f dV")
-                parts.append(f"flow at zero command on {name}: the offset lies {above} above the knee")
+                allowed = self.allowed_L_min.get(name)
+                of_it = "" if allowed is None else f", of which {units.text(allowed, '.3g L/min')} are allowed"
+                parts.append(f"flow at zero command on {name}{of_it}: the offset lies {above} above the knee")
         if self.at_end_L_min is not None:
             parts.append(f"flow on closing at the transition's end {units.text(self.at_end_L_min, '.2f L/min')}")
         read = " and ".join(f"{share:.2%} on {name}" for name, share in self.read.items())
@@ -82,12 +86,14 @@ def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> Cost
             f"the largest output is {limit:.1%} of full drive, but the valve opens at {opens:.1%} at {at}, so nothing "
             "would ever flow; give a larger --output-max"
         )
+    allowed = test.zero_flow_L_min
     return CostAtTest(
         side=side,
         dp_MPa=test.dp_MPa or 0.0,
         offset_V=offset_V,
         onset={name: share for name, share in left.items() if name not in above},
         above_knee_V=above,
+        allowed_L_min={} if allowed is None else {compensator.side(sign).certificate.guard: allowed},
         at_end_L_min=at_end,
         reading_flow_L_min=compensator.reading_flow_L_min,
         read=read_dead_zone(compensator, test, sign),

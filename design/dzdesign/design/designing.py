@@ -56,10 +56,13 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
         _refuse_two_signs(valve, options.guard)
-    laws = {}
+    functions = options.drive_functions(transition_codes)
+    dither = functions.dither(signals)
+    dither.check(valve.dither)
+    reserve, laws = dither.reserve(valve.dither), {}
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
-        laws[sign] = _side_law(side, options, u_max, sign, units, transition_codes)
+        laws[sign] = _side_law(side, options, u_max, sign, units, transition_codes, reserve)
     digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
     request = options.request
     compensator = Compensator(
@@ -79,12 +82,17 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         reading_flow_L_min=options.reading_flow_L_min or default_reading_flow(valve),
         zero_band_codes=options.error.zero_band_codes if transition_codes else 0,
         command_error=options.error,
-        drive_functions=options.drive_functions(transition_codes),
+        drive_functions=functions,
         costs=(),
         valve=valve,
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
+    if options.play and functions.dither_counts and valve.dither is None:
+        raise InputError(
+            "--hysteresis play takes out the recorded hysteresis, and --dither most of the same once more; give one of "
+            f'them, or record ramps with that dither: identify --dithered "{options.dither_text}"'
+        )
     if options.play:
         compensator = with_play(compensator)
     return replace(compensator, costs=costs_of(compensator))
@@ -113,9 +121,18 @@ def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:
 
 
 def _side_law(
-    side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units, transition_codes: int
+    side: SideModel,
+    options: DesignOptions,
+    u_max: Fraction,
+    sign: int,
+    units: Units,
+    transition_codes: int,
+    dither_counts: int,
 ) -> SideLaw:
-    """Choose the coefficients and tables of one side, and prove its certificate."""
+    """Choose the coefficients and tables of one side, and prove its certificate.
+
+    So many counts of the dither are kept free under the bound.
+    """
     signals = options.signals
     if "branch-order" not in options.accept:
         _refuse_crossed_branches(side)
@@ -128,8 +145,7 @@ def _side_law(
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
-    dither = options.drive_functions(transition_codes).dither_counts
-    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither)
+    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither_counts)
     if min(ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 

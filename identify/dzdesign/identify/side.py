@@ -13,8 +13,9 @@ from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds, opening_curve
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.guarded_thresholds import Guarding, guard_thresholds
-from dzdesign.identify.fitting.guarding import Threshold
 from dzdesign.identify.fitting.identifying import identify_curve
+from dzdesign.identify.fitting.threshold import Threshold
+from dzdesign.identify.fitting.zero_flow import allowed_at_zero
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
 from dzdesign.identify.knees.curve_thinning import recorded_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -52,12 +53,11 @@ def identify_side(
     knees = guarding.knees if curve.premise == "monotone" else free
     model = _side_model(group, guarding, certified, knees, reference, options, units)
     departure = np.maximum(guarding.departure, guarding.guarded_departure)
-    refused = next(iter(certified.values())).refused
     return SideIdentification(
         model=model,
         described=group,
         knees=knees,
-        warnings=find_warnings(model, group, departure, refused, options),
+        warnings=find_warnings(model, group, departure, next(iter(certified.values())), options),
     )
 
 
@@ -118,7 +118,7 @@ def _side_model(
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
     rows = range(len(described))
     return SideModel(
-        tests=tuple(_test_result(group, knees, row, curves[guard], options.u_max, units) for row in rows),
+        tests=tuple(_test_result(group, knees, row, curves[guard], options, units) for row in rows),
         reference=Reference(
             dp_MPa=None if dp0 is None else dp0 / MPA,
             u_min_V=joint.curves[guard].u_V[reference],
@@ -136,6 +136,7 @@ def _side_model(
             confidence=options.confidence,
             guard=guard,
             level_L_min=group.noise_level / L_MIN,
+            zero_flow_L_min=None if options.zero_flow is None else options.zero_flow / L_MIN,
             repeatability=_repeatability(group.between(guarding.column)),
         ),
         identified=joint.curves,
@@ -173,10 +174,17 @@ def _repeatability(found: BetweenRamps) -> Repeatability:
 
 
 def _test_result(
-    group: DescribedTests, knees: KneeFit, row: int, guarded: CertifiedCurve, u_max: float, units: RecordedUnits
+    group: DescribedTests,
+    knees: KneeFit,
+    row: int,
+    guarded: CertifiedCurve,
+    options: IdentifyOptions,
+    units: RecordedUnits,
 ) -> TestResult:
     """Return one row of valve.json's tests."""
-    item = group.tests[row]
+    item, u_max = group.tests[row], options.u_max
+    allowed = allowed_at_zero(group, options)
+    at_zero = None if allowed is None else allowed[row]
     rising, falling = item.shapes
     noise_level = max(shape.dead_zone.noise_level for shape in item.branches)
     return TestResult(
@@ -194,11 +202,12 @@ def _test_result(
         saturates=all(shape.saturates for shape in item.branches),
         leak_L_min=group.leak[row] / L_MIN,
         noise_level_L_min=noise_level / L_MIN,
+        zero_flow_L_min=None if at_zero is None else at_zero / L_MIN,
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
         spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
-        recorded=recorded_curve(item, group.leak[row], noise_level, u_max),
+        recorded=recorded_curve(item, group.leak[row], noise_level, u_max, at_zero),
         ramps=item.ramps,
         left_out=item.left_out,
     )

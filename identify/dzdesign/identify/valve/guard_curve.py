@@ -46,7 +46,8 @@ class PremiseCheck:
         Probability | None,
         Meta(
             description="Probability of tests as unlike the premise as these if it were true, against noise and "
-            "scatter; below 0.01 it is refused. null: the tests can't contradict it."
+            "scatter; below 0.01 it is refused. Of monotone the smaller of two: of its steps, and of a lowest point "
+            "between two tests. null: the tests can't contradict it."
         ),
     ]
     dead_zone_over_u_max: Annotated[
@@ -162,8 +163,8 @@ class CertifiedCurve:
             )
         return (
             "Premise monotone: between two tests the bound is the lower one's, on the premise that the threshold runs "
-            f"one way there ({tested}), which no test checks between them: a threshold lowest between two tests "
-            "would lie below it"
+            f"one way there ({tested}): one that is lowest between two tests, in a bend that they do not show, lies "
+            "below it"
         )
 
     def bound(self, trend: Direction) -> CertifiedBound:

@@ -90,12 +90,14 @@ class Scene:
 
         It ended at this pressure drop unless told otherwise.
         """
+        ended_MPa = self.dp_MPa if end_MPa is None else end_MPa
         shut = np.flatnonzero(_held_for(run.command <= 0, round(self.settle_s / STEP_S)))
         return ScenarioResult(
             name=name,
             side=self.side,
             dp_MPa=self.dp_MPa,
-            leak_L_min=self.loop.leak_L_min(self.dp_MPa if end_MPa is None else end_MPa),
+            leak_L_min=self.loop.leak_L_min(ended_MPa),
+            allowed_at_zero_L_min=self.loop.allowed_at_zero_L_min(ended_MPa),
             q_zero_L_min=float(run.q_largest_L_min[-1]),
             q_peak_at_zero_L_min=float(run.q_largest_L_min[shut].max(initial=0.0)),
             unseen_below_L_min=self.loop.unseen_below_L_min(self.dp_MPa),
@@ -246,6 +248,7 @@ def _converter_off_at_zero(scene: Scene) -> ScenarioResult:
         side=scene.side,
         dp_MPa=scene.dp_MPa,
         leak_L_min=scene.loop.leak_L_min(scene.dp_MPa),
+        allowed_at_zero_L_min=scene.loop.allowed_at_zero_L_min(scene.dp_MPa),
         q_zero_L_min=float(flow.max()),
         q_peak_at_zero_L_min=float(flow.max()),
         unseen_below_L_min=scene.loop.unseen_below_L_min(scene.dp_MPa),
