@@ -88,14 +88,19 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
-    if options.play and functions.dither_counts and valve.dither is None:
+    if options.play:
+        compensator = _with_play(compensator, options)
+    return replace(compensator, costs=costs_of(compensator))
+
+
+def _with_play(compensator: Compensator, options: DesignOptions) -> Compensator:
+    """Add the inverse play, unless a dither takes the same hysteresis out."""
+    if compensator.drive_functions.dither_counts and compensator.valve.dither is None:
         raise InputError(
             "--hysteresis play takes out the recorded hysteresis, and --dither most of the same once more; give one of "
             f'them, or record ramps with that dither: identify --dithered "{options.dither_text}"'
         )
-    if options.play:
-        compensator = with_play(compensator)
-    return replace(compensator, costs=costs_of(compensator))
+    return with_play(compensator)
 
 
 def _full_command(valve: ValveModel, options: DesignOptions) -> Fraction:
