@@ -63,8 +63,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
         laws[sign] = _side_law(side, options, u_max, sign, units, transition_codes, reserve)
-    digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
-    request = options.request
+    digest, request = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes), options.request
     compensator = Compensator(
         tool=THIS_TOOL,
         made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=digest),),
@@ -88,13 +87,14 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
-    if options.play:
-        compensator = _with_play(compensator, options)
+    compensator = _with_play(compensator, options)
     return replace(compensator, costs=costs_of(compensator))
 
 
 def _with_play(compensator: Compensator, options: DesignOptions) -> Compensator:
-    """Add the inverse play, unless a dither takes the same hysteresis out."""
+    """Add the inverse play if it is asked for; not where a dither takes the same hysteresis out."""
+    if not options.play:
+        return compensator
     if compensator.drive_functions.dither_counts and compensator.valve.dither is None:
         raise InputError(
             "--hysteresis play takes out the recorded hysteresis, and --dither most of the same once more; give one of "
