@@ -52,7 +52,7 @@ def certify(
 
 def prove_certificates(compensator: Compensator) -> None:
     """Prove the certificates of a compensator again, from the valve in it; refuse the first statement that differs."""
-    signals, dither = compensator.signals, compensator.drive_functions.dither_counts
+    signals, dither = compensator.signals, compensator.dither_reserve_counts
     for sign in signals.signs:
         name = SIDE_NAMES[sign]
         law, model = compensator.side(sign), compensator.valve.sides.get(name)

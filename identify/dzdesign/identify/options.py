@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from dzdesign.core.dither import DeclaredDither
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.identify.constants import PREMISES, Premise
 
@@ -45,10 +46,12 @@ class IdentifyOptions:
         Standard deviation of the threshold from ramp to ramp, as a share of u_max; None measures it where ramps are
         repeated, and takes 0.25 % elsewhere.
     curve : {"line", "smooth", "monotone"} or None
-        Premise about the threshold between the tests; None takes `smooth` where its curvature can be told from the
-        tests and certifies more than `monotone`.
+        Premise about the threshold between the tests; None takes `smooth` where its curvature is declared, and where
+        it can be told from the tests and certifies more than `monotone`, or these contradict `monotone`.
     curvature : float or None
         M of `smooth`: the largest second divided difference of the threshold, V/Pa²; None estimates it from the tests.
+    dithered : DeclaredDither or None
+        Dither that the drive superimposed on the command of every recording; None: none that `design` is to make.
     """
 
     u_max: float = 10.0
@@ -66,6 +69,7 @@ class IdentifyOptions:
     repeatability: float | None = None
     curve: Premise | None = None
     curvature: float | None = None
+    dithered: DeclaredDither | None = None
 
     def __post_init__(self) -> None:
         if not self.u_max > 0:

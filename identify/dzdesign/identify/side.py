@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.worded import all_of, worded
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.side_warnings import find_warnings
@@ -33,8 +34,10 @@ REFERENCE_TOLERANCE = 0.1
 PAPER_DP0 = 1 * MPA
 
 
-def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideIdentification:
-    """Identify the side of positive commands from ramp tests in any order.
+def identify_side(
+    tests: Sequence[RampTest], options: IdentifyOptions, units: RecordedUnits = AS_COMPUTED
+) -> SideIdentification:
+    """Identify the side of positive commands from ramp tests in any order; texts of its model are in `units`.
 
     Raises
     ------
@@ -48,14 +51,13 @@ def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideId
     certified = _certify(group, guarding, reference, options)
     curve = next(iter(certified.values())).curve
     knees = guarding.knees if curve.premise == "monotone" else free
-    model = _side_model(group, guarding, certified, knees, reference, options)
+    model = _side_model(group, guarding, certified, knees, reference, options, units)
     departure = np.maximum(guarding.departure, guarding.guarded_departure)
-    refused = next(iter(certified.values())).refused
     return SideIdentification(
         model=model,
         described=group,
         knees=knees,
-        warnings=find_warnings(model, group, departure, refused, options),
+        warnings=find_warnings(model, group, departure, next(iter(certified.values())), options),
     )
 
 
@@ -104,6 +106,7 @@ def _side_model(
     knees: KneeFit,
     reference: int,
     options: IdentifyOptions,
+    units: RecordedUnits,
 ) -> SideModel:
     """Assemble one side: what was identified, the curves that may be certified, and k x_max."""
     described, trend = group.tests, guarding.trend
@@ -113,8 +116,9 @@ def _side_model(
     dp0 = described[reference].dp
     several = len(described) > 1
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
+    rows = range(len(described))
     return SideModel(
-        tests=tuple(_test_result(group, knees, row, curves[guard], options) for row in range(len(described))),
+        tests=tuple(_test_result(group, knees, row, curves[guard], options, units) for row in rows),
         reference=Reference(
             dp_MPa=None if dp0 is None else dp0 / MPA,
             u_min_V=joint.curves[guard].u_V[reference],
@@ -170,7 +174,12 @@ def _repeatability(found: BetweenRamps) -> Repeatability:
 
 
 def _test_result(
-    group: DescribedTests, knees: KneeFit, row: int, guarded: CertifiedCurve, options: IdentifyOptions
+    group: DescribedTests,
+    knees: KneeFit,
+    row: int,
+    guarded: CertifiedCurve,
+    options: IdentifyOptions,
+    units: RecordedUnits,
 ) -> TestResult:
     """Return one row of valve.json's tests."""
     item, u_max = group.tests[row], options.u_max
@@ -185,7 +194,7 @@ def _test_result(
         **_thresholds(item, knees, row),
         straight_rising=rising.line.window if rising else None,
         straight_falling=falling.line.window if falling else None,
-        not_observable=_not_observable(group, row),
+        not_observable=_not_observable(group, row, units),
         u_guard_V=guarded.u_threshold_V[row],
         u_guard_lower_V=guarded.u_lower_V[row],
         slope_L_min_V=float(np.nanmean(knees.slope[row])) / L_MIN,
@@ -220,7 +229,7 @@ def _thresholds(item: DescribedTest, knees: KneeFit, row: int) -> dict[str, floa
     return values
 
 
-def _not_observable(group: DescribedTests, row: int) -> dict[str, str]:
+def _not_observable(group: DescribedTests, row: int, units: RecordedUnits) -> dict[str, str]:
     """Say of thresholds that can't be seen why; what valve.json gives instead is said too."""
     reasons = {}
     for direction, shape in zip(BRANCHES, group.tests[row].shapes, strict=True):
@@ -231,12 +240,12 @@ def _not_observable(group: DescribedTests, row: int) -> dict[str, str]:
             low, high = shape.tail.hole
             for name in ("level", "onset"):
                 reasons[f"u_{name}_{direction}_V"] = (
-                    f"rows are missing from {low:.3f} to {high:.3f} V, where the flow begins; the onset's value is the "
-                    "lower end"
+                    f"rows are missing {units.span(low, high, '.3f V')}, where the flow begins; the onset's value is "
+                    "the lower end"
                 )
         elif group.floor > 0:
+            least = units.text(group.floor / L_MIN, ".2f L/min")
             reasons[f"u_onset_{direction}_V"] = (
-                f"the meter shows nothing below {group.floor / L_MIN:.2f} L/min; the value is the tail above that "
-                "flow, extrapolated to zero"
+                f"the meter shows nothing below {least}; the value is the tail above that flow, extrapolated to zero"
             )
     return reasons

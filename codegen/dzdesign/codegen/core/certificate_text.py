@@ -43,5 +43,11 @@ def _counted(compensator: Compensator) -> str:
     rounding = "the converters' error and the rounding to counts"
     if not compensator.drive_functions.dither_counts:
         return rounding
-    peak = compensator.drive_functions.dither_counts / compensator.signals.compare_max * float(compensator.u_max_V)
-    return f"{rounding} and the dither's peak of {1e3 * peak:.4g} mV, which dz_drive adds to it"
+    counted = compensator.dither_reserve_counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    recorded = compensator.valve.dither
+    if recorded is not None:
+        return (
+            f"{rounding} and {1e3 * counted:.4g} mV by which dz_drive's dither may differ from that of the recordings, "
+            f"{recorded.in_words()}, which the bound has in it"
+        )
+    return f"{rounding} and the dither's peak of {1e3 * counted:.4g} mV, which dz_drive adds to it"

@@ -10,7 +10,7 @@ from dzdesign.identify.fitting.bounds import (
     lower_bounds,
 )
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
-from dzdesign.identify.fitting.soft_edges import find_softness
+from dzdesign.identify.fitting.soft_edges import EdgeShapes, find_softness, fit_edge_shapes
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.fitting.zero_flow import with_zero_flow
 from dzdesign.identify.knees.described_tests import DescribedTests
@@ -92,9 +92,18 @@ def order_knees(
     return OrderedKnees(column=column, fit=fit, departure=departure)
 
 
-def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: IdentifyOptions) -> Threshold:
+def edges_of_branch(group: DescribedTests, column: int, options: IdentifyOptions) -> EdgeShapes:
+    """Fit the shapes of the edge to the tests' rising (0) or falling (1) branch."""
+    shapes = [item.branch(column) for item in group.tests]
+    return fit_edge_shapes(shapes, level=group.noise_level, lag=group.lag, u_max=options.u_max)
+
+
+def bound_threshold(
+    group: DescribedTests, knees: OrderedKnees, edges: EdgeShapes, options: IdentifyOptions
+) -> Threshold:
     """Bound the knee, or below it what a soft edge still passes: the tail's zero, if that lies below by more than its
-    error, and where the flow falls to the noise level; or where it comes to the flow that is allowed at zero."""
+    error, and where the flow falls to the noise level; or where it comes to the flow that is allowed at zero. `edges`
+    are those of the same branch."""
     shapes = [item.branch(knees.column) for item in group.tests]
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
@@ -127,9 +136,7 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     bound = np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth)
     # Where the edge may pass more than the level below the knee, as credible as the bound is sure. Both errors are of
     # different readings, so they add by their squares.
-    softness = find_softness(
-        shapes, knee, level=group.noise_level, lag=group.lag, confidence=options.confidence, u_max=options.u_max
-    )
+    softness = find_softness(edges, knee, options.confidence)
     margin = np.hypot(knee - knee_bound, softness.at_most - softness.likely)
     found = Threshold(
         np.minimum(value, knee - softness.likely),

@@ -208,12 +208,11 @@ class SideModel:
         if known.beta and abs(known.beta[row] - 1) > BETA_ROUNDING:
             raise RuleError(f"beta at dP0 is {known.beta[row]:g}, expected 1")
 
-    @property
-    def premise(self) -> str:
-        """What the bounds between the tests rest on, in words."""
+    def premise_in_words(self, units: RecordedUnits) -> str:
+        """Return what the bounds between the tests rest on."""
         if len(self.tests) < 2:
             return "one pressure drop was tested: the bound holds there, and nothing is certified at another"
-        return f"{len(self.tests)} pressure drops were tested. {self.curve.premise_in_words}"
+        return f"{len(self.tests)} pressure drops were tested. {self.curve.premise_in_words(units)}"
 
     @property
     def zero_flow_L_min(self) -> float | None:

@@ -40,6 +40,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
                 f"{units.text(valve.u_max_V, 'g V')}.",
                 *([f"Units: {shown}; the files and the curves as CSV are in V, MPa and L/min."] if shown else []),
                 f"Flow meter: floor {units.text(meter.floor_L_min, '.2f L/min')}; {meter.lag_in_words()}.",
+                *([f"Recorded under {valve.dither_in_words}."] if valve.dither else []),
                 *(_trend(name, side, units.of_side(name)) for name, side in valve.sides.items()),
                 *(
                     f"{name.capitalize()} commands, from ramp to ramp: "
@@ -53,7 +54,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             figures=thresholds,
             tables=tables,
             lines=(
-                *(f"Premise, {name} commands: {side.premise}." for name, side in valve.sides.items()),
+                *(f"Premise, {name} commands: {side.premise_in_words(units)}." for name, side in valve.sides.items()),
                 *(f"{warning.text}." for warning in valve.warnings if warning.code in ORDER),
             ),
         ),

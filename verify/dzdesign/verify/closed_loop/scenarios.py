@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.design.zero_band import CommandError
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
@@ -48,6 +49,8 @@ class Scene:
     #: Of a zero command's code; and whether the law has a zero band against it.
     command_error: CommandError
     has_zero_band: bool
+    #: In which a scenario's name has its pressures.
+    units: RecordedUnits = AS_COMPUTED
 
     @property
     def settle_s(self) -> float:
@@ -193,7 +196,8 @@ def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
 def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The sensors freeze, then the pressure drop rises. The codes are sound: what it costs is stated, not required."""
     low, high = tested_MPa
-    name = f"sensors frozen at {low:.2f} MPa, then {high:.2f} MPa"
+    first, then = (scene.units.text(dp_MPa, ".2f MPa") for dp_MPa in tested_MPa)
+    name = f"sensors frozen at {first}, then {then}"
     return scene.result(name, _changed_in_mid_ramp(scene, low, high)[0], must_shut=False, end_MPa=high)
 
 
