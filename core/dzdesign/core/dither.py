@@ -134,9 +134,9 @@ class DrivenDither:
         if abs(self.frequency_Hz / Fraction(repr(recorded.frequency_Hz)) - 1) > SAME_FREQUENCY:
             made = f"{float(self.frequency_Hz):.6g} Hz"
             raise InputError(
-                f"{asked}, but --dither makes {made}, half a wave being whole PWM periods; expected the recorded frequency "
-                f"within {float(SAME_FREQUENCY):.0%}; give that to --dither, or record ramps with one that the PWM makes, "
-                f"such as {made}"
+                f"{asked}, but --dither makes {made}, half a wave being whole PWM periods; expected the recorded "
+                f"frequency within {float(SAME_FREQUENCY):.0%}; give that to --dither, or record ramps with one that "
+                f"the PWM makes, such as {made}"
             )
 
     def reserve(self, recorded: Dither | None) -> int:

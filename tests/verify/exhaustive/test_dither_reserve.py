@@ -1,4 +1,4 @@
-"""What of a dither counts as drive at zero command: derived anew, so that a design that keeps too little free is seen."""
+"""What of a dither counts as drive at zero command, derived anew: a design that keeps too little free is seen."""
 
 from dataclasses import replace
 from fractions import Fraction
