@@ -16,7 +16,7 @@ from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
 from dzdesign.design.design_choices import BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
-from dzdesign.design.lot_valves import LotValve
+from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs

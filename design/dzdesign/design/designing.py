@@ -51,12 +51,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     options = options or DesignOptions()
     signals = options.signals
     law(options.law)
-    u_max = Fraction(repr(valve.u_max_V))
-    if options.full_command_V not in (None, u_max):
-        raise InputError(
-            f"the command signal's upper end stands for {float(options.full_command_V or 0):g} V, but the valve was "
-            f"identified with a full command of {valve.u_max_V:g} V; write the signal's range up to that"
-        )
+    u_max = _full_command(valve, options)
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
@@ -68,8 +63,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
         laws[sign] = _side_law(side, options, u_max, sign, units, transition_codes, reserve)
-    digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
-    request = options.request
+    digest, request = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes), options.request
     compensator = Compensator(
         tool=THIS_TOOL,
         made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=digest),),
@@ -93,14 +87,31 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
-    if options.play and functions.dither_counts and valve.dither is None:
+    compensator = _with_play(compensator, options)
+    return replace(compensator, costs=costs_of(compensator))
+
+
+def _with_play(compensator: Compensator, options: DesignOptions) -> Compensator:
+    """Add the inverse play if it is asked for; not where a dither takes the same hysteresis out."""
+    if not options.play:
+        return compensator
+    if compensator.drive_functions.dither_counts and compensator.valve.dither is None:
         raise InputError(
             "--hysteresis play takes out the recorded hysteresis, and --dither most of the same once more; give one of "
             f'them, or record ramps with that dither: identify --dithered "{options.dither_text}"'
         )
-    if options.play:
-        compensator = with_play(compensator)
-    return replace(compensator, costs=costs_of(compensator))
+    return with_play(compensator)
+
+
+def _full_command(valve: ValveModel, options: DesignOptions) -> Fraction:
+    """Return the full command that the valve was identified with, V, which a signal that states one must end at."""
+    u_max = Fraction(repr(valve.u_max_V))
+    if options.full_command_V not in (None, u_max):
+        raise InputError(
+            f"the command signal's upper end stands for {float(options.full_command_V or 0):g} V, but the valve was "
+            f"identified with a full command of {valve.u_max_V:g} V; write the signal's range up to that"
+        )
+    return u_max
 
 
 def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs import read_dead_zone, remaining_dead_zone
+from dzdesign.design.costs_at_tests import read_dead_zone, remaining_dead_zone
 from dzdesign.design.designing import design
 from dzdesign.design.law_corners import corners_of
 from dzdesign.design.option_texts import options_of

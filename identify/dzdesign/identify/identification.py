@@ -116,7 +116,7 @@ def _each_side(
         pressures = (*mixed, *about_single_pressures(of_side, mixed))
         of_side, side_options, clipped = without_clipping(of_side, options)
         try:
-            sides[name] = identify_side(of_side, side_options)
+            sides[name] = identify_side(of_side, side_options, in_side)
         except InputError as error:
             # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
             cause = f"; it may be that {in_units(mixed[0].text, in_side)}" if mixed else ""

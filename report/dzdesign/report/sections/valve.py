@@ -54,7 +54,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             figures=thresholds,
             tables=tables,
             lines=(
-                *(f"Premise, {name} commands: {side.premise}." for name, side in valve.sides.items()),
+                *(f"Premise, {name} commands: {side.premise_in_words(units)}." for name, side in valve.sides.items()),
                 *(f"{warning.text}." for warning in valve.warnings if warning.code in ORDER),
             ),
         ),
@@ -92,6 +92,9 @@ def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUni
     def cell(value: float | None, form: str) -> Cell:
         return recorded(value, form, units)
 
+    allowed = (
+        (f"allowed at zero ({flow})", lambda row: cell(row[0].zero_flow_L_min, ".2f L/min")),
+    )
     leaks = ((f"leak ({flow})", lambda row: cell(row[0].leak_L_min, ".2f L/min")),)
     return table_of(
         title,
@@ -108,5 +111,6 @@ def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUni
         (f"noise ({flow})", lambda row: cell(row[0].noise_L_min, ".3f L/min")),
         (f"noise level ({flow})", lambda row: cell(row[0].noise_level_L_min, ".2f L/min")),
         *(leaks if any(test.leak_L_min for test in side.tests) else ()),
+        *(allowed if side.certificate.zero_flow_L_min is not None else ()),
         ("ramp test", lambda row: _first_of(row[0].ramps)),
     )

@@ -11,7 +11,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.stand_in import StandIn
@@ -131,6 +131,7 @@ class ClosedLoop:
         #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
+        self._side = compensator.valve.sides.get(SIDE_NAMES[sign]) if compensator else None
         self._take(plant)
 
     def _take(self, plant: Plant | StandIn) -> None:
@@ -159,6 +160,10 @@ class ClosedLoop:
     def leak_L_min(self, dp_MPa: float) -> float:
         """Return what the valve passes without any drive at a pressure drop: no compensator can stop it."""
         return float(self.run(np.zeros(1), dp_MPa, periods_per_record=1).q_mean_L_min[0])
+
+    def allowed_at_zero_L_min(self, dp_MPa: float) -> float | None:
+        """Return the flow that is allowed at zero command at a pressure drop, a leak included; None: none declared."""
+        return self._side.zero_flow_at(dp_MPa) if self._side else None
 
     def unseen_below_L_min(self, dp_MPa: float) -> float | None:
         """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""

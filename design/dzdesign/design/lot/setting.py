@@ -22,8 +22,8 @@ from dzdesign.design.certificate import certify, guarded_curve, prove_certificat
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import design, over, prove_monotone, travel
-from dzdesign.design.lot import LotMargin, prove_lot
-from dzdesign.design.lot_valves import LotValve
+from dzdesign.design.lot.margins import LotMargin, prove_lot
+from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
