@@ -31,6 +31,7 @@ from scoreboard import run_parts  # noqa: E402
 from soft_edges import print_soft_edges  # noqa: E402
 from stops import print_stops  # noqa: E402
 from timing import print_timing  # noqa: E402
+from worn_valves import print_worn_valves  # noqa: E402
 
 PARTS = {
     "accuracy": (print_accuracy, 101),
@@ -48,6 +49,7 @@ PARTS = {
     "premises": (print_curve_premises, 1414),
     "choice": (print_curve_choice, 1616),
     "recorded-premises": (print_recorded_premises, 1515),
+    "worn-valves": (print_worn_valves, 1616),
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),
     "timing": (print_timing, 0),
