@@ -27,8 +27,7 @@ SHARE_OF_LINE = 0.5
 INNER_FACTOR = 4.0
 #: In the first and the last interval only one test shows a kink, and of one near the end but a small part; with three
 #: tests that one is the only one there is. Its second difference then counts whatever its sign: a bend down at the
-#: test hides one up beside it, and that there is none was no estimate (13 of 200 falling curves with two kinks lay under
-#: their bound somewhere, then 1).
+#: test hides one up beside it (of 200 falling curves with two kinks 13 had an offset above them somewhere, so 1 has).
 END_FACTOR, END_FACTOR_OF_THREE = 32.0, 64.0
 #: Fewest tests from which a curvature can be estimated.
 FEWEST_FOR_CURVATURE = 3
