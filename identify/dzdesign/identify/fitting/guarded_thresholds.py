@@ -11,7 +11,6 @@ from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, T
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.guarding import (
     OrderedKnees,
-    Threshold,
     bound_threshold,
     edges_of_branch,
     mean_threshold,
@@ -20,6 +19,7 @@ from dzdesign.identify.fitting.guarding import (
 )
 from dzdesign.identify.fitting.premises import REFUSED, confidence_at_tests, one_way_p
 from dzdesign.identify.fitting.soft_edges import EdgeShapes
+from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
@@ -94,7 +94,7 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
         )
     departure = guarded_departure(thresholds[guard], trend.direction)
     finest = FINEST_ERROR * options.u_max
-    thresholds = {name: _lowered(each, trend.direction, finest) for name, each in thresholds.items()}
+    thresholds = {name: lowered(each, trend.direction, finest) for name, each in thresholds.items()}
     departure = _said(thresholds[guard], trend.direction, departure)
     if other in thresholds:
         thresholds["mean"] = _mean_of(group, thresholds)
@@ -164,14 +164,14 @@ def guarded_departure(guarded: GuardedThreshold, direction: Direction) -> np.nda
     return excess_departure(np.abs(value - nearest), error, guarded.allowance)
 
 
-def _lowered(guarded: GuardedThreshold, direction: Direction, finest: float) -> GuardedThreshold:
+def lowered(guarded: GuardedThreshold, direction: Direction, finest: float) -> GuardedThreshold:
     """Lower the bounds under one direction by what the guarded threshold departs from it, and test the direction.
 
     Errors below `finest`, V, weigh alike. Without a direction the lowest bound of all tests holds everywhere, whatever
     the others do.
     """
     departure = float(guarded_departure(guarded, direction).max())
-    lowered = guarded.ordered.bound - (0.0 if direction == "flat" else departure)
+    bound = guarded.ordered.bound - (0.0 if direction == "flat" else departure)
     free, between = guarded.free, guarded.between
     p_value = one_way_p(
         free.value,
@@ -181,7 +181,7 @@ def _lowered(guarded: GuardedThreshold, direction: Direction, finest: float) -> 
     )
     return replace(
         guarded,
-        ordered=replace(guarded.ordered, bound=lowered),
+        ordered=replace(guarded.ordered, bound=bound),
         departs=guarded.departs or departure > 0,
         one_way_p=p_value,
     )

@@ -11,6 +11,8 @@ from dzdesign.identify.fitting.bounds import (
 )
 from dzdesign.identify.fitting.constrained_fits import ACTIVE, KneeFit, fit_knees
 from dzdesign.identify.fitting.soft_edges import EdgeShapes, find_softness, fit_edge_shapes
+from dzdesign.identify.fitting.threshold import Threshold
+from dzdesign.identify.fitting.zero_flow import with_zero_flow
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.staircase import Direction
@@ -42,17 +44,6 @@ class OrderedKnees:
     def knee_se(self) -> np.ndarray:
         """Their standard errors, V."""
         return self.fit.knee_se[:, self.column]
-
-
-@dataclass(frozen=True, slots=True)
-class Threshold:
-    """A guarded threshold, its standard errors and simultaneous lower bounds (V), all (T,)."""
-
-    value: np.ndarray
-    se: np.ndarray
-    bound: np.ndarray
-    #: By how much the bounds were lowered for the tolerance of the meter's lag, V, (T,).
-    lag_budget: np.ndarray
 
 
 def systematic_change(group: DescribedTests, column: int, options: IdentifyOptions) -> float:
@@ -107,7 +98,8 @@ def bound_threshold(
     group: DescribedTests, knees: OrderedKnees, edges: EdgeShapes, options: IdentifyOptions
 ) -> Threshold:
     """Bound the knee, or below it what a soft edge still passes: the tail's zero, if that lies below by more than its
-    error, and where the flow falls to the noise level; `edges` are those of the same branch."""
+    error, and where the flow falls to the noise level; or where it comes to the flow that is allowed at zero. `edges`
+    are those of the same branch."""
     shapes = [item.branch(knees.column) for item in group.tests]
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
@@ -142,12 +134,13 @@ def bound_threshold(
     # different readings, so they add by their squares.
     softness = find_softness(edges, knee, options.confidence)
     margin = np.hypot(knee - knee_bound, softness.at_most - softness.likely)
-    return Threshold(
+    found = Threshold(
         np.minimum(value, knee - softness.likely),
         np.where(soft, zero_se, knee_se),
         np.minimum(bound, knee - softness.likely - margin),
         lag_budget,
     )
+    return with_zero_flow(group, knees.column, found, shared, options)
 
 
 def mean_threshold(group: DescribedTests, opening: Threshold, closing: Threshold) -> Threshold:
