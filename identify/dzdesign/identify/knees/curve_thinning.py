@@ -98,7 +98,10 @@ def _thinned(
     u: np.ndarray, q: np.ndarray, onset: float, *, leak: float, level: float, tolerance: float, at_zero: float
 ) -> RecordedBranch:
     """Return the points of a branch whose flow q (m³/s) was averaged in bins of the command."""
-    at, q_at = _points(u, q, np.where(q < ABOUT_ZERO * at_zero, min(OF_ZERO_FLOW * at_zero, tolerance), tolerance))
+    of_bins = np.full(q.size, tolerance)
+    if at_zero > 0:
+        of_bins[q < ABOUT_ZERO * at_zero] = min(OF_ZERO_FLOW * at_zero, tolerance)
+    at, q_at = _points(u, q, of_bins)
     u_seen = _first_seen(u[at], q_at, leak + level)
     lowest, seen = float(u[0]), u[at] > u_seen
     points = [(u_seen, leak + level), *zip(u[at][seen].tolist(), np.maximum(q_at[seen], 0.0).tolist(), strict=True)]
