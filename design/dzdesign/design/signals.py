@@ -182,7 +182,10 @@ class Signals:
         return max(self.difference(a[0], b[1], sign) if reversed_ else self.difference(a[1], b[0], sign), 1)
 
     def difference_error(self, sign: int) -> tuple[int, int]:
-        """Return how many codes a difference may read too high (as a negative number) and too low, rounded outwards."""
+        """Return how many codes a difference may read too high (as a negative number) and too low, rounded outwards.
+
+        That is rounding to codes alone: errors of the sensors and of their converters are not in it.
+        """
         a, b = self.pressure_a, self.pressure_b
         low, high = a.error_MPa[0] - b.error_MPa[1], a.error_MPa[1] - b.error_MPa[0]
         # What the weight is off, at the sensor's largest code, and the shift that rounds down.

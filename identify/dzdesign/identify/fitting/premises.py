@@ -26,7 +26,8 @@ SHARE_OF_LINE = 0.5
 #: between two tests shows as half of its change of slope at each, and over the distance of two tests instead of one.
 INNER_FACTOR = 4.0
 #: In the first and the last interval only one test shows a kink, and of one near the end but a small part; with three
-#: tests that one is the only one there is.
+#: tests that one is the only one there is. Its second difference then counts whatever its sign: a bend down at the
+#: test hides one up beside it (of 200 falling curves with two kinks 13 had an offset above them somewhere, so 1 has).
 END_FACTOR, END_FACTOR_OF_THREE = 32.0, 64.0
 #: Fewest tests from which a curvature can be estimated.
 FEWEST_FOR_CURVATURE = 3
@@ -69,8 +70,9 @@ def find_curvature(
 
     Only a threshold that bends upwards lies below its chords. Estimated, M is four times the largest second divided
     difference at the tests; in the first and the last interval at least 32 times that of the one test that tells of it
-    (64 with three tests). Its error needs no allowance: what M lacks by it is small beside the distance of the bounds
-    from the thresholds, which the same errors set (benchmarks/identify/curve_premises.py).
+    (64 with three tests, where it counts whatever its sign). Its error needs no allowance: what M lacks by it is small
+    beside the distance of the bounds from the thresholds, which the same errors set
+    (benchmarks/identify/curve_premises.py).
 
     Parameters
     ----------
@@ -93,8 +95,9 @@ def find_curvature(
             beyond = float(np.max((found - declared) / np.maximum(se, np.finfo(float).tiny)))
             p_value = min(1.0, float(found.size * stdtr(degrees, -beyond)))
     else:
-        end = END_FACTOR_OF_THREE if dp_MPa.size == FEWEST_FOR_CURVATURE else END_FACTOR
-        upwards = np.maximum(found, 0.0)
+        three = dp_MPa.size == FEWEST_FOR_CURVATURE
+        end = END_FACTOR_OF_THREE if three else END_FACTOR
+        upwards = np.abs(found) if three else np.maximum(found, 0.0)
         allowed = np.full(dp_MPa.size - 1, INNER_FACTOR * float(upwards.max()))
         allowed[0] = max(allowed[0], end * float(upwards[0]))
         allowed[-1] = max(allowed[-1], end * float(upwards[-1]))
