@@ -219,6 +219,11 @@ class TestChoice:
         assert line.beta.beta_se[-1] < smooth.beta.beta_se[-1] and line.beta.beta_se[0] == 0
         np.testing.assert_allclose(np.diff(line.beta.beta, 2), 0, atol=2e-6)
 
+    @pytest.mark.parametrize(("curvature", "got"), [(-2e-14, "-20 mV/MPa"), (1e296, "1e.311|inf mV/MPa")])
+    def test_a_curvature_of_no_valve_is_refused_in_its_unit(self, curvature, got):
+        with pytest.raises(InputError, match=got):
+            IdentifyOptions(curvature=curvature)
+
     def test_a_curvature_beside_another_premise_is_refused(self):
         with pytest.raises(InputError, match="curvature"):
             IdentifyOptions(curve="line", curvature=1e-14)

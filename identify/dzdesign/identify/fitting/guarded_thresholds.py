@@ -81,7 +81,7 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
     # Where the solver finds no order of the other branch's knees, that guard is not on offer, and `design` says so.
     with suppress(InputError):
         if group.tests[0].shapes[1 - column]:
-            knees[other] = order_knees(group, free, of_knees, 1 - column, options, alone=True)
+            knees[other] = order_knees(group, free, of_knees, 1 - column, options)
             edges[other] = edges_of_branch(group, 1 - column, options)
             single[other] = _unordered(group, free, 1 - column, edges[other], options)
     thresholds: dict[Guard, GuardedThreshold] = {}
@@ -146,7 +146,7 @@ def _opening(
     if "opening" not in knees or of_knees == direction:
         return knees.get("opening")
     with suppress(InputError):
-        return order_knees(group, free, direction, 0, options, alone=True)
+        return order_knees(group, free, direction, 0, options)
     return None
 
 
