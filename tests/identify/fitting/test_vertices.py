@@ -7,8 +7,9 @@ import pytest
 from curve_choice import certify, draw_curve
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fitting import certifying
-from dzdesign.identify.fitting.premises import REFUSED, find_curvature
+from dzdesign.identify.fitting.premises import find_curvature
 from dzdesign.identify.fitting.vertices import find_vertex
 from dzdesign.identify.options import IdentifyOptions
 from tests.identify.fitting.test_premises import codes, ramps
