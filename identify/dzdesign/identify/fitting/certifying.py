@@ -219,7 +219,7 @@ def _too_much_sag(bound: BoundUnderPremise) -> InputError | None:
     largest = 1e3 * float(bound.curvature.max())
     return InputError(
         worded(
-            "with a curvature M of up to {largest:.3g} mV/MPa² the threshold may sag between the tests so far that no "
+            "with a curvature M of up to {largest:.3g mV/MPa²} the threshold may sag between the tests so far that no "
             "positive offset is left, or one that varies beyond bounds; record tests between, declare the valve's "
             "--curvature if it is less, or ask for another --curve",
             largest=largest,
