@@ -78,7 +78,8 @@ def _about_premises(side: SideModel, certified: Certified) -> Iterator[Finding]:
     if vertex:
         yield warn(
             "vertex-between-tests",
-            case="premise" if taken == "monotone" else "other-premise",
+            None,
+            "premise" if taken == "monotone" else "other-premise",
             low_MPa=vertex.from_MPa,
             high_MPa=vertex.to_MPa,
             at_MPa=vertex.at_MPa,

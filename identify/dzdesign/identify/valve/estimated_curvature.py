@@ -12,9 +12,12 @@ import numpy as np
 #: between two tests shows as half of its change of slope at each, and over the distance of two tests instead of one.
 INNER_FACTOR = 4.0
 #: In the first and the last interval only one test shows a kink, and of one near the end but a small part; with three
-#: tests that one is the only one there is. Its second difference then counts whatever its sign: a bend down at the
-#: test hides one up beside it (of 200 falling curves with two kinks 13 had an offset above them somewhere, so 1 has).
+#: tests that one is the only one there is.
 END_FACTOR, END_FACTOR_OF_THREE = 32.0, 64.0
+#: Up to so many tests a second difference counts whatever its sign: a bend down at a test hides one up beside it. Of 200
+#: falling curves with two kinks 13 (three tests) and 2 (four) had an offset above them somewhere; so 1 and none has, and
+#: of six tests none either way.
+FEW_TESTS = 4
 #: Fewest tests from which a curvature can be estimated.
 FEWEST_FOR_CURVATURE = 3
 
@@ -31,11 +34,11 @@ def estimated_curvature(found: np.ndarray) -> np.ndarray:
     """Return M between neighbouring tests (T - 1,), V/MPa², from the second differences (T - 2,) at the inner ones.
 
     It is four times the largest that bends upwards; in the first and the last interval at least 32 times that of the
-    one test that tells of it (64 with three tests, where it counts whatever its sign).
+    one test that tells of it (64 with three tests). Of three or four tests a bend counts whatever its sign.
     """
-    three = found.size == FEWEST_FOR_CURVATURE - 2
-    end = END_FACTOR_OF_THREE if three else END_FACTOR
-    upwards = np.abs(found) if three else np.maximum(found, 0.0)
+    tests = found.size + 2
+    end = END_FACTOR_OF_THREE if tests == FEWEST_FOR_CURVATURE else END_FACTOR
+    upwards = np.abs(found) if tests <= FEW_TESTS else np.maximum(found, 0.0)
     allowed = np.full(found.size + 1, INNER_FACTOR * float(upwards.max()))
     allowed[0] = max(allowed[0], end * float(upwards[0]))
     allowed[-1] = max(allowed[-1], end * float(upwards[-1]))
