@@ -175,6 +175,17 @@ class Signals:
         turn = -1 if sign < 0 and self.swapped else 1
         return turn * (a * WEIGHT_UNIT - b * self.weight_b) >> WEIGHT_SHIFT
 
+    def hidden_excess(self, sign: int) -> tuple[str, ...]:
+        """Return the failures of a sensor that make the pressure difference read too high with codes that are valid."""
+        sensors = {"A": self.pressure_a, "B": self.pressure_b}
+        ahead, behind = ("B", "A") if sign < 0 and self.swapped else ("A", "B")
+        found = []
+        if sensors[behind].valid_codes[0] == 0:
+            found.append(f"a broken wire of sensor {behind}")
+        if sensors[ahead].valid_codes[1] == self.code_max:
+            found.append(f"a reading of sensor {ahead} above its span")
+        return tuple(found)
+
     def largest_difference(self, sign: int) -> int:
         """Return the largest difference that sound codes make."""
         a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes

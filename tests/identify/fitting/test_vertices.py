@@ -7,8 +7,10 @@ import pytest
 from curve_choice import certify, draw_curve
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fitting import certifying
-from dzdesign.identify.fitting.premises import REFUSED, find_curvature
+from dzdesign.identify.fitting.premises import find_curvature
 from dzdesign.identify.fitting.vertices import find_vertex
 from dzdesign.identify.options import IdentifyOptions
 from tests.identify.fitting.test_premises import codes, ramps
@@ -107,6 +109,10 @@ class TestThreeTests:
         curve = identify(ramps(kinked, (1.0, 3.0, 5.0)), QUIET).positive.curve
         fine = np.linspace(1, 5, 401)
         assert np.all(np.interp(fine, curve.offset_dp_MPa, curve.offset_V) < kinked(fine) - 0.1)
+
+    def test_a_curvature_that_the_tests_gave_is_not_called_tested(self):
+        curve = identify(ramps(lambda dp: 5.6 - 0.06 * dp, (1.0, 3.0, 5.0)), replace(QUIET, curve="smooth"))
+        assert "no test of it" in curve.positive.curve.premise_in_words(AS_COMPUTED)
 
     def test_its_second_difference_counts_whatever_its_sign(self):
         dp = np.array([1.0, 3.0, 5.0])

@@ -127,7 +127,7 @@ def test_the_stand_in_of_a_dithered_recording_is_not_dithered_twice(bench, tmp_p
     for scene, test in zip(scenes_of(folder, made, None), made.valve.positive.tests, strict=True):
         expected = hysteresis_left(made, test)[LEVELS.index(0.5)]  # from the recorded branches
         assert width(scene) == pytest.approx(expected, abs=5e-4)
-        assert all(not each.must_shut or each.q_opened_L_min == 0 for each in run_scenarios(scene))
+        assert all(not each.must_shut or each.q_zero_L_min == 0 for each in run_scenarios(scene))
     monkeypatch.setattr(ClosedLoop, "_wave", lambda _: (0, 1, False))
     twice = scenes_of(folder, made, None)[1]
     assert width(twice) < 0.8 * expected

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, Trend, excess_departure, find_trend
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.guarding import (
@@ -17,7 +18,7 @@ from dzdesign.identify.fitting.guarding import (
     order_knees,
     systematic_change,
 )
-from dzdesign.identify.fitting.premises import REFUSED, confidence_at_tests, one_way_p
+from dzdesign.identify.fitting.premises import confidence_at_tests, one_way_p
 from dzdesign.identify.fitting.soft_edges import EdgeShapes
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.knees.between_ramps import BetweenRamps
