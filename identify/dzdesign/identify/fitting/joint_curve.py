@@ -66,6 +66,15 @@ class _Layout:
     #: Of each branch: the thresholds that are reported, as parts of the unknowns, and their start (T, P), (T,).
     reported: dict[int, tuple[np.ndarray, np.ndarray]]
 
+    def thresholds(self, unknown: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the thresholds (T, 2), V, and their covariance (2, T, T), V²; NaN where a branch is missing."""
+        tests = max(level.size for level, _ in self.reported.values())
+        u, of_u = np.full((tests, 2), np.nan), np.full((2, tests, tests), np.nan)
+        for column, (level, parts) in self.reported.items():
+            u[:, column] = level + parts @ unknown
+            of_u[column] = parts @ covariance @ parts.T
+        return u, of_u
+
 
 def fit_joint_curve(
     shapes: Sequence[tuple[BranchShape | None, BranchShape | None]],
@@ -117,11 +126,7 @@ def fit_joint_curve(
         of_dp0.weights * own_slope * u_max / of_dp0.flow, [k_x_max / u_max, of_dp0.flow_se / of_dp0.flow],
     ])  # fmt: skip
     best, covariance = _solve(len(placed), rows[0].shape[0], layout.parts.shape[1], start, known)
-    unknown, inside = best[len(placed) : -1], covariance[len(placed) : -1, len(placed) : -1]
-    u, of_u = np.full((len(shapes), 2), np.nan), np.full((2, len(shapes), len(shapes)), np.nan)
-    for column, (level, parts) in layout.reported.items():
-        u[:, column] = level + parts @ unknown
-        of_u[column] = parts @ inside @ parts.T
+    u, of_u = layout.thresholds(best[len(placed) : -1], covariance[len(placed) : -1, len(placed) : -1])
     return JointCurve(
         u=u,
         covariance=of_u,

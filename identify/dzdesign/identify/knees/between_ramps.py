@@ -247,9 +247,7 @@ def knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float]
 
     `when` has for each ramp of each test when it was recorded, s, on one clock for all.
     """
-    tests: list[int] = []
-    numbers: list[int] = []
-    told: list[tuple[float, float, float]] = []
+    told: list[tuple[float, ...]] = []
     for test, (shape, times) in enumerate(zip(shapes, when, strict=True)):
         branch, seen = shape.prepared.branch, shape.line.kept & ~shape.line.censored
         width = float(np.ptp(branch.u[seen]))
@@ -262,10 +260,9 @@ def knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float]
                 continue
             lever = 1 / u.size + (u.mean() - knee) ** 2 / float(np.sum((u - u.mean()) ** 2))
             noise = (shape.sigma / slope) ** 2 * lever * shape.variance_inflation
-            tests.append(test)
-            numbers.append(number)
-            told.append((knee, noise, times[number]))
-    return RampKnees(np.array(tests, dtype=int), np.array(numbers, dtype=int), *np.array(told).reshape(-1, 3).T)
+            told.append((test, number, knee, noise, times[number]))
+    columns = np.array(told).reshape(-1, 5).T
+    return RampKnees(*columns[:2].astype(int), *columns[2:])
 
 
 def _series_clock(known: RampKnees, count: int) -> tuple[np.ndarray, NoDrift]:
