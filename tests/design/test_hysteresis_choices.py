@@ -1,10 +1,18 @@
 """The table of what each way with the hysteresis leaves."""
 
+import numpy as np
+import pytest
+
 from dzdesign.codegen.project import DEFAULT_TARGET, target_named
+from dzdesign.design.costs_at_tests import remaining_dead_zone
 from dzdesign.design.designing import design
 from dzdesign.design.hysteresis_choices import hysteresis_choices
+from dzdesign.design.law_corners import corners_of
 from dzdesign.design.option_texts import options_of
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.terminal.choices_table import print_choices
+from tests.support.repeatable_valves import identify
+from tests.support.synthetic import Truth, synthetic_ramp
 
 
 def choices(valve, **texts):
@@ -27,3 +35,22 @@ def test_what_the_sweeps_cannot_tell_of_a_play_is_said_where_it_is_recommended(e
     assert "small loop" in capsys.readouterr().out
     print_choices([each for each in found if "play" not in each.given])
     assert "small loop" not in capsys.readouterr().out
+
+
+def test_the_dead_zone_between_the_tests_counts():
+    """Three tests: M is large, and between two of them the offset lies lower than at both."""
+    ramps = [
+        synthetic_ramp(dp, Truth(knee_rising=5.6 - 0.06 * dp + 0.002 * dp**2, slope=4 * dp**0.5, noise=0.02), seed=row)
+        for row, dp in enumerate((1.0, 3.0, 5.0))
+    ]
+    valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="smooth"))
+    off = choices(valve, transition="off")[0]
+    made_off = design(valve, options_of({"transition": "off"}, target_named(DEFAULT_TARGET).inputs()))
+    at_tests = max(remaining_dead_zone(made_off, test)["opening"] for test in valve.positive.tests)
+    middle = [test.dp_MPa for test in valve.positive.tests]
+    knees = [test.u_knee_rising_V for test in valve.positive.tests]
+    found = []
+    for code in range(205, 1024):  # 1 to 5 MPa of 20
+        knee = np.interp(float(made_off.signals.dp_MPa(code)), middle, knees) / 10
+        found.append(corners_of(made_off, code, 1).command_at(knee))
+    assert off.onset == pytest.approx(max(found), abs=1e-3) and off.onset > 1.1 * at_tests

@@ -47,6 +47,13 @@ def test_design_takes_it_and_keeps_it(example_valve):
     assert all("read at 1.50 L/min" in line for line in compensator.costs if "offset" in line and " MPa: " in line)
 
 
+@pytest.mark.parametrize(("share", "told"), [(0.5, True), (1.0, False), (2.0, False)])
+def test_a_reading_where_nothing_was_recorded_is_said_to_be_none(example_valve, share, told):
+    flow = share * default_reading_flow(example_valve)
+    compensator = design(example_valve, replace(default_options(), reading_flow_L_min=flow))
+    assert any("not all of the recordings show a flow" in line for line in compensator.costs) == told
+
+
 @pytest.mark.parametrize("flow", [0.0, -1.0])
 def test_no_flow_is_none_to_read_at(flow, wording):
     with wording.refusal(InputError):

@@ -7,6 +7,7 @@ from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.identify.valve.reading_flow import default_reading_flow
 from dzdesign.identify.valve.side_model import SideModel
 
 
@@ -26,6 +27,12 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
         f"{beyond} the nearest tested beta is held and nothing is certified; "
         f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
     )
+    if compensator.reading_flow_L_min < (least := default_reading_flow(valve)):
+        lines.append(
+            f"dead zones read at {units.text(compensator.reading_flow_L_min, '.3g L/min')} are those of straight lines "
+            f"from the first flow seen down to the onset: below {units.text(least, '.3g L/min')} not all of the "
+            "recordings show a flow"
+        )
     if compensator.negative is None and valve.sides.get("negative") is not None:
         lines.append(
             "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "

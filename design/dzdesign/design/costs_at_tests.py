@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
@@ -71,7 +73,7 @@ def costs_at_tests(compensator: Compensator, sign: int) -> tuple[CostAtTest, ...
 
 def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> CostAtTest:
     side, u_max = SIDE_NAMES[sign], float(compensator.u_max_V)
-    corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+    corners = corners_of(compensator, _code_of(compensator, test), sign)
     offset_V, left = corners.offset * u_max, remaining_dead_zone(compensator, test, sign)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     above = {name: offset_V - knee for name, knee in knees.items() if knee is not None and knee < offset_V}
@@ -110,7 +112,31 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
     share is 0 where flow passes at zero command.
     """
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
-    return _commands_at(compensator, test, sign, knees)
+    return _commands_at(compensator, _code_of(compensator, test), sign, knees)
+
+
+def between_tests(compensator: Compensator, sign: int) -> float:
+    """Return the largest dead zone on opening that the law leaves between the tests of a side, a share of command.
+
+    There the opening knee is taken as straight. The law's beta is so between the table's nodes, so that one of these,
+    or a test, has the largest. 0 without a rising branch, without pressure, and of tests with no node between.
+    """
+    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    known = [
+        (test.dp_MPa, test.u_knee_rising_V)
+        for test in tests
+        if test.dp_MPa is not None and test.u_knee_rising_V is not None
+    ]
+    if len(known) < len(tests):
+        return 0.0
+    dp_MPa, knees_V = zip(*known, strict=True)
+    low, high = (round(compensator.signals.dp_code(Fraction(repr(end)))) for end in (dp_MPa[0], dp_MPa[-1]))
+    step = compensator.beta_step_codes
+    found = [0.0]
+    for code in range((low // step + 1) * step, high, step):
+        knee = float(np.interp(float(compensator.signals.dp_MPa(code)), dp_MPa, knees_V))
+        found.append(_commands_at(compensator, code, sign, {"opening": knee})["opening"])
+    return max(found)
 
 
 def read_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
@@ -123,14 +149,19 @@ def read_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) ->
         "opening": recorded.rising.command_at(flow) if recorded.rising else None,
         "closing": recorded.falling.command_at(flow) if recorded.falling else None,
     }
-    return _commands_at(compensator, test, sign, thresholds)
+    return _commands_at(compensator, _code_of(compensator, test), sign, thresholds)
+
+
+def _code_of(compensator: Compensator, test: TestResult) -> int:
+    """Return the difference of pressure codes at a test."""
+    return round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
 
 
 def _commands_at(
-    compensator: Compensator, test: TestResult, sign: int, thresholds_V: Mapping[str, float | None]
+    compensator: Compensator, dp_code: int, sign: int, thresholds_V: Mapping[str, float | None]
 ) -> dict[str, float]:
-    """Return the command at which the drive reaches each threshold that there is, at a test's pressure drop."""
-    corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+    """Return the command at which the drive reaches each threshold that there is, at a difference of pressure codes."""
+    corners = corners_of(compensator, dp_code, sign)
     shares = {name: at / float(compensator.u_max_V) for name, at in thresholds_V.items() if at is not None}
     nodes = compensator.drive_functions.play_counts[0 if sign > 0 else 1] or (0,)
     widths = (nodes[0] / compensator.signals.compare_max, nodes[-1] / compensator.signals.compare_max)

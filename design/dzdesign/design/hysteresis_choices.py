@@ -8,7 +8,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import read_dead_zone, remaining_dead_zone
+from dzdesign.design.costs_at_tests import between_tests, read_dead_zone, remaining_dead_zone
 from dzdesign.design.designing import design
 from dzdesign.design.law_corners import corners_of
 from dzdesign.design.option_texts import options_of
@@ -28,7 +28,7 @@ WORTH = 0.002
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HysteresisChoice:
-    """One choice, the worst of all tests and both sides; shares of full command."""
+    """One choice, the worst of all tests and both sides, and at the onset between the tests too; shares of command."""
 
     given: str
     #: None where no test has what it needs, or the design is refused: then `refused` says why.
@@ -92,13 +92,14 @@ def hysteresis_choices(compensator: Compensator) -> tuple[HysteresisChoice, ...]
 
 def _judged(given: str, made: Compensator) -> HysteresisChoice:
     tests = [(test, sign) for sign in made.signals.signs for test in made.valve.sides[SIDE_NAMES[sign]].tests]
+    between = [between_tests(made, sign) for sign in made.signals.signs]
     onsets = [left["opening"] for test, sign in tests if "opening" in (left := remaining_dead_zone(made, test, sign))]
     read = [left["opening"] for test, sign in tests if "opening" in (left := read_dead_zone(made, test, sign))]
     widths = [np.abs(found) for test, sign in tests if (found := hysteresis_left(made, test, sign)).size]
     travel = max((_travel(made, sign) for sign in made.signals.signs), default=0.0)
     return HysteresisChoice(
         given=given,
-        onset=max(onsets, default=None),
+        onset=max(*onsets, *between) if onsets else None,
         # A test that never comes to that flow is no better than the others.
         reading=max(read, default=None) if len(read) == len(onsets) else None,
         hysteresis=max(float(np.concatenate(widths).mean()), travel) if widths else None,

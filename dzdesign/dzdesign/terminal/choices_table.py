@@ -42,7 +42,7 @@ def print_choices(
         "hysteresis, mean": lambda each: share(each.hysteresis),
         "largest": lambda each: share(each.largest),
     }
-    put_rows(console, "What is left of command, the worst of all tests", choices, columns)
+    put_rows(console, "What is left of command, the worst of all tests (onset: between them too)", choices, columns)
     for each in choices:
         if each.refused:
             put_line(console, f"{each.given}: {each.refused}")

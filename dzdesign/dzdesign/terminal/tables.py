@@ -169,7 +169,8 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
-    return (f"largest dead zone on opening, without a transition, by --curve: {', '.join(words)}",)
+    what = "largest dead zone on opening, between the tests too, without a transition, by --curve"
+    return (f"{what}: {', '.join(words)}",)
 
 
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:

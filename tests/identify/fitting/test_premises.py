@@ -188,6 +188,18 @@ class TestChoice:
         line, monotone = (each.dead_zone_over_u_max for each in curve.premises)
         assert monotone - line > 0.02
 
+    def test_what_a_premise_leaves_is_the_largest_between_the_tests_too(self):
+        """With three tests M is large, and the offset sags most in the middle of an interval."""
+        tests = ramps(lambda dp: 5.6 - 0.06 * dp + 0.002 * dp**2, (1.0, 3.0, 5.0))
+        curve = identify(tests, replace(QUIET, curve="smooth")).positive.curve
+        left = next(each.dead_zone_over_u_max for each in curve.premises if each.premise == "smooth")
+        fine = np.linspace(1, 5, 2001)
+        offset = np.interp(fine, curve.offset_dp_MPa, curve.offset_V)
+        knee = np.interp(fine, curve.dp_MPa, curve.u_threshold_V) + 0.1  # opening lies above by the hysteresis
+        dead = (knee - offset) / (10 - offset)
+        assert left == pytest.approx(dead.max(), abs=2e-3)
+        assert left > 1.2 * max(dead[np.searchsorted(fine, curve.dp_MPa)])
+
     def test_three_pressures_take_the_smooth_curve_and_two_with_a_declared_curvature(self):
         tests = ramps(lambda dp: 5.6 - 0.06 * dp)
         estimated = identify(tests, QUIET).positive.curve

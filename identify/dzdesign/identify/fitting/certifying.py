@@ -262,11 +262,19 @@ def _fit_offset(bound: BoundUnderPremise, tested: Tested) -> OffsetUnderBound:
 
 
 def _check(bound: BoundUnderPremise, offset: OffsetUnderBound | None, tested: Tested) -> PremiseCheck:
-    """Return a premise's test, and the largest dead zone on opening that a law without transition would leave."""
+    """Return a premise's test, and the largest dead zone on opening that a law without transition would leave.
+
+    Between the tests too, where the offset may sag and the opening knee is taken as straight: by the tests alone a
+    curvature would look cheaper than it is. Both are straight between their nodes, so one of these has the largest.
+    """
     left = None
     if offset is not None:
-        at_tests = np.interp(tested.dp_MPa, offset.dp_MPa, offset.offset) if offset.dp_MPa.size > 1 else offset.offset
-        above = (tested.opens_V - at_tests) / np.maximum(tested.options.u_max - at_tests, np.finfo(float).tiny)
+        offset_V, opens_V = offset.offset, tested.opens_V
+        if offset.dp_MPa.size > 1:
+            nodes = np.union1d(offset.dp_MPa, tested.dp_MPa)
+            offset_V = np.interp(nodes, offset.dp_MPa, offset_V)
+            opens_V = np.interp(nodes, tested.dp_MPa, opens_V)
+        above = (opens_V - offset_V) / np.maximum(tested.options.u_max - offset_V, np.finfo(float).tiny)
         left = float(np.clip(above.max(), 0.0, 1.0))
     return PremiseCheck(premise=bound.premise, lack_of_fit_p=bound.p_value, dead_zone_over_u_max=left)
 

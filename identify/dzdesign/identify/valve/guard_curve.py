@@ -62,8 +62,8 @@ class PremiseCheck:
         Ratio | None,
         quantity(
             "1",
-            "Largest dead zone on opening that a law without transition would leave at a tested pressure drop; null "
-            "where no positive offset follows.",
+            "Largest dead zone on opening that a law without transition would leave on the tested interval, with an "
+            "opening knee that is straight between two tests; null where no positive offset follows.",
         ),
     ]
 
