@@ -7,6 +7,7 @@ from dzdesign.design.current.loop import CurrentLoop, SupplyCorrection
 PLAIN = CurrentLoop(
     full_counts=60000,
     compare_limit=57000,
+    rate=4800,
     samples=8,
     current_gain=22500,
     current_shift=13,
@@ -44,5 +45,6 @@ LARGEST = replace(
     feed_forward=8191,
     integral_limit=65535,
     offset_shift=0,
+    rate=65535,
 )
 LOOPS = {"plain": PLAIN, "supply": replace(PLAIN, supply=SUPPLY, integral_limit=5000), "largest": LARGEST}

@@ -63,7 +63,7 @@ def test_both_forms_of_the_exact_controller_agree(name):
     zero = loop.integral_limit << loop.gain_shift
     for exact, after in zip(exact_controllers(loop, given_of(periods, loop)), periods["after"], strict=True):
         integral = exact.integral * (1 << loop.gain_shift) + zero
-        found = (integral, exact.compare, exact.faults, exact.over_ticks, exact.open_ticks)
+        found = (integral, exact.compare, exact.faults, exact.over_ticks, exact.open_ticks, exact.ramped)
         assert found == tuple(int(after[field]) for field in COMPARED)
 
 
@@ -99,6 +99,7 @@ SEEDED = {
     "integral kept at zero": ("(limited & on) | (INTEGRAL_ZERO & ~on)", "limited"),
     "output on at a fault": ("~negative(0u - faults)", "~0u"),
     "output on at no set point": ("negative(0u - (uint32_t)set_point) & ~neg", "~neg"),
+    "rate of one sign": ("way & ~negative(way)", "way & 0xFFFFu"),
     "fault forgotten": ("faults = loop->faults |", "faults ="),
     "over-current a period late": ("(uint32_t)over_ticks - OVER_TICKS", "(uint32_t)loop->over_ticks - OVER_TICKS"),
     "open load at any output": (" & ~negative((uint32_t)loop->compare - OPEN_COMPARE)", ""),
@@ -106,7 +107,8 @@ SEEDED = {
     "short one code late": ("(uint32_t)sum - SHORT_SUM", "(uint32_t)sum - 1u - SHORT_SUM"),
     "offset not rounded": ("(loop->offset_total + OFFSET_HALF)", "(loop->offset_total)"),
     "offset never wrong": ("? DZ_CURRENT_SENSOR : 0u", "? 0u : 0u"),
-    "feed-forward of the current": ("(uint32_t)set_point * FEED", "current * FEED"),
+    "feed-forward of the current": ("(aim * FEED", "(current * FEED"),
+    "set point without its rate": ("RATE + RATE)) - RATE", "RATE + RATE + 1u)) - RATE"),
     "supply between nodes": ("correction[node + 1u] * past", "correction[node] * past"),
     "supply above its range": ("SUPPLY_LOW), SUPPLY_HIGH - SUPPLY_LOW)", "SUPPLY_LOW), SUPPLY_HIGH - SUPPLY_LOW - 9u)"),
 }
@@ -199,7 +201,7 @@ def test_a_wound_up_integral_leaves_the_end_at_once():
 def test_the_supply_scales_the_output():
     outputs = []
     for code in (1638, 2457, 3276, 100, 4095):
-        controller = settled(ExactController(LOOPS["supply"]))
+        controller = settled(ExactController(LOOPS["supply"], ramped=30000))
         controller.tick(30000, PLAIN.offset_nominal + 8000, code)
         outputs.append(controller.compare)
     low, middle, high, below, above = outputs
@@ -210,7 +212,7 @@ def test_the_supply_scales_the_output():
 @pytest.mark.parametrize(
     "changed",
     [
-        {"proportional": 8192}, {"samples": 3}, {"current_gain": 30000}, {"over_sum": 100}, {"offset_tolerance": 500},
+        {"proportional": 8192}, {"samples": 3}, {"current_gain": 30000}, {"over_sum": 100}, {"offset_tolerance": 65500},
         {"integral_limit": 65535, "gain_shift": 14}, {"open_ticks": 0},
     ],
 )  # fmt: skip

@@ -86,6 +86,7 @@ def current_constants(loop: CurrentLoop) -> list[Define]:
     unit, per_count = 1 << loop.gain_shift, "PWM counts for a count of "
     rows: list[tuple[str, int, str, str, str, tuple[str, ...]]] = [
         ("COMPARE_LIMIT", loop.compare_limit, "plain", "largest compare value", "of the PWM", ("compare_limit",)),
+        ("RATE", loop.rate, "uint32", "largest change of the set point in a period", "counts", ("rate",)),
         ("CURRENT_GAIN", loop.current_gain, "plain", "counts of current for a code of the sum, over 2^CURRENT_SHIFT",
          f"{loop.current_gain / (1 << loop.current_shift):.6g}", ("current_gain", "current_shift")),
         ("CURRENT_SHIFT", loop.current_shift, "plain", "binary places of CURRENT_GAIN", "", ("current_shift",)),
@@ -104,7 +105,7 @@ def current_constants(loop: CurrentLoop) -> list[Define]:
         ("INTEGRAL_END", loop.integral_limit << (loop.gain_shift + 1), "uint32", "largest integral",
          f"{loop.integral_limit} PWM counts above INTEGRAL_ZERO", ("integral_limit", "gain_shift")),
         ("OFFSET_NOMINAL", loop.offset_nominal, "plain", "sum without current", "as designed", ("offset_nominal",)),
-        ("OFFSET_LOW", loop.offset_nominal - loop.offset_tolerance, "plain", "lowest offset of a sound sensor", "",
+        ("OFFSET_LOW", max(loop.offset_nominal - loop.offset_tolerance, 0), "plain", "lowest offset of a sound sensor", "",
          ("offset_nominal", "offset_tolerance")),
         ("OFFSET_HIGH", loop.offset_nominal + loop.offset_tolerance, "plain", "highest offset of a sound sensor", "",
          ("offset_nominal", "offset_tolerance")),

@@ -54,6 +54,7 @@ class CurrentLoop:
 
     full_counts: Annotated[int, Meta(description="Set point of the rated current, counts.", ge=1, le=65535)]
     compare_limit: Annotated[Count, Meta(description="Largest compare value of the PWM.")]
+    rate: Annotated[int, Meta(description="Largest change of the set point in a PWM period, counts.", ge=1, le=65535)]
     samples: Annotated[int, Meta(description="Codes of the current in a PWM period, a power of two.", ge=1, le=16)]
     current_gain: Annotated[
         int, Meta(description="Counts of current for the sum of codes less its offset, over 2^current_shift.", ge=1)
@@ -94,11 +95,11 @@ class CurrentLoop:
             raise RuleError(f"the gain of the current is {self.current_gain} over 2^{self.current_shift}")
         if self.integral_limit << self.gain_shift > 65535 * 8192:
             raise RuleError("the integral's limit and the gains' binary places need more than 31 bits")
-        if self.offset_tolerance > min(self.offset_nominal, 65535 - self.offset_nominal):
-            raise RuleError("the offset's tolerance reaches past the ends of the sum")
+        if self.offset_nominal + self.offset_tolerance > 65535:
+            raise RuleError("the offset's tolerance reaches past the end of the sum")
         if not 0 < self.open_sum < self.over_sum < self.short_sum <= 65535:
             raise RuleError("the sums of open load, over-current and short must rise in this order")
-        for name in ("over_ticks", "open_ticks"):
+        for name in ("over_ticks", "open_ticks", "rate"):
             if not 1 <= getattr(self, name) <= 65535:
                 raise RuleError(f"{name} is {getattr(self, name)}, expected 1 to 65535")
 

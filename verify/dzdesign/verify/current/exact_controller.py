@@ -32,6 +32,8 @@ class ExactController:
     faults: int = NO_OFFSET
     over_ticks: int = 0
     open_ticks: int = 0
+    #: The set point that it follows.
+    ramped: int = 0
     offset: int = -1
     sums: list[int] = field(default_factory=list)
 
@@ -54,10 +56,11 @@ class ExactController:
         """Go on by a period of the PWM."""
         loop = self.loop
         above = max(total - self.offset, 0)
-        error = set_point - floor(Fraction(loop.current_gain * above, 1 << loop.current_shift) + HALF)
+        self.ramped += min(max(set_point - self.ramped, -loop.rate), loop.rate)
+        error = self.ramped - floor(Fraction(loop.current_gain * above, 1 << loop.current_shift) + HALF)
         self._detect(total, above)
         gain = {name: Fraction(getattr(loop, name), 1 << loop.gain_shift) for name in ("proportional", "integral")}
-        feed_forward = Fraction(loop.feed_forward, 1 << loop.gain_shift) * set_point
+        feed_forward = Fraction(loop.feed_forward, 1 << loop.gain_shift) * self.ramped
         asked = self.integral + gain["proportional"] * error + feed_forward
         counts = self._corrected(floor(max(asked, Fraction(0)) + HALF), supply_code)
         winds_up = (counts > loop.compare_limit and error > 0) or (asked < 0 and error < 0)
@@ -66,7 +69,7 @@ class ExactController:
             self.integral = min(max(moved, Fraction(-loop.integral_limit)), Fraction(loop.integral_limit))
         self.compare = min(counts, loop.compare_limit)
         if set_point == 0 or self.faults:
-            self.compare, self.integral = 0, Fraction(0)
+            self.compare, self.integral, self.ramped = 0, Fraction(0), 0
 
     def _detect(self, total: int, above: int) -> None:
         loop = self.loop
@@ -98,7 +101,8 @@ def exact_ticks(loop: CurrentLoop, given: Columns) -> dict[str, np.ndarray]:
     """
     unit = 1 << loop.gain_shift
     above = np.maximum(given["total"] - given["offset"], 0)
-    error = given["set_point"] - _rounded(loop.current_gain * above, 1 << loop.current_shift)
+    aim = given["ramped"] + np.clip(given["set_point"] - given["ramped"], -loop.rate, loop.rate)
+    error = aim - _rounded(loop.current_gain * above, 1 << loop.current_shift)
     too_high, dead = above >= loop.over_sum, (above < loop.open_sum) & (given["compare"] >= loop.open_compare)
     over_ticks = np.where(too_high, np.minimum(given["over_ticks"] + 1, LARGEST_TICKS), 0)
     open_ticks = np.where(dead, np.minimum(given["open_ticks"] + 1, LARGEST_TICKS), 0)
@@ -109,7 +113,7 @@ def exact_ticks(loop: CurrentLoop, given: Columns) -> dict[str, np.ndarray]:
         (OPEN, open_ticks >= loop.open_ticks),
     ):
         faults |= np.where(stands, bit, 0)
-    asked = given["integral"] + loop.proportional * error + loop.feed_forward * given["set_point"]
+    asked = given["integral"] + loop.proportional * error + loop.feed_forward * aim
     counts = _corrected(loop, _rounded(np.maximum(asked, 0), unit), given["supply_code"])
     winds_up = ((counts > loop.compare_limit) & (error > 0)) | ((asked < 0) & (error < 0))
     end = loop.integral_limit * unit
@@ -121,6 +125,7 @@ def exact_ticks(loop: CurrentLoop, given: Columns) -> dict[str, np.ndarray]:
         "faults": faults,
         "over_ticks": over_ticks,
         "open_ticks": open_ticks,
+        "ramped": np.where(off, 0, aim),
     }
 
 

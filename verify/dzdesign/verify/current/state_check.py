@@ -20,13 +20,16 @@ OFFSETS = 200
 SEED = 22
 STATE = np.dtype(
     [("integral", "<u4"), ("offset_total", "<u4")]
-    + [(name, "<u2") for name in ("offset_ticks", "offset", "compare", "faults", "over_ticks", "open_ticks")]
+    + [
+        (name, "<u2")
+        for name in ("offset_ticks", "offset", "compare", "faults", "over_ticks", "open_ticks", "ramped", "_")
+    ]
 )
 #: `struct period` of programs/current_states.h.
 PERIOD = np.dtype(
     [("before", STATE), ("after", STATE), ("set_point", "<u2"), ("total", "<u2"), ("supply_code", "<u2"), ("_", "<u2")]
 )
-COMPARED = ("integral", "compare", "faults", "over_ticks", "open_ticks")
+COMPARED = ("integral", "compare", "faults", "over_ticks", "open_ticks", "ramped")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +48,7 @@ def edges_of(loop: CurrentLoop) -> str:
     """Return edges.h: values of each field that lie at the ends that matter, within two of them."""
     lasts = (2, 32767, 65533)
     low, high = loop.supply.valid_codes if loop.supply else (0, 4095)
-    lowest, highest = (loop.offset_nominal + sign * loop.offset_tolerance for sign in (-1, 1))
+    lowest, highest = (max(loop.offset_nominal + sign * loop.offset_tolerance, 2) for sign in (-1, 1))
     sums = (loop.short_sum, loop.over_sum, loop.open_sum)
     found = {
         "offset": (2, loop.offset_nominal, lowest, highest, loop.offset_nominal),
@@ -61,23 +64,29 @@ def edges_of(loop: CurrentLoop) -> str:
         f"static const uint16_t {name}_edges[] = {{{', '.join(f'{min(value, 65533)}u' for value in values)}}};"
         for name, values in found.items()
     ]
-    supply = ", supply" if loop.supply else ""
     return "\n".join(
         [
             "#define COUNT(edges) ((uint16_t)(sizeof(edges) / sizeof((edges)[0])))",
+            f"#define RATE_EDGE UINT32_C({loop.rate})",
             f"#define INTEGRAL_MOST UINT32_C({loop.integral_limit << (loop.gain_shift + 1)})",
-            f"#define TICK(loop, set_point, sum, supply) (void)(supply), dz_current_tick(loop, set_point, sum{supply})",
             *lines,
             "",
         ]
     )
 
 
+def tick_macro(loop: CurrentLoop) -> str:
+    """Return tick.h: one way to call a controller with and without the supply's voltage."""
+    supply = ", supply" if loop.supply else ""
+    return f"#define TICK(loop, set_point, sum, supply) (void)(supply), dz_current_tick(loop, set_point, sum{supply})\n"
+
+
 def program_files(loop: CurrentLoop, core: Mapping[str, str], *mains: str) -> dict[str, str]:
     """Return the sources of a program over the states, with the controller's own among them."""
     own = {name: core[name] for name in ("dz_current.c", "dz_current.h")}
     names = ("current_states.c", "current_states.h", *mains)
-    return own | {"edges.h": edges_of(loop)} | {name: (PROGRAMS / name).read_text("utf-8") for name in names}
+    own |= {"edges.h": edges_of(loop), "tick.h": tick_macro(loop)}
+    return own | {name: (PROGRAMS / name).read_text("utf-8") for name in names}
 
 
 class HostStates:
@@ -171,7 +180,7 @@ def exact_controllers(loop: CurrentLoop, given: Mapping[str, np.ndarray]) -> Ite
         controller = ExactController(
             loop,
             integral=Fraction(row["integral"], 1 << loop.gain_shift),
-            **{name: row[name] for name in ("compare", "faults", "over_ticks", "open_ticks", "offset")},
+            **{name: row[name] for name in ("compare", "faults", "over_ticks", "open_ticks", "ramped", "offset")},
         )
         controller.tick(row["set_point"], row["total"], row["supply_code"])
         yield controller

@@ -4,6 +4,7 @@
 
 #include "current_states.h"
 #include "edges.h"
+#include "tick.h"
 
 static uint32_t random_state;
 
@@ -49,6 +50,7 @@ static void any_state(struct dz_current *loop)
     loop->compare = drawn(compare_edges, COUNT(compare_edges));
     loop->over_ticks = drawn(over_tick_edges, COUNT(over_tick_edges));
     loop->open_ticks = drawn(open_tick_edges, COUNT(open_tick_edges));
+    loop->ramped = drawn(set_point_edges, COUNT(set_point_edges));
 }
 
 static uint32_t folded(uint32_t hash, uint32_t word)
@@ -61,6 +63,7 @@ static uint32_t hash_of(uint32_t hash, const struct dz_current *loop)
     hash = folded(hash, loop->integral);
     hash = folded(hash, ((uint32_t)loop->compare << 16) | loop->faults);
     hash = folded(hash, ((uint32_t)loop->over_ticks << 16) | loop->open_ticks);
+    hash = folded(hash, loop->ramped);
     return folded(hash, ((uint32_t)loop->offset << 16) | loop->offset_ticks);
 }
 
@@ -78,6 +81,9 @@ uint32_t current_states(uint32_t seed, uint32_t count, struct period *periods)
             any_state(&loop);
         }
         set_point = drawn(set_point_edges, COUNT(set_point_edges));
+        if ((any() & 0x300u) == 0u) { /* a step of the rate at most */
+            set_point = (uint16_t)(loop.ramped + (uint16_t)(any() % (2u * RATE_EDGE + 9u)) - (uint16_t)(RATE_EDGE + 4u));
+        }
         sum = ((any() & 0xC00u) == 0u) ? drawn(sum_edges, COUNT(sum_edges))
                                        : (uint16_t)(loop.offset + (drawn(above_edges, COUNT(above_edges)) >> 1));
         supply = drawn(supply_edges, COUNT(supply_edges));
