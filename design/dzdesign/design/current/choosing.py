@@ -117,7 +117,7 @@ def choose_loop(
         current_shift=current_shift,
         gain_shift=gain_shift,
         **{name: round(value * 2**gain_shift) for name, value in real.items()},
-        integral_limit=compare_max,
+        integral_limit=1 << (compare_max.bit_length() - 1),  # a power of two is one instruction
         offset_nominal=sums.offset,
         offset_tolerance=round(OFFSET_SHARE * converter.levels) * sampling.samples,
         offset_shift=OFFSET_SHIFT,
