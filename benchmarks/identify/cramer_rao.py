@@ -80,11 +80,16 @@ def cramer_rao(bench: Bench, dp_MPa: float) -> Bound:
     )
 
 
-def beta_bound(bench: Bench, dp_MPa: float, dp0_MPa: float = 1.0) -> float:
-    """Return the bound of beta(dP) = u_min(dP)/u_min(dP0), the two tests being independent."""
-    at, reference = bench.threshold_V(dp_MPa), bench.threshold_V(dp0_MPa)
-    errors = cramer_rao(bench, dp_MPa).middle_V / at, cramer_rao(bench, dp0_MPa).middle_V / reference
-    return float(at / reference * np.hypot(*errors))
+def beta_bound(bench: Bench, dp_MPa: float, dp0_MPa: float = 1.0, *, closing: bool = False) -> float:
+    """Return the bound of beta(dP) = u_min(dP)/u_min(dP0), the two tests being independent.
+
+    Of the middle of opening and closing, or of closing alone, the slope of that branch its own.
+    """
+    of = bench.closing_V if closing else bench.threshold_V
+    at, reference = of(dp_MPa), of(dp0_MPa)
+    last, first = cramer_rao(bench, dp_MPa), cramer_rao(bench, dp0_MPa)
+    errors = [(bound.branch_V if closing else bound.middle_V) for bound in (last, first)]
+    return float(at / reference * np.hypot(errors[0] / at, errors[1] / reference))
 
 
 def _inverse(information: np.ndarray) -> np.ndarray:

@@ -39,8 +39,10 @@ class Outcomes:
     residual, residual_volts : (R,) array
         Largest residual dead zone over the interval beyond the hysteresis: share of the command range, and distance
         between offset and closing threshold over u_max.
-    beta_last : (R,) array
-        beta at the largest pressure drop.
+    beta_last, law_beta_last : (R,) array
+        Identified beta, Eq. (5), of the closing threshold at the largest pressure drop, and the certified offset's.
+    beta_last_se : (R,) array
+        Claimed standard error of the former.
     trends : dict
         Trend -> replicates.
     refusals : tuple of str
@@ -56,6 +58,8 @@ class Outcomes:
     residual: np.ndarray
     residual_volts: np.ndarray
     beta_last: np.ndarray
+    law_beta_last: np.ndarray
+    beta_last_se: np.ndarray
     trends: dict[str, int]
     refusals: tuple[str, ...]
 
@@ -147,4 +151,6 @@ def _held_against_truth(valve: ValveModel, bench: Bench, dp: np.ndarray) -> dict
         "residual": float((short / gain).max()),
         "residual_volts": float(short.max()),
         "beta_last": side.beta.beta[-1],
+        "law_beta_last": offset[-1] / np.interp(side.reference.dp_MPa, grid, offset),
+        "beta_last_se": side.beta.beta_se[-1],
     }

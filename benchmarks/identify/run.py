@@ -18,6 +18,7 @@ from between_ramps import print_between_ramps  # noqa: E402
 from bound_coverage import print_coverage, print_over_compensation, print_residual  # noqa: E402
 from corpus import print_corpus  # noqa: E402
 from corpus_units import print_corpus_of_units  # noqa: E402
+from curve_choice import print_curve_choice  # noqa: E402
 from curve_premises import print_curve_premises  # noqa: E402
 from measured import print_measured  # noqa: E402
 from meters import print_meters  # noqa: E402
@@ -30,6 +31,7 @@ from scoreboard import run_parts  # noqa: E402
 from soft_edges import print_soft_edges  # noqa: E402
 from stops import print_stops  # noqa: E402
 from timing import print_timing  # noqa: E402
+from worn_valves import print_worn_valves  # noqa: E402
 
 PARTS = {
     "accuracy": (print_accuracy, 101),
@@ -45,7 +47,9 @@ PARTS = {
     "corpus-units": (print_corpus_of_units, 0),
     "soft-edges": (print_soft_edges, 1313),
     "premises": (print_curve_premises, 1414),
+    "choice": (print_curve_choice, 1616),
     "recorded-premises": (print_recorded_premises, 1515),
+    "worn-valves": (print_worn_valves, 1616),
     "random": (print_random_valves, 404),
     "measured": (print_measured, 0),
     "timing": (print_timing, 0),

@@ -98,8 +98,10 @@ def _kind(argument: Argument) -> str:
 
 
 def _checked(argument: Argument, value: Any) -> Any:
-    """Return a value, an iterable as a list; refuse one that does not fit."""
+    """Return a value, an iterable as a list, a zero as text; refuse one that does not fit."""
     kinds, name = argument.kinds, argument.name
+    if type(value) in (int, float) and value == 0 and argument.option.example and not argument.is_path:
+        return "0" if str in kinds else value  # zero needs no unit
     # A number is read by what it is for, which refuses what can't be one.
     fits = bool({int, float} & kinds) or isinstance(value, tuple(kinds - {Mapping, Iterable}))
     if fits or argument.result_class in (one.__name__ for one in type(value).__mro__):

@@ -142,7 +142,7 @@ def test_design_and_codegen_fit_the_target(name, tmp_path, capsys):
     assert main(["design", str(VALVE), "--target", name, "-o", str(compensator)]) == 0
     signals = json.loads(compensator.read_text())["signals"]
     assert signals["compare_max"] == target.compare_max
-    assert signals["code_max"] == signals["command"]["full_code"] == target.adc_code_max
+    assert signals["code_max"] == signals["command"]["full_code"] == target.converter.code_max
     assert main(["codegen", str(compensator), "--target", name, "-o", str(one)]) == 0
     assert main(["codegen", str(VALVE), "--target", name, "-o", str(two)]) == 0
     files = {path.relative_to(one): path.read_bytes() for path in one.rglob("*") if path.is_file()}

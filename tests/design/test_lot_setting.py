@@ -11,7 +11,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
-from dzdesign.design.lot_setting import _limit, lot_setting
+from dzdesign.design.lot.setting import _limit, lot_setting
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal

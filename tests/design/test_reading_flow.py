@@ -7,7 +7,7 @@ import pytest
 
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.design.costs import read_dead_zone, remaining_dead_zone
+from dzdesign.design.costs_at_tests import read_dead_zone, remaining_dead_zone
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.valve.reading_flow import dead_zone_at, default_reading_flow, ideal_line

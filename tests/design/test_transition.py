@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from fractions import Fraction
 from itertools import pairwise
 
@@ -16,6 +17,7 @@ from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.regeneration import regenerated
 from dzdesign.verify.closed_loop.loop import RampSequence
+from tests.support.paths import ROOT
 from tests.support.synthetic import SHARED, needs_compiler
 
 TRANSITION = options_of({"transition": "1 %"}, target_named("f28335").inputs())
@@ -70,6 +72,15 @@ def test_the_gain_error_counts_as_far_as_zero_lies_up_the_converters_range(signa
 
     command = command_signal(parse_signal(signal, "--command-signal"), Converter())
     assert command_error_of("", Converter(), command).zero_band_codes == band
+
+
+@pytest.mark.parametrize(("name", "error"), [("f28335", (15, 30, 4)), ("f280049c", (5, 45, 4)), ("host", (15, 30, 4))])
+def test_the_errors_are_those_of_the_targets_data_sheet(name, error):
+    """SPRS439Q and SPRS945G, as the table of docs/concepts/residual.md has them."""
+    converter = target_named(name).converter
+    assert (converter.offset_codes, converter.gain_codes, converter.noise_codes) == error
+    page = (ROOT / "docs" / "concepts" / "residual.md").read_text(encoding="utf-8")
+    assert re.search(rf"`{name}` \| {error[0]} codes \| {error[1]} codes \| {error[2]} codes \|", page)
 
 
 def test_a_declared_error_is_rounded_up_to_codes():

@@ -22,6 +22,7 @@ from dzdesign.report.chain import Chain
 from dzdesign.report.figures.figure import figure_style
 from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import key_figures
+from tests.support.synthetic import needs_compiler
 
 #: A number in the units in which all is computed; a range or an example is quoted.
 COMPUTED = re.compile(r"\d\s?(mV|V|MPa|L/min)\b")
@@ -97,7 +98,34 @@ def test_identify_plan_and_design_print_no_other_unit(folder, printed):
         assert "bar" in text and "mA" in text and "gpm" in text, name
     row = next(line for line in printed.splitlines() if line.lstrip().startswith("r1_")).split()
     assert float(row[-7]) == pytest.approx(OPENS, abs=0.03) and float(row[-6]) == pytest.approx(CLOSES, abs=0.03)
-    assert re.search(r"offset 11\.\d+ mA", pages["design"]) and re.search(r"4 to 20 mA in", pages["plan"])
+    assert re.search(r"4 to 20 mA in", pages["plan"])
+    offsets = re.findall(r"^ +[\d.]+ +(1\d\.\d+) .*%$", pages["design"], re.MULTILINE)
+    assert "offset (mA)" in pages["design"] and len(offsets) == 2
+    assert all(4 < float(offset) < CLOSES for offset in offsets)
+
+
+def test_the_premise_and_what_cannot_be_seen_too(folder, ramps):
+    every = [write_ramp(folder, f"p{dp:g}.csv", dp, seed=int(10 * dp)) for dp in (1.0, 2.0, 3.0, 4.0)]
+    words = ["identify", *every, "--columns", COLUMNS, *LAG, "--meter-floor", "0.1 gpm", "-o", folder / "smooth.json"]
+    status, text = run(*words, "--curve", "smooth", "--curvature", "10 mV/MPa^2")
+    assert status == 0 and re.search(r"M = 0\.00016\d* mA/bar² \(declared", text), text
+    found = read_artefact((folder / "smooth.json").read_bytes(), ValveModel, "smooth.json")
+    reasons = found.positive.tests[0].not_observable.values()
+    assert "below 0.100 gpm" in " ".join(reasons) and not any(map(numbers_as_computed, reasons))
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_verify_speaks_of_what_was_recorded(folder, printed):
+    compensator, firmware = folder / "for_verify.json", folder / "firmware"
+    assert run("design", folder / "valve.json", "--target", "host", "-o", compensator)[0] == 0
+    assert run("codegen", compensator, "--target", "host", "-o", firmware)[0] == 0
+    status, text = run("verify", firmware, "-o", folder / "evidence")
+    assert status == 0 and not numbers_as_computed(text), (status, numbers_as_computed(text))
+    for unit in ("dP (bar)", "(gpm)", " mA", "10.0 bar", "sensors frozen at 10.0 bar"):
+        assert unit in text, unit
+    page = (folder / "evidence" / "report.html").read_text(encoding="utf-8")
+    assert "CONTRADICTS ITSELF" not in page and "Every requirement holds" in page
 
 
 def test_warnings_carry_the_units_in_the_file_too(valve):

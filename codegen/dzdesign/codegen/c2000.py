@@ -6,6 +6,7 @@ from fractions import Fraction
 from dzdesign.codegen.target import Target
 from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError
+from dzdesign.design.target_inputs import Converter
 
 PWM_HZ = 2_500  # section 3 of the paper
 SAMPLE_HZ = 1_250  # section 4.1 of the paper
@@ -29,7 +30,7 @@ def c2000_target(
     description: str,
     context: Mapping[str, str],
     *,
-    adc_span_V: Fraction | int,
+    converter: Converter,
     sources: tuple[str, ...] = (),
     link: Link | None = None,
 ) -> Target:
@@ -38,8 +39,7 @@ def c2000_target(
         name=name,
         description=description,
         compare_max=int(context["compare_max"]),
-        adc_code_max=int(context["adc_code_max"]),
-        adc_full_V=Fraction(adc_span_V),
+        converter=converter,
         sample_Hz=SAMPLE_HZ,
         tick_Hz=PWM_HZ,
         templates={f"{name}/{file}": f"{file}.jinja" for file in (*SOURCES, *sources, *PROJECT_FILES)},

@@ -137,7 +137,7 @@ def generate(
 def target_files(compensator: Compensator, target: Target, banner: Banner) -> dict[str, str]:
     """Return the files around the core, path to text."""
     signals = compensator.signals
-    levels, full_V = signals.code_max + 1, target.adc_full_V
+    levels, full_V = signals.code_max + 1, target.converter.full_V
     if target.takes_any_signals and compensator.target:  # a target without a converter of its own takes any
         full_V = compensator.target.converter.full_V
     values = {

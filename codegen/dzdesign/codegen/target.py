@@ -2,8 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from fractions import Fraction
+from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
@@ -35,9 +34,9 @@ class Target:
     description: str
     #: Compare value of 100 % duty, the core's ``DZ_COMPARE_MAX``: fits an unsigned 16-bit register.
     compare_max: int
-    #: Largest code of the converter, right-justified, the core's ``DZ_ADC_CODE_MAX``; the voltage one code above it.
-    adc_code_max: int
-    adc_full_V: Fraction = Fraction(3)
+    #: Its codes are right-justified, the largest is the core's ``DZ_ADC_CODE_MAX``; a target without one takes the
+    #: F28335's, errors included.
+    converter: Converter = field(default_factory=Converter)
     #: Samples and PWM periods in a second.
     sample_Hz: int = 1250
     tick_Hz: int = 2500
@@ -48,7 +47,7 @@ class Target:
     #: One of `ARITHMETICS`.
     arithmetic: str = "wide"
     #: Of a target without a converter and timer of its own, such as a library: it takes the scalings of any
-    #: compensator, and `compare_max` and `adc_code_max` are only what `design` uses if nobody says otherwise.
+    #: compensator, and `compare_max` and `converter` are only what `design` uses if nobody says otherwise.
     takes_any_signals: bool = False
     #: Whether it takes samples and ticks by a timer of its own, at `sample_Hz` and `tick_Hz` and no other rate.
     has_timer: bool = True
@@ -62,7 +61,7 @@ class Target:
             raise DzdesignError(f"target name: expected words of a-z and 0-9 with hyphens, got {self.name!r}")
         if self.arithmetic not in ARITHMETICS:
             raise DzdesignError(f"target {self.name}: arithmetic must be one of {ARITHMETICS}, got {self.arithmetic!r}")
-        for label, number in (("compare_max", self.compare_max), ("adc_code_max", self.adc_code_max)):
+        for label, number in (("compare_max", self.compare_max), ("converter.code_max", self.converter.code_max)):
             if not 0 < number <= 0xFFFF:
                 raise DzdesignError(f"target {self.name}: {label} must fit 16 bits unsigned, got {number}")
         for path in self.templates:
@@ -92,7 +91,7 @@ class Target:
         """Return the converter and timer that a compensator for this target is designed for."""
         return TargetInputs(
             name=self.name,
-            converter=Converter(full_V=self.adc_full_V, levels=self.adc_code_max + 1),
+            converter=self.converter,
             compare_max=self.compare_max,
             sample_Hz=self.sample_Hz,
             tick_Hz=self.tick_Hz,
@@ -102,7 +101,7 @@ class Target:
         """Refuse a compensator that was designed for another converter or PWM: the first scaling that differs."""
         for what, asked, has, fixed in (
             ("largest compare value", signals.compare_max, self.compare_max, not self.takes_any_signals),
-            ("largest converter code", signals.code_max, self.adc_code_max, not self.takes_any_signals),
+            ("largest converter code", signals.code_max, self.converter.code_max, not self.takes_any_signals),
             ("number of samples a second", signals.sample_Hz, self.sample_Hz, self.has_timer),
             ("number of PWM periods a second", signals.tick_Hz, self.tick_Hz, self.has_timer),
         ):

@@ -36,8 +36,10 @@ def json_schema(kind: type[Artefact]) -> Node:
     definitions: dict[str, Node] = {name: _tidy(node) for name, node in components.items()}
     for found in _dataclasses(msgspec.inspect.type_info(kind)):
         node, names = definitions[found.__name__], [field.name for field in fields(found)]
-        # In the order of the file, and each of them: a default is for who makes one in Python.
-        node |= {"properties": {name: node["properties"][name] for name in names}, "required": names}
+        # In the order of the file, and each of them: a default is for who makes one in Python. A field that may be
+        # unset stands in the file only where it says something.
+        required = [field.name for field in fields(found) if field.default is not msgspec.UNSET]
+        node |= {"properties": {name: node["properties"][name] for name in names}, "required": required}
     root = definitions.pop(kind.__name__)
     if "#/$defs/Fraction" in str((root, definitions)):
         definitions["Fraction"] = {"description": "An exact number.", **FRACTION}

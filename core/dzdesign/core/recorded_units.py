@@ -93,6 +93,7 @@ _KINDS = {
     "L/min": _Kind("L/min", "{q}", q=1),
     "L/min/V": _Kind("L/min/V", "{q}/{u}", u=-1, q=1),
     "L/min a volt": _Kind("L/min a volt", "{q} per {u}", u=-1, q=1),
+    "mV/MPa²": _Kind("mV/MPa²", "{u}/{dp}²", u=1, dp=-2, scale=1e-3),
     "L/min per MPa": _Kind("L/min per MPa", "{q} per {dp}", dp=-1, q=1),
 }
 _FORMAT = re.compile(r"(?P<sign>\+?)(?:\.(?P<digits>\d+))?(?P<kind>[fg])")

@@ -42,6 +42,7 @@ def certify(
         confidence=side.certificate.confidence,
         guard=guard,
         level_L_min=side.certificate.level_L_min,
+        zero_flow_L_min=side.zero_flow_L_min,
         dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]),
         smallest_margin_V=_smallest_margin(ceiling, table, u_min0, denominator) * u_max_V,
         mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
@@ -51,7 +52,7 @@ def certify(
 
 def prove_certificates(compensator: Compensator) -> None:
     """Prove the certificates of a compensator again, from the valve in it; refuse the first statement that differs."""
-    signals, dither = compensator.signals, compensator.drive_functions.dither_counts
+    signals, dither = compensator.signals, compensator.dither_reserve_counts
     for sign in signals.signs:
         name = SIDE_NAMES[sign]
         law, model = compensator.side(sign), compensator.valve.sides.get(name)

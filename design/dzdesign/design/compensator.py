@@ -16,7 +16,7 @@ from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
 from dzdesign.design.design_choices import BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
-from dzdesign.design.lot_valves import LotValve
+from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
@@ -177,6 +177,11 @@ class Compensator(ShownInNotebooks, Artefact):
         if side is None:
             raise InputError("this compensator has no law for negative commands")
         return side
+
+    @property
+    def dither_reserve_counts(self) -> int:
+        """Counts by which the offset stays lower for the dither; next to none where the ramps were recorded with it."""
+        return self.drive_functions.dither(self.signals).reserve(self.valve.dither)
 
     @property
     def transition_end(self) -> int:

@@ -1,17 +1,12 @@
 """What a design costs, in a person's words: dead zone that remains, flow at the transition, drive at full command."""
 
-from collections.abc import Mapping
 from fractions import Fraction
 
-from dzdesign.core.errors import InputError
-from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.law_corners import corners_of
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
-from dzdesign.identify.valve.ramp_result import TestResult
-from dzdesign.identify.valve.reading_flow import ideal_line
 from dzdesign.identify.valve.side_model import SideModel
 
 
@@ -21,7 +16,7 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
     lines = list(hidden_failures(compensator))
     for sign in compensator.signals.signs:
         side, label = valve.sides[SIDE_NAMES[sign]], _side_label(compensator, sign)
-        lines += [label + _cost_of_test(compensator, test, sign) for test in side.tests]
+        lines += lines_of_tests(compensator, sign)
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
     units = valve.recorded_units
@@ -39,6 +34,12 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
     return tuple(lines + _cost_of_options(compensator))
 
 
+def lines_of_tests(compensator: Compensator, sign: int) -> list[str]:
+    """Return one line for each test of a side."""
+    label, units = _side_label(compensator, sign), compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    return [label + cost.text(units) for cost in costs_at_tests(compensator, sign)]
+
+
 def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
     """Return one line for each failure of a signal that the firmware can't see; the first of `costs_of`."""
     lines = unseen_failures(compensator.signals)
@@ -54,87 +55,6 @@ def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
 
 def _side_label(compensator: Compensator, sign: int) -> str:
     return "" if compensator.negative is None else f"{SIDE_NAMES[sign]} side, "
-
-
-def _cost_of_test(compensator: Compensator, test: TestResult, sign: int) -> str:
-    """Say what remains at one tested pressure drop."""
-    signals, u_max = compensator.signals, float(compensator.u_max_V)
-    code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
-    corners = corners_of(compensator, code, sign)
-    left = remaining_dead_zone(compensator, test, sign)
-    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
-    at = units.text(test.dp_MPa or 0.0, ".2f MPa")
-    parts = [f"{at}: offset {units.text(corners.offset * u_max, '.3f V')}"]
-    for name, knee in (("opening", test.u_knee_rising_V), ("closing", test.u_knee_falling_V)):
-        if knee is not None and knee >= corners.offset * u_max:
-            parts.append(f"dead zone that remains on {name} {left[name]:.2%} of command (knee)")
-        elif knee is not None:
-            above = units.text(corners.offset * u_max - knee, ".3f dV")
-            parts.append(f"flow at zero command on {name}: the offset lies {above} above the knee")
-    if corners.end and test.u_knee_falling_V is not None:
-        flow = test.slope_L_min_V * max(corners.at_end * u_max - test.u_knee_falling_V, 0.0)
-        parts.append(f"flow on closing at the transition's end {units.text(flow, '.2f L/min')}")
-    parts.append(_reading(compensator, test, sign, units))
-    limit = compensator.drive_functions.compare_limit / signals.compare_max
-    if limit <= corners.offset or limit <= (test.u_knee_rising_V or 0.0) / u_max:
-        raise InputError(
-            f"the largest output is {limit:.1%} of full drive, but the valve opens at "
-            f"{max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max):.1%} at {at}, so nothing would ever flow; "
-            "give a larger --output-max"
-        )
-    if limit < corners.full:
-        reached = corners.command_at(limit)
-        parts.append(f"the largest drive, {limit:.2%}, is reached at {reached:.1%} of command")
-    else:
-        parts.append(f"drive at full command {corners.full:.2%}")
-    return ", ".join(parts)
-
-
-def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
-    """Return the dead zone that the law leaves at a tested pressure drop, as a share of command, by branch.
-
-    The test need not be of the valve that the law was designed for. A branch that was not recorded is left out; the
-    share is 0 where flow passes at zero command.
-    """
-    knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
-    return _commands_at(compensator, test, sign, knees)
-
-
-def read_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
-    """Return the command at which the compensated valve passes the reading flow, as a share of full, by branch.
-
-    It is read from the recorded flow; a branch that was not recorded, or never comes to that flow, is left out.
-    """
-    flow, recorded = compensator.reading_flow_L_min, test.recorded
-    thresholds = {
-        "opening": recorded.rising.command_at(flow) if recorded.rising else None,
-        "closing": recorded.falling.command_at(flow) if recorded.falling else None,
-    }
-    return _commands_at(compensator, test, sign, thresholds)
-
-
-def _commands_at(
-    compensator: Compensator, test: TestResult, sign: int, thresholds_V: Mapping[str, float | None]
-) -> dict[str, float]:
-    """Return the command at which the drive reaches each threshold that there is, at a test's pressure drop."""
-    corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
-    shares = {name: at / float(compensator.u_max_V) for name, at in thresholds_V.items() if at is not None}
-    nodes = compensator.drive_functions.play_counts[0 if sign > 0 else 1] or (0,)
-    widths = (nodes[0] / compensator.signals.compare_max, nodes[-1] / compensator.signals.compare_max)
-    branches = {"opening": corners, "closing": corners.lowered(*widths)}
-    found = {name: max(branches[name].command_at(at), 0.0) for name, at in shares.items()}
-    if "opening" in found:  # from rest the drive leaves the zero band at its outer end
-        found["opening"] = max(found["opening"], corners.leaves)
-    return found
-
-
-def _reading(compensator: Compensator, test: TestResult, sign: int, units: RecordedUnits) -> str:
-    """Say what is read at the reading flow, beside what an ideal line to the largest flow would read."""
-    flow = compensator.reading_flow_L_min
-    read = [f"{share:.2%} on {name}" for name, share in read_dead_zone(compensator, test, sign).items()]
-    ideal = ideal_line(flow, test.recorded.q_max_L_min)
-    words = " and ".join(read) or "nothing: the valve never passes it"
-    return f"read at {units.text(flow, '.2f L/min')} {words} (ideal line {ideal:.2%})"
 
 
 def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[str]:
@@ -164,12 +84,7 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
     signals, functions = compensator.signals, compensator.drive_functions
     lines = []
     if functions.dither_counts:
-        peak = functions.dither_counts / signals.compare_max
-        frequency = signals.tick_Hz / (2 * functions.dither_ticks)
-        lines.append(
-            f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full "
-            "drive: the offset stands lower by that much, so that zero command stays shut at the wave's top"
-        )
+        lines.append(_cost_of_dither(compensator))
     lines += _cost_of_zero_band(compensator)
     if functions.has_play:
         width = max(count for nodes in functions.play_counts for count in nodes) / signals.compare_max
@@ -190,6 +105,22 @@ def _cost_of_options(compensator: Compensator) -> list[str]:
             "much dead zone remains then, if the lines above say less"
         )
     return lines
+
+
+def _cost_of_dither(compensator: Compensator) -> str:
+    """Say what the dither is, and by how much the offset stands lower for it."""
+    signals, functions, recorded = compensator.signals, compensator.drive_functions, compensator.valve.dither
+    frequency = signals.tick_Hz / (2 * functions.dither_ticks)
+    peak, kept = (
+        counts / signals.compare_max for counts in (functions.dither_counts, compensator.dither_reserve_counts)
+    )
+    what = f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full drive"
+    if recorded is None:
+        return f"{what}: the offset stands lower by that much, so that zero command stays shut at the wave's top"
+    return (
+        f"{what}: the ramps were recorded with {recorded.in_words()}, so the bounds hold under it; the offset stands "
+        f"lower by {kept:.3%} only, for what the two waves differ in"
+    )
 
 
 def _cost_of_zero_band(compensator: Compensator) -> list[str]:
@@ -221,11 +152,12 @@ def _lift_V(compensator: Compensator) -> float:
 
 
 def _of_which_dither(compensator: Compensator) -> str:
-    counts = compensator.drive_functions.dither_counts
+    counts = compensator.dither_reserve_counts
     if not counts:
         return ""
-    peak = counts / compensator.signals.compare_max * float(compensator.u_max_V)
-    return f", of which {compensator.valve.recorded_units.text(1e3 * peak, '.2f mV')} are the dither's peak"
+    kept = 1e3 * counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    whose = "the dither's peak" if compensator.valve.dither is None else "for the dither"
+    return f", of which {compensator.valve.recorded_units.text(kept, '.2f mV')} are {whose}"
 
 
 def _ramp_text(compensator: Compensator) -> str:

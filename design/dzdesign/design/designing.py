@@ -51,22 +51,19 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     options = options or DesignOptions()
     signals = options.signals
     law(options.law)
-    u_max = Fraction(repr(valve.u_max_V))
-    if options.full_command_V not in (None, u_max):
-        raise InputError(
-            f"the command signal's upper end stands for {float(options.full_command_V or 0):g} V, but the valve was "
-            f"identified with a full command of {valve.u_max_V:g} V; write the signal's range up to that"
-        )
+    u_max = _full_command(valve, options)
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
         _refuse_two_signs(valve, options.guard)
-    laws = {}
+    functions = options.drive_functions(transition_codes)
+    dither = functions.dither(signals)
+    dither.check(valve.dither)
+    reserve, laws = dither.reserve(valve.dither), {}
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
-        laws[sign] = _side_law(side, options, u_max, sign, units, transition_codes)
-    digest = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes)
-    request = options.request
+        laws[sign] = _side_law(side, options, u_max, sign, units, transition_codes, reserve)
+    digest, request = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes), options.request
     compensator = Compensator(
         tool=THIS_TOOL,
         made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=digest),),
@@ -84,15 +81,37 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         reading_flow_L_min=options.reading_flow_L_min or default_reading_flow(valve),
         zero_band_codes=options.error.zero_band_codes if transition_codes else 0,
         command_error=options.error,
-        drive_functions=options.drive_functions(transition_codes),
+        drive_functions=functions,
         costs=(),
         valve=valve,
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
-    if options.play:
-        compensator = with_play(compensator)
+    compensator = _with_play(compensator, options)
     return replace(compensator, costs=costs_of(compensator))
+
+
+def _with_play(compensator: Compensator, options: DesignOptions) -> Compensator:
+    """Add the inverse play if it is asked for; not where a dither takes the same hysteresis out."""
+    if not options.play:
+        return compensator
+    if compensator.drive_functions.dither_counts and compensator.valve.dither is None:
+        raise InputError(
+            "--hysteresis play takes out the recorded hysteresis, and --dither most of the same once more; give one of "
+            f'them, or record ramps with that dither: identify --dithered "{options.dither_text}"'
+        )
+    return with_play(compensator)
+
+
+def _full_command(valve: ValveModel, options: DesignOptions) -> Fraction:
+    """Return the full command that the valve was identified with, V, which a signal that states one must end at."""
+    u_max = Fraction(repr(valve.u_max_V))
+    if options.full_command_V not in (None, u_max):
+        raise InputError(
+            f"the command signal's upper end stands for {float(options.full_command_V or 0):g} V, but the valve was "
+            f"identified with a full command of {valve.u_max_V:g} V; write the signal's range up to that"
+        )
+    return u_max
 
 
 def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:
@@ -107,9 +126,18 @@ def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:
 
 
 def _side_law(
-    side: SideModel, options: DesignOptions, u_max: Fraction, sign: int, units: Units, transition_codes: int
+    side: SideModel,
+    options: DesignOptions,
+    u_max: Fraction,
+    sign: int,
+    units: Units,
+    transition_codes: int,
+    dither_counts: int,
 ) -> SideLaw:
-    """Choose the coefficients and tables of one side, and prove its certificate."""
+    """Choose the coefficients and tables of one side, and prove its certificate.
+
+    So many counts of the dither are kept free under the bound.
+    """
     signals = options.signals
     if "branch-order" not in options.accept:
         _refuse_crossed_branches(side)
@@ -122,8 +150,7 @@ def _side_law(
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
-    dither = options.drive_functions(transition_codes).dither_counts
-    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither)
+    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither_counts)
     if min(ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 

@@ -1,11 +1,14 @@
 """What the drive does around the law: zero band, sides, ramps, dither, play, a largest output."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Annotated
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError
+from dzdesign.core.dither import DrivenDither
+from dzdesign.design.signals import Signals
 
 #: Ramps count in codes of command over this, a sample.
 RAMP_UNIT = 1 << 16
@@ -94,6 +97,14 @@ class DriveFunctions:
         ):
             if not 1 <= value <= limit or value & (value - 1):
                 raise RuleError(f"{name} is {value}, expected a power of two from 1 to {limit}")
+
+    def dither(self, signals: Signals) -> DrivenDither:
+        """Return the dither that the drive makes with a PWM."""
+        return DrivenDither(
+            counts=self.dither_counts,
+            compare_max=signals.compare_max,
+            frequency_Hz=Fraction(signals.tick_Hz, 2 * self.dither_ticks),
+        )
 
     @property
     def has_play(self) -> bool:

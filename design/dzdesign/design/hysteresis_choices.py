@@ -1,15 +1,18 @@
 """What each way with the valve's hysteresis leaves: the table that `dzdesign design` prints, and what it recommends."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs import read_dead_zone, remaining_dead_zone
+from dzdesign.design.costs_at_tests import read_dead_zone, remaining_dead_zone
 from dzdesign.design.designing import design
 from dzdesign.design.law_corners import corners_of
 from dzdesign.design.option_texts import options_of
+from dzdesign.design.play import LEVELS
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
 
@@ -31,13 +34,18 @@ class HysteresisChoice:
     #: None where no test has what it needs, or the design is refused: then `refused` says why.
     onset: float | None = None
     reading: float | None = None
+    #: Of the compensated branches over the command, from 5 % of the largest flow on: on average, and at most.
     hysteresis: float | None = None
+    largest: float | None = None
     refused: str = ""
     recommended: bool = False
 
     @property
     def left(self) -> float:
-        """Return what it leaves in all: dead zone on opening and hysteresis."""
+        """Return what it leaves in all: dead zone on opening and hysteresis, the mean of which counts.
+
+        Its largest is where a ramp stuck, or where the flow hardly grows any more.
+        """
         return 1.0 if self.onset is None else self.onset + (self.hysteresis or 0.0)
 
 
@@ -45,13 +53,16 @@ def hysteresis_choices(compensator: Compensator) -> tuple[HysteresisChoice, ...]
     """Return the choices for a compensator's valve with its other options; none where they are not known.
 
     One with a dither has its thresholds moved by it, of which ramps without a dither say nothing: there is no table.
+    Of ramps that were recorded with it there is: a play takes out what hysteresis is left under the dither.
     """
     if compensator.target is None or compensator.options is None or compensator.lot:
         return ()
-    if compensator.drive_functions.dither_counts:
+    dithered = compensator.drive_functions.dither_counts > 0
+    if dithered and compensator.valve.dither is None:
         return ()
     found = []
     for given, texts in WAYS.items():
+        given = f'--dither "{compensator.options["dither"]}" {given}' if dithered else given
         try:
             made = design(compensator.valve, options_of({**compensator.options, **texts}, compensator.target))
         except (InputError, RequirementError) as error:
@@ -71,6 +82,7 @@ def hysteresis_choices(compensator: Compensator) -> tuple[HysteresisChoice, ...]
             onset=each.onset,
             reading=each.reading,
             hysteresis=each.hysteresis,
+            largest=each.largest,
             refused=each.refused,
             recommended=each is best and each.onset is not None,
         )
@@ -82,23 +94,51 @@ def _judged(given: str, made: Compensator) -> HysteresisChoice:
     tests = [(test, sign) for sign in made.signals.signs for test in made.valve.sides[SIDE_NAMES[sign]].tests]
     onsets = [left["opening"] for test, sign in tests if "opening" in (left := remaining_dead_zone(made, test, sign))]
     read = [left["opening"] for test, sign in tests if "opening" in (left := read_dead_zone(made, test, sign))]
+    widths = [np.abs(found) for test, sign in tests if (found := hysteresis_left(made, test, sign)).size]
+    travel = max((_travel(made, sign) for sign in made.signals.signs), default=0.0)
     return HysteresisChoice(
         given=given,
         onset=max(onsets, default=None),
         reading=max(read, default=None),
-        hysteresis=max((width for test, sign in tests for width in _hysteresis(made, test, sign)), default=None),
+        hysteresis=max(float(np.concatenate(widths).mean()), travel) if widths else None,
+        largest=max(*(float(found.max()) for found in widths), travel) if widths else None,
     )
 
 
-def _hysteresis(made: Compensator, test: TestResult, sign: int) -> Iterator[float]:
-    """Yield the hysteresis that a test's knees leave over the command, a share; with a play its travel beside it."""
-    if test.u_knee_rising_V is None or test.u_knee_falling_V is None or test.dp_MPa is None:
-        return
-    functions, span = made.drive_functions, made.signals.command.span(sign)
+def _travel(made: Compensator, sign: int) -> float:
+    """Return the share of command that a play needs to turn: noise to both sides, and the way from branch to branch."""
+    functions = made.drive_functions
+    if not functions.has_play:
+        return 0.0
+    return (2 * functions.play_noise_codes + functions.play_codes) / made.signals.command.span(sign)
+
+
+def hysteresis_left(made: Compensator, test: TestResult, sign: int = 1) -> np.ndarray:
+    """Return how far the compensated branches lie apart over the command, shares, from 5 to 99 % of the largest flow.
+
+    They are the recorded branches, each driven as its direction is. Above zero the falling one lies lower. Where the
+    flow hardly grows any more a small difference of it is a large one of command. Nothing of a test of one branch.
+    """
+    if test.recorded.rising is None or test.recorded.falling is None or test.dp_MPa is None:
+        return np.zeros(0)
     corners = corners_of(made, round(made.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
-    gain = (corners.full - corners.at_end) / (1 - corners.end)
-    width = (test.u_knee_rising_V - test.u_knee_falling_V) / float(made.u_max_V)
-    nodes = functions.play_counts[0 if sign > 0 else 1]
-    taken = nodes[len(nodes) // 2] / made.signals.compare_max if nodes else 0.0
-    travel = (2 * functions.play_noise_codes + functions.play_codes) / span if nodes else 0.0
-    yield max(abs(width - taken) / gain, travel)
+    functions, span = made.drive_functions, made.signals.command.span(sign)
+    share = np.arange(span + 1) / span
+    ends = ([0.0, corners.zero_band, corners.end, 1.0], [corners.offset, corners.offset, corners.at_end, corners.full])
+    rising = np.interp(share, *ends)
+    falling = rising
+    if nodes := functions.play_counts[0 if sign > 0 else 1]:
+        at = np.arange(len(nodes)) * functions.play_step_codes / span
+        begun = np.clip((share - corners.zero_band) / (corners.end - corners.zero_band), 0, 1)
+        falling = rising - np.interp(share, at, np.array(nodes) / made.signals.compare_max) * begun
+    found = []
+    for level in LEVELS:
+        flow = level * test.recorded.q_max_L_min
+        up, down = test.recorded.rising.command_at(flow), test.recorded.falling.command_at(flow)
+        drives = [each / float(made.u_max_V) for each in (up, down) if each is not None]
+        if len(drives) == 2 and drives[0] < rising[-1]:
+            opened, closed = (
+                float(np.interp(drive, branch, share)) for drive, branch in zip(drives, (rising, falling), strict=True)
+            )
+            found.append(opened - closed)
+    return np.array(found)

@@ -1,10 +1,10 @@
 """The engineer's options as text, turned into `DesignOptions`."""
 
-import re
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import cast
 
+from dzdesign.core.dither import parted
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
@@ -98,10 +98,5 @@ def _dither(text: str) -> tuple[float, Fraction]:
     """Read ``off`` or a frequency and the peak of the wave."""
     if text == "off":
         return 0.0, Fraction(0)
-    parts = re.fullmatch(r"(.+?hz)\b(.+)", text.strip(), re.IGNORECASE)
-    if parts is None:
-        raise InputError(
-            f"--dither is '{text}', expected 'off', or a frequency in Hz and the wave's peak over full drive, such as "
-            "'150 Hz 1 %'"
-        )
-    return parse_quantity(parts[1], "frequency", "--dither"), _share(parts[2], "--dither")
+    frequency_Hz, peak = parted(text, "--dither", "'off', or ")
+    return frequency_Hz, _share(peak, "--dither")

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from math import ceil, floor
 
+from dzdesign.core.dither import HIGHEST_HZ, LARGEST_PEAK, LOWEST_HZ
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.design_choices import BELOW_DP0, BelowDp0, DesignRequest
 from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
@@ -15,9 +16,9 @@ from dzdesign.identify.valve.guard_curve import GUARDS, Guard
 #: The transition where nothing is said; largest transition and dither, of full command or drive.
 TRANSITION = Fraction(1, 100)
 LARGEST_TRANSITION = Fraction(1, 10)
-LARGEST_DITHER = Fraction(1, 10)
+LARGEST_DITHER = Fraction(repr(LARGEST_PEAK))
 #: Frequencies that a proportional valve's dither has, Hz.
-DITHER_HZ = (100.0, 300.0)
+DITHER_HZ = (LOWEST_HZ, HIGHEST_HZ)
 LONGEST_RAMP_S = 600.0
 #: Beyond any flow that a valve of a control passes.
 MOST_L_MIN = 1e6
@@ -116,8 +117,6 @@ class DesignOptions:
             )
         if self.play and self.transition == 0:
             raise InputError("--hysteresis play begins in the transition, but --transition is off; leave out one")
-        if self.play and self.dither_Hz:
-            raise InputError("--hysteresis play and --dither both take the hysteresis out; give one of them")
         for seconds in self.ramp_up_s + self.ramp_down_s:
             if not 0 <= seconds <= LONGEST_RAMP_S or 0 < seconds < 1 / self.signals.sample_Hz:
                 raise InputError(
@@ -152,6 +151,11 @@ class DesignOptions:
                 "converter, a smaller --command-error, or --transition off"
             )
         return codes
+
+    @property
+    def dither_text(self) -> str:
+        """The dither as `--dither` takes it."""
+        return f"{self.dither_Hz:g} Hz {100 * float(self.dither_peak):g} %"
 
     @property
     def error(self) -> CommandError:

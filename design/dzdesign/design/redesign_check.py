@@ -8,8 +8,8 @@ from dzdesign.core.errors import InputError, RequirementError, quoted
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot import prove_lot
-from dzdesign.design.lot_valves import LotSide
+from dzdesign.design.lot.margins import prove_lot
+from dzdesign.design.lot.valves import LotSide
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.signals import SIDE_NAMES
 

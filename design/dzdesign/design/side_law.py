@@ -24,6 +24,16 @@ class Certificate:
         float,
         quantity("L/min", "Flow that counted as flow when the thresholds were identified.", ge=0, le=1e6),
     ]
+    zero_flow_L_min: Annotated[
+        float,
+        quantity(
+            "L/min",
+            "Flow at zero command, a leak included, that the bounds allow: the declared zero flow, or what leak and "
+            "noise level come to. Null: none was declared, and no flow above `level_L_min` is allowed.",
+            ge=0,
+            le=1e6,
+        ),
+    ] | None
     dp_MPa: Annotated[tuple[Fraction, Fraction], quantity("MPa", "Interval of the pressure drop on which it holds.")]
     smallest_margin_V: Annotated[
         Fraction, quantity("V", "Smallest distance from the offset to the lower bound, over all those codes.")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import floor
+from math import ceil, floor, sqrt
 from typing import Annotated
 
 from msgspec import Meta
@@ -11,6 +11,24 @@ from dzdesign.core.artefact_types import RuleError, quantity
 
 Count = Annotated[int, Meta(ge=1, le=65535)]
 Error = Annotated[int, Meta(ge=0, le=4095)]
+#: Peak of a noise, in standard deviations.
+PEAK = 6
+
+
+def peak_noise_codes(snr_dB: float, levels: int) -> int:
+    """Return the peak of a converter's noise, codes, from the signal-to-noise ratio of a sine over its whole range.
+
+    Examples
+    --------
+    >>> peak_noise_codes(68.0, 4096)
+    4
+    """
+    return ceil(PEAK * levels / (2 * sqrt(2)) / 10 ** (snr_dB / 20))
+
+
+#: Errors of the F28335's converter, codes of 12 bits: data sheet SPRS439Q, "ADC Electrical Characteristics": largest
+#: offset error; largest overall gain error, of internal and external reference alike; SNR 68 dB.
+F28335_OFFSET, F28335_GAIN, F28335_NOISE = 15, 30, peak_noise_codes(68.0, 4096)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,10 +39,9 @@ class Converter:
         default_factory=lambda: Fraction(3)
     )
     levels: Annotated[int, Meta(description="Number of codes.", ge=2, le=65536)] = 4096
-    # Without a declaration: the F28335's, by its data sheet (SPRS439) the worst of the targets'.
-    offset_codes: Annotated[Error, Meta(description="Largest offset error, codes.")] = 15
-    gain_codes: Annotated[Error, Meta(description="Largest gain error at the top of the range, codes.")] = 30
-    noise_codes: Annotated[Error, Meta(description="Peak of the noise on a reading, codes.")] = 4
+    offset_codes: Annotated[Error, Meta(description="Largest offset error, codes.")] = F28335_OFFSET
+    gain_codes: Annotated[Error, Meta(description="Largest gain error at the top of the range, codes.")] = F28335_GAIN
+    noise_codes: Annotated[Error, Meta(description="Peak of the noise on a reading, codes.")] = F28335_NOISE
 
     def __post_init__(self) -> None:
         if self.full_V <= 0:

@@ -19,6 +19,6 @@ def run(arguments: Arguments, json: bool) -> int:
         print_json(compensator)
     else:
         print_compensator(compensator)
-        print_choices(hysteresis_choices(compensator))
+        print_choices(hysteresis_choices(compensator), dithered=compensator.valve.dither is not None)
         print(one_line(f"Written: {arguments.output}"))
     return 0

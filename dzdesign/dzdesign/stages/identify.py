@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, fields
 from typing import TYPE_CHECKING, Annotated
 
+from dzdesign.core.dither import read_dithered
 from dzdesign.core.option_readers import number, percent, quantity
 from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text
 from dzdesign.stages.recording_order import in_order
@@ -37,6 +38,9 @@ class IdentifyChoices(RampArguments):
     noise_level: Annotated[Text, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = None
     """Flow below which there is none, if averages over the dead zone resolve it (default: what they resolve, and at
     least 0.5 % of the largest flow)."""
+    zero_flow: Annotated[Text, Option("Q", FIT, example="0.1 L/min", read=quantity("flow"))] = None
+    """Flow allowed at zero command, a leak included: the command at which the valve passes it is guarded (default:
+    none is declared, the first flow seen is guarded)."""
     dp0: Annotated[Text, Option("P", FIT, example="1 MPa", read=quantity("pressure"))] = None
     """Reference pressure drop (default: the test nearest to "1 MPa")."""
     x_max: Annotated[Text, Option("X", FIT, example="1.8 mm", read=quantity("length"))] = None
@@ -51,12 +55,15 @@ class IdentifyChoices(RampArguments):
     """Standard deviation of the threshold from ramp to ramp, in percent of full command, such as "0.1 %" (default:
     measured where ramps are repeated, otherwise 0.25 %)."""
     curve: Annotated[Text, Option("PREMISE", FIT, choices=PREMISES)] = None
-    """Premise about the threshold between the tests (default: smooth, where three or more pressure drops support it,
-    otherwise monotone). line: straight over the pressure drop. smooth: curvature at most M. monotone: it runs one
-    way."""
+    """Premise about the threshold between the tests (default: smooth where a curvature is declared, or three or more
+    pressure drops support it, otherwise monotone). line: straight over the pressure drop. smooth: curvature at most M.
+    monotone: it runs one way."""
     curvature: Annotated[Text, Option("M", FIT, example="20 mV/MPa^2", read=quantity("curvature"))] = None
     """M of the premise smooth, such as "20 mV/MPa^2": bound of the threshold's second divided difference, kinks
     included (default: estimated from the tests)."""
+    dithered: Annotated[Text, Option("D", RECORDINGS, example="150 Hz 1 %", read=read_dithered)] = None
+    """Dither that the drive superimposed on the command of every recording, frequency and peak of its square wave, such
+    as "150 Hz 1 %" of full command, or "150 Hz 0.1 V". `design --dither` then asks for the same."""
     record: Annotated[Mapping[str, object] | None, Option("ENTRY", RECORDINGS, by_entry=True)] = None
     """Entry of the test record, such as "serial = 4711": kept in valve.json and printed in the report, nothing is
     computed from it. Repeatable. In the options file a table [record]."""

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, write_folder
+from dzdesign.core.dither import read_dithered
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import percent, quantity, whole_number
 from dzdesign.core.options import AnyPath, Option, Text, Texts, read_options, texts_of
+from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress
 
@@ -38,6 +40,8 @@ class SimulateArguments:
     """Standard deviation of the threshold from ramp to ramp, in percent of full command (default: 0)."""
     ramp_time: Annotated[str, Option("T", example="100 s", read=quantity("time"))] = "100 s"
     """Time from zero to full command."""
+    dither: Annotated[Text, Option("D", example="150 Hz 1 %", read=read_dithered)] = None
+    """Dither about the command of the ramps, for `identify --dithered` (default: none)."""
     seed: Annotated[
         int | str, Option("N", read=whole_number("a whole number of zero or more, such as 1", digits=18))
     ] = "1"
@@ -70,13 +74,15 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     pressures = [parse_quantity(text, "pressure", "--dp") / 1e6 for text in texts]
     if len({f"{dp_MPa:g}" for dp_MPa in pressures}) < len(pressures):  # one file each, named by it
         raise InputError(f"--dp repeats a pressure drop ({', '.join(texts)}); give each of them once")
-    read = read_options(arguments, ["repeats", "repeatability", "ramp_time", "seed"])
+    read = read_options(arguments, ["repeats", "repeatability", "ramp_time", "dither", "seed"])
     series = Series(repeats=read["repeats"], scatter_V=(read["repeatability"] or 0.0) * plant.u_max_V)
     firmware = Path(arguments.firmware) if arguments.firmware is not None else None
+    dither = read["dither"] and read["dither"].of(AS_COMPUTED, plant.u_max_V)
     with stage_progress() as stage:
         files, manifest = simulated_files(
-            plant, pressures, read["ramp_time"], Bench(seed=read["seed"]), say=stage, firmware=firmware, series=series
-        )
+            plant, pressures, read["ramp_time"], Bench(seed=read["seed"]), say=stage, firmware=firmware, series=series,
+            dither=dither,
+        )  # fmt: skip
     if arguments.output is not None:
         write_folder(Path(arguments.output), files, manifest)
     return SimulatedRamps(files=files, manifest=manifest)

@@ -11,12 +11,18 @@ if TYPE_CHECKING:
     from dzdesign.design.hysteresis_choices import HysteresisChoice
 
 DITHER = (
-    "A dither takes the hysteresis out too, but moves the thresholds: give one only with ramps recorded under it."
+    "A dither takes the hysteresis out too, but moves the thresholds: record the ramps under it, identify them with "
+    "--dithered, and give --dither here."
 )
 
 
-def print_choices(choices: "Sequence[HysteresisChoice]", console: "Console | None" = None) -> None:
-    """Print the choices, nothing where there are none; the recommended one is marked."""
+def print_choices(
+    choices: "Sequence[HysteresisChoice]", *, dithered: bool = False, console: "Console | None" = None
+) -> None:
+    """Print the choices, nothing where there are none; the recommended one is marked.
+
+    Of a valve that was not recorded under a dither it is said what one would need.
+    """
     if not choices:
         return
     console = console or new_console()
@@ -28,10 +34,12 @@ def print_choices(choices: "Sequence[HysteresisChoice]", console: "Console | Non
         "choice": lambda each: each.given + (" (recommended)" if each.recommended else ""),
         "dead zone on opening, onset": lambda each: share(each.onset),
         "at the reading flow": lambda each: share(each.reading),
-        "hysteresis": lambda each: share(each.hysteresis),
+        "hysteresis, mean": lambda each: share(each.hysteresis),
+        "largest": lambda each: share(each.largest),
     }
     put_rows(console, "What is left of command, the worst of all tests", choices, columns)
     for each in choices:
         if each.refused:
             put_line(console, f"{each.given}: {each.refused}")
-    put_line(console, DITHER)
+    if not dithered:
+        put_line(console, DITHER)

@@ -44,6 +44,8 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
     put_line(console, meter_line(valve.meter.floor_L_min, valve.meter.lag_in_words(), valve.recorded_units))
+    if valve.dither is not None:
+        put_line(console, f"recorded under {valve.dither_in_words}: all of this is of the dithered valve")
     put_units(console, valve.recorded_units, "valve.json")
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
@@ -110,15 +112,13 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
     return (
         f"pressure drop: {', '.join(made_of)}",
         f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
-        "threshold (the knee, or the tail's zero where the edge is soft); flow below "
-        f"{units.text(certificate.level_L_min, '.2f L/min')} (noise level: the meter's floor, what averages resolve, "
-        "or 0.5 % of the largest flow) counts as none",
+        f"threshold {_guarded(side, units)}",
         f"from ramp to ramp: {certificate.repeatability.in_words(units)}",
         f"identified: u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
         f"{units.text(side.reference.u_min_se_V, '.4f dV')}{at}, the knee on {certificate.guard}{_betas(side, units)}",
         f"certified: an offset of {units.text(side.curve.u_min0_V, '.4f V')}{at}, the largest under the bounds; more "
         "tests raise it",
-        f"premise: {side.premise}",
+        f"premise: {side.premise_in_words(units)}",
         *_premise_lines(side),
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f}: "
         "command from the knee to full stroke, as a share of full command; the law's counts from its offset, which "
@@ -132,6 +132,17 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         if side.trend_change_V is None or side.trend_change_se_V is None
         else f"trend with dP: {side.trend} ({units.number(1e3 * side.trend_change_V, '+.1f mV')} ± "
         f"{units.text(1e3 * side.trend_change_se_V, '.1f mV')} over the tested range, {chance(side.trend_p or 0.0)})",
+    )
+
+
+def _guarded(side: "SideModel", units: "RecordedUnits") -> str:
+    """Say which threshold is bounded, and what counts as no flow."""
+    if declared := side.zero_flow_in_words(units):
+        return f"(the command that passes the flow allowed at zero); below, {declared}"
+    return (
+        "(the knee, or the tail's zero where the edge is soft); flow below "
+        f"{units.text(side.certificate.level_L_min, '.2f L/min')} (noise level: the meter's floor, what averages "
+        "resolve, or 0.5 % of the largest flow) counts as none"
     )
 
 
@@ -162,8 +173,10 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
     """Print the law, the certificate and what the choices cost."""
     from dzdesign.derivation.law import law
-    from dzdesign.design.costs import hidden_failures
+    from dzdesign.design.costs import hidden_failures, lines_of_tests
     from dzdesign.design.signal_descriptions import signals_in_words
+    from dzdesign.design.signals import SIDE_NAMES
+    from dzdesign.terminal.cost_table import print_costs_at_tests
 
     chosen, units = law(compensator.law), compensator.valve.recorded_units
     lines = [
@@ -181,9 +194,13 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate: the offset stays below the {100 * certificate.confidence:.6g}% lower bound of the "
-            f"{certificate.guard} threshold {units.span(low, high, '.3f MPa')}, at every pressure code; flow below "
-            f"{units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of the largest "
-            "flow) counts as none",
+            f"{certificate.guard} threshold {units.span(low, high, '.3f MPa')}, at every pressure code; "
+            + (
+                f"flow below {units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of "
+                "the largest flow) counts as none"
+                if certificate.zero_flow_L_min is None
+                else compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)
+            ),
         ]
     if compensator.transition_codes:
         span, guard = compensator.signals.command.span(1), compensator.positive.certificate.guard
@@ -193,10 +210,14 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"threshold over those from there to {end:.2%}"
         )
     hidden = hidden_failures(compensator)
-    costs = [line for line in compensator.costs if line not in hidden]
+    elsewhere = {*hidden, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
     console = console or new_console()
-    for line in (*(f"warning: {line}" for line in hidden), *lines, *(f"cost: {line}" for line in costs)):
+    for line in (*(f"warning: {line}" for line in hidden), *lines):
         put_line(console, line)
+    print_costs_at_tests(compensator, console)
+    for line in compensator.costs:
+        if line not in elsewhere:
+            put_line(console, f"cost: {line}")
 
 
 def print_firmware(firmware: "Firmware", console: "Console | None" = None, folder: str = "") -> None:

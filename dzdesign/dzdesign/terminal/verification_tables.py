@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.evidence import MutationScore
     from dzdesign.verify.loop_results import MonteCarlo, PressureResult, Scatter, ScenarioResult, Spread
@@ -30,39 +31,44 @@ def print_verification(verification: "Verification", console: "Console | None" =
         put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
     for name in not_tried(verification.evidence):
         put_line(console, f"{NOT_CHECKED}  {name}".replace("`", ""))
+    units = verification.derived.valve.recorded_units if verification.derived else AS_COMPUTED
     if verification.loops:
-        _put_closed_loop(console, verification)
-    print_scenarios(verification.evidence.scenarios, console)
+        _put_closed_loop(console, verification, units)
+    print_scenarios(verification.evidence.scenarios, console, units)
     if verification.evidence.monte_carlo:
-        print_scatter(verification.evidence.monte_carlo, console)
+        print_scatter(verification.evidence.monte_carlo, console, units)
     put_line(console, verification.verdict)
     if verification.evidence.mutants:
         print_firmware_mutants(verification.evidence.mutants, console)
 
 
-def _put_closed_loop(console: "Console", verification: "Verification") -> None:
+def _put_closed_loop(console: "Console", verification: "Verification", units: "RecordedUnits") -> None:
     plant = verification.evidence.closed_loop.plant_source
+    pressure, flow = (units.label(unit) for unit in ("MPa", "L/min"))
     both = len({loop.result.side for loop in verification.loops}) > 1
     columns: dict[str, Callable[[PressureResult], str]] = {
-        "dP (MPa)": lambda loop: f"{loop.side} {loop.dp_MPa:.2f}" if both else f"{loop.dp_MPa:.2f}",
+        f"dP ({pressure})": lambda loop: (f"{loop.side} " if both else "") + units.number(loop.dp_MPa, ".2f MPa"),
         "without: opening": lambda loop: _percent(loop.dead_zone_opening),
         "without: closing": lambda loop: _percent(loop.dead_zone_closing),
         "with: opening": lambda loop: _percent(loop.residual_opening),
         "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
-        "Q at zero, beta": lambda loop: loop.in_words(loop.q_zero_L_min, AS_COMPUTED),
-        "Q max without": lambda loop: f"{loop.q_max_direct_L_min:.1f}",
-        "Q max with (L/min)": lambda loop: f"{loop.q_max_L_min:.1f}",
+        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, units),
+        "Q at zero, beta": lambda loop: loop.in_words(loop.q_zero_L_min, units),
+        "Q max without": lambda loop: units.number(loop.q_max_direct_L_min, ".1f L/min"),
+        f"Q max with ({flow})": lambda loop: units.number(loop.q_max_L_min, ".1f L/min"),
     }
     hidden = verification.loops[0].result.unseen_below_L_min is not None
     onset = "onset of flow" + (" (the first flow seen, continued to none)" if hidden else "")
     title = f"Closed loop (plant: {plant}); dead zones in per cent of full command, at the {onset}"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
-    _put_readings(console, verification, {"dP (MPa)": columns["dP (MPa)"]})
+    _put_readings(console, verification, {f"dP ({pressure})": columns[f"dP ({pressure})"]}, units)
 
 
 def _put_readings(
-    console: "Console", verification: "Verification", where: "Mapping[str, Callable[[PressureResult], str]]"
+    console: "Console",
+    verification: "Verification",
+    where: "Mapping[str, Callable[[PressureResult], str]]",
+    units: "RecordedUnits",
 ) -> None:
     """Print the dead zones read at the reading flow, as a bench reads them, beside an ideal line's."""
     results = [loop.result for loop in verification.loops]
@@ -74,11 +80,13 @@ def _put_readings(
         "with: closing": lambda loop: _percent(loop.reading_closing),
         "ideal line": lambda loop: _percent(loop.ideal_line),
     }
-    title = f"Dead zones read at {results[0].reading_flow_L_min:.2f} L/min; an ideal line rises straight from zero"
-    put_rows(console, title, results, columns)
+    flow = units.text(results[0].reading_flow_L_min, ".2f L/min")
+    put_rows(console, f"Dead zones read at {flow}; an ideal line rises straight from zero", results, columns)
 
 
-def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -> None:
+def print_scenarios(
+    scenarios: "Sequence[ScenarioResult]", console: "Console", units: "RecordedUnits" = AS_COMPUTED
+) -> None:
     """Print every scenario once: its worst over the pressure drops, and below the table what else was read there."""
 
     def severity(each: "ScenarioResult") -> tuple[float, float, float]:
@@ -86,25 +94,28 @@ def print_scenarios(scenarios: "Sequence[ScenarioResult]", console: "Console") -
 
     names = dict.fromkeys(each.name for each in scenarios)
     shown = [max((each for each in scenarios if each.name == name), key=severity) for name in names]
+    flow = units.label("L/min")
     columns: dict[str, Callable[[ScenarioResult], str]] = {
         "scenario": lambda each: each.name + ("" if each.must_shut else " (no core can know)"),
-        "dP (MPa)": lambda each: f"{each.dp_MPa:.2f}",
-        "Q at zero, at the end (L/min)": lambda each: each.in_words(each.q_zero_L_min, AS_COMPUTED),
-        "on the way, at most (L/min)": lambda each: each.in_words(each.q_peak_at_zero_L_min, AS_COMPUTED),
+        f"dP ({units.label('MPa')})": lambda each: units.number(each.dp_MPa, ".2f MPa"),
+        f"Q at zero, at the end ({flow})": lambda each: each.in_words(each.q_zero_L_min, units),
+        f"on the way, at most ({flow})": lambda each: each.in_words(each.q_peak_at_zero_L_min, units),
     }
     if shown:
         put_rows(console, "Scenarios with the compensator, worst of all pressure drops", shown, columns)
     for each in shown:  # words of many lines in a narrow column are no table
         if each.figures:
-            put_line(console, f"{each.name}: {_figures(each)}")
+            put_line(console, f"{each.name}: {_figures(each, units)}")
 
 
 #: How a figure's name begins -> of which valve it is; and how it ends -> its unit.
 VALVES = {"compensated_": "with the compensator ", "direct_": "without it ", "": ""}
-UNITS = {"_L_min": " L/min", "_MPa": " MPa", "_ms": " ms", "_mL": " mL", "_percent": " %", "": ""}
+UNITS = {"_L_min": "L/min", "_MPa": "MPa", "_ms": "ms", "_mL": "mL", "_percent": "%", "": ""}
+#: Those in which a valve may be recorded otherwise.
+RECORDED = ("L/min", "MPa")
 
 
-def _figures(result: "ScenarioResult") -> str:
+def _figures(result: "ScenarioResult", units: "RecordedUnits") -> str:
     """Return figures as words, those of one valve together: rise_ms is a rise in ms."""
     figures, unseen = result.figures, result.unseen_below_L_min
     groups: dict[str, list[str]] = {start: [] for start in VALVES}
@@ -113,24 +124,34 @@ def _figures(result: "ScenarioResult") -> str:
         name = key.removeprefix(start).removesuffix(end).replace("_", " ")
         # A change of flow may well be small; a flow that the recordings can't show is no small one.
         hidden = unseen is not None and name.endswith("flow") and value < unseen
-        groups[start].append(f"{name} {result.in_words(value, AS_COMPUTED) if hidden else f'{value:.3g}'}{UNITS[end]}")
+        unit = UNITS[end]
+        number = units.number(value, f".3g {unit}") if unit in RECORDED else f"{value:.3g}"
+        number = result.in_words(value, units) if hidden else number
+        groups[start].append(f"{name} {number} {units.label(unit) if unit in RECORDED else unit}".rstrip())
     return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
 
 
-def print_scatter(series: "MonteCarlo", console: "Console") -> None:
+def print_scatter(series: "MonteCarlo", console: "Console", units: "RecordedUnits" = AS_COMPUTED) -> None:
     """Print the quantiles of a series of plants per pressure drop."""
 
-    def spread(of: "Spread", by: float, digits: int) -> str:
-        middle, low, high = (by * value for value in (of.p50, of.p01, of.p99))
-        return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+    def spread(of: "Spread", text: "Callable[[float], str]") -> str:
+        middle, low, high = map(text, (of.p50, of.p01, of.p99))
+        return f"{middle} ({low} to {high})"
 
+    def percent(share: float) -> str:
+        return f"{100 * share:.1f}"
+
+    def flow(form: str) -> "Callable[[float], str]":
+        return lambda value: units.number(value, form)
+
+    unit = units.label("L/min")
     columns: dict[str, Callable[[Scatter], str]] = {
         "side": lambda each: each.side,
-        "dP (MPa)": lambda each: f"{each.dp_MPa:.2f}",
-        "dead zone opening (%)": lambda each: spread(each.residual_opening, 100, 1),
-        "closing (%)": lambda each: spread(each.residual_closing, 100, 1),
-        "Q max (L/min)": lambda each: spread(each.q_max_L_min, 1, 1),
-        "Q at zero (L/min)": lambda each: spread(each.q_zero_L_min, 1, 2),
+        f"dP ({units.label('MPa')})": lambda each: units.number(each.dp_MPa, ".2f MPa"),
+        "dead zone opening (%)": lambda each: spread(each.residual_opening, percent),
+        "closing (%)": lambda each: spread(each.residual_closing, percent),
+        f"Q max ({unit})": lambda each: spread(each.q_max_L_min, flow(".1f L/min")),
+        f"Q at zero ({unit})": lambda each: spread(each.q_zero_L_min, flow(".2f L/min")),
         "plants that leak": lambda each: f"{each.leaking} of {each.plants}",
     }
     put_rows(console, f"Series of {series.plants} plants: median (1 to 99 %)", series.pressures, columns)
@@ -140,7 +161,8 @@ def print_scatter(series: "MonteCarlo", console: "Console") -> None:
         plant = ", ".join(f"{name} {value:.4g}" for name, value in worst.worst_plant.items())
         put_line(
             console,
-            f"Most at zero command: {worst.worst:.2f} L/min at {at.dp_MPa:.2f} MPa, by the plant with {plant}. "
+            f"Most at zero command: {units.text(worst.worst, '.2f L/min')} at {units.text(at.dp_MPa, '.2f MPa')}, by "
+            f"the plant with {plant}. "
             "A series is no requirement: the compensator is certified for the valve of its ramp tests.",
         )
 
@@ -164,7 +186,7 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     }
     console, title = new_console(), "Simulated example valve, 0-10 V ramps in closed loop with the generated C"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
-    _put_readings(console, verification, {"dP (MPa)": columns["dP (MPa)"]})
+    _put_readings(console, verification, {"dP (MPa)": columns["dP (MPa)"]}, AS_COMPUTED)
     checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))
     put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
     put_line(console, verification.verdict)

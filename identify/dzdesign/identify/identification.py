@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from msgspec import UNSET
+
 from dzdesign.core.artefact_reading import rounded
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
@@ -14,6 +16,7 @@ from dzdesign.identify.data_quality.clipped_meter import without_clipping
 from dzdesign.identify.data_quality.pressures import about_mixed_pressures, about_single_pressures
 from dzdesign.identify.data_quality.recordings import about_recordings
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.dithered_command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.units_of_columns import units_of
@@ -61,6 +64,8 @@ def identify_sides(
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     units = units_of(tests)
+    dither = options.dithered.of(units, options.u_max) if options.dithered else None
+    tests = [without_dither(test, dither, options.u_max) for test in tests]
     sides, warnings = _each_side(tests, options, units)
     lag = next(iter(sides.values())).described.lag
     files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
@@ -87,6 +92,7 @@ def identify_sides(
             )
         ),
         record=dict(record or {}),
+        dithered=dither or UNSET,
     )
     # Rounded as they are, factors of a small unit would lose their digits.
     model = replace(rounded(model, DECIMALS), recorded_units=units)
@@ -110,7 +116,7 @@ def _each_side(
         pressures = (*mixed, *about_single_pressures(of_side, mixed))
         of_side, side_options, clipped = without_clipping(of_side, options)
         try:
-            sides[name] = identify_side(of_side, side_options)
+            sides[name] = identify_side(of_side, side_options, in_side)
         except InputError as error:
             # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
             cause = f"; it may be that {in_units(mixed[0].text, in_side)}" if mixed else ""

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from dzdesign.core.dither import DeclaredDither
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.identify.constants import PREMISES, Premise
 
@@ -26,6 +27,9 @@ class IdentifyOptions:
     noise_level : float or None
         Flow below which there is none, m³/s, if the recordings resolve it; None takes what their averages over the
         dead zone resolve, and at least 0.5 % of the largest flow.
+    zero_flow : float or None
+        Flow that is allowed at zero command, a leak included, m³/s: the command that passes it is guarded. None guards
+        the first flow seen.
     meter_zero : float
         Bound of the meter's zero error, m³/s, against which the certificate guards.
     x_max : float or None
@@ -42,10 +46,12 @@ class IdentifyOptions:
         Standard deviation of the threshold from ramp to ramp, as a share of u_max; None measures it where ramps are
         repeated, and takes 0.25 % elsewhere.
     curve : {"line", "smooth", "monotone"} or None
-        Premise about the threshold between the tests; None takes `smooth` where its curvature can be told from the
-        tests and certifies more than `monotone`.
+        Premise about the threshold between the tests; None takes `smooth` where its curvature is declared, and where
+        it can be told from the tests and certifies more than `monotone`, or these contradict `monotone`.
     curvature : float or None
         M of `smooth`: the largest second divided difference of the threshold, V/Pa²; None estimates it from the tests.
+    dithered : DeclaredDither or None
+        Dither that the drive superimposed on the command of every recording; None: none that `design` is to make.
     """
 
     u_max: float = 10.0
@@ -54,6 +60,7 @@ class IdentifyOptions:
     meter_lag: float | None = None
     meter_lag_tolerance: float | None = None
     noise_level: float | None = None
+    zero_flow: float | None = None
     meter_zero: float = 0.0
     x_max: float | None = None
     confidence: float = 0.99
@@ -62,6 +69,7 @@ class IdentifyOptions:
     repeatability: float | None = None
     curve: Premise | None = None
     curvature: float | None = None
+    dithered: DeclaredDither | None = None
 
     def __post_init__(self) -> None:
         if not self.u_max > 0:
@@ -86,7 +94,7 @@ class IdentifyOptions:
         for name in ("meter_floor", "meter_lag", "meter_lag_tolerance", "noise_level", "meter_zero"):
             if (getattr(self, name) or 0) < 0:
                 raise InputError(f"{name} is negative, expected zero or more")
-        for name in ("dp0", "x_max"):
+        for name in ("dp0", "x_max", "zero_flow"):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise InputError(f"{name} is {value}, expected a positive number")

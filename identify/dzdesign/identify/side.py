@@ -6,14 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.worded import all_of, worded
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds, opening_curve
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.guarded_thresholds import Guarding, guard_thresholds
-from dzdesign.identify.fitting.guarding import Threshold
 from dzdesign.identify.fitting.identifying import identify_curve
+from dzdesign.identify.fitting.threshold import Threshold
+from dzdesign.identify.fitting.zero_flow import allowed_at_zero
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
 from dzdesign.identify.knees.curve_thinning import recorded_curve
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
@@ -32,8 +34,10 @@ REFERENCE_TOLERANCE = 0.1
 PAPER_DP0 = 1 * MPA
 
 
-def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideIdentification:
-    """Identify the side of positive commands from ramp tests in any order.
+def identify_side(
+    tests: Sequence[RampTest], options: IdentifyOptions, units: RecordedUnits = AS_COMPUTED
+) -> SideIdentification:
+    """Identify the side of positive commands from ramp tests in any order; texts of its model are in `units`.
 
     Raises
     ------
@@ -47,14 +51,13 @@ def identify_side(tests: Sequence[RampTest], options: IdentifyOptions) -> SideId
     certified = _certify(group, guarding, reference, options)
     curve = next(iter(certified.values())).curve
     knees = guarding.knees if curve.premise == "monotone" else free
-    model = _side_model(group, guarding, certified, knees, reference, options)
+    model = _side_model(group, guarding, certified, knees, reference, options, units)
     departure = np.maximum(guarding.departure, guarding.guarded_departure)
-    refused = next(iter(certified.values())).refused
     return SideIdentification(
         model=model,
         described=group,
         knees=knees,
-        warnings=find_warnings(model, group, departure, refused, options),
+        warnings=find_warnings(model, group, departure, next(iter(certified.values())), options),
     )
 
 
@@ -103,6 +106,7 @@ def _side_model(
     knees: KneeFit,
     reference: int,
     options: IdentifyOptions,
+    units: RecordedUnits,
 ) -> SideModel:
     """Assemble one side: what was identified, the curves that may be certified, and k x_max."""
     described, trend = group.tests, guarding.trend
@@ -112,8 +116,9 @@ def _side_model(
     dp0 = described[reference].dp
     several = len(described) > 1
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
+    rows = range(len(described))
     return SideModel(
-        tests=tuple(_test_result(group, knees, row, curves[guard], options.u_max) for row in range(len(described))),
+        tests=tuple(_test_result(group, knees, row, curves[guard], options, units) for row in rows),
         reference=Reference(
             dp_MPa=None if dp0 is None else dp0 / MPA,
             u_min_V=joint.curves[guard].u_V[reference],
@@ -131,6 +136,7 @@ def _side_model(
             confidence=options.confidence,
             guard=guard,
             level_L_min=group.noise_level / L_MIN,
+            zero_flow_L_min=None if options.zero_flow is None else options.zero_flow / L_MIN,
             repeatability=_repeatability(group.between(guarding.column)),
         ),
         identified=joint.curves,
@@ -167,9 +173,18 @@ def _repeatability(found: BetweenRamps) -> Repeatability:
     )
 
 
-def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: CertifiedCurve, u_max: float) -> TestResult:
+def _test_result(
+    group: DescribedTests,
+    knees: KneeFit,
+    row: int,
+    guarded: CertifiedCurve,
+    options: IdentifyOptions,
+    units: RecordedUnits,
+) -> TestResult:
     """Return one row of valve.json's tests."""
-    item = group.tests[row]
+    item, u_max = group.tests[row], options.u_max
+    allowed = allowed_at_zero(group, options)
+    at_zero = None if allowed is None else allowed[row]
     rising, falling = item.shapes
     noise_level = max(shape.dead_zone.noise_level for shape in item.branches)
     return TestResult(
@@ -179,7 +194,7 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Certi
         **_thresholds(item, knees, row),
         straight_rising=rising.line.window if rising else None,
         straight_falling=falling.line.window if falling else None,
-        not_observable=_not_observable(group, row),
+        not_observable=_not_observable(group, row, units),
         u_guard_V=guarded.u_threshold_V[row],
         u_guard_lower_V=guarded.u_lower_V[row],
         slope_L_min_V=float(np.nanmean(knees.slope[row])) / L_MIN,
@@ -187,11 +202,12 @@ def _test_result(group: DescribedTests, knees: KneeFit, row: int, guarded: Certi
         saturates=all(shape.saturates for shape in item.branches),
         leak_L_min=group.leak[row] / L_MIN,
         noise_level_L_min=noise_level / L_MIN,
+        zero_flow_L_min=None if at_zero is None else at_zero / L_MIN,
         noise_L_min=max(shape.sigma for shape in item.branches) / L_MIN,
         noise_variance_inflation=max(shape.variance_inflation for shape in item.branches),
         spool_ripple_V=max(shape.ripple for shape in item.branches),
         outliers=sum(shape.outliers for shape in item.branches),
-        recorded=recorded_curve(item, group.leak[row], noise_level, u_max),
+        recorded=recorded_curve(item, group.leak[row], noise_level, u_max, at_zero),
         ramps=item.ramps,
         left_out=item.left_out,
     )
@@ -213,7 +229,7 @@ def _thresholds(item: DescribedTest, knees: KneeFit, row: int) -> dict[str, floa
     return values
 
 
-def _not_observable(group: DescribedTests, row: int) -> dict[str, str]:
+def _not_observable(group: DescribedTests, row: int, units: RecordedUnits) -> dict[str, str]:
     """Say of thresholds that can't be seen why; what valve.json gives instead is said too."""
     reasons = {}
     for direction, shape in zip(BRANCHES, group.tests[row].shapes, strict=True):
@@ -224,12 +240,12 @@ def _not_observable(group: DescribedTests, row: int) -> dict[str, str]:
             low, high = shape.tail.hole
             for name in ("level", "onset"):
                 reasons[f"u_{name}_{direction}_V"] = (
-                    f"rows are missing from {low:.3f} to {high:.3f} V, where the flow begins; the onset's value is the "
-                    "lower end"
+                    f"rows are missing {units.span(low, high, '.3f V')}, where the flow begins; the onset's value is "
+                    "the lower end"
                 )
         elif group.floor > 0:
+            least = units.text(group.floor / L_MIN, ".2f L/min")
             reasons[f"u_onset_{direction}_V"] = (
-                f"the meter shows nothing below {group.floor / L_MIN:.2f} L/min; the value is the tail above that "
-                "flow, extrapolated to zero"
+                f"the meter shows nothing below {least}; the value is the tail above that flow, extrapolated to zero"
             )
     return reasons

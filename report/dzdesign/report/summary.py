@@ -127,6 +127,9 @@ def worst_of(loops: Sequence[PressureResult], units: RecordedUnits) -> str:
 
 def _at_zero(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
     worst = max(loops, key=lambda each: (each.q_zero_L_min, each.unseen_below_L_min or 0.0))
+    allowed = worst.allowed_at_zero_L_min
+    within = allowed is not None and all(each.q_beyond_L_min <= 0 for each in loops)
+    of_it = "" if allowed is None else f"; {units.text(allowed, '.3g L/min')} are allowed there"
     bare = max(loops, key=lambda each: each.q_zero_without_beta_L_min)
     flow, unseen = worst.q_zero_L_min, worst.unseen_below_L_min
     hidden = "" if unseen is None else "; less than that the recordings don't show"
@@ -135,9 +138,9 @@ def _at_zero(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
     return Figure(
         label="Flow at zero command",
         value="none" if flow <= 1e-9 and unseen is None else f"{value} {unit}",
-        note=f"in the simulated loop, after closing, {worst_of(loops, units)}{hidden}; without β it would be "
+        note=f"in the simulated loop, after closing, {worst_of(loops, units)}{hidden}{of_it}; without β it would be "
         f"{bare.in_words(bare.q_zero_without_beta_L_min, units)} {unit}",
-        kind="text" if flow <= 1e-9 else "bad",
+        kind="text" if flow <= 1e-9 or within else "bad",
     )
 
 
@@ -157,7 +160,8 @@ def _threshold(valve: ValveModel) -> Figure:
 
 
 def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figure:
-    worst = min((law.certificate for law in laws_of(compensator).values()), key=lambda one: one.smallest_margin_V)
+    name, law = min(laws_of(compensator).items(), key=lambda item: item[1].certificate.smallest_margin_V)
+    worst, at_zero = law.certificate, compensator.valve.sides[name]
     units, (low, high) = compensator.valve.recorded_units, map(float, worst.dp_MPa)
     least = min((1e3 * each.smallest_margin_V for each in inputs), default=0.0)
     if exceeded := sum(each.over_compensated for each in inputs):
@@ -176,7 +180,11 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         f"{units.text(1e3 * float(worst.smallest_margin_V), '.3f mV')} of the exact law under "
         "the certified offset, half a count kept for the rounding"
         + (f"; {units.text(least, '.3f mV')} of the C's compare values under the threshold's bound" if inputs else "")
-        + f". Flow below {units.text(worst.level_L_min, '.2f L/min')} counts as none"
+        + (
+            f". Flow below {units.text(worst.level_L_min, '.2f L/min')} counts as none"
+            if worst.zero_flow_L_min is None
+            else f"; {at_zero.zero_flow_in_words(units)}"
+        )
         + _premise(compensator),
     )
 

@@ -257,7 +257,7 @@ def test_arguments_in_a_wrong_order_do_not_compile(firmware):
 def test_numbers_follow_from_the_engineering_quantities():
     context = TARGET.context
     assert int(context["tbprd"]) == 100_000_000 // 2_500 - 1 == 39_999
-    assert TARGET.compare_max == 40_000 and TARGET.adc_code_max == 4_095
+    assert TARGET.compare_max == 40_000 and TARGET.converter.code_max == 4_095
     assert int(context["cmpb"]) == 100 * 20 and context["adcclk_mhz"] == "50"
 
 

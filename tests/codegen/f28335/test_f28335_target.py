@@ -124,7 +124,7 @@ def test_numbers_follow_from_the_engineering_quantities():
     context = TARGET.context
     assert int(context["tbprd"]) == 150_000_000 // 2_500 - 1 == 59_999
     assert int(context["cmpb"]) == 150 * 20 == 3_000
-    assert TARGET.compare_max == 60_000 and TARGET.adc_code_max == 4_095
+    assert TARGET.compare_max == 60_000 and TARGET.converter.code_max == 4_095
     assert (context["adcclk_mhz"], context["sequence_us"]) == ("12.5", "4.52")
     assert context["held_us"] == "1.48", "2.5 + 16 periods of 80 ns"
     # 400 - 1.48; 400 more less one count of 1/150 us; 400 more

@@ -28,7 +28,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import DECIMALS
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.design_choices import DesignChoices
-from dzdesign.design.lot_setting import lot_setting
+from dzdesign.design.lot.setting import lot_setting
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.lot.valve_folder import read_manifest

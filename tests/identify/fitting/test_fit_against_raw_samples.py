@@ -146,7 +146,7 @@ class TestOffset:
 
     @pytest.mark.parametrize("fault", ["direction reversed", "no ceiling", "no weights"])
     def test_the_referee_sees_a_fault(self, fault, monkeypatch, fresh_solvers, wording):
-        original = ca.nlpsol
+        original = ca.qpsol
 
         def faulty(*problem):
             solver = original(*problem)
@@ -161,7 +161,7 @@ class TestOffset:
             solved.stats = solver.stats
             return solved
 
-        monkeypatch.setattr(ca, "nlpsol", faulty)
+        monkeypatch.setattr(ca, "qpsol", faulty)
         if fault == "no weights":
             monkeypatch.setattr(fit, "LARGEST_WEIGHT", 1.0)
         if fault != "no weights":  # seen by the fit itself

@@ -41,7 +41,7 @@ def test_no_more_than_the_level_flows_and_the_meter_can_show_it(name):
 
 
 def test_without_the_shape_of_the_edge_the_notch_opens(monkeypatch):
-    monkeypatch.setattr(guarding, "find_softness", lambda shapes, knees, **_: Softness(0 * knees, 0 * knees))
+    monkeypatch.setattr(guarding, "find_softness", lambda edges, knees, confidence: Softness(0 * knees, 0 * knees))
     name = next(iter(COUNTS))
     assert sum(result[0] for result in examined(name, COUNTS[name])) > COUNTS[name] / 2
 
@@ -65,7 +65,7 @@ def test_the_lag_in_steps_too_wide_opens(monkeypatch):
 @pytest.mark.parametrize("name", ["sharp edges", "sharp edges and a floor"])
 def test_sharp_edges_pay_next_to_nothing(name, monkeypatch):
     with_it = np.array([result[2] for result in examined(name, 5)])
-    monkeypatch.setattr(guarding, "find_softness", lambda shapes, knees, **_: Softness(0 * knees, 0 * knees))
+    monkeypatch.setattr(guarding, "find_softness", lambda edges, knees, confidence: Softness(0 * knees, 0 * knees))
     without = np.array([result[2] for result in examined(name, 5)])
     assert np.all(with_it >= without - 1e-9)
     assert np.median(with_it - without) < 1e-3

@@ -74,6 +74,12 @@ def test_every_constant_comparison_and_operator_is_changed():
     assert changes("d->n++;") == ["d->n--;"] and changes("n += m;") == ["n -= m;"]
 
 
+def test_a_wide_constant_is_changed_by_what_a_16_bit_output_resolves():
+    assert changes("x = 65535u;") == ["x = 65536u;", "x = 65534u;"]
+    assert changes("x = 65536u;") == ["x = 65538u;", "x = 65534u;"]
+    assert changes("UINT32_C(157286400)") == ["UINT32_C(157290496)", "UINT32_C(157282304)"]
+
+
 def test_names_comments_and_includes_are_left_alone():
     assert changes('/* 1 + 1 */ #include "dz_comp.h"\n#ifndef DZ_1\n#define DZ_1\n#endif\nuint16_t a1; // 2\n') == []
     assert changes("#define STEP 64u\n") == ["#define STEP 65u\n", "#define STEP 63u\n"]
@@ -141,8 +147,7 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
     assert {mutant.file for mutant in every} >= {"dz_comp.c", "dz_comp.h", "dz_drive.c"} and len(every) > 300
     score = mutation_score(judge_all(bench, random.Random(SEED).sample(every, TRIED)))
     assert score.survived == 0 and score.refused == 0
-    # The last bit of a table's wide integers, of which half of the mutants are made, is far below one count.
-    assert score.killed >= 0.5 * TRIED
+    assert score.killed >= 0.8 * TRIED
     assert sum(score.killers.values()) == score.killed
 
 

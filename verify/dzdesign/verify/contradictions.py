@@ -1,12 +1,13 @@
 """Whether the checks of evidence follow from its figures: who edits one of both contradicts the other."""
 
 from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.all_inputs import input_checks
 from dzdesign.verify.exhaustive.lot_check import lot_checked
-from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, Check
+from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, ZERO_COMMAND, Check
 
 
 def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple[Check, ...]:
@@ -15,7 +16,8 @@ def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple
     Without a compensator the figures of the inputs alone are looked at.
     """
     inputs, loop = evidence.inputs, evidence.closed_loop
-    follow = [check for each in inputs for check in input_checks(each, both_signs=len(inputs) > 1)]
+    units = compensator.valve.recorded_units if compensator else AS_COMPUTED
+    follow = [check for each in inputs for check in input_checks(each, units, both_signs=len(inputs) > 1)]
     kinds = set(FROM_INPUTS)
     if compensator:
         kinds |= {LOT, *FROM_LOOP}
@@ -24,8 +26,9 @@ def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple
             given = loop.plant is not None
             follow += loop_checks(loop.pressures, evidence.scenarios, compensator, plant_given=given)
 
-    def key(check: Check) -> tuple[object, ...]:  # another version may word it otherwise
-        return (check.id, check.name, check.holds, check.text if evidence.tool == THIS_TOOL else "")
+    def key(check: Check) -> tuple[object, ...]:  # another version may word it otherwise, and units be another valve's
+        worded_alike = evidence.tool == THIS_TOOL and (compensator is not None or check.id != ZERO_COMMAND.id)
+        return (check.id, check.name, check.holds, check.text if worded_alike else "")
 
     ids, derived = {kind.id for kind in kinds}, {key(check) for check in follow}
     return tuple(each for each in evidence.checks if each.holds and each.id in ids and key(each) not in derived)

@@ -48,6 +48,10 @@ class PressureResult:
         about("Flow below which the recordings show none, so that the plant's is not known; null of a given plant."),
     ]
     leak_L_min: Annotated[Flow, about("Flow without any drive, which no compensator can stop.")]
+    allowed_at_zero_L_min: Annotated[
+        Flow | None,
+        about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
+    ]
     q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing, with compensator; a leak is in it.")]
     q_zero_without_beta_L_min: Annotated[Flow, about("The same with beta held at 1: what over-compensation would do.")]
     flow_miss: Annotated[
@@ -64,9 +68,9 @@ class PressureResult:
     q_max_L_min: Annotated[Flow, about("Largest flow with it.")]
 
     @property
-    def q_opened_L_min(self) -> float:
-        """Flow at zero command beyond the leak: what the compensator lets through."""
-        return self.q_zero_L_min - self.leak_L_min
+    def q_beyond_L_min(self) -> float:
+        """Flow at zero command beyond what is allowed there: the leak, or more where a flow was declared."""
+        return self.q_zero_L_min - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
 
     def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
         """Return a flow to two decimals of a L/min; what the recordings can't show is no 0.00."""
@@ -118,6 +122,10 @@ class ScenarioResult:
     side: Side
     dp_MPa: PressureDrop
     leak_L_min: Annotated[Flow, about("Flow without any drive at the end, which no compensator can stop.")]
+    allowed_at_zero_L_min: Annotated[
+        Flow | None,
+        about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
+    ]
     q_zero_L_min: Annotated[Flow, about("Flow at zero command at the end; a leak is in it.")]
     q_peak_at_zero_L_min: Annotated[
         Flow, about("Largest flow while the command was zero and the valve had closed before.")
@@ -137,9 +145,9 @@ class ScenarioResult:
         return "pressure_drop_then_MPa" in self.figures
 
     @property
-    def q_opened_L_min(self) -> float:
-        """Flow at zero command beyond the leak: what the compensator lets through."""
-        return self.q_zero_L_min - self.leak_L_min
+    def q_beyond_L_min(self) -> float:
+        """Flow at zero command beyond what is allowed there: the leak, or more where a flow was declared."""
+        return self.q_zero_L_min - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
 
     def in_words(self, flow_L_min: float, units: RecordedUnits) -> str:
         """Return a flow to two decimals of a L/min; what the recordings can't show is no 0.00."""
@@ -166,7 +174,9 @@ class Scatter:
     side: Side
     dp_MPa: PressureDrop
     plants: Annotated[int, Meta(description="How many plants.", ge=1, le=10**6)]
-    leaking: Annotated[Count, about("How many pass flow at zero command after closing.")]
+    leaking: Annotated[
+        Count, about("How many pass flow at zero command after closing, or more than was declared as allowed.")
+    ]
     residual_opening: Annotated[Spread, about("Dead zone on opening, share of full command.")]
     residual_closing: Annotated[Spread, about("Dead zone on closing, share of full command.")]
     q_zero_L_min: Annotated[Spread, about("Flow at zero command, L/min.")]

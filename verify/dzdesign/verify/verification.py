@@ -105,10 +105,9 @@ def verify(
         valve_follows(folder, compensator),
         *board.checks,
     )
-    digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     evidence = Evidence(
         tool=THIS_TOOL,
-        made_from=(SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=digest),),
+        made_from=(_manifest_source(folder),),
         target=manifest.target,
         changed_board_files=tuple(changed_board_files(folder, manifest)),
         user_files=tuple(user_files(folder, manifest)),
@@ -122,6 +121,12 @@ def verify(
     )
     derived = compensator if law.holds else None
     return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=derived)
+
+
+def _manifest_source(folder: Path) -> SourceFile:
+    """Return name and hash of the manifest, which has the hashes of all other files."""
+    digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
+    return SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=digest)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +144,7 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
     if not compiles.holds:
         return _Core(checks=(compiles,))
     say("comparing every input with the exact law")
-    signs = compensator.signals.signs
+    signs, units = compensator.signals.signs, compensator.valve.recorded_units
     try:
         inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
     except RequirementError as error:
@@ -147,7 +152,7 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
     return _Core(
         checks=(
             compiles,
-            *(check for each in inputs for check in input_checks(each, both_signs=len(inputs) > 1)),
+            *(check for each in inputs for check in input_checks(each, units, both_signs=len(inputs) > 1)),
             *lot_checked(inputs, compensator),
             drive_follows(folder, compensator),
         ),

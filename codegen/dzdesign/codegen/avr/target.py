@@ -28,7 +28,6 @@ TARGET = Target(
     name="avr",
     description="Atmel ATmega1280: self-test of the core where int has 16 bits, over UART; runs in simavr",
     compare_max=60_000,
-    adc_code_max=4_095,
     takes_any_signals=True,
     has_timer=False,
     arithmetic="narrow",  # an 8-bit processor pays for 64-bit products

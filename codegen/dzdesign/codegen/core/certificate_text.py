@@ -4,8 +4,10 @@ from textwrap import wrap
 
 from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
+from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.units import span_MPa
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.signals import SIDE_NAMES
 
 
 def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
@@ -26,7 +28,9 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
         f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold, by "
         f"{1e3 * float(certificate.smallest_margin_V):.3g} mV at the least beyond {_counted(compensator)}"
     )
-    if certificate.guard == "closing":
+    if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:
+        text += f", so that {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(AS_COMPUTED)}."
+    elif certificate.guard == "closing":
         text += f", so that less than {certificate.level_L_min:.2f} L/min flows: what the recordings can't show."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
@@ -39,5 +43,11 @@ def _counted(compensator: Compensator) -> str:
     rounding = "the converters' error and the rounding to counts"
     if not compensator.drive_functions.dither_counts:
         return rounding
-    peak = compensator.drive_functions.dither_counts / compensator.signals.compare_max * float(compensator.u_max_V)
-    return f"{rounding} and the dither's peak of {1e3 * peak:.4g} mV, which dz_drive adds to it"
+    counted = compensator.dither_reserve_counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    recorded = compensator.valve.dither
+    if recorded is not None:
+        return (
+            f"{rounding} and {1e3 * counted:.4g} mV by which dz_drive's dither may differ from that of the recordings, "
+            f"{recorded.in_words()}, which the bound has in it"
+        )
+    return f"{rounding} and the dither's peak of {1e3 * counted:.4g} mV, which dz_drive adds to it"

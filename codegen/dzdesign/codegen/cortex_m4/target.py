@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from dzdesign.codegen.target import Target
 from dzdesign.core.errors import DzdesignError
+from dzdesign.design.target_inputs import Converter
 
 FOLDER = "cortex_m4"
 CLOCK_HZ = 25_000_000
@@ -40,8 +41,7 @@ TARGET = Target(
     name="cortex-m4",
     description="ARM Cortex-M4 without CMSIS: start-up, SysTick at 2.5 kHz, three functions to fill in; runs in QEMU",
     compare_max=COMPARE_MAX,
-    adc_code_max=2**ADC_BITS - 1,
-    adc_full_V=ADC_SPAN_V,
+    converter=Converter(full_V=ADC_SPAN_V, levels=2**ADC_BITS),
     takes_any_signals=True,
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in OWN_FILES + OTHER_FILES},
     board=frozenset(f"{FOLDER}/{file}" for file in BOARD_FILES),

@@ -7,6 +7,7 @@ converter: data sheet SPRS945.
 from fractions import Fraction
 
 from dzdesign.codegen.c2000 import ADC_BITS, CHANNELS, ISR_DELAY_S, c2000_target, exact, printed, pwm_timing, within
+from dzdesign.design.target_inputs import Converter, peak_noise_codes
 
 SYSCLK_HZ = 100_000_000  # DEVICE_SYSCLK_FREQ of device.h: 20 MHz crystal, times 10, over 2
 SOCA_PRESCALE_MAX = 15  # EPWM_setADCTriggerEventPrescale()
@@ -17,6 +18,9 @@ WINDOW_LEAST_S = Fraction(75, 10**9)
 CONVERSION_ADCCLKS = 12  # one more than the 10.5 of 12 bits, rounded up
 WATCHDOG_HZ = 10_000_000  # INTOSC1
 ADC_SPAN_V = Fraction(33, 10)
+# SPRS945G, table of the ADC's characteristics: largest offset error; largest gain error with the internal reference,
+# which dz_hardware.c takes; SNR with SYSCLK from X1, which device.h takes.
+OFFSET_CODES, GAIN_CODES, SNR_DB = 5, 45, 68.8
 
 
 def timing() -> dict[str, str]:
@@ -59,5 +63,11 @@ TARGET = c2000_target(
     "f280049c",
     "TI TMS320F280049C at 100 MHz: DriverLib, ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
     {**timing(), **converter(), **OPTIONS},
-    adc_span_V=ADC_SPAN_V,
+    converter=Converter(
+        full_V=ADC_SPAN_V,
+        levels=2**ADC_BITS,
+        offset_codes=OFFSET_CODES,
+        gain_codes=GAIN_CODES,
+        noise_codes=peak_noise_codes(SNR_DB, 2**ADC_BITS),
+    ),
 )

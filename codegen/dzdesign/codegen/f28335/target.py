@@ -18,6 +18,7 @@ from dzdesign.codegen.c2000 import (
     within,
 )
 from dzdesign.codegen.telemetry.frame import CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
+from dzdesign.design.target_inputs import Converter
 
 CRYSTAL_HZ = 30_000_000
 PLL_DIV, PLL_DIVSEL = 10, 2  # SYSCLKOUT = crystal * DIV / DIVSEL, as C2000Ware's InitSysCtrl() sets it
@@ -136,7 +137,7 @@ TARGET = c2000_target(
     "f28335",
     "TI TMS320F28335 at 150 MHz: ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
     {**timing(), **converter(), **serial_line(), **frame_context()},
-    adc_span_V=ADC_SPAN_V,
+    converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
     sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
     link=LINK,
 )

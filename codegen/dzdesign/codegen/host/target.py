@@ -20,7 +20,6 @@ TARGET = Target(
     description="shared library of the core for Windows, Linux and macOS (Python, MATLAB, LabVIEW), with a self-test",
     # Of the F28335, so that the library answers as that firmware does unless another target's design is given.
     compare_max=60_000,
-    adc_code_max=4_095,
     takes_any_signals=True,
     has_timer=False,
     templates={f"host/{file}": f"{file}.jinja" for file in (*FILES, *SHARED_FILES, "CMakeLists.txt", "README.md")},

@@ -4,11 +4,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from dzdesign.core.worded import all_of, worded
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.identify.valve.side_model import PROMISED, SideModel
 
 #: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
 LARGE_LAG = 1e-2
@@ -26,6 +27,7 @@ def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOpt
     """Yield the warnings about the flow meter, of one side."""
     yield from _about_zeros(group.zero_L_min)
     yield from _about_a_leak(side)
+    yield from _about_the_zero_flow(side, group)
     yield from _about_the_noise_level(side, options)
     yield from _about_steps(side, group.tests, options)
     yield from _about_the_lag(group, options)
@@ -44,6 +46,31 @@ def _about_a_leak(side: SideModel) -> Iterator[Finding]:
         shift_mV = 1e3 * max(test.leak_L_min / test.slope_L_min_V for test in side.tests)
         leak = worst.leak_L_min
         yield warn("leak", worst.source, "at-rest", per_MPa=leak / worst.dp_MPa, leak_L_min=leak, shift_mV=shift_mV)
+
+
+def _about_the_zero_flow(side: SideModel, group: DescribedTests) -> Iterator[Finding]:
+    """Say of a declared flow at zero that a leak alone is more, or that it can't be told from none."""
+    declared, allowed = side.certificate.zero_flow_L_min, side.zero_flow_L_min
+    if declared is None or allowed is None or allowed <= PROMISED * declared:
+        return
+    rest = [flow / L_MIN for flow, _ in group.at_rest]
+    worst = max(side.tests, key=lambda test: test.zero_flow_L_min or 0.0)
+    numbers = {"declared_L_min": declared, "allowed_L_min": allowed}
+    if max(group.leak) > 0 and max(rest) > declared:
+        above = [(test.dp_MPa, flow) for test, flow in zip(side.tests, rest, strict=True) if flow > declared]
+        places = all_of([worded("{dp:.3g #MPa}", dp=dp) for dp, _ in above[:-1]], ", ")
+        flows = all_of([worded("{flow:.3g #L/min}", flow=flow) for _, flow in above[:-1]], ", ")
+        comma = ", " if len(above) > 1 else ""
+        yield warn(
+            "zero-flow", worst.source, "leak",
+            leaks=worded("{flows}{comma}{last:.3g L/min}", flows=flows, comma=comma, last=above[-1][1]),
+            pressures=worded("{places}{comma}{last:.3g MPa}", places=places, comma=comma, last=above[-1][0]),
+            **numbers,
+        )  # fmt: skip
+    elif len(side.tests) == 1 and rest[0] > 0:
+        yield warn("zero-flow", worst.source, "rest", rest_L_min=max(rest), **numbers)
+    else:
+        yield warn("zero-flow", worst.source, "unresolved", **numbers)
 
 
 def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterator[Finding]:

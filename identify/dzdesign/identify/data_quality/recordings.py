@@ -32,6 +32,10 @@ def _about_one(test: RampTest) -> Iterator[Finding]:
         yield warn("missing-samples", test.source, numbers=test.no_values)
     if test.cut:
         yield warn("cut-ramp", test.source, ramps="; ".join(test.cut))
+    if test.undeclared_dither:
+        yield warn("dither-undeclared", test.source, peak_V=test.undeclared_dither)
+    if test.dither_averaged:
+        yield warn("dither-in-command", test.source, samples=test.dither_averaged)
     if test.run > 1:
         yield warn("thinned", test.source, rows=test.rows_read, run=test.run, samples=test.time.size)
 

@@ -12,12 +12,12 @@ from dzdesign.identify.data_quality.flow_meter import about_the_meter
 from dzdesign.identify.data_quality.knee_errors import about_errors
 from dzdesign.identify.data_quality.pressures import about_flow_gains
 from dzdesign.identify.data_quality.sweeps import about_sweeps
+from dzdesign.identify.fitting.certifying import Certified
 from dzdesign.identify.knees.characteristic import TAIL
 from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTests
 from dzdesign.identify.knees.meter_lag import softness_of_filter
 from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.guard_curve import PremiseCheck
 from dzdesign.identify.valve.side_model import SideModel
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
@@ -34,13 +34,14 @@ def find_warnings(
     side: SideModel,
     group: DescribedTests,
     departure: np.ndarray,
-    refused: PremiseCheck | None,
+    certified: Certified,
     options: IdentifyOptions,
 ) -> tuple[Finding, ...]:
     """Return the warnings about one side.
 
     `departure` (T,) says by how much each test's threshold departs from one direction with the pressure drop, V; zero
-    within its error, and of no matter under another premise. `refused` is the premise that the tests contradict.
+    within its error, and of no matter under another premise. `certified` is the default guard's curve, with what the
+    tests say against a premise.
     """
     return (
         *about_the_meter(side, group, options),
@@ -55,7 +56,7 @@ def find_warnings(
             for test, gap in zip(side.tests, departure, strict=True)
             if gap > 0
         ),
-        *([_about_premise(side, refused)] if refused else []),
+        *_about_premises(side, certified),
         *(
             warn("stick-slip", test.source, ripple_mV=1e3 * test.spool_ripple_V, stop_mV=1.732e3 * test.spool_ripple_V)
             for test in side.tests
@@ -70,8 +71,21 @@ def find_warnings(
     )
 
 
-def _about_premise(side: SideModel, refused: PremiseCheck) -> Finding:
-    return warn("premise-refused", premise=refused.premise, p=refused.lack_of_fit_p, taken=side.curve.premise)
+def _about_premises(side: SideModel, certified: Certified) -> Iterator[Finding]:
+    refused, vertex, taken = certified.refused, certified.vertex, side.curve.premise
+    if refused:
+        yield warn("premise-refused", premise=refused.premise, p=refused.lack_of_fit_p, taken=taken)
+    if vertex:
+        yield warn(
+            "vertex-between-tests",
+            case="premise" if taken == "monotone" else "other-premise",
+            low_MPa=vertex.from_MPa,
+            high_MPa=vertex.to_MPa,
+            at_MPa=vertex.at_MPa,
+            depth_mV=1e3 * vertex.depth_V,
+            p=vertex.p_value,
+            taken=taken,
+        )
 
 
 def _checks(side: SideModel, group: DescribedTests) -> ScatterChecks:

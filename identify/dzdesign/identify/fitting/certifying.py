@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import Worded, worded
 from dzdesign.identify.constants import MPA, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import fit_offset
@@ -20,6 +21,7 @@ from dzdesign.identify.fitting.premises import (
     confidence_at_tests,
     find_curvature,
 )
+from dzdesign.identify.fitting.vertices import Vertex, find_vertex
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, OpeningCurve, PremiseCheck
@@ -52,6 +54,8 @@ class BoundUnderPremise:
     #: M between neighbouring tests, V/MPa²; empty for `monotone`.
     curvature: np.ndarray
     p_value: float | None
+    #: Where the tests show, significantly, that a threshold that is to be `monotone` is lowest between two of them.
+    vertex: Vertex | None = None
 
     @property
     def refused(self) -> bool:
@@ -62,16 +66,11 @@ class BoundUnderPremise:
 def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Premise, BoundUnderPremise]:
     """Return the bounds under every premise that these tests allow to be taken, the strongest first."""
     free, between, dp, options = guarded.free, guarded.between, tested.dp_MPa, tested.options
-    ordered = guarded.ordered
-    monotone = BoundUnderPremise(
-        premise="monotone", value=ordered.value, se=ordered.se, lower=ordered.bound, curvature=np.zeros(0),
-        p_value=guarded.one_way_p,
-    )  # fmt: skip
-    found = [monotone]
+    covariance = between.covariance_of_mean(free.se) + (FINEST_ERROR * options.u_max) ** 2 * np.eye(dp.size)
+    degrees = float(between.degrees_of_freedom(free.se, DEGREES_OF_FREEDOM).min())
+    found = [_monotone(guarded, find_vertex(dp, free.value, covariance, degrees))]
     declared = None if options.curvature is None else options.curvature * MPA**2
     if dp.size > 1 and (dp.size >= FEWEST_FOR_CURVATURE or options.curvature is not None):
-        covariance = between.covariance_of_mean(free.se) + (FINEST_ERROR * options.u_max) ** 2 * np.eye(dp.size)
-        degrees = float(between.degrees_of_freedom(free.se, DEGREES_OF_FREEDOM).min())
         bends = find_curvature(dp, free.value, covariance, degrees, declared)
         smooth = BoundUnderPremise(
             premise="smooth", value=free.value, se=free.se, lower=free.bound, curvature=bends.allowed,
@@ -91,13 +90,28 @@ def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Pre
     return {each.premise: each for each in found}
 
 
+def _monotone(guarded: GuardedThreshold, vertex: Vertex | None) -> BoundUnderPremise:
+    """Return the bounds of a threshold that runs one way: two tests, of its steps and between them, each at 1 %."""
+    ordered = guarded.ordered
+    tested = [p for p in (guarded.one_way_p, vertex.p_value if vertex else None) if p is not None]
+    return BoundUnderPremise(
+        premise="monotone", value=ordered.value, se=ordered.se, lower=ordered.bound, curvature=np.zeros(0),
+        p_value=min(tested, default=None),
+        vertex=vertex if vertex and vertex.significant else None,
+    )  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certified:
-    """A certified curve, which constraints of its offset hold with equality, and a premise that was refused."""
+    """A certified curve, which constraints of its offset hold with equality, and what the tests say against premises.
+
+    `refused` is a premise that was asked for; the `vertex` contradicts the curve, or what would certify more.
+    """
 
     curve: CertifiedCurve
     active: tuple[str, ...]
     refused: PremiseCheck | None
+    vertex: Vertex | None
 
 
 def certify_thresholds(thresholds: Mapping[Guard, GuardedThreshold], tested: Tested) -> dict[Guard, Certified]:
@@ -133,10 +147,10 @@ def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
             failures[premise] = error
     checks = {premise: _check(bound, offsets.get(premise), tested) for premise, bound in bounds.items()}
     one_way = not (guarded.departs or bounds["monotone"].refused)
-    taken, refused = _take(bounds, offsets, tested.options.curve, one_way=one_way)
+    taken, refused = _take(bounds, offsets, _asked(tested.options), one_way=one_way)
     if taken not in offsets:
-        raise failures[taken]
-    bound, offset = bounds[taken], offsets[taken]
+        raise _too_much_sag(bounds[taken]) or failures[taken]
+    bound, offset, vertex = bounds[taken], offsets[taken], bounds["monotone"].vertex
     declared: Literal["declared", "estimated"] = "declared" if tested.options.curvature is not None else "estimated"
     with_dp = tested.dp_MPa.size > 0 and not np.isnan(tested.dp_MPa).any()
     curve = CertifiedCurve(
@@ -151,7 +165,16 @@ def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
         offset_dp_MPa=tuple(map(float, offset.dp_MPa)) if with_dp else (),
         offset_V=tuple(map(float, offset.offset)),
     )
-    return Certified(curve=curve, active=offset.active, refused=checks[refused] if refused else None)
+    costs = taken == "monotone" or ("monotone" in offsets and offsets["monotone"].mean > offset.mean)
+    return Certified(
+        curve=curve, active=offset.active, refused=checks[refused] if refused else None,
+        vertex=vertex if costs else None,
+    )  # fmt: skip
+
+
+def _asked(options: IdentifyOptions) -> Premise | None:
+    """Return the premise that the engineer states: who declares a curvature states `smooth`."""
+    return "smooth" if options.curvature is not None else options.curve
 
 
 def _take(
@@ -163,9 +186,14 @@ def _take(
 ) -> tuple[Premise, Premise | None]:
     """Return the premise to take, and the one that was asked for but that the tests refuse.
 
-    By default `smooth`, where its curvature can be told or is declared and it certifies more, on average, than
-    `monotone`: a curvature that the tests know too badly supports nothing. Where the tests do not run `one_way`, it is
-    `smooth` whatever it certifies.
+    By default `smooth`, where its curvature can be told and it certifies more, on average, than `monotone`: a curvature
+    that the tests know too badly supports nothing. But it certifies the less the more the tests bend, so where they
+    bend to a vertex between two of them it is taken whatever it certifies; so it is where they do not run `one_way`.
+
+    Raises
+    ------
+    InputError
+        If the premise that is asked for needs more tests, or if the tests show a vertex and no curvature is supported.
     """
     # One that runs the wrong way has paid for it: its bounds are lowered.
     refused = asked if asked in ("line", "smooth") and asked in bounds and bounds[asked].refused else None
@@ -176,11 +204,39 @@ def _take(
         )
     if asked is not None and refused is None:
         return asked, None
-    smooth = bounds.get("smooth")
+    smooth, vertex = bounds.get("smooth"), bounds["monotone"].vertex
     if refused == "smooth" or smooth is None or smooth.refused or "smooth" not in offsets:
+        if vertex:
+            raise InputError(_no_premise(vertex))
         return "monotone", refused
-    better = not one_way or "monotone" not in offsets or offsets["smooth"].mean > offsets["monotone"].mean
+    better = vertex or not one_way or "monotone" not in offsets or offsets["smooth"].mean > offsets["monotone"].mean
     return ("smooth" if better else "monotone"), refused
+
+
+def _too_much_sag(bound: BoundUnderPremise) -> InputError | None:
+    """Say that the curvature leaves no offset where the bounds at the tests themselves would."""
+    if bound.premise != "smooth" or bound.lower.min() <= 0:
+        return None
+    largest = 1e3 * float(bound.curvature.max())
+    return InputError(
+        worded(
+            "with a curvature M of up to {largest:.3g} mV/MPa² the threshold may sag between the tests so far that no "
+            "positive offset is left, or one that varies beyond bounds; record tests between, declare the valve's "
+            "--curvature if it is less, or ask for another --curve",
+            largest=largest,
+        )
+    )
+
+
+def _no_premise(vertex: Vertex) -> Worded:
+    """Say that neither a direction nor a curvature is supported, and which test would help."""
+    return worded(
+        "the tests bend so much that the threshold seems lowest between {low:.3g #MPa} and {high:.3g MPa}, "
+        "{depth:.3g mV} below both (p = {p:.2g}): no threshold that runs one way, and no curvature that leaves an "
+        "offset, agrees with them. Record a test at about {at:.2g MPa}, declare the largest --curvature, or, if you "
+        "know that it runs one way there, give --curve monotone",
+        low=vertex.from_MPa, high=vertex.to_MPa, depth=1e3 * vertex.depth_V, p=vertex.p_value, at=vertex.at_MPa,
+    )  # fmt: skip
 
 
 def _fit_offset(bound: BoundUnderPremise, tested: Tested) -> OffsetUnderBound:

@@ -213,7 +213,7 @@ def fit_offset(
     low, high = {"decreasing": (-np.inf, 0.0), "increasing": (0.0, np.inf), "flat": (0.0, 0.0)}[trend]
     with SOLVER_LOCK:
         solver = offset_solver(guard.size)
-        solution = solver(x0=0.1, p=known, lbx=0.0, lbg=low, ubg=high)
+        solution = solver(p=known, lbx=0.0, lbg=low, ubg=high)
         outcome = solver.stats()
         slack = np.maximum(np.asarray(solution["x"]).ravel(), 0.0) / 1e3
     _log("offset", outcome)
@@ -221,7 +221,7 @@ def fit_offset(
     wrong_way = {"decreasing": np.diff(found), "increasing": -np.diff(found), "flat": np.abs(np.diff(found))}[trend]
     if not outcome["success"] or np.any(wrong_way > 2 * ACTIVE * u_max):
         raise InputError(
-            f"beta(dP) could not be fitted under its bounds ({outcome['return_status']}); "
+            f"beta(dP) could not be fitted under its bounds ({outcome['unified_return_status']}); "
             "check that the ramp tests belong to one valve"
         )
     return OffsetFit(u_min0=float(found[reference]), beta=found / found[reference], active=slack < ACTIVE * u_max)

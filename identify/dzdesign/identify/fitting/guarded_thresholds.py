@@ -11,13 +11,15 @@ from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, T
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.guarding import (
     OrderedKnees,
-    Threshold,
     bound_threshold,
+    edges_of_branch,
     mean_threshold,
     order_knees,
     systematic_change,
 )
 from dzdesign.identify.fitting.premises import REFUSED, confidence_at_tests, one_way_p
+from dzdesign.identify.fitting.soft_edges import EdgeShapes
+from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
@@ -70,7 +72,8 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
     column = 1 if group.tests[0].shapes[1] else 0  # falling wherever there is one: zero command comes after closing
     guard: Guard = "closing" if column else "opening"
     other: Guard = "opening" if column else "closing"
-    single = {guard: _unordered(group, free, column, options)}
+    edges = {guard: edges_of_branch(group, column, options)}
+    single = {guard: _unordered(group, free, column, edges[guard], options)}
     trend = _trend_of(group, column, single[guard].value, single[guard].se, options)
     of_knees = _trend_of(group, column, free.knee[:, column], free.knee_se[:, column], options).direction
     knees = {guard: order_knees(group, free, of_knees, column, options)}
@@ -78,19 +81,20 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
     with suppress(InputError):
         if group.tests[0].shapes[1 - column]:
             knees[other] = order_knees(group, free, of_knees, 1 - column, options, alone=True)
-            single[other] = _unordered(group, free, 1 - column, options)
+            edges[other] = edges_of_branch(group, 1 - column, options)
+            single[other] = _unordered(group, free, 1 - column, edges[other], options)
     thresholds: dict[Guard, GuardedThreshold] = {}
     for name, ordered in knees.items():
         thresholds[name] = GuardedThreshold(
             free=single[name],
-            ordered=bound_threshold(group, ordered, options),
+            ordered=bound_threshold(group, ordered, edges[name], options),
             between=group.between(ordered.column),
             allowance=systematic_change(group, ordered.column, options),
             departs=bool(ordered.departure.max() > 0),
         )
     departure = guarded_departure(thresholds[guard], trend.direction)
     finest = FINEST_ERROR * options.u_max
-    thresholds = {name: _lowered(each, trend.direction, finest) for name, each in thresholds.items()}
+    thresholds = {name: lowered(each, trend.direction, finest) for name, each in thresholds.items()}
     departure = _said(thresholds[guard], trend.direction, departure)
     if other in thresholds:
         thresholds["mean"] = _mean_of(group, thresholds)
@@ -106,10 +110,12 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
     )
 
 
-def _unordered(group: DescribedTests, free: KneeFit, column: int, options: IdentifyOptions) -> Threshold:
+def _unordered(
+    group: DescribedTests, free: KneeFit, column: int, edges: EdgeShapes, options: IdentifyOptions
+) -> Threshold:
     """Return a branch's threshold for a premise that is no direction."""
     alone = OrderedKnees(column=column, fit=free, departure=np.zeros(len(group.tests)))
-    return bound_threshold(group, alone, replace(options, confidence=confidence_at_tests(options.confidence)))
+    return bound_threshold(group, alone, edges, replace(options, confidence=confidence_at_tests(options.confidence)))
 
 
 def _trend_of(
@@ -158,14 +164,14 @@ def guarded_departure(guarded: GuardedThreshold, direction: Direction) -> np.nda
     return excess_departure(np.abs(value - nearest), error, guarded.allowance)
 
 
-def _lowered(guarded: GuardedThreshold, direction: Direction, finest: float) -> GuardedThreshold:
+def lowered(guarded: GuardedThreshold, direction: Direction, finest: float) -> GuardedThreshold:
     """Lower the bounds under one direction by what the guarded threshold departs from it, and test the direction.
 
     Errors below `finest`, V, weigh alike. Without a direction the lowest bound of all tests holds everywhere, whatever
     the others do.
     """
     departure = float(guarded_departure(guarded, direction).max())
-    lowered = guarded.ordered.bound - (0.0 if direction == "flat" else departure)
+    bound = guarded.ordered.bound - (0.0 if direction == "flat" else departure)
     free, between = guarded.free, guarded.between
     p_value = one_way_p(
         free.value,
@@ -175,7 +181,7 @@ def _lowered(guarded: GuardedThreshold, direction: Direction, finest: float) -> 
     )
     return replace(
         guarded,
-        ordered=replace(guarded.ordered, bound=lowered),
+        ordered=replace(guarded.ordered, bound=bound),
         departs=guarded.departs or departure > 0,
         one_way_p=p_value,
     )

@@ -10,7 +10,9 @@ from dzdesign.identify.fitting.bounds import (
     lower_bounds,
 )
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
-from dzdesign.identify.fitting.soft_edges import find_softness
+from dzdesign.identify.fitting.soft_edges import EdgeShapes, find_softness, fit_edge_shapes
+from dzdesign.identify.fitting.threshold import Threshold
+from dzdesign.identify.fitting.zero_flow import with_zero_flow
 from dzdesign.identify.knees.described_tests import DescribedTests
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.staircase import Direction
@@ -42,17 +44,6 @@ class OrderedKnees:
     def knee_se(self) -> np.ndarray:
         """Their standard errors, V."""
         return self.fit.knee_se[:, self.column]
-
-
-@dataclass(frozen=True, slots=True)
-class Threshold:
-    """A guarded threshold, its standard errors and simultaneous lower bounds (V), all (T,)."""
-
-    value: np.ndarray
-    se: np.ndarray
-    bound: np.ndarray
-    #: By how much the bounds were lowered for the tolerance of the meter's lag, V, (T,).
-    lag_budget: np.ndarray
 
 
 def systematic_change(group: DescribedTests, column: int, options: IdentifyOptions) -> float:
@@ -101,9 +92,18 @@ def order_knees(
     return OrderedKnees(column=column, fit=fit, departure=departure)
 
 
-def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: IdentifyOptions) -> Threshold:
+def edges_of_branch(group: DescribedTests, column: int, options: IdentifyOptions) -> EdgeShapes:
+    """Fit the shapes of the edge to the tests' rising (0) or falling (1) branch."""
+    shapes = [item.branch(column) for item in group.tests]
+    return fit_edge_shapes(shapes, level=group.noise_level, lag=group.lag, u_max=options.u_max)
+
+
+def bound_threshold(
+    group: DescribedTests, knees: OrderedKnees, edges: EdgeShapes, options: IdentifyOptions
+) -> Threshold:
     """Bound the knee, or below it what a soft edge still passes: the tail's zero, if that lies below by more than its
-    error, and where the flow falls to the noise level."""
+    error, and where the flow falls to the noise level; or where it comes to the flow that is allowed at zero. `edges`
+    are those of the same branch."""
     shapes = [item.branch(knees.column) for item in group.tests]
     knee, knee_se = knees.knee, knees.knee_se
     zero = np.array([shape.tail.zero for shape in shapes])
@@ -136,16 +136,15 @@ def bound_threshold(group: DescribedTests, knees: OrderedKnees, options: Identif
     bound = np.minimum(np.where(soft, np.minimum(knee_bound, zero_bound), knee_bound), knee_bound - depth)
     # Where the edge may pass more than the level below the knee, as credible as the bound is sure. Both errors are of
     # different readings, so they add by their squares.
-    softness = find_softness(
-        shapes, knee, level=group.noise_level, lag=group.lag, confidence=options.confidence, u_max=options.u_max
-    )
+    softness = find_softness(edges, knee, options.confidence)
     margin = np.hypot(knee - knee_bound, softness.at_most - softness.likely)
-    return Threshold(
+    found = Threshold(
         np.minimum(value, knee - softness.likely),
         np.where(soft, zero_se, knee_se),
         np.minimum(bound, knee - softness.likely - margin),
         lag_budget,
     )
+    return with_zero_flow(group, knees.column, found, shared, options)
 
 
 def mean_threshold(group: DescribedTests, opening: Threshold, closing: Threshold) -> Threshold:

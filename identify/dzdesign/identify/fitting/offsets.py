@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.fitting.casadi_problems import EXACT, IPOPT, KEPT, SOLVER_LOCK
+from dzdesign.identify.fitting.casadi_problems import KEPT, QUADRATIC, SOLVER_LOCK
 from dzdesign.identify.fitting.constrained_fits import ACTIVE
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 from dzdesign.identify.valve.guard_curve import largest_excess
@@ -114,14 +114,13 @@ def _solve(
         bottom[ceiling.size :] = 0.0
     with SOLVER_LOCK:
         solver = _offset_solver(nodes.size)
-        start = min(0.0, float(np.min(wanted - lowest) * 1e3)) - 1.0
-        solution = solver(x0=start, p=known, lbg=bottom, ubg=top)
+        solution = solver(p=known, lbg=bottom, ubg=top)
         outcome = solver.stats()
         found: np.ndarray = lowest + np.asarray(solution["x"]).ravel() / 1e3
     steps = np.diff(found) * (1 if trend == "decreasing" else -1)
     if not outcome["success"] or np.any(steps > WRONG_WAY * u_max):
         raise InputError(
-            f"the law's offset could not be fitted under its bounds ({outcome['return_status']}); "
+            f"the law's offset could not be fitted under its bounds ({outcome['unified_return_status']}); "
             "check that the ramp tests belong to one valve"
         )
     # What runs the wrong way by the solver's tolerance is brought down.
@@ -148,4 +147,4 @@ def _offset_solver(nodes: int) -> "ca.Function":
         "f": ca.dot(length, (wanted - offset) ** 2),
         "g": ca.vertcat(*between, offset[-1], offset[1:] - offset[:-1]),
     }
-    return ca.nlpsol("offset_under_bound", "ipopt", problem, IPOPT | EXACT)
+    return ca.qpsol("offset_under_bound", "daqp", problem, QUADRATIC)

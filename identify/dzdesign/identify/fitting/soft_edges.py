@@ -9,7 +9,7 @@ sharp edge too, so each is asked with every lag that the meter may have.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,45 +50,68 @@ class _Shapes:
     at_level: np.ndarray
 
 
-def find_softness(
-    shapes: Sequence[BranchShape], knees: np.ndarray, *, level: float, lag: MeterLag, confidence: float, u_max: float
-) -> Softness:
-    """Find how far below the knees (V, (T,)) of one branch the flow may exceed the level (m³/s)."""
-    from scipy.special import stdtrit
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EdgeShapes:
+    """The edges that were fitted to the tests of one branch: what `find_softness` judges."""
 
+    grids: tuple[_Shapes, ...]
+    #: Readings beyond the three parameters of each test, and which tests tell an edge, (T,).
+    degrees: int
+    told: np.ndarray
+
+    @property
+    def best(self) -> _Shapes:
+        """The grid that has the most credible shape of all."""
+        return min(self.grids, key=lambda grid: float(grid.squares.min()))
+
+
+def fit_edge_shapes(shapes: Sequence[BranchShape], *, level: float, lag: MeterLag, u_max: float) -> EdgeShapes:
+    """Fit edges of two straight parts to one branch of all tests, with every lag that the meter may have.
+
+    The level is the flow (m³/s) that is looked for below the knees.
+    """
     floor = smallest_flow_shown(shapes, u_max)
     averages = [average_about_edge(shape, floor, u_max) for shape in shapes]
     known = [item for item in averages if item is not None]
+    found = EdgeShapes(
+        grids=(),
+        degrees=max(sum(item.u.size - 3 for item in known), 1),
+        told=np.array([item is not None for item in averages]),
+    )
     if not known:
-        return Softness(np.zeros(knees.size), np.zeros(knees.size))
+        return found
     width = np.concatenate([[0.0], WIDTHS * u_max])
-    grids = [_fit(known, SHARES, width, seconds, level, u_max) for seconds in _lags(lag, shapes, known, level)]
-    best = _best(grids)
+    grids = tuple(_fit(known, SHARES, width, seconds, level, u_max) for seconds in _lags(lag, shapes, known, level))
+    found = replace(found, grids=grids)
     for _ in range(REFINED):
+        best = found.best
         if best.width[int(np.argmin(best.squares)) % best.width.size] == 0:
             break
-        grids.append(_finer(known, best, level, u_max))
-        best = _best(grids)
+        found = replace(found, grids=(*found.grids, _finer(known, best, level, u_max)))
+    return found
+
+
+def find_softness(edges: EdgeShapes, knees: np.ndarray, confidence: float) -> Softness:
+    """Find how far below the knees (V, (T,)) of one branch the flow may exceed the level."""
+    from scipy.special import stdtrit
+
+    if not edges.grids:
+        return Softness(np.zeros(knees.size), np.zeros(knees.size))
+    best = edges.best
     least = float(best.squares.min())
     # Where no shape fits as well as the noise allows, all of them are judged by what the best one leaves.
-    left = max(least / max(sum(item.u.size - 3 for item in known), 1), 1.0)
+    left = max(least / edges.degrees, 1.0)
     credible = float(stdtrit(DEGREES_OF_FREEDOM, confidence)) ** 2 * left
-    likely = best.at_level.reshape(len(known), -1)[:, int(np.argmin(best.squares))]
-    lowest = np.min([likely, *(_lowest_credible(grid, least + credible) for grid in grids)], axis=0)
-    told = np.array([item is not None for item in averages])
+    likely = best.at_level.reshape(len(best.at_level), -1)[:, int(np.argmin(best.squares))]
+    lowest = np.min([likely, *(_lowest_credible(grid, least + credible) for grid in edges.grids)], axis=0)
     found = []
     for command in (likely, lowest):
-        below = np.maximum(knees[told] - command, 0.0)
+        below = np.maximum(knees[edges.told] - command, 0.0)
         # One edge has made all tests: one that tells nothing by itself has what the others have.
         every = np.full(knees.size, below.max())
-        every[told] = below
+        every[edges.told] = below
         found.append(every)
     return Softness(*found)
-
-
-def _best(grids: Sequence[_Shapes]) -> _Shapes:
-    """Return the grid that has the most credible shape of all."""
-    return min(grids, key=lambda grid: float(grid.squares.min()))
 
 
 def _lags(lag: MeterLag, shapes: Sequence[BranchShape], known: Sequence[EdgeAverages], level: float) -> np.ndarray:

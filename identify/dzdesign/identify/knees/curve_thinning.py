@@ -16,6 +16,8 @@ from dzdesign.identify.valve.recorded_curve import MOST_POINTS, SAG_STEPS, Recor
 #: A line between two points is halved where the flow, averaged over so many bins (0.5 % of full command), departs from
 #: it by more than this share of the test's largest flow, and by more than its own noise explains, standard errors.
 AVERAGED, TOLERANCE, NOISE_ERRORS = 5, 2.5e-3, 4.0
+#: Up to this multiple of a flow that is allowed at zero command the share is of that flow, if it is less.
+ABOUT_ZERO, OF_ZERO_FLOW = 2.0, 0.1
 #: Readings within this share of a step of the flow tell the pressure drop there.
 NEAR_STEP = 0.1
 #: Share by which a pressure drop is another than the flow's usual one: more than straight lines between the steps miss
@@ -25,13 +27,19 @@ OFF_THE_USUAL = 0.15
 DIGITS, DECIMALS = 5, 7
 
 
-def recorded_curve(item: DescribedTest, leak: float, noise_level: float, u_max: float) -> RecordedCurve:
-    """Return the characteristic that the ramps of a test show; leak and noise level in m³/s."""
+def recorded_curve(
+    item: DescribedTest, leak: float, noise_level: float, u_max: float, at_zero: float | None = None
+) -> RecordedCurve:
+    """Return the characteristic that the ramps of a test show; leak and noise level in m³/s.
+
+    Where a flow (m³/s) is allowed at zero command, the points stand closer about it, as the loop is judged by it.
+    """
     supply = _Supply.of([shape.prepared.branch for shape in item.branches], leak, item.q_max + leak)
     profiles = [_profile(shape, supply, leak, u_max) if shape else None for shape in item.shapes]
     tolerance = TOLERANCE * max(float(profile[1].max()) for profile in profiles if profile)
     rising, falling = (
-        profile and _thinned(*profile, leak=leak, level=noise_level, tolerance=tolerance) for profile in profiles
+        profile and _thinned(*profile, leak=leak, level=noise_level, tolerance=tolerance, at_zero=at_zero or 0.0)
+        for profile in profiles
     )
     curve = RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=None)
     if supply is None:
@@ -87,10 +95,10 @@ def _profile(
 
 
 def _thinned(
-    u: np.ndarray, q: np.ndarray, onset: float, *, leak: float, level: float, tolerance: float
+    u: np.ndarray, q: np.ndarray, onset: float, *, leak: float, level: float, tolerance: float, at_zero: float
 ) -> RecordedBranch:
     """Return the points of a branch whose flow q (m³/s) was averaged in bins of the command."""
-    at, q_at = _points(u, q, tolerance)
+    at, q_at = _points(u, q, np.where(q < ABOUT_ZERO * at_zero, min(OF_ZERO_FLOW * at_zero, tolerance), tolerance))
     u_seen = _first_seen(u[at], q_at, leak + level)
     lowest, seen = float(u[0]), u[at] > u_seen
     points = [(u_seen, leak + level), *zip(u[at][seen].tolist(), np.maximum(q_at[seen], 0.0).tolist(), strict=True)]
@@ -117,18 +125,21 @@ def _decimals(largest: float) -> int:
     return min(max(DIGITS - math.ceil(math.log10(largest)), 0), DECIMALS)
 
 
-def _points(u: np.ndarray, q: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return at which bins the points stand, and the flow there: least squares, halved until the lines fit."""
+def _points(u: np.ndarray, q: np.ndarray, tolerance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return at which bins the points stand, and the flow there: least squares, halved until the lines fit.
+
+    `tolerance` is that of each bin.
+    """
     # Of neighbouring bins on a straight line the second difference is noise alone, of six times its variance.
     noise = robust_sigma(np.diff(q, 2)) / math.sqrt(6) if q.size > 2 else 0.0
-    allowed = max(tolerance, NOISE_ERRORS * noise / math.sqrt(AVERAGED))
+    allowed = np.maximum(tolerance, NOISE_ERRORS * noise / math.sqrt(AVERAGED))
     at = np.unique(np.linspace(0, u.size - 1, min(9, u.size)).round().astype(int))
     while True:
         flows = _least_squares(u, q, at)
-        misses = np.abs(_averaged(q - np.interp(u, u[at], flows)))
+        misses = np.abs(_averaged(q - np.interp(u, u[at], flows))) / allowed
         wide = np.diff(at) > 1
         worst = np.maximum.reduceat(misses, at[:-1])
-        halved = np.flatnonzero(wide & (worst > allowed))
+        halved = np.flatnonzero(wide & (worst > 1))
         room = MOST_POINTS - at.size
         if not halved.size or room <= 0:
             return at, flows

@@ -62,6 +62,8 @@ class DescribedTests:
     zero_se: tuple[float, ...]
     #: Leak that was subtracted from each of `tests`, m³/s; 0 where there is none.
     leak: tuple[float, ...]
+    #: What the shut valve itself may pass of all that was subtracted from each of `tests`, and its standard error.
+    at_rest: tuple[tuple[float, float], ...]
     #: What differs from ramp to ramp, of the rising and of the falling branch; None where there is none.
     between_ramps: tuple[BetweenRamps | None, BetweenRamps | None]
 

@@ -128,7 +128,7 @@ def _lag_of_two_rates(ramps: Sequence[Ramp], options: IdentifyOptions) -> tuple[
     for group in group_by_pressure(ramps):
         for rising in (True, False):
             rates, of_group, errors = _knees(group, rising, options)
-            if rates.size < 2 or rates.max() < TWO_RATES * rates.min():
+            if not _two_rates(rates):
                 continue
             # Each group and direction has a knee of its own, so only departures from its mean tell the lag.
             weight = 1 / (errors**2 + scatter**2)
@@ -149,18 +149,27 @@ def _lag_of_two_rates(ramps: Sequence[Ramp], options: IdentifyOptions) -> tuple[
 
 def _knees(group: Sequence[Ramp], rising: bool, options: IdentifyOptions) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return rate (V/s), knee and its standard error (V) of each ramp's branch of one direction; without those that
-    show no knee by themselves."""
+    show no knee by themselves. None are looked for in branches of one rate."""
     found = []
     highest = max((branch.u.max() for ramp in group for branch in ramp.branches), default=0.0)
-    for ramp in group:
-        for branch in ramp.branches:
-            whole = branch.u.max() >= FULL_SWEEP * highest and np.ptp(branch.u) >= FULL_SWEEP * highest
-            if branch.rising is not rising or not math.isfinite(branch.rate) or not whole:
-                continue
-            read = prepare_branch(branch, ramp.test, u_max=options.u_max, floor=options.meter_floor or 0.0)
-            with suppress(InputError):
-                line = lay_line(read, options.knee_window)
-                if line.slope > 0:
-                    found.append((branch.rate, line.knee, line.knee_se))
+    whole = [
+        (ramp, branch)
+        for ramp in group
+        for branch in ramp.branches
+        if branch.rising is rising
+        and math.isfinite(branch.rate)
+        and branch.u.max() >= FULL_SWEEP * highest
+        and np.ptp(branch.u) >= FULL_SWEEP * highest
+    ]
+    for ramp, branch in whole if _two_rates([branch.rate for _, branch in whole]) else ():
+        read = prepare_branch(branch, ramp.test, u_max=options.u_max, floor=options.meter_floor or 0.0)
+        with suppress(InputError):
+            line = lay_line(read, options.knee_window)
+            if line.slope > 0:
+                found.append((branch.rate, line.knee, line.knee_se))
     columns = np.array(found).reshape(-1, 3)
     return columns[:, 0], columns[:, 1], columns[:, 2]
+
+
+def _two_rates(rates: Sequence[float] | np.ndarray) -> bool:
+    return len(rates) > 1 and max(rates) >= TWO_RATES * min(rates)

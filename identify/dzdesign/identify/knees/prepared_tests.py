@@ -72,6 +72,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         # Of several recordings pooled to one test, the worst: each stands for its own part of the ramp.
         zero_se=tuple(max(rest.se.get(name, 0.0) for name, _ in item.files) for item in described),
         leak=tuple(rest.leak_per_Pa * (item.dp or 0.0) for item in described),
+        at_rest=tuple(rest.passed_by_the_valve([name for name, _ in item.files], item.dp) for item in described),
     )
 
 

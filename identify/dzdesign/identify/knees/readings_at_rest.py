@@ -39,6 +39,28 @@ class RestFlows:
     se: dict[str, float]
     #: Leak over the pressure drop, m³/(s Pa); 0 where there is none.
     leak_per_Pa: float
+    #: The same whether or not it stands out, and its standard error; None where one pressure drop can't tell it.
+    growth_per_Pa: tuple[float, float] | None
+    #: By source: what was subtracted beside the leak, whether or not it stands out; and the least reading at rest of
+    #: all recordings, m³/s.
+    beside: dict[str, float]
+    least: float
+
+    def passed_by_the_valve(self, sources: Sequence[str], dp: float | None) -> tuple[float, float]:
+        """Return what the shut valve itself may pass of the flow that was subtracted, and its standard error, m³/s.
+
+        A meter's zero and a leak are told apart by the pressure drop alone: at a single one all that was read is
+        counted. One meter has one zero, and no leak flows backwards, so what a recording reads beyond the least of all
+        is a leak however it grows: a meter with a floor shows that of high pressure drops only.
+        """
+        beside = max(self.beside.get(source, 0.0) for source in sources)
+        if not self.leak_per_Pa and not any(self.beside.get(source, 0.0) for source in sources):
+            return 0.0, 0.0  # nothing was subtracted, so all of it is in the readings
+        se = max(self.se.get(source, 0.0) for source in sources)
+        if self.growth_per_Pa is None or dp is None:
+            return max(0.0, beside), se
+        growth, error = self.growth_per_Pa
+        return max(growth * dp, beside + self.leak_per_Pa * dp - self.least, 0.0), max(error * dp, se)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +78,12 @@ class _Rest:
 def find_rest_flows(tests: Sequence[RampTest], u_max: float) -> RestFlows:
     """Find what recordings read at zero command, and what of it grows with the pressure drop."""
     levels = [level for number, test in enumerate(tests) for level in _levels(number, test, u_max)]
-    leak = _leak(levels, max(float(np.abs(test.q).max()) for test in tests))
+    largest = max(float(np.abs(test.q).max()) for test in tests)
+    growth = _growth(levels, largest)
+    leak = _leak(growth, levels, largest)
     flows: list[float | np.ndarray] = []
     zeros: dict[str, float] = {}
+    beside: dict[str, float] = {}
     errors: dict[str, float] = {}
     for number, test in enumerate(tests):
         own = [level for level in levels if level.recording == number]
@@ -67,8 +92,13 @@ def find_rest_flows(tests: Sequence[RampTest], u_max: float) -> RestFlows:
         # Beside a leak the zero is what a line extrapolates to no pressure, about twice as far off.
         told = abs(zero) > max(2 * ZERO_ERRORS * se, ZERO_SHARE * float(np.abs(test.q).max()))
         zeros[test.source] = zero if told or not leak else 0.0
+        beside[test.source] = zero
         flows.append(zero if leak == 0 or test.dp is None else zero + leak * test.dp)
-    return RestFlows(flows=tuple(flows), zero=zeros, se=errors, leak_per_Pa=leak)
+    return RestFlows(
+        flows=tuple(flows), zero=zeros, se=errors, leak_per_Pa=leak,
+        growth_per_Pa=(growth.per_Pa, growth.error) if growth else None,
+        beside=beside, least=min((level.flow for level in levels), default=0.0),
+    )  # fmt: skip
 
 
 def _zero_beside(leak: float, test: RampTest, levels: Sequence[_Rest], u_max: float) -> tuple[float, float]:
@@ -105,25 +135,48 @@ def _levels(number: int, test: RampTest, u_max: float) -> Iterator[_Rest]:
         yield _Rest(number, float(np.median(test.dp[part])), float(np.median(q)), _error_of_median(q), colour)
 
 
-def _leak(levels: Sequence[_Rest], largest: float) -> float:
-    """Return by how much the readings at rest grow with the pressure drop, m³/(s Pa); 0 if that does not stand out.
+@dataclass(frozen=True, slots=True)
+class _Growth:
+    """By how much the readings at rest grow with the pressure drop, m³/(s Pa)."""
+
+    per_Pa: float
+    #: Standard error by the readings' noise, and with what they depart from the line.
+    noise: float
+    error: float
+    #: Share of the squares of the readings about their mean that it explains.
+    explained: float
+
+
+def _growth(levels: Sequence[_Rest], largest: float) -> _Growth | None:
+    """Return by how much the readings at rest grow with the pressure drop; None where one pressure drop was recorded.
 
     Weighted least squares of a zero error that is common to all, and a leak proportional to the pressure drop.
     """
     if len(levels) < 2:
-        return 0.0
+        return None
     dp, flow, se = (np.array([getattr(level, name) for level in levels]) for name in ("dp", "flow", "se"))
     if dp.max() <= TWO_PRESSURES * dp.min():
-        return 0.0
+        return None
     # One meter, so one colour; readings without noise are taken to be as fine as no meter is.
     se = np.maximum(se * math.sqrt(max(1.0, float(np.median([level.colour for level in levels])))), 1e-6 * largest)
     weight = se**-2.0
     away, rise = dp - np.average(dp, weights=weight), flow - np.average(flow, weights=weight)
     squares = float(np.sum(weight * away**2))
-    leak = float(np.sum(weight * away * rise)) / squares
-    explained = leak**2 * squares >= EXPLAINED * float(np.sum(weight * rise**2))
-    stands_out = leak * math.sqrt(squares) > LEAK_ERRORS and leak * np.ptp(dp) > ZERO_SHARE * largest
-    return leak if explained and stands_out else 0.0
+    growth = float(np.sum(weight * away * rise)) / squares
+    every, left = float(np.sum(weight * rise**2)), float(np.sum(weight * (rise - growth * away) ** 2))
+    noise = 1 / math.sqrt(squares)
+    scatter = math.sqrt(max(1.0, left / (len(levels) - 2))) if len(levels) > 2 else 1.0
+    return _Growth(growth, noise, noise * scatter, growth**2 * squares / every if every > 0 else 0.0)
+
+
+def _leak(growth: _Growth | None, levels: Sequence[_Rest], largest: float) -> float:
+    """Return the leak, m³/(s Pa); 0 if the growth does not stand out."""
+    if growth is None:
+        return 0.0
+    dp = [level.dp for level in levels]
+    stands_out = growth.per_Pa > LEAK_ERRORS * growth.noise
+    worth_it = growth.per_Pa * (max(dp) - min(dp)) > ZERO_SHARE * largest
+    return growth.per_Pa if growth.explained >= EXPLAINED and stands_out and worth_it else 0.0
 
 
 def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:

@@ -53,6 +53,10 @@ class RampTest:
     clock_doubt: str = ""
     simulated: bool = False
     no_values: str = ""
+    #: Samples over which the command was averaged, as its column shows the dither; 0: it does not.
+    dither_averaged: int = 0
+    #: Peak of a square wave about the command that was not declared, V; 0: none is seen.
+    undeclared_dither: float = 0.0
     #: Date and time of `time` = 0 that the recording itself states, and time on the clock of the series that counts, s.
     stamp: Start | None = None
     started: float | None = None

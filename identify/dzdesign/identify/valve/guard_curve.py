@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import Premise
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.quantity_types import (
@@ -45,7 +46,8 @@ class PremiseCheck:
         Probability | None,
         Meta(
             description="Probability of tests as unlike the premise as these if it were true, against noise and "
-            "scatter; below 0.01 it is refused. null: the tests can't contradict it."
+            "scatter; below 0.01 it is refused. Of monotone the smaller of two: of its steps, and of a lowest point "
+            "between two tests. null: the tests can't contradict it."
         ),
     ]
     dead_zone_over_u_max: Annotated[
@@ -143,9 +145,8 @@ class CertifiedCurve:
         """Offset at the tests over that at dP0; empty where the pressure drop is unknown."""
         return tuple(value / self.u_min0_V for value in self.u_offset_V) if self.dp_MPa else ()
 
-    @property
-    def premise_in_words(self) -> str:
-        """What the bound rests on between the tests, and how that was tested."""
+    def premise_in_words(self, units: RecordedUnits) -> str:
+        """Return what the bound rests on between the tests, and how that was tested."""
         check = next((each for each in self.premises if each.premise == self.premise), None)
         p_value = None if check is None else check.lack_of_fit_p
         tested = "which these tests can't contradict" if p_value is None else f"lack of fit p = {p_value:.2g}"
@@ -154,15 +155,16 @@ class CertifiedCurve:
         if self.premise == "smooth":
             bends = [1e3 * value for value in self.curvature_V_MPa2]
             inner, ends = min(bends), (bends[0], bends[-1])
-            at_ends = f", {ends[0]:.3g} and {ends[1]:.3g} in the first and last interval" if max(ends) > inner else ""
+            first, last = (units.number(end, ".3g mV/MPa²") for end in ends)
+            at_ends = f", {first} and {last} in the first and last interval" if max(ends) > inner else ""
             return (
                 f"Premise smooth: between two tests the threshold sags at most M h²/8 below the chord of its bounds, "
-                f"M = {inner:.3g} mV/MPa² ({self.curvature_is}{at_ends}; {tested})"
+                f"M = {units.text(inner, '.3g mV/MPa²')} ({self.curvature_is}{at_ends}; {tested})"
             )
         return (
             "Premise monotone: between two tests the bound is the lower one's, on the premise that the threshold runs "
-            f"one way there ({tested}), which no test checks between them: a threshold lowest between two tests "
-            "would lie below it"
+            f"one way there ({tested}): one that is lowest between two tests, in a bend that they do not show, lies "
+            "below it"
         )
 
     def bound(self, trend: Direction) -> CertifiedBound:

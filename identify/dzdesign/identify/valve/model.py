@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.core.artefact_types import Artefact, RuleError, quantity, schema_of
+from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.result_display import ShownInNotebooks
@@ -117,6 +118,13 @@ class ValveModel(ShownInNotebooks, Artefact):
             "quantity that the recordings have in several units, those."
         ),
     ] = AS_COMPUTED
+    dithered: Annotated[
+        Dither | UnsetType,
+        Meta(
+            description="Dither that the drive superimposed on the command while the ramps were recorded: thresholds "
+            "and characteristics are those of the dithered valve. Left out where it had none."
+        ),
+    ] = UNSET
 
     def __post_init__(self) -> None:
         if not self.sides or not set(self.sides) <= set(SIDES):
@@ -126,6 +134,19 @@ class ValveModel(ShownInNotebooks, Artefact):
             raise RuleError(f"'simulated' is {stated}, but 'warnings' {there} warning of that code")
         object.__setattr__(self, "record", checked_record(self.record.items(), "the record"))
         object.__setattr__(self, "untested_sides", tuple(name for name in SIDES if name not in self.sides))
+
+    @property
+    def dither(self) -> Dither | None:
+        """The dither under which the valve was recorded; None: without one."""
+        return None if isinstance(self.dithered, UnsetType) else self.dithered
+
+    @property
+    def dither_in_words(self) -> str:
+        """The dither with its peak in the command's unit; empty without one."""
+        if self.dither is None:
+            return ""
+        peak = self.recorded_units.text(self.dither.peak * self.u_max_V, ".3g dV")
+        return f"a dither of {self.dither.in_words()} (±{peak})"
 
     @property
     def positive(self) -> SideModel:

@@ -102,6 +102,13 @@ class TestResult:
             "zone resolve, and 0.5 % of the largest flow or what was declared."
         ),
     ]
+    zero_flow_L_min: Annotated[
+        Flow | None,
+        Meta(
+            description="Flow at zero command, a leak included, that the bound answers for where one was declared by "
+            "--zero-flow: the declared one, or leak and noise level where they are more. Null: none was declared."
+        ),
+    ]
     noise_L_min: Annotated[Flow, Meta(description="Standard deviation of the flow's noise.")]
     noise_variance_inflation: Annotated[
         float,

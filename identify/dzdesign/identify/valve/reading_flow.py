@@ -14,10 +14,13 @@ from dzdesign.identify.valve.model import ValveModel
 def default_reading_flow(valve: ValveModel) -> float:
     """Return the flow at which dead zones are read unless another is stated, L/min: the meter's floor.
 
-    Of a meter without one it is the largest noise level of the tests: the least flow that all of them show.
+    Of a meter without one it is the largest noise level of the tests: the least flow that all of them show. Where a
+    flow at zero command was declared as allowed, no less than what may flow there: a smaller one is no end of a dead
+    zone.
     """
     levels = (test.noise_level_L_min for side in valve.sides.values() for test in side.tests)
-    return valve.meter.floor_L_min or max(levels)
+    at_zero = (side.zero_flow_L_min or 0.0 for side in valve.sides.values())
+    return max(valve.meter.floor_L_min or max(levels), *at_zero)
 
 
 def ideal_line(flow_L_min: float, largest_L_min: float) -> float:

@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, get_args
 
+import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, CertifiedCurve, Guard, OpeningCurve
 from dzdesign.identify.valve.identified_curve import BETA_ROUNDING, IDENTIFIED, IdentifiedCurve
 from dzdesign.identify.valve.quantity_types import (
@@ -22,6 +24,10 @@ from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.staircase import Direction
 
+#: What bounds answer for over the declared zero flow, above which it is said to be more.
+PROMISED = 1.001
+#: valve.json has seven decimals, L/min.
+ROUNDING_L_MIN = 1e-6
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
 
@@ -64,6 +70,10 @@ class BoundsBasis:
         Meta(
             description="Flow below which there is none: the largest noise level of the tests."
         ),
+    ]
+    zero_flow_L_min: Annotated[
+        Flow | None,
+        Meta(description="Flow at zero command, a leak included, that --zero-flow declared as allowed; null: none."),
     ]
     repeatability: Annotated[Repeatability, Meta(description="What differs from ramp to ramp.")]
 
@@ -143,6 +153,7 @@ class SideModel:
             self._check_nodes(guard.dp_MPa, len(guard.u_lower_V))
             guard.check_offset(self.trend or "flat", self.reference.dp_MPa)
         self._check_guarded()
+        self._check_zero_flow()
         self._check_identified()
         if self.opening_curve is not None:
             self._check_nodes(self.opening_curve.dp_MPa, len(self.opening_curve.u_V))
@@ -167,6 +178,17 @@ class SideModel:
             if abs(test.u_guard_V - threshold) > ROUNDING_V or abs(test.u_guard_lower_V - bound) > ROUNDING_V:
                 raise RuleError(f"the tests' guarded thresholds and bounds are not those of the {guard} curve")
 
+    def _check_zero_flow(self) -> None:
+        """Check that every test answers for the declared flow at zero, or none does."""
+        declared = self.certificate.zero_flow_L_min
+        for test in self.tests:
+            allowed = test.zero_flow_L_min
+            if (allowed is None) != (declared is None) or (allowed or 0.0) < (declared or 0.0) - ROUNDING_L_MIN:
+                raise RuleError(
+                    f"a test answers for a flow at zero of {allowed} L/min beside a declared one of {declared} L/min, "
+                    "expected as much or more, and none where none is declared"
+                )
+
     def _check_identified(self) -> None:
         """Check that there is a curve for the guarded branch, one node a test, and that the reference repeats it."""
         guard = self.certificate.guard
@@ -186,12 +208,37 @@ class SideModel:
         if known.beta and abs(known.beta[row] - 1) > BETA_ROUNDING:
             raise RuleError(f"beta at dP0 is {known.beta[row]:g}, expected 1")
 
-    @property
-    def premise(self) -> str:
-        """What the bounds between the tests rest on, in words."""
+    def premise_in_words(self, units: RecordedUnits) -> str:
+        """Return what the bounds between the tests rest on."""
         if len(self.tests) < 2:
             return "one pressure drop was tested: the bound holds there, and nothing is certified at another"
-        return f"{len(self.tests)} pressure drops were tested. {self.curve.premise_in_words}"
+        return f"{len(self.tests)} pressure drops were tested. {self.curve.premise_in_words(units)}"
+
+    @property
+    def zero_flow_L_min(self) -> float | None:
+        """Largest flow at zero command that the bounds answer for, a leak included; None where none was declared."""
+        allowed = [test.zero_flow_L_min for test in self.tests if test.zero_flow_L_min is not None]
+        return max(allowed, default=None)
+
+    def zero_flow_in_words(self, units: RecordedUnits) -> str:
+        """Say what flows at zero command at most, and what was declared; nothing where nothing was declared."""
+        declared, allowed = self.certificate.zero_flow_L_min, self.zero_flow_L_min
+        if declared is None or allowed is None:
+            return ""
+        text = f"up to {units.text(allowed, '.3g L/min')} may flow, a leak included: "
+        if allowed <= PROMISED * declared:
+            return f"{text}the declared zero flow"
+        zero_flow = units.text(declared, ".3g L/min")
+        return f"{text}leak and noise level come to more than the declared zero flow of {zero_flow}"
+
+    def zero_flow_at(self, dp_MPa: float) -> float | None:
+        """Return the flow at zero command that the bounds answer for at a pressure drop, L/min; None: not declared."""
+        if self.zero_flow_L_min is None:
+            return None
+        if len(self.tests) == 1:
+            return self.zero_flow_L_min
+        places, flows = ([getattr(test, key) for test in self.tests] for key in ("dp_MPa", "zero_flow_L_min"))
+        return float(np.interp(dp_MPa, places, flows))
 
     @property
     def curve(self) -> CertifiedCurve:

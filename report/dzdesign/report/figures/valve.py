@@ -83,7 +83,7 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units:
         "drive at zero command stays below "
         + (
             f"the {BOUND_NAMES[curve.premise]}, which is what the bounds of all tests together certify between the "
-            f"tests too. {curve.premise_in_words}."
+            f"tests too. {curve.premise_in_words(units)}."
             if several
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."
         ),

@@ -92,7 +92,7 @@ def _side(designed: "Compensator", sign: int) -> "SideModel":
 
 def _remaining(law: "Compensator", side: "SideModel", sign: int) -> dict[str, list[float]]:
     """Return the dead zone that a law leaves at each of a valve's tests, by branch, as shares of command."""
-    from dzdesign.design.costs import remaining_dead_zone
+    from dzdesign.design.costs_at_tests import remaining_dead_zone
 
     left = [remaining_dead_zone(law, test, sign) for test in side.tests]
     return {branch: [each[branch] for each in left] for branch in left[0]}

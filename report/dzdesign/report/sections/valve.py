@@ -40,6 +40,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
                 f"{units.text(valve.u_max_V, 'g V')}.",
                 *([f"Units: {shown}; the files and the curves as CSV are in V, MPa and L/min."] if shown else []),
                 f"Flow meter: floor {units.text(meter.floor_L_min, '.2f L/min')}; {meter.lag_in_words()}.",
+                *([f"Recorded under {valve.dither_in_words}."] if valve.dither else []),
                 *(_trend(name, side, units.of_side(name)) for name, side in valve.sides.items()),
                 *(
                     f"{name.capitalize()} commands, from ramp to ramp: "
@@ -53,7 +54,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             figures=thresholds,
             tables=tables,
             lines=(
-                *(f"Premise, {name} commands: {side.premise}." for name, side in valve.sides.items()),
+                *(f"Premise, {name} commands: {side.premise_in_words(units)}." for name, side in valve.sides.items()),
                 *(f"{warning.text}." for warning in valve.warnings if warning.code in ORDER),
             ),
         ),
@@ -91,6 +92,9 @@ def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUni
     def cell(value: float | None, form: str) -> Cell:
         return recorded(value, form, units)
 
+    allowed = (
+        (f"allowed at zero ({flow})", lambda row: cell(row[0].zero_flow_L_min, ".2f L/min")),
+    )
     leaks = ((f"leak ({flow})", lambda row: cell(row[0].leak_L_min, ".2f L/min")),)
     return table_of(
         title,
@@ -107,5 +111,6 @@ def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUni
         (f"noise ({flow})", lambda row: cell(row[0].noise_L_min, ".3f L/min")),
         (f"noise level ({flow})", lambda row: cell(row[0].noise_level_L_min, ".2f L/min")),
         *(leaks if any(test.leak_L_min for test in side.tests) else ()),
+        *(allowed if side.certificate.zero_flow_L_min is not None else ()),
         ("ramp test", lambda row: _first_of(row[0].ramps)),
     )

@@ -1,4 +1,8 @@
-"""Wrong C: one constant, comparison or operator of a file changed at a time."""
+"""Wrong C: one constant, comparison or operator of a file changed at a time.
+
+A constant is changed by one, or, beyond 16 bits, by one in the last of its 16 leading bits: the finest that a compare
+value of 16 bits resolves. Below that lie the bits of a scaled product that its one rounding takes away.
+"""
 
 import re
 from collections.abc import Iterator
@@ -19,6 +23,8 @@ SWAPS = {
     "+": "-", "-": "+", "<<": ">>", ">>": "<<", "&": "|", "|": "&", "&&": "||", "||": "&&",
     "+=": "-=", "-=": "+=", "++": "--", "--": "++",
 }  # fmt: skip
+#: Bits of the widest output, the compare value.
+OUTPUT_BITS = 16
 #: Left out where they stand before an operand.
 DROPPED = ("-", "~", "!")
 ENDS_OPERAND = re.compile(r"[\w\])]$")
@@ -53,7 +59,8 @@ def _instead(token: re.Match[str], before: str) -> list[str]:
     """Return what may stand in place of a token."""
     if token["number"]:
         value = int(token["number"], 0)
-        return [str(value + 1)] + ([str(value - 1)] if value else [])
+        change = 1 << max(value.bit_length() - OUTPUT_BITS, 0)
+        return [str(value + change)] + ([str(value - change)] if value else [])
     operator = token["operator"]
     if operator in ("++", "--"):
         return [SWAPS[operator]]

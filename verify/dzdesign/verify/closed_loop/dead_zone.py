@@ -65,6 +65,7 @@ def compare_at_pressure(
         ideal_line=ideal_line(reading, largest),
         unseen_below_L_min=loop.unseen_below_L_min(dp_MPa),
         leak_L_min=leak,
+        allowed_at_zero_L_min=loop.allowed_at_zero_L_min(dp_MPa),
         q_zero_L_min=float(with_core.q_largest_L_min[-1]),
         q_zero_without_beta_L_min=float(without_beta.q_largest_L_min[-1]),
         flow_miss=largest_miss(direct, loop.u_max_V, recorded),

@@ -44,12 +44,27 @@ struct task
     int32_t amplifier; /* 0: the command goes to the PWM as it is */
     int32_t negative;  /* drive solenoid B */
     int32_t swapped;   /* sensors A and B the other way round */
+    int32_t wave;      /* without the amplifier: half the height of a square wave about the command, counts; 0: none */
+    int32_t wave_ticks; /* and the periods of half of it */
+    int32_t mean;      /* the plant has the drive's dither in it already: it takes the law without it */
     const double *command;    /* share of u_max */
     const double *supply_MPa; /* pressure drop at no flow */
     const double *seen_MPa;   /* pressure drop that the sensors show; not a number: the plant's */
     double back_MPa;          /* pressure behind the edge */
     struct channel channels[3]; /* command, pressures A and B */
 };
+
+/* The command with the wave about it, as the ramps were recorded; none at zero command, within the PWM's range. */
+static int32_t waved(const struct task *task, int32_t direct, int32_t place, int32_t counts)
+{
+    const int32_t up = (place % (2 * task->wave_ticks)) < task->wave_ticks;
+    const int32_t compare = direct + (up ? task->wave : -task->wave);
+
+    if ((direct == 0) || (task->wave == 0)) {
+        return direct;
+    }
+    return (compare < 0) ? 0 : ((compare > counts) ? counts : compare);
+}
 
 static inline void run(const struct task *task, struct plant *plant, double *record, int linear)
 {
@@ -81,8 +96,11 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
                 tick--;
                 dz_drive_tick(&drive);
                 compare = task->negative ? drive.compare_b : drive.compare_a;
+                if (task->mean) {
+                    compare = (drive.side == (task->negative ? -1 : 1)) ? drive.law : 0u;
+                }
             } else {
-                compare = direct;
+                compare = (uint16_t)waved(task, direct, k * task->every + j, plant->counts);
             }
             plant_period(plant, (in_force < plant->counts) ? in_force : plant->counts, linear);
             sum += plant->flow;
@@ -97,7 +115,8 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
     }
 }
 
-/* choices: n, every, amplifier, negative, swapped, largest code, largest compare value. series, channels: see `task`.
+/* choices: n, every, amplifier, negative, swapped, wave, its ticks, mean, largest code, largest compare value. series,
+ * channels: see `task`.
  * p, coarse, fine: the plant, see motion.py; curve: its recorded characteristic, see stand_in.py, or null.
  * record[n][6]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m. */
 EXPORT void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *seen_MPa,
@@ -105,13 +124,13 @@ EXPORT void dz_loop(const int32_t *choices, const double *command, const double 
                     const double *coarse, const double *fine, const double *curve, double *record)
 {
     struct plant plant;
-    struct task task = {choices[0], choices[1], choices[2], choices[3], choices[4], command, supply_MPa, seen_MPa,
-                        back_MPa,   {{0.0, 0.0, 0.0}}};
+    struct task task = {choices[0], choices[1], choices[2], choices[3], choices[4], choices[5], choices[6], choices[7],
+                        command,    supply_MPa, seen_MPa,   back_MPa,   {{0.0, 0.0, 0.0}}};
 
     for (int index = 0; index < 3; index++) {
-        task.channels[index] = channel_of(zeros[index], fulls[index], spans[index], choices[5]);
+        task.channels[index] = channel_of(zeros[index], fulls[index], spans[index], choices[8]);
     }
-    plant_at_rest(&plant, p, coarse, fine, curve, choices[6], supply_MPa[0]);
+    plant_at_rest(&plant, p, coarse, fine, curve, choices[9], supply_MPa[0]);
     if (p[PLANT_LINEAR] > 0.5) {
         run(&task, &plant, record, 1);
     } else {

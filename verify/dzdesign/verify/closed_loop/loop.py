@@ -11,7 +11,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.signals import Signals
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.stand_in import StandIn
@@ -79,11 +79,20 @@ def _slowest_ramp_s(compensator: Compensator, sign: int) -> float:
     return max((units / step / signals.sample_Hz * RAMP_RESERVE for step in steps), default=0.0)
 
 
+def _recorded_dither(compensator: Compensator | None) -> tuple[int, int] | None:
+    """Return the drive's dither where the valve was recorded under it: `design` has seen to it that they are alike."""
+    if compensator is None or compensator.valve.dither is None:
+        return None
+    functions = compensator.drive_functions
+    return functions.dither_counts, functions.dither_ticks
+
+
 class ClosedLoop:
     """One plant and, where given, the core of one firmware folder, compiled into one native loop.
 
     Without a firmware there is only the direct drive; with one, its compensator gives scalings and ramps. `sign` is
-    that of the command that opens the side.
+    that of the command that opens the side. `dither` is one about a direct command, counts and PWM periods of half a
+    wave; of a compensator that of its valve's recordings.
     """
 
     def __init__(
@@ -92,6 +101,7 @@ class ClosedLoop:
         firmware: Path | None = None,
         compensator: Compensator | None = None,
         sign: int = 1,
+        dither: tuple[int, int] | None = None,
     ) -> None:
         driver = files("dzdesign.verify.closed_loop")
         sources = {"plant_motion.h": motion_header()}
@@ -105,6 +115,8 @@ class ClosedLoop:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")
         self._library = load_library(sources, "the closed loop", FLOATING)
+        #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
+        self._dither = dither or _recorded_dither(compensator)
         #: Without a compensator no code is read, and any scaling serves.
         self._signals = compensator.signals if compensator else Signals()
         self._negative = sign < 0
@@ -119,6 +131,7 @@ class ClosedLoop:
         #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
+        self._side = compensator.valve.sides.get(SIDE_NAMES[sign]) if compensator else None
         self._take(plant)
 
     def _take(self, plant: Plant | StandIn) -> None:
@@ -129,9 +142,28 @@ class ClosedLoop:
         self.u_max_V = plant.parameters.u_max_V
         self._stand_in = plant if isinstance(plant, StandIn) else None
 
+    def _wave(self) -> tuple[int, int, bool]:
+        """Return the wave about a direct command, counts and periods of half of it; whether the plant has it in it.
+
+        A plant of equations feels the dither in time: that of the drive, and about a direct command that of the
+        recordings. A stand-in is the recorded flow under the dither: a second one would shrink its hysteresis twice.
+        """
+        if self._dither is None:
+            return 0, 1, False
+        return (0, 1, True) if self._stand_in else (*self._dither, False)
+
+    @property
+    def has_dither(self) -> bool:
+        """Whether a direct command has a wave about it."""
+        return self._wave()[0] > 0
+
     def leak_L_min(self, dp_MPa: float) -> float:
         """Return what the valve passes without any drive at a pressure drop: no compensator can stop it."""
         return float(self.run(np.zeros(1), dp_MPa, periods_per_record=1).q_mean_L_min[0])
+
+    def allowed_at_zero_L_min(self, dp_MPa: float) -> float | None:
+        """Return the flow that is allowed at zero command at a pressure drop, a leak included; None: none declared."""
+        return self._side.zero_flow_at(dp_MPa) if self._side else None
 
     def unseen_below_L_min(self, dp_MPa: float) -> float | None:
         """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""
@@ -186,7 +218,7 @@ class ClosedLoop:
             raise InputError(f"a pressure drop of {highest:g} MPa exceeds the sensors' span of {span:g} MPa")
         choices = (
             command.size, periods_per_record, mode != "direct", negative, negative and signals.swapped,
-            signals.code_max, signals.compare_max,
+            *self._wave(), signals.code_max, signals.compare_max,
         )  # fmt: skip
         series = (np.array(choices, dtype=np.int32), command, supply, seen)
         given = (*self._scalings, plant.flat, plant.coarse, plant.fine, self._curve, record)

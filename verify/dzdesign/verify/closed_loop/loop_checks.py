@@ -1,13 +1,22 @@
-"""What the closed loop must show: the plant opens where the valve does, and nothing flows at zero command."""
+"""What the closed loop must show: the plant opens where the valve does, and at zero command nothing flows, or no more
+than was declared."""
 
 from collections.abc import Sequence
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.loop_results import PressureResult, ScenarioResult
-from dzdesign.verify.requirements import PLANT_IS_THE_VALVE, PLANT_OPENS, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, Check
+from dzdesign.verify.requirements import (
+    PLANT_IS_THE_VALVE,
+    PLANT_OPENS,
+    ZERO_FLOW,
+    ZERO_FLOW_AFTER_SCENARIOS,
+    Check,
+    Requirement,
+)
 
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03
@@ -19,22 +28,23 @@ def loop_checks(
     ramps: Sequence[PressureResult], scenarios: Sequence[ScenarioResult], compensator: Compensator, *, plant_given: bool
 ) -> tuple[Check, ...]:
     """Return all of them, in the order of the report."""
-    zero_flow = no_flow_at_zero(ramps, compensator, plant_given=plant_given)
+    zero_flow, valve = no_flow_at_zero(ramps, compensator, plant_given=plant_given), compensator.valve
+    units = valve.recorded_units
     return (
-        plant_opens(ramps),
-        plant_is_the_valve(ramps, compensator.valve) if plant_given else stand_in_is_the_recording(ramps),
+        plant_opens(ramps, units),
+        plant_is_the_valve(ramps, valve) if plant_given else stand_in_is_the_recording(ramps, units),
         zero_flow,
-        shut_after_scenarios(scenarios, zero_flow, plant_given=plant_given),
+        shut_after_scenarios(scenarios, zero_flow, units, plant_given=plant_given),
     )
 
 
-def plant_opens(ramps: Sequence[PressureResult]) -> Check:
+def plant_opens(ramps: Sequence[PressureResult], units: RecordedUnits) -> Check:
     """Tell whether flow passes at full command: of a plant that stays shut, or whose motion is not finite, the other
     figures of the closed loop say nothing."""
     least = min(ramps, key=lambda ramp: ramp.q_max_L_min)
     return PLANT_OPENS.check(
         holds=least.q_max_L_min > NO_FLOW_L_MIN,
-        text=f"{least.q_max_L_min:.4g} L/min at full command and {least.dp_MPa:.2f} MPa, where it is least",
+        text=f"{units.text(least.q_max_L_min, '.4g L/min')} at full command and {_at(least, units)}, where it is least",
     )
 
 
@@ -49,25 +59,31 @@ def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Ch
     worst = max(ramps, key=lambda ramp: abs(float.__sub__(*opens_V(ramp))))
     plant_V, valve_V = opens_V(worst)
     holds = abs(plant_V - valve_V) <= SAME_THRESHOLD * valve.u_max_V
-    text = f"at {plant_V:.2f} V, the ramp tests at {valve_V:.2f} V (at {worst.dp_MPa:.2f} MPa, the worst); "
-    text += _miss(max(ramps, key=lambda ramp: ramp.flow_miss))
+    units = valve.recorded_units
+    plant_at, valve_at = (units.of_side(worst.side).text(opens, ".2f V") for opens in (plant_V, valve_V))
+    text = f"at {plant_at}, the ramp tests at {valve_at} (at {_at(worst, units)}, the worst); "
+    text += _miss(max(ramps, key=lambda ramp: ramp.flow_miss), units)
     if not holds:
         text += "; the closed loop is of another valve: correct preload, spring or force in --plant"
     return PLANT_IS_THE_VALVE.check(holds=holds, text=text)
 
 
-def stand_in_is_the_recording(ramps: Sequence[PressureResult]) -> Check:
+def stand_in_is_the_recording(ramps: Sequence[PressureResult], units: RecordedUnits) -> Check:
     """Tell whether the flow of a stand-in is that of valve.json at the tests, over the command and on both branches."""
     worst = max(ramps, key=lambda ramp: ramp.flow_miss)
     holds = worst.flow_miss <= SAME_FLOW
-    return PLANT_IS_THE_VALVE.check(holds=holds, text=f"{_miss(worst)}; expected {SAME_FLOW:.0%} at most")
+    return PLANT_IS_THE_VALVE.check(holds=holds, text=f"{_miss(worst, units)}; expected {SAME_FLOW:.0%} at most")
 
 
-def _miss(worst: PressureResult) -> str:
+def _at(where: PressureResult | ScenarioResult, units: RecordedUnits) -> str:
+    return units.text(where.dp_MPa, ".2f MPa")
+
+
+def _miss(worst: PressureResult, units: RecordedUnits) -> str:
     """Say how near the plant's flow is to the recorded one."""
     return (
         f"its mean flow per {BIN:.0%} of command departs from the recorded one by {worst.flow_miss:.1%} of the largest "
-        f"flow (at {worst.dp_MPa:.2f} MPa, the worst)"
+        f"flow (at {_at(worst, units)}, the worst)"
     )
 
 
@@ -76,7 +92,7 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
 
     A stand-in closes where the recorded flow, continued below the noise level, comes to none.
     """
-    worst = max(ramps, key=_zero_flow)
+    worst, units = max(ramps, key=_zero_flow), compensator.valve.recorded_units
     leakiest = max(ramps, key=lambda ramp: ramp.q_zero_without_beta_L_min)
     guards = {sign: compensator.side(sign).certificate.guard for sign in compensator.signals.signs}
     sides = compensator.valve.sides
@@ -86,7 +102,7 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
         return ZERO_FLOW.check(
             holds=None,
             text=f"the {chosen[0]} threshold was chosen to be guarded, above the one at which the valve closes: "
-            f"{_flow(worst, worst.q_zero_L_min)} after closing (at {worst.dp_MPa:.2f} MPa) is the price of that "
+            f"{_flow(worst, worst.q_zero_L_min, units)} after closing (at {_at(worst, units)}) is the price of that "
             "choice. Design with --guard closing to have none",
         )
     if not plant_given and "opening" in guards.values():
@@ -96,39 +112,61 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
             "they open, and flow at zero command after closing is to be expected. Record the falling branch",
         )
     return ZERO_FLOW.check(
-        holds=worst.q_opened_L_min <= NO_FLOW_L_MIN,
-        text=f"{_flow(worst, worst.q_zero_L_min)} after closing (at {worst.dp_MPa:.2f} MPa), "
-        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min)} without beta{_leak(ramps)}",
+        holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN,
+        text=f"{_flow(worst, worst.q_zero_L_min, units)} after closing (at {_at(worst, units)}), "
+        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min, units)} without beta{_allowed(worst, units)}"
+        f"{_leak(ramps, units)}",
+        name=_name(ZERO_FLOW, worst),
     )
 
 
 def _zero_flow(result: PressureResult | ScenarioResult) -> tuple[float, float]:
-    """Return what passes at zero command beyond the leak, and below what it is not known: the worst is the largest."""
-    return result.q_opened_L_min, result.unseen_below_L_min or 0.0
+    """Return what passes at zero beyond what is allowed, and below what it is not known: the worst is the largest."""
+    return result.q_beyond_L_min, result.unseen_below_L_min or 0.0
 
 
-def _leak(ramps: Sequence[PressureResult]) -> str:
+def _name(requirement: Requirement, worst: PressureResult | ScenarioResult) -> str:
+    """Return what is required: no flow, or no more than the declared one."""
+    if worst.allowed_at_zero_L_min is None:
+        return requirement.title
+    return requirement.title.replace("no flow", "no more than the declared zero flow", 1)
+
+
+def _allowed(worst: PressureResult | ScenarioResult, units: RecordedUnits) -> str:
+    """Say which flow is allowed at zero command, where one was declared."""
+    allowed = worst.allowed_at_zero_L_min
+    if not allowed:
+        return ""
+    at_most = units.text(allowed, ".3g L/min")
+    return f"; allowed there are {at_most}, a leak included: the declared zero flow, or leak and noise level"
+
+
+def _leak(ramps: Sequence[PressureResult], units: RecordedUnits) -> str:
     """Say what leaks without any drive: it is in every flow at zero command, and no failure of the compensator."""
     worst = max(ramps, key=lambda ramp: ramp.leak_L_min)
     if worst.leak_L_min <= NO_FLOW_L_MIN:
         return ""
     return (
-        f"; of it {worst.leak_L_min:.2g} L/min (at {worst.dp_MPa:.2f} MPa) leak through the shut valve, which no "
-        "compensator can stop"
+        f"; of it {units.text(worst.leak_L_min, '.2g L/min')} (at {_at(worst, units)}) leak through the shut valve, "
+        "which no compensator can stop"
     )
 
 
-def _flow(where: PressureResult | ScenarioResult, flow_L_min: float) -> str:
+def _flow(where: PressureResult | ScenarioResult, flow_L_min: float, units: RecordedUnits) -> str:
     """Return a flow; where the recordings can't show it, below what, and what their first flows, continued, say."""
     unseen = where.unseen_below_L_min
     if unseen is None or flow_L_min >= unseen:
-        return f"at most {flow_L_min:.4g} L/min"
+        return f"at most {units.text(flow_L_min, '.4g L/min')}"
     opened = flow_L_min - where.leak_L_min
-    more = f": {opened:.2g} L/min if the first flow seen goes on below" if opened > NO_FLOW_L_MIN else ""
-    return f"below {unseen:.2f} L/min (less than the recordings show{more})"
+    more = ""
+    if opened > NO_FLOW_L_MIN:
+        more = f": {units.text(opened, '.2g L/min')} if the first flow seen goes on below"
+    return f"below {units.text(unseen, '.2f L/min')} (less than the recordings show{more})"
 
 
-def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, *, plant_given: bool) -> Check:
+def shut_after_scenarios(
+    scenarios: Sequence[ScenarioResult], zero_flow: Check, units: RecordedUnits, *, plant_given: bool
+) -> Check:
     """Tell whether the valve is shut at zero command after everything that a core can know of, and what it can't.
 
     Where the flow at zero command could not be checked, this can't be; a plant that is given sees all scenarios.
@@ -136,15 +174,17 @@ def shut_after_scenarios(scenarios: Sequence[ScenarioResult], zero_flow: Check, 
     required = [each for each in scenarios if each.must_shut]
     worst = max(required, key=_zero_flow)
     text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: "
-    text += f"{_flow(worst, worst.q_zero_L_min)} ({worst.name}, at {worst.dp_MPa:.2f} MPa)"
+    text += f"{_flow(worst, worst.q_zero_L_min, units)} ({worst.name}, at {_at(worst, units)}){_allowed(worst, units)}"
     if hidden := [each for each in scenarios if not each.must_shut]:
         leak = max(hidden, key=lambda each: each.q_zero_L_min)
         text += (
             f"; not required, as no core can know of it or it has no zero band: {leak.name}, "
-            f"{_flow(leak, leak.q_zero_L_min)}"
+            f"{_flow(leak, leak.q_zero_L_min, units)}"
         )
     if not plant_given and not any(each.is_load_step for each in scenarios):
         text += "; load steps and frozen sensors were not tried: that needs ramps at two pressure drops, or --plant"
     if zero_flow.holds is None:
         return ZERO_FLOW_AFTER_SCENARIOS.check(holds=None, text=f"{text}; see the ramps")
-    return ZERO_FLOW_AFTER_SCENARIOS.check(holds=worst.q_opened_L_min <= NO_FLOW_L_MIN, text=text)
+    return ZERO_FLOW_AFTER_SCENARIOS.check(
+        holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN, text=text, name=_name(ZERO_FLOW_AFTER_SCENARIOS, worst)
+    )

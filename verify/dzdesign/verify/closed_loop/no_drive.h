@@ -10,12 +10,16 @@ struct dz_drive
 {
     uint16_t compare_a;
     uint16_t compare_b;
+    uint16_t law;
+    int16_t side;
 };
 
 static void dz_drive_init(struct dz_drive *drive)
 {
     drive->compare_a = 0u;
     drive->compare_b = 0u;
+    drive->law = 0u;
+    drive->side = 0;
 }
 
 static void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)

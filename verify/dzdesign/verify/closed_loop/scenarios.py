@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.design.zero_band import CommandError
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
@@ -48,6 +49,8 @@ class Scene:
     #: Of a zero command's code; and whether the law has a zero band against it.
     command_error: CommandError
     has_zero_band: bool
+    #: In which a scenario's name has its pressures.
+    units: RecordedUnits = AS_COMPUTED
 
     @property
     def settle_s(self) -> float:
@@ -87,12 +90,14 @@ class Scene:
 
         It ended at this pressure drop unless told otherwise.
         """
+        ended_MPa = self.dp_MPa if end_MPa is None else end_MPa
         shut = np.flatnonzero(_held_for(run.command <= 0, round(self.settle_s / STEP_S)))
         return ScenarioResult(
             name=name,
             side=self.side,
             dp_MPa=self.dp_MPa,
-            leak_L_min=self.loop.leak_L_min(self.dp_MPa if end_MPa is None else end_MPa),
+            leak_L_min=self.loop.leak_L_min(ended_MPa),
+            allowed_at_zero_L_min=self.loop.allowed_at_zero_L_min(ended_MPa),
             q_zero_L_min=float(run.q_largest_L_min[-1]),
             q_peak_at_zero_L_min=float(run.q_largest_L_min[shut].max(initial=0.0)),
             unseen_below_L_min=self.loop.unseen_below_L_min(self.dp_MPa),
@@ -191,7 +196,8 @@ def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
 def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The sensors freeze, then the pressure drop rises. The codes are sound: what it costs is stated, not required."""
     low, high = tested_MPa
-    name = f"sensors frozen at {low:.2f} MPa, then {high:.2f} MPa"
+    first, then = (scene.units.text(dp_MPa, ".2f MPa") for dp_MPa in tested_MPa)
+    name = f"sensors frozen at {first}, then {then}"
     return scene.result(name, _changed_in_mid_ramp(scene, low, high)[0], must_shut=False, end_MPa=high)
 
 
@@ -242,6 +248,7 @@ def _converter_off_at_zero(scene: Scene) -> ScenarioResult:
         side=scene.side,
         dp_MPa=scene.dp_MPa,
         leak_L_min=scene.loop.leak_L_min(scene.dp_MPa),
+        allowed_at_zero_L_min=scene.loop.allowed_at_zero_L_min(scene.dp_MPa),
         q_zero_L_min=float(flow.max()),
         q_peak_at_zero_L_min=float(flow.max()),
         unseen_below_L_min=scene.loop.unseen_below_L_min(scene.dp_MPa),

@@ -11,10 +11,12 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, quantity
+from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
+from dzdesign.design.signals import Signals
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
-from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.firmware.folder import check_firmware_inside, read_compensator
 
 #: Beginning of a series, in its time stamps; any day serves, and the same day gives the same bytes.
@@ -105,9 +107,10 @@ def simulate_ramp(
     scatter_N = series.scatter_V * plant.force_per_volt * np.random.default_rng([*stream, 1, number]).standard_normal()
     loop = loop.with_plant(replace(plant, preload_N=max(plant.preload_N + scatter_N, 0.0)))
     run = loop.run(sequence.no_faster_than(loop.slowest_ramp_s).command(), dp_MPa, mode)
+    waves = with_core or loop.has_dither
     share = 1 - np.exp(-RECORD_S / bench.meter_lag_s) if bench.meter_lag_s > 0 else 1.0
     # Of a dither a meter sees the mean.
-    metered = lfilter([share], [1, share - 1], run.q_mean_L_min if with_core else run.q_L_min)
+    metered = lfilter([share], [1, share - 1], run.q_mean_L_min if waves else run.q_L_min)
     rows = np.round(np.arange(0, run.time[-1], 1 / bench.rate_Hz) / RECORD_S).astype(int)
     noise = random.standard_normal((3, rows.size))
     seen = np.where(metered[rows] < bench.meter_floor_L_min, 0.0, metered[rows])
@@ -127,11 +130,12 @@ def simulated_files(
     say: Callable[[str], None],
     firmware: Path | None = None,
     series: Series = ONE_OF_EACH,
+    dither: Dither | None = None,
 ) -> tuple[dict[str, bytes], SimulationManifest]:
     """Simulate ramp tests, up and down, at each pressure drop; with a firmware folder, of the compensated valve.
 
     A series with repeats is in random order, so that a drift of the valve could be told from the pressure drop, and
-    its time stamps tell that order.
+    its time stamps tell that order. A dither is about the command of the valve without a compensator.
 
     Returns
     -------
@@ -145,7 +149,9 @@ def simulated_files(
             f"the repeatability is {100 * series.scatter_V / plant.u_max_V:.3g} % of full command, expected 0 to "
             f"{100 * LARGEST_SCATTER:g} %"
         )
-    loop, made_from = (ClosedLoop(plant), ()) if firmware is None else _loop_of(plant, firmware)
+    if firmware is not None and dither is not None:
+        raise InputError("a firmware makes its own dither, the one that `design` was given; leave out --dither")
+    loop, made_from = (ClosedLoop(plant, dither=_wave(dither)), ()) if firmware is None else _loop_of(plant, firmware)
     name, mode = ("ramp", "direct") if firmware is None else ("compensated", "compensated")
     sequence = RampSequence(ramp=ramp_s)
     ramps = [(dp_MPa, number) for dp_MPa in pressures_MPa for number in range(1, series.repeats + 1)]
@@ -162,6 +168,7 @@ def simulated_files(
             f"meter: floor {bench.meter_floor_L_min:g} L/min, lag {bench.meter_lag_s:g} s, "
             f"noise {bench.meter_noise_L_min:g} L/min; seed {bench.seed}",
             *(["with the compensator; u is its command"] if firmware else []),
+            *([f"under a dither of {dither.in_words()}; u is the command without it"] if dither else []),
         )
         columns = simulate_ramp(loop, plant, dp_MPa, bench, sequence, mode, series, number)
         ramp = f"{name}_dP{dp_MPa:g}"
@@ -171,6 +178,13 @@ def simulated_files(
             begins += datetime.timedelta(seconds=round(float(seconds[-1]) + PAUSE_S))
         contents[f"{ramp}.csv.gz"] = ramp_file_bytes(columns, comments, compress=True)
     return contents, SimulationManifest(tool=THIS_TOOL, made_from=made_from, plant=plant, bench=bench, series=series)
+
+
+def _wave(dither: Dither | None) -> tuple[int, int] | None:
+    """Return a dither as the loop takes it: counts, and periods of half a wave, the whole number that comes nearest."""
+    if dither is None:
+        return None
+    return round(dither.peak * Signals().compare_max), round(0.5 / (dither.frequency_Hz * PWM_PERIOD_S))
 
 
 def _order(count: int, seed: int) -> list[int]:

@@ -96,12 +96,13 @@ def scatter(
 
     with ThreadPoolExecutor(WORKERS) as pool:
         opening, closing, q_zero, q_max = np.array(list(pool.map(one, plants))).T
+    allowed = loop.allowed_at_zero_L_min(dp_MPa) or NO_FLOW_L_MIN
     drawn = [{name: getattr(plant, name) for name in tolerances.spreads} for plant in plants]
     return Scatter(
         side=side,
         dp_MPa=dp_MPa,
         plants=len(plants),
-        leaking=int((q_zero > NO_FLOW_L_MIN).sum()),
+        leaking=int((q_zero > allowed).sum()),
         residual_opening=_spread_of(opening, drawn, int(opening.argmax())),
         residual_closing=_spread_of(closing, drawn, int(closing.argmax())),
         q_zero_L_min=_spread_of(q_zero, drawn, int(q_zero.argmax())),

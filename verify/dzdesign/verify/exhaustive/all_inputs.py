@@ -4,6 +4,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
 from dzdesign.verify.evidence import InputCheck, InputCounts
@@ -62,9 +63,9 @@ def first_wrong(prepared: PreparedInputs, found: Findings) -> str | None:
     )
 
 
-def input_checks(inputs: InputCheck, *, both_signs: bool) -> list[Check]:
+def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) -> list[Check]:
     """Return one requirement for each property that was compared; where there are two sides each says which."""
-    margin_mV = 1e3 * inputs.smallest_margin_V
+    margin = units.text(1e3 * inputs.smallest_margin_V, ".3f mV")
     found = (
         (
             requirements.EXACT_LAW,
@@ -83,7 +84,7 @@ def input_checks(inputs: InputCheck, *, both_signs: bool) -> list[Check]:
             requirements.ZERO_COMMAND,
             inputs.over_compensated,
             f"{inputs.over_compensated} pressure codes above the threshold's lower bound, smallest margin of the C's "
-            f"compare values {margin_mV:.3f} mV",
+            f"compare values {margin}",
         ),
         (
             requirements.PRESSURE_DIFFERENCE,

@@ -11,7 +11,7 @@ import numpy as np
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, differences
-from dzdesign.verify.exhaustive.zero_command import Staircase, guarded_bounds, pressure_drops
+from dzdesign.verify.exhaustive.zero_command import Staircase, counted_dither, guarded_bounds, pressure_drops
 from dzdesign.verify.loop_results import Side
 from dzdesign.verify.toolchain.compiled_core import SOURCES
 from dzdesign.verify.toolchain.host_compiler import load_library
@@ -31,7 +31,7 @@ class InputMap:
     #: commands first. Of a command that is not sound the law says nothing, and there is no error.
     grid: tuple[tuple[int, int, int, int, int], ...]
     #: At every difference of the tested interval: its code, pressure drop in MPa, drive at zero command in V (with a
-    #: dither its peak), and the lower bound of the threshold in V.
+    #: dither that the recordings lack its peak), and the lower bound of the threshold in V.
     zero_command: tuple[tuple[int, float, float, float], ...]
 
 
@@ -59,7 +59,7 @@ def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMa
             grid.append((code, dp_code, given, error, status(code, *pair)))
     a_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
     volt = float(compensator.u_max_V) / exact.compare_max
-    peak = compensator.drive_functions.dither_counts
+    peak = counted_dither(compensator)
     return InputMap(
         side=exact.side,
         grid=tuple(grid),

@@ -10,7 +10,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot import NAMED
+from dzdesign.design.lot.margins import NAMED
 from dzdesign.verify.evidence import InputCheck, LotCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences
@@ -51,7 +51,7 @@ def check_lot(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> LotCh
 
 def lot_checked(inputs: Sequence[InputCheck], compensator: Compensator) -> list[Check]:
     """Tell whether the core of a lot setting over-compensates any valve of its lot; nothing of a valve's own."""
-    count = len(compensator.lot)
+    count, units = len(compensator.lot), compensator.valve.recorded_units
     found = [each.lot for each in inputs if each.lot is not None]
     if not found:
         return []
@@ -62,7 +62,8 @@ def lot_checked(inputs: Sequence[InputCheck], compensator: Compensator) -> list[
         f"{min(each.valves for each in found)} of {count} valves, each at every difference of pressure codes that it "
         f"was tested over, against its own bounds ({least if least == most else f'{least} to {most}'} % for each): "
         f"{len(over)} over-compensated" + (f": {and_more(over, NAMED)}" if over else "") + "; smallest margin of the "
-        f"C's compare values {1e3 * worst.smallest_margin_V:.3f} mV: {worst.worst}, {worst.worst_dp_MPa:.2f} MPa"
+        f"C's compare values {units.text(1e3 * worst.smallest_margin_V, '.3f mV')}: {worst.worst}, "
+        f"{units.text(worst.worst_dp_MPa, '.2f MPa')}"
     )
     all_there = all(each.valves == count for each in found)
     return [LOT.check(holds=not over and all_there, text=text)]

@@ -3,20 +3,20 @@
 The bound is argued from the ramp tests anew. By monotonicity a threshold that falls with dP is at least the bound of
 any test at a higher dP, one that rises at least that of any test at a lower dP, and of a flat one only the lowest bound
 is known. One of limited curvature sags below the chord of two tests by a parabola at most (`SaggingBound`). A code
-stands for all pressures that may have made it; a dither's peak counts as drive.
+stands for all pressures that may have made it; what of a dither the recordings do not have counts as drive.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate
-from math import floor, lcm
+from math import ceil, floor, lcm
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot_valves import LotSide
+from dzdesign.design.lot.valves import LotSide
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
 from dzdesign.verify.exhaustive.test_vectors import Differences
@@ -135,13 +135,27 @@ def zero_command_margins(
     """
     drops = pressure_drops(exact, found, {Fraction(repr(dp)) for each in bounds for dp in each.dp_MPa})
     unit_V = exact.compensator.u_max_V / exact.compare_max
-    at_peak = at_zero + exact.compensator.drive_functions.dither_counts
+    at_peak = at_zero + counted_dither(exact.compensator)
     return [
         _margin(Staircase(each), drops, at_peak, unit_V)
         if each.premise == "monotone" or len(each.dp_MPa) == 1
         else _margin_of_sagging(SaggingBound(each), drops, at_peak, unit_V)
         for each in bounds
     ]
+
+
+def counted_dither(compensator: Compensator) -> int:
+    """Return how many counts of the dither are drive at zero command, written from the documentation anew.
+
+    The whole peak, unless the ramps were recorded with a dither: then by how much its peak is another, and what a
+    motion that falls with the square of the frequency makes of the frequency's difference.
+    """
+    functions, signals, recorded = compensator.drive_functions, compensator.signals, compensator.valve.dither
+    if recorded is None:
+        return functions.dither_counts
+    half_waves = 2 * Fraction(repr(recorded.frequency_Hz)) * functions.dither_ticks / signals.tick_Hz
+    other_peak = abs(Fraction(repr(recorded.peak)) * signals.compare_max - functions.dither_counts)
+    return ceil(other_peak + functions.dither_counts * abs(1 - half_waves * half_waves))
 
 
 def _margin_of_sagging(

@@ -9,7 +9,6 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError
-from dzdesign.core.units import span_MPa
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.redesign_check import prove_derived
@@ -33,7 +32,8 @@ def certificate_follows(compensator: Compensator) -> Check:
     common = f"of {valves} valves the one in compensator.json: " if valves else ""
     text = f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, "
     low, high = map(float, certificate.dp_MPa)
-    text += f"{span_MPa(low, high)}, proved again at every difference of pressure codes"
+    tested = compensator.valve.recorded_units.span(low, high, ".2f MPa")
+    text += f"{tested}, proved again at every difference of pressure codes"
     return CERTIFICATE.check(holds=True, text=text)
 
 

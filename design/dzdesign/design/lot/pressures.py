@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.design.lot_valves import LotSide, LotValve
+from dzdesign.design.lot.valves import LotSide, LotValve
 
 #: Tests nearer than this share are at one pressure drop of the lot: no bench sets it to a per cent.
 SAME = 0.05

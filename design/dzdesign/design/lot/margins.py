@@ -38,7 +38,7 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
     A code stands for all pressures that may have made it; rounding and dither count as drive.
     """
     signals = compensator.signals
-    kept = (Fraction(1, 2) + compensator.drive_functions.dither_counts) / signals.compare_max
+    kept = (Fraction(1, 2) + compensator.dither_reserve_counts) / signals.compare_max
     margins: dict[str, LotMargin] = {}
     for sign in signals.signs:
         law = compensator.side(sign)

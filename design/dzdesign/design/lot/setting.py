@@ -22,8 +22,8 @@ from dzdesign.design.certificate import certify, guarded_curve, prove_certificat
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import design, over, prove_monotone, travel
-from dzdesign.design.lot import LotMargin, prove_lot
-from dzdesign.design.lot_valves import LotValve
+from dzdesign.design.lot.margins import LotMargin, prove_lot
+from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
@@ -144,6 +144,8 @@ def _shared_design(batch: Mapping[str, Compensator]) -> Compensator:
         unlike = [field for field in SHARED if getattr(each, field) != getattr(first, field)]
         if each.positive.certificate.guard != first.positive.certificate.guard:
             unlike.append("guard")
+        if each.valve.dither != first.valve.dither:
+            unlike.append("dither of the recordings")
         if unlike:
             raise InputError(f"{other} and {name} are designed with another {unlike[0]}, so no setting serves both")
     asked = (first.options or {}).get("transition", "auto")
@@ -180,7 +182,7 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
 def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
     signals, u_max = first.signals, first.u_max_V
-    dither = first.drive_functions.dither_counts
+    dither = first.dither_reserve_counts
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     curves = {name: guarded_curve(model, guard, first.below_dp0) for name, model in models.items()}
@@ -264,7 +266,7 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
 
 def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
     """Prove the common law for one valve, on the whole interval that it was tested over."""
-    dither = first.drive_functions.dither_counts
+    dither = first.dither_reserve_counts
     curve = side.curves[name]
     ceiling = side.exact.get(name) or offset_ceiling(
         curve, first.signals, first.u_max_V, sign=side.sign, dither_counts=dither

@@ -1,0 +1,153 @@
+"""A dither: the square wave about the drive, declared of recordings (`identify --dithered`) and of a design."""
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil
+from typing import Annotated
+
+from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.units import measures, parse_quantity, si_factor
+
+#: Frequencies that a proportional valve's dither has, Hz; and its largest peak, over full drive.
+LOWEST_HZ, HIGHEST_HZ = 100.0, 300.0
+LARGEST_PEAK = 0.1
+EXAMPLE = "150 Hz 1 %"
+#: Share of a recorded frequency by which that of the drive may differ: half a wave is a whole number of PWM periods.
+SAME_FREQUENCY = Fraction(5, 100)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dither:
+    """A square wave about the drive."""
+
+    frequency_Hz: Annotated[float, quantity("Hz", "Its frequency.", ge=LOWEST_HZ, le=HIGHEST_HZ)]
+    peak: Annotated[float, quantity("1", "Half its height, over full command.", gt=0, le=LARGEST_PEAK)]
+
+    def __post_init__(self) -> None:
+        if not LOWEST_HZ <= self.frequency_Hz <= HIGHEST_HZ:
+            raise RuleError(
+                f"the dither's frequency is {self.frequency_Hz:g} Hz, expected {LOWEST_HZ:g} to {HIGHEST_HZ:g} Hz"
+            )
+        if not 0 < self.peak <= LARGEST_PEAK:
+            raise RuleError(
+                f"the dither is {self.peak:.3%}, expected more than 0 to {LARGEST_PEAK:.0%} of full command, which is "
+                "half the wave's height"
+            )
+
+    def in_words(self) -> str:
+        """Return it as an option takes it.
+
+        Examples
+        --------
+        >>> Dither(frequency_Hz=150.0, peak=0.01).in_words()
+        '150 Hz 1 %'
+        """
+        return f"{self.frequency_Hz:.6g} Hz {100 * self.peak:.6g} %"
+
+
+def parted(text: str, option: str, expected: str = "") -> tuple[float, str]:
+    """Return frequency, Hz, and the text of the peak; `expected` is what may stand there besides."""
+    parts = re.fullmatch(r"(.{1,30}?hz)\b(.{1,60})", text.strip(), re.IGNORECASE) if isinstance(text, str) else None
+    if parts is None:
+        raise InputError(
+            f"{option} is {quoted(text)}, expected {expected}a frequency in Hz and the wave's peak over full drive, "
+            f"such as '{EXAMPLE}'"
+        )
+    return parse_quantity(parts[1], "frequency", option), parts[2].strip()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeclaredDither:
+    """A dither as it was declared of recordings, whose unit of the command is not known before they are read."""
+
+    frequency_Hz: float
+    #: Half the wave's height, in the unit; 1: a share of full command.
+    peak: float
+    unit: str
+
+    def of(self, units: RecordedUnits, u_max_V: float) -> Dither:
+        """Return the dither, its peak over full command.
+
+        Examples
+        --------
+        >>> read_dithered("150 Hz 100 mV", "--dithered").of(RecordedUnits(), 10.0).in_words()
+        '150 Hz 1 %'
+        """
+        if self.unit == "1":
+            peak = self.peak
+        elif measures(self.unit, "voltage"):
+            peak = self.peak * si_factor(self.unit, "voltage") / u_max_V
+        elif self.unit == units.command.unit:
+            peak = self.peak / abs(units.command.factor) / u_max_V
+        else:
+            raise InputError(
+                f"--dithered gives the peak in {self.unit}, but the command was recorded in {units.command.unit}; "
+                f"give it in that, or in percent of full command, such as '{EXAMPLE}'"
+            )
+        return Dither(frequency_Hz=self.frequency_Hz, peak=peak)
+
+
+def read_dithered(text: str, option: str) -> DeclaredDither:
+    """Read a frequency and a peak, in percent of full command, or a number with a unit of the command."""
+    frequency, peak = parted(text, option)
+    found = re.fullmatch(r"(\d{1,9}(?:\.\d{0,15})?)\s?([^\d\s.,][^\d.,]{0,39})", peak)
+    if found is None:
+        raise InputError(
+            f"{option} is {quoted(text)}: its peak {quoted(peak)} is no number with a unit, expected one such as in "
+            f"'{EXAMPLE}'"
+        )
+    number, unit = float(found[1]), found[2].strip()
+    percent = unit == "%"
+    declared = DeclaredDither(
+        frequency_Hz=frequency, peak=number / 100 if percent else number, unit="1" if percent else unit
+    )
+    if percent:
+        declared.of(RecordedUnits(), 1.0)  # refused before the recordings are read
+    return declared
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrivenDither:
+    """The dither that a drive makes, in the firmware's integers; 0 counts: none."""
+
+    counts: int
+    compare_max: int
+    frequency_Hz: Fraction
+
+    def check(self, recorded: Dither | None) -> None:
+        """Refuse one that is not that of the recordings, where they had one: of any other valve.json knows nothing.
+
+        With a smaller one the hysteresis is wider, so that the valve closes lower, and with a larger one the knee is
+        softer.
+        """
+        if recorded is None:
+            return
+        asked = f"the ramps were recorded with a dither of {recorded.in_words()}"
+        remedy = f'give --dither "{recorded.in_words()}", or record ramps with the one that is wanted'
+        if not self.counts:
+            raise InputError(f"{asked}, without which the valve closes lower, but --dither is off; {remedy}")
+        if abs(self.counts - Fraction(repr(recorded.peak)) * self.compare_max) > Fraction(1, 2):
+            raise InputError(f"{asked}, but --dither has a peak of {self.counts / self.compare_max:.4%}; {remedy}")
+        if abs(self.frequency_Hz / Fraction(repr(recorded.frequency_Hz)) - 1) > SAME_FREQUENCY:
+            raise InputError(
+                f"{asked}, but --dither makes {float(self.frequency_Hz):.4g} Hz, half a wave being whole PWM periods; "
+                f"expected the recorded frequency within {float(SAME_FREQUENCY):.0%}; {remedy}"
+            )
+
+    def reserve(self, recorded: Dither | None) -> int:
+        """Return by how many counts the offset stays lower for the dither.
+
+        By the whole peak where the ramps had none: at the wave's top zero command must be shut. Recorded with it they
+        count it already, and what is left is that the drive's wave is not quite theirs. The motion that a dither makes
+        falls with the square of its frequency at most (a mass on a spring, above its resonance), and a valve whose
+        force and flow only rise with its drive passes no more at a command than with the recorded wave at one higher
+        by the difference of the peaks.
+        """
+        if recorded is None:
+            return self.counts
+        peak = Fraction(repr(recorded.peak)) * self.compare_max
+        moved = self.counts * abs(1 - (Fraction(repr(recorded.frequency_Hz)) / self.frequency_Hz) ** 2)
+        return ceil(abs(self.counts - peak) + moved)

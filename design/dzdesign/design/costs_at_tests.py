@@ -1,0 +1,141 @@
+"""What a design leaves at the tested pressure drops: dead zone at the onset and at the reading flow, flow, drive."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.law_corners import corners_of
+from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.reading_flow import ideal_line
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CostAtTest:
+    """What remains at one tested pressure drop, by branch where there are two; shares are of full command or drive."""
+
+    side: str
+    dp_MPa: float
+    offset_V: float
+    #: Dead zone to the knee; missing where the branch was not recorded, or `above_knee_V` says more.
+    onset: Mapping[str, float]
+    #: By how much the offset lies above the knee, so that flow passes at zero command.
+    above_knee_V: Mapping[str, float]
+    #: Flow that was declared to be allowed at zero command, of the guarded branch; empty if none was.
+    allowed_L_min: Mapping[str, float]
+    #: Flow on closing at the transition's end, None without one.
+    at_end_L_min: float | None
+    reading_flow_L_min: float
+    #: Command at which the reading flow passes, and that of an ideal line to the largest flow.
+    read: Mapping[str, float]
+    ideal: float
+    #: Drive at full command, and the command from which it no longer rises, None where that is full command.
+    full: float
+    limited_from: float | None
+
+    def drive_text(self) -> str:
+        """Return the drive at full command, and where it is reached."""
+        return f"{self.full:.2%}" + (f" from {self.limited_from:.1%} on" if self.limited_from is not None else "")
+
+    def text(self, units: RecordedUnits) -> str:
+        """Return all of it as one line."""
+        parts = [f"{units.text(self.dp_MPa, '.2f MPa')}: offset {units.text(self.offset_V, '.3f V')}"]
+        for name in ("opening", "closing"):
+            if name in self.onset:
+                parts.append(f"dead zone that remains on {name} {self.onset[name]:.2%} of command (knee)")
+            elif name in self.above_knee_V:
+                above = units.text(self.above_knee_V[name], ".3f dV")
+                allowed = self.allowed_L_min.get(name)
+                of_it = "" if allowed is None else f", of which {units.text(allowed, '.3g L/min')} are allowed"
+                parts.append(f"flow at zero command on {name}{of_it}: the offset lies {above} above the knee")
+        if self.at_end_L_min is not None:
+            parts.append(f"flow on closing at the transition's end {units.text(self.at_end_L_min, '.2f L/min')}")
+        read = " and ".join(f"{share:.2%} on {name}" for name, share in self.read.items())
+        at = units.text(self.reading_flow_L_min, ".2f L/min")
+        parts.append(f"read at {at} {read or 'nothing: the valve never passes it'} (ideal line {self.ideal:.2%})")
+        if self.limited_from is None:
+            parts.append(f"drive at full command {self.full:.2%}")
+        else:
+            parts.append(f"the largest drive, {self.full:.2%}, is reached at {self.limited_from:.1%} of command")
+        return ", ".join(parts)
+
+
+def costs_at_tests(compensator: Compensator, sign: int) -> tuple[CostAtTest, ...]:
+    """Return what remains at every tested pressure drop of a side; an output that never opens the valve is refused."""
+    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    return tuple(_cost_at_test(compensator, test, sign) for test in tests)
+
+
+def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> CostAtTest:
+    side, u_max = SIDE_NAMES[sign], float(compensator.u_max_V)
+    corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+    offset_V, left = corners.offset * u_max, remaining_dead_zone(compensator, test, sign)
+    knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
+    above = {name: offset_V - knee for name, knee in knees.items() if knee is not None and knee < offset_V}
+    at_end = None
+    if corners.end and test.u_knee_falling_V is not None:
+        at_end = test.slope_L_min_V * max(corners.at_end * u_max - test.u_knee_falling_V, 0.0)
+    limit = compensator.drive_functions.compare_limit / compensator.signals.compare_max
+    opens = max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max)
+    if limit <= opens:
+        at = compensator.valve.recorded_units.of_side(side).text(test.dp_MPa or 0.0, ".2f MPa")
+        raise InputError(
+            f"the largest output is {limit:.1%} of full drive, but the valve opens at {opens:.1%} at {at}, so nothing "
+            "would ever flow; give a larger --output-max"
+        )
+    allowed = test.zero_flow_L_min
+    return CostAtTest(
+        side=side,
+        dp_MPa=test.dp_MPa or 0.0,
+        offset_V=offset_V,
+        onset={name: share for name, share in left.items() if name not in above},
+        above_knee_V=above,
+        allowed_L_min={} if allowed is None else {compensator.side(sign).certificate.guard: allowed},
+        at_end_L_min=at_end,
+        reading_flow_L_min=compensator.reading_flow_L_min,
+        read=read_dead_zone(compensator, test, sign),
+        ideal=ideal_line(compensator.reading_flow_L_min, test.recorded.q_max_L_min),
+        full=min(limit, corners.full),
+        limited_from=corners.command_at(limit) if limit < corners.full else None,
+    )
+
+
+def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
+    """Return the dead zone that the law leaves at a tested pressure drop, as a share of command, by branch.
+
+    The test need not be of the valve that the law was designed for. A branch that was not recorded is left out; the
+    share is 0 where flow passes at zero command.
+    """
+    knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
+    return _commands_at(compensator, test, sign, knees)
+
+
+def read_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:
+    """Return the command at which the compensated valve passes the reading flow, as a share of full, by branch.
+
+    It is read from the recorded flow; a branch that was not recorded, or never comes to that flow, is left out.
+    """
+    flow, recorded = compensator.reading_flow_L_min, test.recorded
+    thresholds = {
+        "opening": recorded.rising.command_at(flow) if recorded.rising else None,
+        "closing": recorded.falling.command_at(flow) if recorded.falling else None,
+    }
+    return _commands_at(compensator, test, sign, thresholds)
+
+
+def _commands_at(
+    compensator: Compensator, test: TestResult, sign: int, thresholds_V: Mapping[str, float | None]
+) -> dict[str, float]:
+    """Return the command at which the drive reaches each threshold that there is, at a test's pressure drop."""
+    corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+    shares = {name: at / float(compensator.u_max_V) for name, at in thresholds_V.items() if at is not None}
+    nodes = compensator.drive_functions.play_counts[0 if sign > 0 else 1] or (0,)
+    widths = (nodes[0] / compensator.signals.compare_max, nodes[-1] / compensator.signals.compare_max)
+    branches = {"opening": corners, "closing": corners.lowered(*widths)}
+    found = {name: max(branches[name].command_at(at), 0.0) for name, at in shares.items()}
+    if "opening" in found:  # from rest the drive leaves the zero band at its outer end
+        found["opening"] = max(found["opening"], corners.leaves)
+    return found

@@ -1,0 +1,1 @@
+"""A lot: many valves' models enter; one setting that over-compensates none of them leaves, with each valve's margin."""

@@ -1,0 +1,41 @@
+"""The table of what a design leaves at its tests: every number of the lines in compensator.json, in its units."""
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from dzdesign.core.recorded_units import FlowUnit, PressureUnit, RecordedUnits
+from dzdesign.design.costs import lines_of_tests
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
+from dzdesign.terminal.tables import print_compensator
+
+BAR = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0), flow=FlowUnit(unit="mL/s", factor=1000 / 60))
+NUMBER = re.compile(r"\d+\.\d+")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        DesignOptions(),
+        DesignOptions(output_max=Fraction(8, 10)),
+        DesignOptions(transition=Fraction(0), guard="mean"),
+    ],
+    ids=["default", "largest output", "flow at zero"],
+)
+@pytest.mark.parametrize("units", [RecordedUnits(), BAR], ids=["MPa", "bar"])
+def test_the_table_has_every_number_of_the_lines(example_valve, capsys, options, units):
+    made = design(replace(example_valve, recorded_units=units), options)
+    print_compensator(made)
+    printed = capsys.readouterr().out
+    lines = lines_of_tests(made, 1)
+    assert set(lines) <= set(made.costs) and not any(line in printed for line in lines)
+    rows = [line for line in printed.splitlines() if re.match(r" +\d+\.\d+ +\d\.\d{3} +", line)]
+    level = NUMBER.search(lines[0].partition("read at ")[2])[0]
+    for line, row in zip(lines, rows, strict=True):
+        numbers = NUMBER.findall(line)
+        numbers.remove(level)
+        assert sorted(numbers) == sorted(NUMBER.findall(row)), row
+    assert f"read at {level} {units.label('L/min')}" in printed and f"dP ({units.label('MPa')})" in printed
