@@ -82,6 +82,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         zero_band_codes=options.error.zero_band_codes if transition_codes else 0,
         command_error=options.error,
         drive_functions=functions,
+        current_drive=options.current_drive(),
         costs=(),
         valve=valve,
     )

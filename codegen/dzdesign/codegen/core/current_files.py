@@ -1,10 +1,9 @@
 """The files of the current controller: dz_current.c and .h, their constants and what else they print."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import wrap
 
-from dzdesign.codegen.core.constants import COLUMNS, Define, defines
+from dzdesign.codegen.core.constants import COLUMNS, Constant, Define, Table, defines
 from dzdesign.codegen.core.files import CoreFile
 from dzdesign.codegen.core.misra import misra_lines
 from dzdesign.core.strict_templates import strict_templates
@@ -13,6 +12,7 @@ from dzdesign.design.current.loop import CORRECTION_SHIFT, CurrentLoop
 HERE = "codegen/dzdesign/codegen/core/current_files.py"
 LOOP = "design/dzdesign/design/current/loop.py"
 CHOICE = "design/dzdesign/design/current/choosing.py"
+CURRENT_SOURCES, CURRENT_HEADERS = ("dz_current.c",), ("dz_current.h",)
 #: Bits of the controller's word of faults, and what each says.
 FAULT_BITS = {
     "NO_OFFSET": "the offset of the current's codes is not calibrated yet",
@@ -23,18 +23,10 @@ FAULT_BITS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Table:
-    """The supply's correction, as the template prints it."""
-
-    comment: tuple[str, ...]
-    lines: tuple[str, ...]
-    size: int
-
-
 def current_files(loop: CurrentLoop) -> dict[str, CoreFile]:
     """Return the files of the current controller, by name."""
-    inside, outside = current_constants(loop), current_interface(loop)
+    inside, outside, table = current_constants(loop), current_interface(loop), supply_table(loop)
+    tables: tuple[Constant, ...] = () if table is None else (table,)
     words = {
         "supply": loop.supply is not None,
         "samples": loop.samples,
@@ -46,11 +38,12 @@ def current_files(loop: CurrentLoop) -> dict[str, CoreFile]:
         **words,
         "misra_lines": misra_lines(),
         "current_defines": defines(inside),
-        "supply_table": _supply_table(loop),
+        "supply_table": table,
+        "supply_lines": [] if table is None else _lines(table),
     }
     header = {**words, "misra_lines": misra_lines("dz_current.h"), "interface_defines": defines(outside)}
     return {
-        "dz_current.c": CoreFile(template="dz_current.c.jinja", values=source, constants=tuple(inside)),
+        "dz_current.c": CoreFile(template="dz_current.c.jinja", values=source, constants=(*inside, *tables)),
         "dz_current.h": CoreFile(template="dz_current.h.jinja", values=header, constants=tuple(outside)),
     }
 
@@ -73,10 +66,10 @@ def current_interface(loop: CurrentLoop) -> list[Define]:
     ]  # fmt: skip
     return [
         Define(symbol="DZ_CURRENT_SAMPLES", value=loop.samples, equation="codes of the current in a sum",
-               engineering="at equal distances over a PWM period", data=("current_loop.samples",), generator=LOOP),
+               engineering="at equal distances over a PWM period", data=("current_drive.loop.samples",), generator=LOOP),
         Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << loop.offset_shift,
                equation="sums that the offset is the mean of", engineering="with the output off",
-               data=("current_loop.offset_shift",), generator=LOOP),
+               data=("current_drive.loop.offset_shift",), generator=LOOP),
         *bits,
     ]  # fmt: skip
 
@@ -134,14 +127,26 @@ def current_constants(loop: CurrentLoop) -> list[Define]:
         ]  # fmt: skip
     return [
         Define(symbol=symbol, value=value, literal=literal, equation=text, engineering=engineering or "as designed",
-               data=tuple(f"current_loop.{key}" for key in keys), generator=CHOICE if keys else HERE)
+               data=tuple(f"current_drive.loop.{key}" for key in keys), generator=CHOICE if keys else HERE)
         for symbol, value, literal, text, engineering, keys in rows
     ]  # fmt: skip
 
 
-def _supply_table(loop: CurrentLoop) -> _Table | None:
+def supply_table(loop: CurrentLoop) -> Table | None:
+    """Return the supply's correction; None where the supply is not measured."""
     if loop.supply is None:
         return None
-    text = "/* Nominal over measured supply times 2^CORRECTION_SHIFT, every SUPPLY_STEP codes from SUPPLY_LOW. */"
-    nodes = ", ".join(f"{node}u" for node in loop.supply.nodes)
-    return _Table(comment=(text,), lines=tuple(wrap(nodes, COLUMNS - 8)), size=len(loop.supply.nodes))
+    return Table(
+        symbol="correction",
+        value=tuple((node, 0) for node in loop.supply.nodes),
+        equation="nominal over measured supply times 2^CORRECTION_SHIFT, every SUPPLY_STEP codes from SUPPLY_LOW",
+        engineering="straight between them",
+        rounding="rounded to nearest",
+        data=("current_drive.loop.supply.nodes",),
+        generator=CHOICE,
+    )
+
+
+def _lines(table: Table) -> list[str]:
+    """Return a table's numbers in lines of C."""
+    return wrap(", ".join(f"{number}u" for number, _ in table.value), COLUMNS - 8)

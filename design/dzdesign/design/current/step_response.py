@@ -143,7 +143,7 @@ def step_responses(
         found.append(
             StepResponse(
                 corner=corner,
-                rise_s=(reached[0] + 1) * sampling.period_s if len(reached) else float("inf"),
+                rise_s=(int(reached[0]) + 1) * sampling.period_s if len(reached) else float("inf"),
                 overshoot=max(0.0, float(after[:, place].max() - high) / (high - low)),
                 least_s=circuit.fastest_rise_s(corner, low, low + 0.9 * (high - low)),
             )
