@@ -30,7 +30,7 @@ CONVERTER, SAMPLING = Converter(), CurrentSampling()
 #: Sensor, and the limit of the rise.
 FORMS = {
     "supply unknown": (CurrentSensor(V_per_A=2.0, offset_V=0.15), 10.0),
-    "supply measured": (CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_V_per_V=0.075), 5.0),
+    "supply measured": (CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.075), 5.0),
 }
 SHARES = (0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 SECONDS, SETTLE_S = 10, 1

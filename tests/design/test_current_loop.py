@@ -114,7 +114,7 @@ def test_a_wider_supply_costs_speed():
     "sensor",
     [
         CurrentSensor(V_per_A=2.6, offset_V=0.15),
-        CurrentSensor(V_per_A=2.0, supply_V_per_V=0.1),
+        CurrentSensor(V_per_A=2.0, supply_divider=0.1),
     ],
 )
 def test_a_sensor_beyond_the_converter_is_refused(sensor):

@@ -12,7 +12,7 @@ CONVERTER, SAMPLING = Converter(), CurrentSampling()
 #: With and without the supply measured.
 SENSORS = {
     "supply unknown": CurrentSensor(V_per_A=2.0, offset_V=0.15),
-    "supply measured": CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_V_per_V=0.075),
+    "supply measured": CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.075),
 }
 
 

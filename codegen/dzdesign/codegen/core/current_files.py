@@ -66,7 +66,7 @@ def current_interface(loop: CurrentLoop) -> list[Define]:
     ]  # fmt: skip
     return [
         Define(symbol="DZ_CURRENT_SAMPLES", value=loop.samples, equation="codes of the current in a sum",
-               engineering="at equal distances over a PWM period", data=("current_drive.loop.samples",), generator=LOOP),
+               engineering="equally far apart in a PWM period", data=("current_drive.loop.samples",), generator=LOOP),
         Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << loop.offset_shift,
                equation="sums that the offset is the mean of", engineering="with the output off",
                data=("current_drive.loop.offset_shift",), generator=LOOP),

@@ -44,12 +44,12 @@ class CurrentSensor:
 
     V_per_A: Annotated[float, quantity("V/A", "Shunt times amplifier gain.", gt=0)]
     offset_V: Annotated[float, quantity("V", "Voltage at the pin without current.", ge=0)] = 0.0
-    supply_V_per_V: Annotated[
+    supply_divider: Annotated[
         float, quantity("1", "Voltage divider of the supply; 0: the supply is not measured.", ge=0)
     ] = 0.0
 
     def __post_init__(self) -> None:
-        if not self.V_per_A > 0 or self.offset_V < 0 or not 0 <= self.supply_V_per_V < 1:
+        if not self.V_per_A > 0 or self.offset_V < 0 or not 0 <= self.supply_divider < 1:
             raise RuleError(
                 "the current's sensor needs a positive gain, an offset of zero or more, a divider below one"
             )
@@ -94,7 +94,7 @@ def choose_loop(
     compare_limit: int | None = None,
 ) -> CurrentLoop:
     """Return the current loop in integers; a coil or a sensor that allows none is an `InputError`."""
-    gains = choose_gains(circuit, sampling, sensor.supply_V_per_V > 0)
+    gains = choose_gains(circuit, sampling, sensor.supply_divider > 0)
     sums = _Sums(circuit=circuit, sensor=sensor, converter=converter, sampling=sampling)
     counts = circuit.rated_A / circuit.nominal_V  # of the PWM for a count of current, over V/A
     real = {name: getattr(gains, name) * counts for name in ("proportional", "integral", "feed_forward")}
@@ -139,7 +139,7 @@ def sensor_line(sensor: CurrentSensor, converter: Converter) -> SensorLine:
         offset_V=sensor.offset_V,
         codes_per_V=converter.levels / float(converter.full_V),
         code_max=converter.code_max,
-        supply_V_per_V=sensor.supply_V_per_V,
+        supply_divider=sensor.supply_divider,
     )
 
 
@@ -212,15 +212,15 @@ class _Sums:
 
 
 def _supply_correction(circuit: CoilCircuit, sensor: CurrentSensor, converter: Converter) -> SupplyCorrection | None:
-    if not sensor.supply_V_per_V:
+    if not sensor.supply_divider:
         return None
-    codes_per_V = sensor.supply_V_per_V * converter.levels / float(converter.full_V)
+    codes_per_V = sensor.supply_divider * converter.levels / float(converter.full_V)
     low = floor(circuit.supply_V[0] * (1 - SUPPLY_BEYOND) * codes_per_V)
     high = ceil(circuit.supply_V[1] * (1 + SUPPLY_BEYOND) * codes_per_V)
     if high > converter.code_max:
         raise InputError(
             f"a supply of {circuit.supply_V[1] * (1 + SUPPLY_BEYOND):.4g} V is beyond the converter's "
-            f"{float(converter.full_V):g} V; lower the divider of {sensor.supply_V_per_V:g}"
+            f"{float(converter.full_V):g} V; lower the divider of {sensor.supply_divider:g}"
         )
     nodes = (high - low) // SUPPLY_STEP + 2
     factors = (

@@ -44,7 +44,7 @@ def current_request(text: Mapping[str, str], target: TargetInputs) -> CurrentReq
         sensor=CurrentSensor(
             V_per_A=float(sensor.volts_per_unit),
             offset_V=float(sensor.offset_V),
-            supply_V_per_V=float(supply.volts_per_unit) if supply else 0.0,
+            supply_divider=float(supply.volts_per_unit) if supply else 0.0,
         ),
         sampling=CurrentSampling(tick_Hz=target.tick_Hz),
     )

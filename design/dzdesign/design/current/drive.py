@@ -49,12 +49,11 @@ class CurrentDrive:
         measured = "measured" if loop.supply else "not measured"
         return (
             f"drive: current control, full drive is {circuit.rated_A:g} A; coil {circuit.resistance_ohm:g} + "
-            f"{circuit.series_ohm:g} ohm (x {_ends(circuit.resistance_factors)}), "
-            f"{1e3 * circuit.inductance_H:g} mH (x {_ends(circuit.inductance_factors)}), supply "
-            f"{low:g}..{high:g} V, {measured}",
+            f"{circuit.series_ohm:g} ohm (x {_ends(circuit.resistance_factors)}), {1e3 * circuit.inductance_H:g} mH (x "
+            f"{_ends(circuit.inductance_factors)}), supply {low:g}..{high:g} V, {measured}",
             f"current loop: phase margin {self.phase_margin_deg:.0f} degrees, gain margin {self.gain_margin:.1f} at "
-            f"the worst corner; 10 to 90 % in {1e3 * self.rise_s:.1f} ms at the slowest ({1e3 * self.least_rise_s:.1f} ms "
-            f"with the switch on all the time), overshoot up to {self.overshoot:.1%}; 90 to 10 % takes up to "
+            f"the worst corner; 10 to 90 % in {1e3 * self.rise_s:.1f} ms at the slowest ({1e3 * self.least_rise_s:.1f} "
+            f"ms with the switch on all the time), overshoot up to {self.overshoot:.1%}; 90 to 10 % takes up to "
             f"{1e3 * self.fall_s:.0f} ms, as the freewheeling diode alone brakes",
         )
 

@@ -15,7 +15,6 @@ CORRECTION_SHIFT = 14
 
 Count = Annotated[int, Meta(ge=0, le=65535)]
 Gain = Annotated[int, Meta(ge=0, le=LARGEST_GAIN)]
-Shift = Annotated[int, Meta(ge=1, le=15)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +58,7 @@ class CurrentLoop:
     current_gain: Annotated[
         int, Meta(description="Counts of current for the sum of codes less its offset, over 2^current_shift.", ge=1)
     ]
-    current_shift: Shift
+    current_shift: Annotated[int, Meta(description="Binary places of current_gain.", ge=1, le=15)]
     gain_shift: Annotated[int, Meta(description="Binary places of the three gains.", ge=1, le=13)]
     proportional: Annotated[Gain, Meta(description="PWM counts for a count of error, over 2^gain_shift.")]
     integral: Annotated[Gain, Meta(description="The same, added in every PWM period.")]

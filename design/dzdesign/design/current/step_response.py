@@ -38,7 +38,7 @@ class SensorLine:
     offset_V: float
     codes_per_V: float
     code_max: int
-    supply_V_per_V: float
+    supply_divider: float
 
     def codes(self, volts: np.ndarray) -> np.ndarray:
         """Return the codes of voltages at the pin."""
@@ -91,7 +91,7 @@ def run_loop(
     coils, unit = Coils(circuit, corners, sampling), float(1 << loop.gain_shift)
     count, before = len(corners), sampling.before
     integral, compare, ramped = np.zeros(count), np.zeros(count), np.zeros(count)
-    factor = _correction(loop, sensor.codes(coils.supply * sensor.supply_V_per_V))
+    factor = _correction(loop, sensor.codes(coils.supply * sensor.supply_divider))
     last = np.full((sampling.samples, count), sensor.codes(np.array(sensor.offset_V)))
     means, compares = [], []
     for set_point in set_points:

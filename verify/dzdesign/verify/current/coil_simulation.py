@@ -27,7 +27,7 @@ class _Coil(ctypes.Structure):
 
 class _Sensor(ctypes.Structure):
     _fields_ = [
-        (name, ctypes.c_double) for name in ("V_per_A", "offset_V", "codes_per_V", "code_max", "supply_V_per_V")
+        (name, ctypes.c_double) for name in ("V_per_A", "offset_V", "codes_per_V", "code_max", "supply_divider")
     ]
 
 
@@ -63,7 +63,7 @@ class CoilSimulation:
             sensor.offset_V,
             converter.levels / float(converter.full_V),
             converter.code_max,
-            sensor.supply_V_per_V,
+            sensor.supply_divider,
         )
         sources = {name: (PROGRAMS / name).read_text("utf-8") for name in ("coil_loop.c", "coil_loop.h")}
         own = {name: core[name] for name in ("dz_current.c", "dz_current.h")}

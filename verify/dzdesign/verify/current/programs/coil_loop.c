@@ -82,7 +82,7 @@ int32_t coil_loop(const struct coil *coil, const struct sensor *sensor, const ui
         for (int sample = 0; sample < coil->samples; sample++) {
             sum = (uint16_t)(sum + ((sample < coil->samples_before) ? now[sample] : last[sample]));
         }
-        TICK(&loop, set_points[k], sum, code_of(coil->supply_V * sensor->supply_V_per_V, sensor));
+        TICK(&loop, set_points[k], sum, code_of(coil->supply_V * sensor->supply_divider, sensor));
         traces[k].sum = sum;
     }
     return (int32_t)loop.faults;

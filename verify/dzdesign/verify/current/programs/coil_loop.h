@@ -26,7 +26,7 @@ struct sensor
     double offset_V;
     double codes_per_V;
     double code_max;
-    double supply_V_per_V;
+    double supply_divider;
 };
 
 struct trace
