@@ -42,8 +42,8 @@ def draw_curve(shape: str, dp: np.ndarray, rng: np.random.Generator) -> Curve:
         left = int(rng.integers(1, dp.size - 1))
         at = float(dp[left] + rng.uniform(0.15, 0.85) * (dp[left + 1] - dp[left]))
         depth = SCATTER * float(np.exp(rng.uniform(np.log(0.3), np.log(30))))
-        # So deep below the nearer of the two tests, and at most a volt below the first.
-        bend = min(depth / min(at - dp[left], dp[left + 1] - at) ** 2, 1 / (at - low) ** 2)
+        # So deep below the nearer of the two tests, and at most a volt below the ends.
+        bend = min(depth / min(at - dp[left], dp[left + 1] - at) ** 2, 1 / max(at - low, high - at) ** 2)
         return lambda x: 5.0 + bend * (x - at) ** 2
     if shape == "decay":
         # From test to test it falls by a third of the step before, or more.

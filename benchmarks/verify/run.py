@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that al
 
 from all_inputs import print_inputs  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
+from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from plant import print_plant  # noqa: E402
 from proof_of_c import print_proof  # noqa: E402
@@ -23,6 +24,7 @@ PARTS = {
     "inputs": (print_inputs, 101),
     "plant": (print_plant, 303),
     "stand-in": (print_stand_in, 0),
+    "hysteresis": (print_hysteresis, 404),
     "mutants": (print_mutants, 202),
     "proof": (print_proof, 0),
     "current": (print_current_loop, 0),

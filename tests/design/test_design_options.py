@@ -49,6 +49,8 @@ def run(tmp_path, capsys):
         (["--command-error", "500 + 4 codes"], "a zero band of 504 codes and a transition of 32 take 536"),
         (["--command-error", "15 + 0 codes"], "no converter is without noise"),
         (["--command-error", "15 codes"], "expected the offset and the noise's peak"),
+        (["--command-error", "1/0 codes + 4 codes"], "expected the offset and the noise's peak"),
+        (["--reading-flow", "1e9 L/min"], "expected at most 1e+06 L/min"),
         (["--negative-dp", "swapped"], "--negative-dp is for a command of both signs"),
         (["--ramp-down", "1 s / 2 s"], "the second time of --ramp-down is for a command of both signs"),
         (["--pressure-a", "0..3 V = 0 MPa"], "the sensor's span is 0 MPa"),

@@ -90,6 +90,8 @@ def test_a_declared_error_is_rounded_up_to_codes():
 
     error = command_error_of("0.4 % + 0.1 %", Converter(), CommandSignal())
     assert (error.offset_codes, error.noise_codes) == (17, 5)  # 16.4 and 4.1 codes of 4095
+    error = command_error_of("14.5 + 3.5 codes", Converter(), CommandSignal())
+    assert (error.offset_codes, error.noise_codes) == (15, 4)
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ FIGURES = {
 def scenario(name, **figures):
     return ScenarioResult(
         name=name, side="positive", dp_MPa=5.0, leak_L_min=0.0, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0,
-        unseen_below_L_min=None, must_shut=True, figures=figures,
+        allowed_at_zero_L_min=None, unseen_below_L_min=None, must_shut=True, figures=figures,
     )  # fmt: skip
 
 

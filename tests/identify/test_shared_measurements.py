@@ -62,6 +62,21 @@ def test_offset_passes_no_flow_that_the_meter_could_see(artefacts):
         assert offset < known["u_falling_Q0.6"]
 
 
+@pytest.mark.parametrize("valve", ["a", "e"])
+def test_offset_passes_no_more_than_a_declared_flow(valve, tmp_path):
+    """The command that truly passes 1 L/min on closing is met, and the bound lies under it."""
+    truth = json.loads((SHARED / "truth.json").read_text())
+    ramps = sorted(str(path) for path in (SHARED / f"valve_{valve}").glob("*.csv.gz"))
+    options = ["--repeatability", "0 %", "--zero-flow", "1000 mL/min", "--meter-lag", "0.1 s"]
+    assert main(["identify", *ramps, *options, "-o", str(tmp_path / "valve.json")]) == 0
+    side = json.loads((tmp_path / "valve.json").read_text())["sides"]["positive"]
+    for test in side["tests"]:
+        known = truth[test["source"].removesuffix(".csv.gz")]["pos"]["u_falling_Q1.0"]
+        assert test["zero_flow_L_min"] == 1.0
+        assert test["u_guard_V"] == pytest.approx(known, abs=0.015)
+        assert known - 0.2 < test["u_guard_lower_V"] < known
+
+
 def test_measured_valve_without_pressure_is_one_pressure_and_says_so(tmp_path, capsys):
     path = tmp_path / "valve.json"
     assert main(["identify", str(SHARED / "real" / "pvp_psol.csv"), "-o", str(path)]) == 0

@@ -9,8 +9,8 @@ from dzdesign.assess.quantities import Reading, hidden, in_units, observed
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.gated_line import GATE, fit_line
-from dzdesign.identify.knees.noise import median
 from dzdesign.identify.knees.profile import crossing
+from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.valve.reading_flow import ideal_line
 
 #: Shares of the largest flow at which the branches' distance is taken, and the fewest of them.

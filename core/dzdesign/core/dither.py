@@ -132,9 +132,11 @@ class DrivenDither:
         if abs(self.counts - Fraction(repr(recorded.peak)) * self.compare_max) > Fraction(1, 2):
             raise InputError(f"{asked}, but --dither has a peak of {self.counts / self.compare_max:.4%}; {remedy}")
         if abs(self.frequency_Hz / Fraction(repr(recorded.frequency_Hz)) - 1) > SAME_FREQUENCY:
+            made = f"{float(self.frequency_Hz):.6g} Hz"
             raise InputError(
-                f"{asked}, but --dither makes {float(self.frequency_Hz):.4g} Hz, half a wave being whole PWM periods; "
-                f"expected the recorded frequency within {float(SAME_FREQUENCY):.0%}; {remedy}"
+                f"{asked}, but --dither makes {made}, half a wave being whole PWM periods; expected the recorded "
+                f"frequency within {float(SAME_FREQUENCY):.0%}; give that to --dither, or record ramps with one that "
+                f"the PWM makes, such as {made}"
             )
 
     def reserve(self, recorded: Dither | None) -> int:

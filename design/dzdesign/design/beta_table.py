@@ -78,7 +78,7 @@ def pressures_MPa(signals: Signals, first: int, last: int) -> tuple[Fraction, ..
 def offset_ceiling(
     curve: OffsetCurve, signals: Signals, u_max_V: Fraction, *, sign: int = 1, dither_counts: int = 0
 ) -> OffsetCeiling:
-    """Return the limit of the offset at every pressure code, the converter's error and the rounding counted.
+    """Return the limit of the offset at every pressure code, rounding to codes and to counts counted.
 
     The dither's peak is kept free beside the rounding. A curve that lies above its bound somewhere
     is refused: valve.json contradicts itself.

@@ -33,7 +33,7 @@ def certify(
 ) -> Certificate:
     """Prove the certificate of one side, in exact arithmetic, at every pressure code.
 
-    The `curve` is the guarded one; the `ceiling` is what the converter's error, rounding and dither leave of it. The
+    The `curve` is the guarded one; the `ceiling` is what rounding, of pressures too, and dither leave of it. The
     table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
     refused.
     """

@@ -45,10 +45,11 @@ def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
     lines = unseen_failures(compensator.signals)
     for sign in compensator.signals.signs:
         if compensator.valve.sides[SIDE_NAMES[sign]].trend == "increasing":
+            hidden = " and ".join(compensator.signals.hidden_excess(sign))
+            remedy = f"{hidden} can't be told; give signals with a live zero and room above the span, or "
             lines.append(
                 f"{_side_label(compensator, sign)}the threshold grows with the pressure drop, so a pressure signal "
-                "that reads too high raises the offset: a broken wire of sensor B is not recognised unless it has a "
-                "live zero; monitor the sensors outside"
+                f"that reads too high raises the offset: {remedy if hidden else ''}monitor the sensors outside"
             )
     return tuple(lines)
 

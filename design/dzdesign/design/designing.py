@@ -236,7 +236,7 @@ def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
 
 
 def _opening_ceiling(opening: OffsetCurve, signals: Signals, u_max: Fraction, sign: int) -> OffsetCeiling:
-    """Return the opening threshold at every pressure code: no bound, so neither the converter's error counts."""
+    """Return the opening threshold at every pressure code: no bound, so rounding to codes does not count."""
     codes = range(signals.largest_difference(sign) + 1)
     return OffsetCeiling(limit=tuple(opening.at(signals.dp_MPa(code)) / u_max for code in codes), certified=range(0))
 

@@ -99,7 +99,8 @@ def _judged(given: str, made: Compensator) -> HysteresisChoice:
     return HysteresisChoice(
         given=given,
         onset=max(onsets, default=None),
-        reading=max(read, default=None),
+        # A test that never comes to that flow is no better than the others.
+        reading=max(read, default=None) if len(read) == len(onsets) else None,
         hysteresis=max(float(np.concatenate(widths).mean()), travel) if widths else None,
         largest=max(*(float(found.max()) for found in widths), travel) if widths else None,
     )

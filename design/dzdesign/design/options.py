@@ -110,8 +110,9 @@ class DesignOptions:
         if not 0 < self.output_max <= 1:
             raise InputError(f"the largest output is {float(self.output_max):.3%}, expected more than 0, up to 100 %")
         if self.reading_flow_L_min is not None and not 0 < self.reading_flow_L_min <= MOST_L_MIN:
+            expected = "more than zero" if self.reading_flow_L_min <= 0 else f"at most {MOST_L_MIN:g} L/min"
             raise InputError(
-                f"the reading flow is {self.reading_flow_L_min:g} L/min, expected more than zero, such as '0.6 L/min'"
+                f"the reading flow is {self.reading_flow_L_min:g} L/min, expected {expected}, such as '0.6 L/min'"
             )
         if bool(self.dither_Hz) != bool(self.dither_peak):
             raise InputError("a dither needs both, a frequency and a peak, such as '150 Hz 1 %'")

@@ -43,7 +43,7 @@ class Certificate:
         quantity(
             "V",
             "By how much the table's offset stays under the certified curve on average: the price of few nodes, "
-            "rounding, the converter's error and the dither.",
+            "rounding of pressures to codes and of the drive to counts, and the dither.",
             ge=-1e6,
             le=1e6,
         ),

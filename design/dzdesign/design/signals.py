@@ -175,6 +175,17 @@ class Signals:
         turn = -1 if sign < 0 and self.swapped else 1
         return turn * (a * WEIGHT_UNIT - b * self.weight_b) >> WEIGHT_SHIFT
 
+    def hidden_excess(self, sign: int) -> tuple[str, ...]:
+        """Return the failures of a sensor that make the pressure difference read too high with codes that are valid."""
+        sensors = {"A": self.pressure_a, "B": self.pressure_b}
+        ahead, behind = ("B", "A") if sign < 0 and self.swapped else ("A", "B")
+        found = []
+        if sensors[behind].valid_codes[0] == 0:
+            found.append(f"a broken wire of sensor {behind}")
+        if sensors[ahead].valid_codes[1] == self.code_max:
+            found.append(f"a reading of sensor {ahead} above its span")
+        return tuple(found)
+
     def largest_difference(self, sign: int) -> int:
         """Return the largest difference that sound codes make."""
         a, b = self.pressure_a.valid_codes, self.pressure_b.valid_codes
@@ -182,7 +193,10 @@ class Signals:
         return max(self.difference(a[0], b[1], sign) if reversed_ else self.difference(a[1], b[0], sign), 1)
 
     def difference_error(self, sign: int) -> tuple[int, int]:
-        """Return how many codes a difference may read too high (as a negative number) and too low, rounded outwards."""
+        """Return how many codes a difference may read too high (as a negative number) and too low, rounded outwards.
+
+        That is rounding to codes alone: errors of the sensors and of their converters are not in it.
+        """
         a, b = self.pressure_a, self.pressure_b
         low, high = a.error_MPa[0] - b.error_MPa[1], a.error_MPa[1] - b.error_MPa[0]
         # What the weight is off, at the sensor's largest code, and the shift that rounds down.

@@ -64,12 +64,12 @@ def command_error_of(text: str, converter: Converter, command: CommandSignal) ->
     parts = [part.strip() for part in text.split("+")]
     if len(parts) != 2:
         raise InputError(f"--command-error is '{text}', {EXPECTED}")
-    if re.search(r"codes?$", parts[1]) and re.fullmatch(r"\d+", parts[0]):
+    if re.search(r"codes?$", parts[1]) and re.fullmatch(r"\d+(\.\d+)?", parts[0]):
         parts[0] += " codes"
     try:
         offset, noise = (_codes(part, command) for part in parts)
         return CommandError(offset_codes=offset, noise_codes=noise)
-    except (ValueError, RuleError) as error:
+    except (ValueError, ZeroDivisionError, RuleError) as error:
         raise InputError(f"--command-error is '{text}', {EXPECTED} ({error})") from error
 
 

@@ -12,7 +12,14 @@ from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
-from dzdesign.batch.summary import SETTING_NAME, lot_setting_of, setting_files, setting_summary, summary_of
+from dzdesign.batch.summary import (
+    SETTING_NAME,
+    lot_setting_of,
+    setting_files,
+    setting_summary,
+    summary_of,
+    units_of_lot,
+)
 from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, write_files
 from dzdesign.core.errors import InputError
@@ -114,6 +121,7 @@ def _finished(
             if valve.name not in unwritten
         },
         anomalies=anomalies_of(found, output, valves),
+        units=units_of_lot(designed),
     )
     if setting is None:
         (output / SETTING_NAME).unlink(missing_ok=True)  # of an earlier run with other valves

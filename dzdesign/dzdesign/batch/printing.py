@@ -1,15 +1,16 @@
 """What `dzdesign batch` prints: counts, spread, the cost of the lot setting, and why valves failed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from dzdesign.core.errors import and_more
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.lot.setting_text import checked_line, cost_lines, span, untested_lines
 from dzdesign.report.lot.summary import LotSummary
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
 
 #: Valves of one warning that are named, and of those that hold the lot setting down.
 NAMED, BINDING_NAMED = 3, 5
-UNITS = {"V": "V", "percent": "%"}
 
 
 def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
@@ -20,7 +21,7 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
     table = Table(title, "", "least", "5 %", "median", "95 %", "largest")
     for column, at in summary.quantiles.items():
         values = (at.least, at.q05, at.median, at.q95, at.largest)
-        table.add_row(_in_words(column), *(f"{value:.3f}" for value in values))
+        table.add_row(_in_words(column, summary.recorded_units), *_numbers(column, values, summary.recorded_units))
     put_table(console, table)
     for line in _setting_lines(summary):
         put_line(console, line)
@@ -39,10 +40,19 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
     )
 
 
-def _in_words(column: str) -> str:
+def _in_words(column: str, units: RecordedUnits) -> str:
     """Return a column's name with its unit in brackets."""
     name, _, unit = column.rpartition("_")
-    return f"{name.replace('_', ' ')} ({UNITS[unit]})" if unit in UNITS else column.replace("_", " ")
+    known = {"V": units.label("V"), "percent": "%"}
+    return f"{name.replace('_', ' ')} ({known[unit]})" if unit in known else column.replace("_", " ")
+
+
+def _numbers(column: str, values: Sequence[float], units: RecordedUnits) -> list[str]:
+    if not column.endswith("_V"):
+        return [f"{value:.3f}" for value in values]
+    shown = units.of_side("negative" if column.startswith("negative_") else "positive")
+    # The least threshold has the largest reading where that falls.
+    return [shown.number(value, ".3f V") for value in (reversed(values) if shown.falling else values)]
 
 
 def _setting_lines(summary: LotSummary) -> list[str]:
@@ -51,9 +61,9 @@ def _setting_lines(summary: LotSummary) -> list[str]:
     if setting is None:
         return [f"no lot setting: {summary.why_no_lot_setting}"]
     return [
-        f"one lot setting, safe for each of these valves {span(*setting.dp_MPa)}, is held down by "
-        f"{and_more(setting.binding, BINDING_NAMED)}; it is in {setting.file}",
-        checked_line(setting),
-        *untested_lines(setting),
+        f"one lot setting, safe for each of these valves {span(*setting.dp_MPa, summary.recorded_units)}, is held "
+        f"down by {and_more(setting.binding, BINDING_NAMED)}; it is in {setting.file}",
+        checked_line(setting, summary.recorded_units),
+        *untested_lines(setting, summary.recorded_units),
         *cost_lines(summary),
     ]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, common_units
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.compensator_sides import SIGNS
 from dzdesign.report.lot.spread import quantiles, spreads_of
@@ -51,6 +52,7 @@ def summary_of(
     why_no_setting: str | None = None,
     made_from: Mapping[str, bytes],
     anomalies: Sequence[str] = (),
+    units: RecordedUnits = AS_COMPUTED,
 ) -> LotSummary:
     """Return what batch.json says of a finished lot.
 
@@ -78,6 +80,19 @@ def summary_of(
         quantiles={spread.column: spread.at for spread in spreads_of(rows)},
         lot_setting=setting,
         why_no_lot_setting=why_no_setting,
+        recorded_units=units,
+    )
+
+
+def units_of_lot(designed: "Mapping[str, Compensator]") -> RecordedUnits:
+    """Return the units in which all valves of a lot were recorded; V, MPa or L/min where they differ."""
+    every = [each.valve.recorded_units for each in designed.values()]
+    return common_units(
+        {
+            "command": tuple(units.command for units in every),
+            "pressure": tuple(units.pressure for units in every),
+            "flow": tuple(units.flow for units in every),
+        }
     )
 
 

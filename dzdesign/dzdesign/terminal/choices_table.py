@@ -14,6 +14,11 @@ DITHER = (
     "A dither takes the hysteresis out too, but moves the thresholds: record the ramps under it, identify them with "
     "--dithered, and give --dither here."
 )
+#: Of the inverse play where it is recommended: the table is of the recorded sweeps.
+PLAY = (
+    "The hysteresis of a play is that of sweeps as recorded: how far the valve turns back in a small loop they can't "
+    "tell. Where it turns back less, small loops are over-compensated, up to the play's width; try them on the machine."
+)
 
 
 def print_choices(
@@ -41,5 +46,7 @@ def print_choices(
     for each in choices:
         if each.refused:
             put_line(console, f"{each.given}: {each.refused}")
+    if any(each.recommended and "play" in each.given for each in choices):
+        put_line(console, PLAY)
     if not dithered:
         put_line(console, DITHER)

@@ -164,7 +164,9 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
     words = []
     for check in side.curve.premises:
         p_value, left = check.lack_of_fit_p, check.dead_zone_over_u_max
-        tested = "untested" if p_value is None else f"lack of fit {chance(p_value)}"
+        estimated = check.premise == "smooth" and len(side.tests) > 2
+        untested = "M made from the tests" if estimated else "untested"
+        tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
     return (f"largest dead zone on opening, without a transition, by --curve: {', '.join(words)}",)

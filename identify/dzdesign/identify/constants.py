@@ -5,6 +5,8 @@ from typing import Literal, get_args
 #: What is taken of the threshold between the tests, from the strongest on.
 Premise = Literal["line", "smooth", "monotone"]
 PREMISES: tuple[Premise, ...] = get_args(Premise)
+#: Probability, if a premise were true, of data as unlike it as these, below which it is refused.
+REFUSED = 0.01
 MPA = 1e6
 L_MIN = 1e-3 / 60
 #: Pressure drops beyond these, Pa, are a wrong unit.

@@ -1,11 +1,13 @@
 """Choices of the engineer for an identification."""
 
-import math
 from dataclasses import dataclass
 
 from dzdesign.core.dither import DeclaredDither
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.identify.constants import PREMISES, Premise
+from dzdesign.identify.constants import MPA, PREMISES, Premise
+
+#: Curvatures beyond this, V/Pa², are a wrong unit: the slope would change by 1 V/MPa within a kilopascal.
+LARGEST_CURVATURE = 1e3 / MPA**2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,8 +87,11 @@ class IdentifyOptions:
             )
         if self.curve not in (*PREMISES, None):
             raise InputError(f"the curve is {quoted(self.curve)}, expected one of {', '.join(PREMISES)}")
-        if self.curvature is not None and not 0 <= self.curvature < math.inf:
-            raise InputError(f"the curvature is {self.curvature} V/Pa², expected zero or more")
+        if self.curvature is not None and not 0 <= self.curvature <= LARGEST_CURVATURE:
+            raise InputError(
+                f"the curvature is {1e3 * MPA * (MPA * self.curvature):.6g} mV/MPa², expected zero or more, at most "
+                f"{1e3 * MPA * (MPA * LARGEST_CURVATURE):g}, such as '20 mV/MPa^2'"
+            )
         if self.curvature is not None and self.curve not in ("smooth", None):
             raise InputError(f"a curvature is declared beside the curve '{self.curve}', expected it beside 'smooth'")
         if not 0 <= self.flat_below < 1:

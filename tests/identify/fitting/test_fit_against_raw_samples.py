@@ -407,6 +407,23 @@ class TestOrderedKnees:
             assert seen["slopes"] > 10 * SAME
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_knees_that_run_one_way_by_themselves_are_not_moved_by_that_order(seed):
+    """`order_knees` then takes the free fit, and fits an order to one branch without the other."""
+    _, shapes = valve(seed)
+    free = fitted(shapes, "flat")
+    order = np.argsort(-free.knee[:, 1])
+    ordered = fitted([shapes[row] for row in order], "decreasing", ordered=1)
+    alone = fitted([(None, shapes[row][1]) for row in order], "decreasing", ordered=1)
+    for name in ("knee", "slope"):
+        expected = getattr(free, name)[order]
+        np.testing.assert_allclose(getattr(ordered, name), expected, rtol=SAME)
+        np.testing.assert_allclose(getattr(alone, name)[:, 1], expected[:, 1], rtol=SAME)
+        merged = getattr(alone.with_other_branch(ordered, 0), name)
+        np.testing.assert_allclose(merged, expected, rtol=SAME)
+    np.testing.assert_allclose(alone.knee_se[:, 1], free.knee_se[order, 1], rtol=1e-6)
+
+
 def tobit_knee(samples, sigma, floor, start):
     """Maximise the likelihood of single samples: those seen by their density, the others by their probability."""
     u, y, cut = samples.u, samples.y, samples.censored

@@ -11,7 +11,7 @@ from scipy.special import ndtr
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.lot.valves import LotSide
-from dzdesign.identify.fitting import premises
+from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fitting.offsets import PARTS, POINTS, fit_offset_under
 from dzdesign.identify.fitting.premises import (
     bound_line,
@@ -19,13 +19,14 @@ from dzdesign.identify.fitting.premises import (
     critical_value,
     find_curvature,
     one_way_p,
-    second_differences,
 )
 from dzdesign.identify.knees.between_ramps import BetweenRamps
 from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve import estimated_curvature
 from dzdesign.identify.valve.certified_bound import CertifiedBound
+from dzdesign.identify.valve.estimated_curvature import second_differences
 from dzdesign.identify.valve.guard_curve import largest_excess
 from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
 from tests.support.repeatable_valves import identify
@@ -113,8 +114,8 @@ class TestCurvature:
             assert failures("line", shape, 6, (0.001, 0.005), DRAWS, declared=False, seed=6)[0] <= MOST
 
     def test_the_check_would_see_chords_that_sag_too_little(self, monkeypatch):
-        monkeypatch.setattr(premises, "INNER_FACTOR", 0.0)
-        monkeypatch.setattr(premises, "END_FACTOR", 0.0)
+        monkeypatch.setattr(estimated_curvature, "INNER_FACTOR", 0.0)
+        monkeypatch.setattr(estimated_curvature, "END_FACTOR", 0.0)
         assert failures("smooth", "kink", 6, (0.001, 0.0), 200, declared=False, seed=3)[0] > MOST
 
 
@@ -218,6 +219,11 @@ class TestChoice:
         assert line.beta.beta_se[-1] < smooth.beta.beta_se[-1] and line.beta.beta_se[0] == 0
         np.testing.assert_allclose(np.diff(line.beta.beta, 2), 0, atol=2e-6)
 
+    @pytest.mark.parametrize(("curvature", "got"), [(-2e-14, "-20 mV/MPa"), (1e296, "1e.311|inf mV/MPa")])
+    def test_a_curvature_of_no_valve_is_refused_in_its_unit(self, curvature, got):
+        with pytest.raises(InputError, match=got):
+            IdentifyOptions(curvature=curvature)
+
     def test_a_curvature_beside_another_premise_is_refused(self):
         with pytest.raises(InputError, match="curvature"):
             IdentifyOptions(curve="line", curvature=1e-14)
@@ -232,10 +238,10 @@ class TestOneWay:
             row = draw % 5
             truth[row + 1] = truth[row] + 10 * 0.003
             p_value = one_way_p(truth + 0.003 * rng.standard_normal(6), covariance, 14.0, "decreasing")
-            seen.append(p_value < premises.REFUSED)
+            seen.append(p_value < REFUSED)
         assert np.mean(seen) > 0.95
         flat = [one_way_p(5 + 0.003 * rng.standard_normal(6), covariance, 1e6, "decreasing") for _ in range(1000)]
-        assert np.mean(np.array(flat) < premises.REFUSED) < 0.02
+        assert np.mean(np.array(flat) < REFUSED) < 0.02
 
     @pytest.mark.parametrize("curve", [None, "monotone"])
     def test_it_is_said_and_by_default_not_relied_on(self, curve):

@@ -7,8 +7,10 @@ import pytest
 from curve_choice import certify, draw_curve
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fitting import certifying
-from dzdesign.identify.fitting.premises import REFUSED
+from dzdesign.identify.fitting.premises import find_curvature
 from dzdesign.identify.fitting.vertices import find_vertex
 from dzdesign.identify.options import IdentifyOptions
 from tests.identify.fitting.test_premises import codes, ramps
@@ -95,6 +97,30 @@ class TestChoice:
     def test_a_curvature_that_leaves_nothing_is_named_as_the_reason(self):
         with pytest.raises(InputError, match="curvature M of up to"):
             identify(ramps(lambda dp: 5.6 - 0.06 * dp, (1.0, 5.0)), replace(QUIET, curvature=9.0 / 1e12))
+
+
+class TestThreeTests:
+    def test_a_bend_down_at_the_test_between_may_hide_one_up(self):
+        """Level from 1.5 to 3 MPa and falling on both sides: the chord from 1 to 3 MPa lies 50 mV above it."""
+
+        def kinked(dp):
+            return np.interp(dp, [1.0, 1.5, 3.0, 5.0], [5.4, 5.3, 5.3, 5.15])
+
+        curve = identify(ramps(kinked, (1.0, 3.0, 5.0)), QUIET).positive.curve
+        fine = np.linspace(1, 5, 401)
+        assert np.all(np.interp(fine, curve.offset_dp_MPa, curve.offset_V) < kinked(fine) - 0.1)
+
+    def test_a_curvature_that_the_tests_gave_is_not_called_tested(self):
+        curve = identify(ramps(lambda dp: 5.6 - 0.06 * dp, (1.0, 3.0, 5.0)), replace(QUIET, curve="smooth"))
+        assert "no test of it" in curve.positive.curve.premise_in_words(AS_COMPUTED)
+
+    def test_its_second_difference_counts_whatever_its_sign(self):
+        dp = np.array([1.0, 3.0, 5.0])
+        up, down = (
+            find_curvature(dp, sign * 0.01 * (dp - 3) ** 2, 1e-8 * np.eye(3), 14.0, None).allowed for sign in (1, -1)
+        )
+        np.testing.assert_allclose(up, down)
+        assert up.min() > 1.0
 
 
 class TestDraws:

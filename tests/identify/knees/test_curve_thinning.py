@@ -9,6 +9,7 @@ from dzdesign.core.artefact_types import RuleError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import curve_thinning
 from dzdesign.identify.knees.curve_thinning import TOLERANCE
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.recorded_curve import MOST_POINTS, RecordedBranch, RecordedCurve
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -50,6 +51,26 @@ def test_the_truth_is_nearer_to_the_curve_than_the_noise():
     for branch, part in zip(test.recorded.branches, (up, ~up), strict=True):
         part = part & (ramp.u > branch.u_seen_V)
         assert np.abs(branch.flow_at(ramp.u[part]) - true[part]).max() < 0.1
+
+
+@pytest.mark.parametrize("zero_flow", [None, 0.4])
+def test_points_stand_closer_only_about_a_flow_that_is_allowed_at_zero(zero_flow, monkeypatch):
+    """Noise below zero is no such flow: without a declared one the tolerance is the same everywhere."""
+    asked = []
+    points = curve_thinning._points
+
+    def noted(u, q, tolerance):
+        asked.append((q / L_MIN, tolerance / L_MIN))
+        return points(u, q, tolerance)
+
+    monkeypatch.setattr(curve_thinning, "_points", noted)
+    ramp, _ = bent_ramp(2.0)
+    (test,) = identify([ramp], IdentifyOptions(zero_flow=zero_flow and zero_flow * L_MIN)).positive.tests
+    assert len(asked) == 2 and any(np.any(q < 0) for q, _ in asked)
+    for q, tolerance in asked:
+        near = q < 2 * (test.zero_flow_L_min or 0.0) if zero_flow else np.zeros(q.size, dtype=bool)
+        assert np.all(tolerance[~near] == tolerance.max()) and tolerance.max() > 0.04
+        assert np.all(tolerance[near] == pytest.approx(0.1 * (test.zero_flow_L_min or 0.0)))
 
 
 def test_single_wrong_readings_leave_no_trace():

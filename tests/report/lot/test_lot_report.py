@@ -5,17 +5,20 @@ import io
 import json
 import re
 import shutil
-from dataclasses import astuple, replace
+from dataclasses import asdict, astuple, replace
 from urllib.parse import unquote
 
 import numpy as np
 import pytest
 from many_valves import recordings, write_lot
 
+from dzdesign.batch.printing import print_lot
 from dzdesign.batch.results import Results
+from dzdesign.batch.summary import units_of_lot
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import AS_COMPUTED, CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.report.lot.folder import read_lot
 from dzdesign.report.lot.reasons import reason_groups
 from dzdesign.report.lot.report import report_of_lot
@@ -459,7 +462,7 @@ V8 = UntestedPressures(name="V8", side="positive", dp_MPa=(2.0,), narrows=False,
     ],
 )  # fmt: skip
 def test_what_lacks_between_two_tests_is_said_with_its_cost(change, said):
-    (line,) = untested_lines(setting_with(replace(V8, **change), (1.0003, 4.0)))
+    (line,) = untested_lines(setting_with(replace(V8, **change), (1.0003, 4.0)), AS_COMPUTED)
     assert line.startswith("V8 was not tested at 2 MPa, as the lot was: ") and said in line
     assert "without it" not in line and "holds for all" not in line
 
@@ -472,7 +475,7 @@ def test_what_lacks_between_two_tests_is_said_with_its_cost(change, said):
     ],
 )
 def test_what_a_valve_that_narrows_the_interval_costs_is_said(dp_MPa, wider, said):
-    (line,) = untested_lines(setting_with(replace(V8, narrows=True), dp_MPa, wider))
+    (line,) = untested_lines(setting_with(replace(V8, narrows=True), dp_MPa, wider), AS_COMPUTED)
     assert said in line
 
 
@@ -542,3 +545,41 @@ def test_the_median_of_an_even_lot_is_the_mean_of_the_two_middle_ones():
         at = quantiles(values[:count])
         assert (at.least, at.largest) == (min(values[:count]), max(values[:count]))  # of valves, that can be named
         np.testing.assert_allclose(astuple(at), np.quantile(values[:count], LEVELS), atol=1e-7)
+
+
+# --- units of the recordings -----------------------------------------------------------------------------------
+
+
+def test_a_lot_is_shown_in_the_units_of_its_recordings(tmp_path, capsys):
+    """Files stay in V; thresholds, their spread and what was tested are in mA and bar, the page and the terminal."""
+    units = RecordedUnits(
+        command=CommandUnit(unit="mA", at_zero=4.0, factor=1.6), pressure=PressureUnit(unit="bar", factor=10.0)
+    )
+    rows = lot_rows(20)
+    folder = write_lot_folder(tmp_path / "lot", rows)
+    document = json.loads((folder / "batch.json").read_text(encoding="utf-8"))
+    assert document["recorded_units"]["command"]["unit"] == "V"
+    document["recorded_units"] = asdict(units)
+    (folder / "batch.json").write_text(json.dumps(document), encoding="utf-8")
+    lot = read_lot(folder)
+    spread = spread_of(lot.calibrated, "knee_opening_V", "", lot.units)
+    assert spread.text(5.0) == "12.000" and spread.heading == "knee on opening (mA)"
+    assert spread.shown().at.median == pytest.approx(4 + 1.6 * spread.at.median)
+    assert spread.shown().deviation == pytest.approx(1.6 * spread.deviation)
+    html = report_of_lot(folder).html
+    text = " ".join(Page(html).text.split())
+    assert "knee on opening (mA)" in text and f"{4 + 1.6 * spread.at.median:.3f}" in text and "dP0 is 10 bar" in text
+    assert not re.search(r"\(V\)| MPa\b", re.sub(r"<svg.*?</svg>|data:[^\"']*", "", html, flags=re.DOTALL))
+    print_lot(lot.summary, folder, None)
+    printed = capsys.readouterr().out
+    assert "knee opening (mA)" in printed and f"{4 + 1.6 * spread.at.median:.3f}" in printed
+    assert f",{rows[0].sides[''].knee_opening_V}," in lot.table
+
+
+def test_the_units_of_a_lot_are_those_that_all_its_valves_have(example_compensator):
+    bar = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0))
+    valve = example_compensator.valve
+    other = replace(example_compensator, valve=replace(valve, recorded_units=bar))
+    assert units_of_lot({"a": other, "b": other}) == bar
+    assert units_of_lot({"a": other, "b": example_compensator}).pressure.unit == "MPa"
+    assert units_of_lot({}) == AS_COMPUTED

@@ -12,6 +12,7 @@ from msgspec import UNSET
 from dzdesign.api import identify
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.hysteresis_choices import hysteresis_choices, hysteresis_left
@@ -19,8 +20,9 @@ from dzdesign.design.option_texts import options_of
 from dzdesign.design.play import LEVELS
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import ClosedLoop
-from dzdesign.verify.closed_loop.plant import read_plant
+from dzdesign.verify.closed_loop.plant import Plant, read_plant
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
+from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulated_files
 from tests.support.synthetic import needs_compiler
 
 pytestmark = [needs_compiler, pytest.mark.slow]
@@ -125,7 +127,7 @@ def test_the_stand_in_of_a_dithered_recording_is_not_dithered_twice(bench, tmp_p
     for scene, test in zip(scenes_of(folder, made, None), made.valve.positive.tests, strict=True):
         expected = hysteresis_left(made, test)[LEVELS.index(0.5)]  # from the recorded branches
         assert width(scene) == pytest.approx(expected, abs=5e-4)
-        assert all(not each.must_shut or each.q_opened_L_min == 0 for each in run_scenarios(scene))
+        assert all(not each.must_shut or each.q_zero_L_min == 0 for each in run_scenarios(scene))
     monkeypatch.setattr(ClosedLoop, "_wave", lambda _: (0, 1, False))
     twice = scenes_of(folder, made, None)[1]
     assert width(twice) < 0.8 * expected
@@ -154,6 +156,13 @@ def test_a_plant_that_is_given_feels_the_dither_of_the_recordings_without_the_co
     assert abs(width_V()) < 0.03
     monkeypatch.setattr(ClosedLoop, "_wave", lambda _: (0, 1, False))  # the seeded fault
     assert width_V() > 0.12
+
+
+def test_a_firmware_is_not_simulated_with_a_second_dither(tmp_path, wording):
+    with wording.refusal(InputError):
+        simulated_files(
+            Plant(), [1.0], 25.0, Bench(), lambda _: None, tmp_path, dither=Dither(frequency_Hz=150.0, peak=0.01)
+        )
 
 
 def test_the_table_of_choices_recommends_what_leaves_least(bench):

@@ -6,9 +6,11 @@ import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.report.sections.evidence import scenarios_table
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero
 from dzdesign.verify.verification import verify
@@ -62,3 +64,11 @@ def test_the_flow_at_zero_is_judged_by_what_is_allowed(verified, compensator, fl
     check = no_flow_at_zero([result], compensator, plant_given=True)
     assert check.holds is holds
     assert ("declared" in check.name) == (allowed is not None)
+
+
+def test_the_report_says_what_is_allowed_in_place_of_shut(verified):
+    table = scenarios_table(verified[0].evidence.scenarios, RecordedUnits())
+    required = {row[-1].text for row in table.rows if "frozen" not in row[0].text}
+    assert required == {"0.35 L/min at most at the end"}
+    bare = [replace(each, allowed_at_zero_L_min=None) for each in verified[0].evidence.scenarios]
+    assert "must be shut at the end" in {row[-1].text for row in scenarios_table(bare, RecordedUnits()).rows}

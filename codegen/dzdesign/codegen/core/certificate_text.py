@@ -34,13 +34,14 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
         text += f", so that less than {certificate.level_L_min:.2f} L/min flows: what the recordings can't show."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
+    text += " Errors of the pressure sensors and of their converters beyond rounding are not in it."
     lot = lot_in_words(compensator)
     return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
 
 
 def _counted(compensator: Compensator) -> str:
     """Return what the certificate's margin is left of."""
-    rounding = "the converters' error and the rounding to counts"
+    rounding = "the rounding of readings to codes and of the drive to counts"
     if not compensator.drive_functions.dither_counts:
         return rounding
     counted = compensator.dither_reserve_counts / compensator.signals.compare_max * float(compensator.u_max_V)

@@ -153,8 +153,8 @@ def _scatters(test: RampTest) -> bool:
 
 def about_mixtures(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield a warning for each pressure drop at which recordings, taken as one test, differ grossly in their flow."""
-    highest = max(float(despiked(test.u).max()) for test in tests)
-    whole = [test for test in tests if despiked(test.u).max() >= FULL_SWEEP * highest]
+    tops = [float(despiked(test.u).max()) for test in tests]
+    whole = [test for test, top in zip(tests, tops, strict=True) if top >= FULL_SWEEP * max(tops)]
     for dp, group in _at_one_pressure(whole):
         top, flows = _flows_at_one_command(group)
         if min(flows) <= 0 or max(flows) <= (1 + GROSSLY_APART) * min(flows):

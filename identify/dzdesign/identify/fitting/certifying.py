@@ -8,15 +8,13 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import Worded, worded
-from dzdesign.identify.constants import MPA, Premise
+from dzdesign.identify.constants import MPA, REFUSED, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import fit_offset
 from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
 from dzdesign.identify.fitting.guarding import OrderedKnees
 from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
 from dzdesign.identify.fitting.premises import (
-    FEWEST_FOR_CURVATURE,
-    REFUSED,
     bound_line,
     confidence_at_tests,
     find_curvature,
@@ -24,6 +22,7 @@ from dzdesign.identify.fitting.premises import (
 from dzdesign.identify.fitting.vertices import Vertex, find_vertex
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.certified_bound import CertifiedBound
+from dzdesign.identify.valve.estimated_curvature import FEWEST_FOR_CURVATURE
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, OpeningCurve, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
 from dzdesign.identify.valve.staircase import Direction, staircase
@@ -220,7 +219,7 @@ def _too_much_sag(bound: BoundUnderPremise) -> InputError | None:
     largest = 1e3 * float(bound.curvature.max())
     return InputError(
         worded(
-            "with a curvature M of up to {largest:.3g} mV/MPa² the threshold may sag between the tests so far that no "
+            "with a curvature M of up to {largest:.3g mV/MPa²} the threshold may sag between the tests so far that no "
             "positive offset is left, or one that varies beyond bounds; record tests between, declare the valve's "
             "--curvature if it is less, or ask for another --curve",
             largest=largest,

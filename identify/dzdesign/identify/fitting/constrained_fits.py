@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,13 @@ class KneeFit:
     slope: np.ndarray
     #: The monotonicity constraints that hold with equality.
     active: tuple[str, ...]
+
+    def with_other_branch(self, fit: "KneeFit", column: int) -> "KneeFit":
+        """Return this fit with the numbers of one branch (0 rising, 1 falling) from another fit."""
+        knee, knee_se, slope = self.knee.copy(), self.knee_se.copy(), self.slope.copy()
+        for own, other in ((knee, fit.knee), (knee_se, fit.knee_se), (slope, fit.slope)):
+            own[:, column] = other[:, column]
+        return replace(self, knee=knee, knee_se=knee_se, slope=slope)
 
 
 def fit_knees(

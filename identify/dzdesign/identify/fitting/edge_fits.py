@@ -32,10 +32,10 @@ def fit_edges(
     root = np.sqrt(test.weight)
     for _ in range(ROUNDS):
         x = u - knee[:, None]
-        flow = share[:, None] * _reading(x + first[:, None], shift, rising=test.rising)
-        gain = share[:, None] * _reading_gain(x + first[:, None], shift, rising=test.rising)
-        flow += (1 - share)[:, None] * _reading(x - second[:, None], shift, rising=test.rising)
-        gain += (1 - share)[:, None] * _reading_gain(x - second[:, None], shift, rising=test.rising)
+        before, gain_before = _reading(x + first[:, None], shift, rising=test.rising)
+        beyond, gain_beyond = _reading(x - second[:, None], shift, rising=test.rising)
+        flow = share[:, None] * before + (1 - share)[:, None] * beyond
+        gain = share[:, None] * gain_before + (1 - share)[:, None] * gain_beyond
         shown, part = _above_floor(test, slope[:, None] * flow)
         columns = [part * flow * root, -part * slope[:, None] * gain * root]
         if test.floor == 0:
@@ -68,24 +68,16 @@ def _above_floor(test: EdgeAverages, flow: np.ndarray) -> tuple[np.ndarray, np.n
     return shown, seen + other + test.floor / test.noise * density * (edge + other_edge)
 
 
-def _reading(x: np.ndarray, shift: float, *, rising: bool) -> np.ndarray:
-    """Return what a first-order meter shows of a flow of unit slope from x = 0 on; `shift` is rate times lag, V."""
-    if shift <= 0:
-        reading: np.ndarray = np.maximum(x, 0.0)
-    elif rising:
-        ahead = np.maximum(x, 0.0)
-        reading = ahead + shift * np.expm1(-ahead / shift)
-    else:
-        reading = np.maximum(x, 0.0) + shift * np.exp(np.minimum(x, 0.0) / shift)
-    return reading
+def _reading(x: np.ndarray, shift: float, *, rising: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a first-order meter shows of a flow of unit slope from x = 0 on, and its derivative.
 
-
-def _reading_gain(x: np.ndarray, shift: float, *, rising: bool) -> np.ndarray:
-    """Return its derivative."""
+    `shift` is the rate times the lag, V.
+    """
+    ahead = np.maximum(x, 0.0)
     if shift <= 0:
-        gain: np.ndarray = (x > 0).astype(float)
-    elif rising:
-        gain = -np.expm1(-np.maximum(x, 0.0) / shift)
-    else:
-        gain = np.exp(np.minimum(x, 0.0) / shift)
-    return gain
+        return ahead, (x > 0).astype(float)
+    if rising:
+        gain = 1 - np.exp(-ahead / shift)
+        return ahead - shift * gain, gain
+    gain = np.exp(np.minimum(x, 0.0) / shift)
+    return ahead + shift * gain, gain

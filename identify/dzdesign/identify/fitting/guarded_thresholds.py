@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, Trend, excess_departure, find_trend
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.guarding import (
@@ -17,7 +18,7 @@ from dzdesign.identify.fitting.guarding import (
     order_knees,
     systematic_change,
 )
-from dzdesign.identify.fitting.premises import REFUSED, confidence_at_tests, one_way_p
+from dzdesign.identify.fitting.premises import confidence_at_tests, one_way_p
 from dzdesign.identify.fitting.soft_edges import EdgeShapes
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.knees.between_ramps import BetweenRamps
@@ -80,7 +81,7 @@ def guard_thresholds(group: DescribedTests, free: KneeFit, options: IdentifyOpti
     # Where the solver finds no order of the other branch's knees, that guard is not on offer, and `design` says so.
     with suppress(InputError):
         if group.tests[0].shapes[1 - column]:
-            knees[other] = order_knees(group, free, of_knees, 1 - column, options, alone=True)
+            knees[other] = order_knees(group, free, of_knees, 1 - column, options)
             edges[other] = edges_of_branch(group, 1 - column, options)
             single[other] = _unordered(group, free, 1 - column, edges[other], options)
     thresholds: dict[Guard, GuardedThreshold] = {}
@@ -145,7 +146,7 @@ def _opening(
     if "opening" not in knees or of_knees == direction:
         return knees.get("opening")
     with suppress(InputError):
-        return order_knees(group, free, direction, 0, options, alone=True)
+        return order_knees(group, free, direction, 0, options)
     return None
 
 

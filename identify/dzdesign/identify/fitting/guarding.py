@@ -9,7 +9,7 @@ from dzdesign.identify.fitting.bounds import (
     excess_departure,
     lower_bounds,
 )
-from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
+from dzdesign.identify.fitting.constrained_fits import ACTIVE, KneeFit, fit_knees
 from dzdesign.identify.fitting.soft_edges import EdgeShapes, find_softness, fit_edge_shapes
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.fitting.zero_flow import with_zero_flow
@@ -58,18 +58,12 @@ def systematic_change(group: DescribedTests, column: int, options: IdentifyOptio
 
 
 def order_knees(
-    group: DescribedTests,
-    free: KneeFit,
-    direction: Direction,
-    column: int,
-    options: IdentifyOptions,
-    *,
-    alone: bool = False,
+    group: DescribedTests, free: KneeFit, direction: Direction, column: int, options: IdentifyOptions
 ) -> OrderedKnees:
     """Fit the knees of one branch again under the trend's direction, and see how far they depart from it.
 
-    From the fit without a direction. The other branch is left out if this one is fitted `alone`: the likelihood is a
-    sum over branches, so the other does not move this one.
+    From the fit without a direction, of which the other branch is: the likelihood is a sum over branches, so it is not
+    moved.
 
     Raises
     ------
@@ -84,10 +78,12 @@ def order_knees(
     if direction == "flat":
         departure = excess_departure(np.abs(knee - knee.mean()), knee_se, budget)
         return OrderedKnees(column=column, fit=free, departure=departure)
-    shapes = [item.shapes for item in group.tests]
-    if alone:
-        shapes = [(None, falling) if column else (rising, None) for rising, falling in shapes]
-    fit = fit_knees(shapes, floor=group.floor, u_max=options.u_max, trend=direction, ordered=column)
+    if np.all(np.diff(knee) * (1 if direction == "increasing" else -1) > ACTIVE * options.u_max):
+        # They run that way by themselves: no constraint would be active, and the fit is the same.
+        return OrderedKnees(column=column, fit=free, departure=np.zeros(knee.size))
+    of_branch = [(None, falling) if column else (rising, None) for rising, falling in (x.shapes for x in group.tests)]
+    fit = fit_knees(of_branch, floor=group.floor, u_max=options.u_max, trend=direction, ordered=column)
+    fit = fit.with_other_branch(free, 1 - column)
     departure = excess_departure(np.abs(knee - fit.knee[:, column]), knee_se, budget)
     return OrderedKnees(column=column, fit=fit, departure=departure)
 

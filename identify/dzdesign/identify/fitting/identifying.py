@@ -8,7 +8,6 @@ from dzdesign.identify.constants import MPA, Premise
 from dzdesign.identify.fitting.constrained_fits import KneeFit
 from dzdesign.identify.fitting.joint_curve import fit_joint_curve
 from dzdesign.identify.knees.described_tests import DescribedTests
-from dzdesign.identify.knees.line_fitting import lay_line
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.identified_curve import IdentifiedCurve
 
@@ -38,7 +37,7 @@ def identify_curve(
     joint = fit_joint_curve(
         [item.shapes for item in tests],
         knees,
-        [_beside_noise(group, knees, column, options) for column in (0, 1)],
+        [_beside_noise(group, knees, column) for column in (0, 1)],
         dp_MPa=dp if premise == "line" and len(tests) > 1 else None,
         reference=reference,
         floor=group.floor,
@@ -59,9 +58,7 @@ def identify_curve(
     return IdentifiedSide(curves=curves, k_x_max=joint.k_x_max, k_x_max_se=joint.k_x_max_se)
 
 
-def _beside_noise(
-    group: DescribedTests, knees: KneeFit, column: int, options: IdentifyOptions
-) -> np.ndarray | None:
+def _beside_noise(group: DescribedTests, knees: KneeFit, column: int) -> np.ndarray | None:
     """Return the covariance of a branch's thresholds beside the noise of the samples, V² (T, T).
 
     From ramp to ramp they scatter. And where the straight part was taken wider than the window that was asked for, for
@@ -72,10 +69,7 @@ def _beside_noise(
         return None
     se = knees.knee_se[:, column]
     covariance = group.between(column).covariance_of_mean(se) - np.diag(se**2)
-    shifts = np.zeros(se.size)
-    for row, item in enumerate(group.tests):
-        shape = item.branch(column)
-        if shape.line.window != options.knee_window:
-            shifts[row] = lay_line(shape.prepared, options.knee_window).knee - shape.knee
+    shapes = [item.branch(column) for item in group.tests]
+    shifts = np.array([shape.knee_of_window - shape.knee for shape in shapes])
     found: np.ndarray = covariance + np.diag(shifts**2)
     return found

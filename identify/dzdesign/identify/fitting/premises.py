@@ -13,23 +13,14 @@ import numpy as np
 
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR
 from dzdesign.identify.knees.between_ramps import BetweenRamps
+from dzdesign.identify.valve.estimated_curvature import estimated_curvature, second_differences
 from dzdesign.identify.valve.staircase import Direction
 
-#: Probability, if a premise were true, of data as unlike it as these, below which it is refused.
-REFUSED = 0.01
 #: Share of the error probability that the bounds at the tests leave to the premise: for a curvature that is estimated,
 #: and for degrees of freedom that are effective ones.
 SHARE_OF_PREMISE = 0.25
 #: The same of a line, whose weights come from errors that are estimated too.
 SHARE_OF_LINE = 0.5
-#: A curvature that is estimated: so many times the largest second divided difference at the tests. A kink half way
-#: between two tests shows as half of its change of slope at each, and over the distance of two tests instead of one.
-INNER_FACTOR = 4.0
-#: In the first and the last interval only one test shows a kink, and of one near the end but a small part; with three
-#: tests that one is the only one there is.
-END_FACTOR, END_FACTOR_OF_THREE = 32.0, 64.0
-#: Fewest tests from which a curvature can be estimated.
-FEWEST_FOR_CURVATURE = 3
 #: From so many degrees of freedom on, Student's law is the normal one.
 LARGEST_DEGREES = 1e6
 #: Points at which the path of a line's error is followed over the interval.
@@ -67,10 +58,9 @@ def find_curvature(
 ) -> Curvature:
     """Find which curvature M the premise `smooth` is to allow, in the class 2 f[a, x, b] <= M between tests.
 
-    Only a threshold that bends upwards lies below its chords. Estimated, M is four times the largest second divided
-    difference at the tests; in the first and the last interval at least 32 times that of the one test that tells of it
-    (64 with three tests). Its error needs no allowance: what M lacks by it is small beside the distance of the bounds
-    from the thresholds, which the same errors set (benchmarks/identify/curve_premises.py).
+    Only a threshold that bends upwards lies below its chords. Where M is estimated, its error needs no allowance: what
+    M lacks by it is small beside the distance of the bounds from the thresholds, which the same errors set
+    (benchmarks/identify/curve_premises.py).
 
     Parameters
     ----------
@@ -93,11 +83,7 @@ def find_curvature(
             beyond = float(np.max((found - declared) / np.maximum(se, np.finfo(float).tiny)))
             p_value = min(1.0, float(found.size * stdtr(degrees, -beyond)))
     else:
-        end = END_FACTOR_OF_THREE if dp_MPa.size == FEWEST_FOR_CURVATURE else END_FACTOR
-        upwards = np.maximum(found, 0.0)
-        allowed = np.full(dp_MPa.size - 1, INNER_FACTOR * float(upwards.max()))
-        allowed[0] = max(allowed[0], end * float(upwards[0]))
-        allowed[-1] = max(allowed[-1], end * float(upwards[-1]))
+        allowed = estimated_curvature(found)
     return Curvature(at_tests=found, se=se, allowed=allowed, declared=declared is not None, p_value=p_value)
 
 
@@ -123,14 +109,6 @@ def one_way_p(
     error = np.sqrt(variance[first] + variance[last] - 2 * covariance[first, last])
     largest = float(np.max(step / np.maximum(error, np.finfo(float).tiny)))
     return min(1.0, float(first.size * stdtr(min(degrees, LARGEST_DEGREES), -largest)))
-
-
-def second_differences(dp_MPa: np.ndarray) -> np.ndarray:
-    """Return the weights (T - 2, T) of 2 f[a, b, c] at each inner test: the second derivative of a parabola."""
-    weights = np.zeros((max(dp_MPa.size - 2, 0), dp_MPa.size))
-    for row, (a, b, c) in enumerate(zip(dp_MPa, dp_MPa[1:], dp_MPa[2:], strict=False)):
-        weights[row, row : row + 3] = 2 / ((a - b) * (a - c)), 2 / ((b - a) * (b - c)), 2 / ((c - a) * (c - b))
-    return weights
 
 
 def bound_line(

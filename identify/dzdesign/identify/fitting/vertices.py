@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dzdesign.identify.fitting.premises import LARGEST_DEGREES, REFUSED
+from dzdesign.identify.constants import REFUSED
+from dzdesign.identify.fitting.premises import LARGEST_DEGREES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

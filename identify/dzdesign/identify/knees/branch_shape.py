@@ -34,6 +34,8 @@ class BranchShape:
     y_max: float
     slope: float
     knee: float
+    #: Knee by the line in the window that was asked for, where the straight part is wider; else the same.
+    knee_of_window: float
     sigma: float
     variance_inflation: float
     outliers: int

@@ -15,6 +15,7 @@ from dzdesign.identify.knees.noise import measure_roughness, robust_sigma, varia
 from dzdesign.identify.knees.profile import crossing, hole_within
 from dzdesign.identify.knees.spool_ripple import spool_ripples
 from dzdesign.identify.ramps.branches import bin_branch
+from dzdesign.identify.ramps.medians import median
 
 #: Standard deviations of a shut reading above which the mean of a bin is flow.
 FIRST_SEEN = 5.0
@@ -76,6 +77,7 @@ def _describe(
         y_max=read.y_max,
         slope=line.slope,
         knee=line.knee,
+        knee_of_window=parts.narrow[index].knee,
         sigma=line.sigma,
         variance_inflation=line.variance_inflation,
         outliers=line.outliers,
@@ -98,7 +100,7 @@ def _without_outliers(u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndar
         slope, zero = fit_line(u[kept], y[kept])
         residual = y - slope * (u - zero)
         sigma = robust_sigma(residual)
-        inside = np.abs(residual - np.median(residual)) <= GATE * sigma
+        inside = np.abs(residual - median(residual)) <= GATE * sigma
         if inside.sum() < TAIL_SAMPLES or np.ptp(u[inside]) == 0:
             break
         kept = inside

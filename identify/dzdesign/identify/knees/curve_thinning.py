@@ -11,6 +11,7 @@ from dzdesign.identify.knees.described_tests import DescribedTest
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import smooth_profile
 from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.valve.recorded_curve import MOST_POINTS, SAG_STEPS, RecordedBranch, RecordedCurve
 
 #: A line between two points is halved where the flow, averaged over so many bins (0.5 % of full command), departs from
@@ -64,7 +65,7 @@ class _Supply:
             return None
         dp, steps = np.concatenate(known), np.concatenate([branch.q + leak for branch in branches]) / q_max * SAG_STEPS
         about = {step: dp[np.abs(steps - step) < NEAR_STEP] for step in range(SAG_STEPS + 1)}
-        found = {step: float(np.median(near)) for step, near in about.items() if near.size}
+        found = {step: median(near) for step, near in about.items() if near.size}
         return cls(np.array(list(found)) * q_max / SAG_STEPS, np.array(list(found.values())))
 
     def at(self, q: np.ndarray) -> np.ndarray:
@@ -72,10 +73,15 @@ class _Supply:
         sagged: np.ndarray = np.maximum(np.interp(q, self.q, self.dp), SMALLEST_DP)
         return sagged
 
-    def brought_to(self, q: np.ndarray, dp: np.ndarray) -> np.ndarray:
-        """Return flows as they would be had the supply sagged as usual, where it was on its way up, or gone."""
+    def brought_to(self, q: np.ndarray, dp: np.ndarray) -> np.ndarray | None:
+        """Return flows as they would be had the supply sagged as usual, where it was on its way up, or gone.
+
+        None where it always was as usual.
+        """
         usual = self.at(q)
         off = np.abs(dp - usual) > OFF_THE_USUAL * usual
+        if not off.any():
+            return None
         # Eq. (1), as at_nominal_pressure has it: below a tenth of the pressure the ratio would only carry noise.
         return np.where(off, q * np.sqrt(usual / np.maximum(dp, 0.1 * usual)), q)
 
@@ -88,17 +94,23 @@ def _profile(
     Of a noisy meter the first flow that stands out comes after the knee, and the valve is no sharper for that.
     """
     branch = shape.prepared.branch
-    flow = branch.q + leak
+    u, q = shape.prepared.recorded
+    q = q + leak
     if supply and branch.dp is not None:
-        flow = supply.brought_to(flow, branch.dp)
-    return *smooth_profile(branch.u, flow, u_max), min(shape.onset, shape.knee)
+        flow = supply.brought_to(branch.q + leak, branch.dp)
+        if flow is not None:
+            u, q = smooth_profile(branch.u, flow, u_max)
+    return u, q, min(shape.onset, shape.knee)
 
 
 def _thinned(
     u: np.ndarray, q: np.ndarray, onset: float, *, leak: float, level: float, tolerance: float, at_zero: float
 ) -> RecordedBranch:
     """Return the points of a branch whose flow q (m³/s) was averaged in bins of the command."""
-    at, q_at = _points(u, q, np.where(q < ABOUT_ZERO * at_zero, min(OF_ZERO_FLOW * at_zero, tolerance), tolerance))
+    of_bins = np.full(q.size, tolerance)
+    if at_zero > 0:
+        of_bins[q < ABOUT_ZERO * at_zero] = min(OF_ZERO_FLOW * at_zero, tolerance)
+    at, q_at = _points(u, q, of_bins)
     u_seen = _first_seen(u[at], q_at, leak + level)
     lowest, seen = float(u[0]), u[at] > u_seen
     points = [(u_seen, leak + level), *zip(u[at][seen].tolist(), np.maximum(q_at[seen], 0.0).tolist(), strict=True)]

@@ -12,6 +12,7 @@ import numpy as np
 
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
+from dzdesign.identify.ramps.medians import median
 
 #: Stretches of command over which readings are averaged, over u_max, and by how much of itself each is moved on: the
 #: longest sees the smallest flows, the shorter ones the steeper edges. One of them says the noise level.
@@ -104,6 +105,6 @@ def _long_run(count: float, correlation: float) -> float:
 
 def _mean(values: np.ndarray, noise: float) -> float:
     """Return the mean of readings, outliers left out."""
-    middle = float(np.median(values))
+    middle = median(values)
     kept = np.abs(values - middle) <= GATE * max(noise, robust_sigma(values))
     return float(values[kept].mean())

@@ -33,8 +33,9 @@ class PreparedBranch:
     branch: Branch
     #: Flow of its samples at the nominal pressure drop, (N,), m³/s.
     y: np.ndarray
-    #: Smoothed course of that flow: command (V), flow (m³/s), each (P,).
+    #: Smoothed course of that flow, and of the flow as recorded: command (V), flow (m³/s), each (P,).
     profile: tuple[np.ndarray, np.ndarray]
+    recorded: tuple[np.ndarray, np.ndarray]
     #: Flow at the largest command, and the meter's floor, m³/s.
     y_max: float
     floor: float
@@ -46,8 +47,15 @@ def prepare_branch(branch: Branch, test: RampTest, *, u_max: float, floor: float
     """Bring the flow of a test's branch to its nominal pressure drop, ready for lines; the meter's `floor` in m³/s."""
     y = at_nominal_pressure(branch, nominal_dp(test))
     profile = smooth_profile(branch.u, y, u_max)
-    y_max = flow_at_top(*profile)
-    return PreparedBranch(branch=branch, y=y, profile=profile, y_max=y_max, floor=floor, source=test.source)
+    return PreparedBranch(
+        branch=branch,
+        y=y,
+        profile=profile,
+        recorded=profile if y is branch.q else smooth_profile(branch.u, branch.q, u_max),
+        y_max=flow_at_top(*profile),
+        floor=floor,
+        source=test.source,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,9 +5,10 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
 from dzdesign.identify.knees.gated_line import GATE, GatedLine, PreparedBranch, fit_line
-from dzdesign.identify.knees.noise import measure_roughness, median
+from dzdesign.identify.knees.noise import measure_roughness
 from dzdesign.identify.knees.profile import crossing
 from dzdesign.identify.knees.table_lines import line_through_levels
+from dzdesign.identify.ramps.medians import median
 
 #: Most rounds in which outliers are left out and the line is laid anew: each finds those that the ones before hid.
 ROUNDS = 20

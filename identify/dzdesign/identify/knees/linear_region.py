@@ -41,8 +41,9 @@ LARGEST_SHIFT = 3e-3
 class StraightParts:
     """The straight parts of all branches of a valve."""
 
-    #: One per branch, as wide as the characteristic goes on straight.
+    #: One per branch, as wide as the characteristic goes on straight, and those in the window that was asked for.
     lines: tuple[GatedLine, ...]
+    narrow: tuple[GatedLine, ...]
     #: Per branch, m³/s: the flow that is no use or below the meter's floor, the one from which on a single reading is
     #: flow, and the noise of a reading while the valve is shut.
     least: tuple[float, ...]
@@ -91,6 +92,7 @@ def find_straight_parts(
     correlation = correlation_upper_limit(correlation, [line.roughness for line in lines])
     return StraightParts(
         lines=tuple(line.with_shared_noise(correlation, blocks) for line in lines),
+        narrow=tuple(narrow),
         least=tuple(least),
         levels=tuple(levels),
         noises=tuple(noises),

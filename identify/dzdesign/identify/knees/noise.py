@@ -12,6 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from dzdesign.identify.ramps.medians import median
+
 #: Parameters of a parabola.
 TERMS = 3
 #: Points on which the share of the noise that a parabola takes along is computed; a longer recording is scaled to them.
@@ -27,14 +29,6 @@ LONGEST_MEMORY = 2.0
 def robust_sigma(values: np.ndarray) -> float:
     """Return the standard deviation of the middle half: the median of departures from the median, for a normal law."""
     return 1.4826 * median(np.abs(values - median(values)))
-
-
-def median(values: np.ndarray) -> float:
-    """Return the median of one or more numbers, none of them NaN: NumPy's looks for those, at twice the time."""
-    half = values.size // 2
-    parted = np.partition(values, half)
-    upper = float(parted[half])
-    return upper if values.size % 2 else (float(parted[:half].max()) + upper) / 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,12 +114,13 @@ def taken_by_parabola(correlation: float, n: int) -> float:
         return float(min(TERMS, n))
     points = min(n, POINTS)
     rate = -float(np.log(correlation)) * n / points
-    return _taken(round(rate, 9), points) * n / points
+    products = _products_of_parabolas(points)
+    return float(2 * products @ np.exp(-rate * np.arange(points)) - products[0]) * n / points
 
 
 @lru_cache(maxsize=4096)
-def _taken(rate: float, points: int) -> float:
-    lags = np.exp(-rate * np.arange(points))
-    covariance = lags[np.abs(np.subtract.outer(np.arange(points), np.arange(points)))]
+def _products_of_parabolas(points: int) -> np.ndarray:
+    """Return what noise is weighted with by its correlation over so many points from 0 on, in what parabolas take."""
     orthonormal = np.linalg.qr(np.vander(np.linspace(-1, 1, points), TERMS))[0]
-    return float(np.trace(orthonormal.T @ covariance @ orthonormal))
+    found: np.ndarray = np.sum([np.correlate(column, column, "full") for column in orthonormal.T], axis=0)
+    return found[points - 1 :]

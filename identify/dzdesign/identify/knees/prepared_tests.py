@@ -16,7 +16,7 @@ from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTest
 from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
-from dzdesign.identify.knees.profile import largest_flow
+from dzdesign.identify.knees.profile import flow_at_top
 from dzdesign.identify.knees.readings_at_rest import find_rest_flows
 from dzdesign.identify.knees.refusals import (
     refuse_a_jump,
@@ -82,9 +82,8 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
     The flow meter's lag is in s.
     """
     ramps = []
-    highest = max(float(despiked(test.u).max()) for test in tests)
-    for test in tests:
-        top = float(despiked(test.u).max())
+    tops = [float(despiked(test.u).max()) for test in tests]
+    for test, top in zip(tests, tops, strict=True):
         if top > 1.05 * options.u_max:
             above = "'{source}': the command reaches {top:.2f V}, above u_max = {u_max:g V}; give --u-max"
             raise InputError(worded(above, source=test.source, top=top, u_max=options.u_max))
@@ -103,7 +102,7 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
             raise _no_ramp(test)
         for ramp in found:
             refuse_a_wrong_pressure(name_of_ramp(ramp), ramp.dp)
-        for item in pool_ramps(found) if top >= FULL_SWEEP * highest else ():  # a fragment may well see no flow
+        for item in pool_ramps(found) if top >= FULL_SWEEP * max(tops) else ():  # a fragment may well see no flow
             refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
         ramps += found
     return ramps
@@ -154,7 +153,7 @@ def _described(pooled: list[PooledTest], floor: float, lag: MeterLag, options: I
     for shape in shapes:
         refuse_an_impossible_knee(shape.prepared.branch, shape.knee, shape.prepared.source, options.u_max)
     of_tests = iter(shapes)
-    return [_describe(item, of_tests, options.u_max) for item in pooled]
+    return [_describe(item, of_tests) for item in pooled]
 
 
 def _between_ramps(described: list[DescribedTest], column: int, options: IdentifyOptions) -> BetweenRamps | None:
@@ -176,14 +175,14 @@ def _with_ramps_together(item: PooledTest, row: int, between: Sequence[BetweenRa
     return replace(item, branches=(rising, falling))
 
 
-def _describe(item: PooledTest, shapes: Iterator[BranchShape], u_max: float) -> DescribedTest:
+def _describe(item: PooledTest, shapes: Iterator[BranchShape]) -> DescribedTest:
     """Put a test together; `shapes` gives those of its branches next."""
     rising, falling = (next(shapes) if branch else None for branch in item.branches)
     return DescribedTest(
         test=item.test,
         dp=nominal_dp(item.test),
         shapes=(rising, falling),
-        q_max=largest_flow(item.branches, u_max),
+        q_max=max(flow_at_top(*shape.prepared.recorded) for shape in (rising, falling) if shape),
         ramps=item.ramps,
         when=item.when,
         files=item.files,

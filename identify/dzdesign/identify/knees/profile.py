@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dzdesign.identify.ramps.branches import Branch, bin_index
+from dzdesign.identify.ramps.medians import median
 
 #: Share of the command's range, from the top, over which the largest flow is read.
 TOP = 0.05
@@ -17,14 +18,13 @@ USUAL_STEPS, SMALLEST_HOLE = 4.0, 2e-3
 
 def smooth_profile(u: np.ndarray, y: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
     """Return command and flow averaged over bins of u and freed of single spikes (medians of five bins)."""
-    index, size = bin_index(u, u_max)
-    n = np.bincount(index)
+    index, n = bin_index(u, u_max)
     u_mean = np.bincount(index, weights=u) / n
     y_mean = np.bincount(index, weights=y) / n
-    if size < 200:  # one level a step, as a staircase test gives: nothing to smooth over
+    if n.size < 200:  # one level a step, as a staircase test gives: nothing to smooth over
         return u_mean, y_mean
     padded = np.pad(y_mean, 2, mode="edge")
-    return u_mean, np.sort(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)[:, 2]
+    return u_mean, np.partition(np.lib.stride_tricks.sliding_window_view(padded, 5), 2, axis=1)[:, 2]
 
 
 def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
@@ -32,10 +32,10 @@ def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
 
     Fewest points are on the wrong side of it, so a few drop-outs far above it do not move it.
     """
-    below = y < level
-    wrong = np.concatenate(([0], np.cumsum(~below))) + np.concatenate((np.cumsum(below[::-1])[::-1], [0]))
+    # Of points on the wrong side, each above `level` before the command counts one up, each below it one down.
+    wrong = np.cumsum(np.where(y < level, -1, 1))
     last = u.size - 1 - int(np.argmin(wrong[::-1]))
-    if last < 0:
+    if wrong[last] > 0:
         return float(u[0])
     if last + 1 == u.size:
         return float(u[-1])
@@ -51,7 +51,7 @@ def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[f
     steps = np.diff(u)
     if not steps.size:
         return None
-    wide = steps > max(USUAL_STEPS * float(np.median(steps)), SMALLEST_HOLE * u_max)
+    wide = steps > max(USUAL_STEPS * median(steps), SMALLEST_HOLE * u_max)
     here = np.flatnonzero(wide & (u[:-1] <= high) & (u[1:] >= low))
     if not here.size:
         return None
@@ -72,13 +72,13 @@ def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:
     top = u_profile >= u_profile[-1] - TOP * np.ptp(u_profile)
     u, y = u_profile[top], y_profile[top]
     if u.size < 5:
-        return float(np.median(y))
+        return median(y)
     # First a line that a quarter of the points can't move, by the medians of the slopes over half of the range.
     half = u.size // 2
-    rough = np.median((y[half:] - y[: u.size - half]) / (u[half:] - u[: u.size - half]))
+    rough = median((y[half:] - y[: u.size - half]) / (u[half:] - u[: u.size - half]))
     miss = y - rough * u
-    miss = np.abs(miss - np.median(miss))
-    kept = miss <= max(TOP_GATE * 1.4826 * np.median(miss), SMALLEST_MISS * float(np.median(y)))
+    miss = np.abs(miss - median(miss))
+    kept = miss <= max(TOP_GATE * 1.4826 * median(miss), SMALLEST_MISS * median(y))
     u, y = u[kept], y[kept]
     u_mean, y_mean = u.mean(), y.mean()
     slope = np.sum((u - u_mean) * (y - y_mean)) / np.sum((u - u_mean) ** 2)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.identify.knees.noise import robust_sigma
+from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.reading.ramp_test import RampTest
 
 #: Commands within this share of u_max are at rest; a wider one is taken where so few readings would be left.
@@ -77,7 +78,8 @@ class _Rest:
 
 def find_rest_flows(tests: Sequence[RampTest], u_max: float) -> RestFlows:
     """Find what recordings read at zero command, and what of it grows with the pressure drop."""
-    levels = [level for number, test in enumerate(tests) for level in _levels(number, test, u_max)]
+    at_rest = [readings_at_rest(test, u_max) for test in tests]
+    levels = [level for number, test in enumerate(tests) for level in _levels(number, test, at_rest[number])]
     largest = max(float(np.abs(test.q).max()) for test in tests)
     growth = _growth(levels, largest)
     leak = _leak(growth, levels, largest)
@@ -87,7 +89,7 @@ def find_rest_flows(tests: Sequence[RampTest], u_max: float) -> RestFlows:
     errors: dict[str, float] = {}
     for number, test in enumerate(tests):
         own = [level for level in levels if level.recording == number]
-        zero, se = _zero_beside(leak, test, own, u_max)
+        zero, se = _zero_beside(leak, test, own, at_rest[number])
         errors[test.source] = se
         # Beside a leak the zero is what a line extrapolates to no pressure, about twice as far off.
         told = abs(zero) > max(2 * ZERO_ERRORS * se, ZERO_SHARE * float(np.abs(test.q).max()))
@@ -101,7 +103,7 @@ def find_rest_flows(tests: Sequence[RampTest], u_max: float) -> RestFlows:
     )  # fmt: skip
 
 
-def _zero_beside(leak: float, test: RampTest, levels: Sequence[_Rest], u_max: float) -> tuple[float, float]:
+def _zero_beside(leak: float, test: RampTest, levels: Sequence[_Rest], at_rest: np.ndarray) -> tuple[float, float]:
     """Return what the meter reads at zero command beside a leak (m³/(s Pa)), and its standard error, m³/s.
 
     Thousands of readings at rest tell it far better than any declared bound; zeros where it does not stand out.
@@ -109,20 +111,19 @@ def _zero_beside(leak: float, test: RampTest, levels: Sequence[_Rest], u_max: fl
     if leak > 0 and levels:
         zero = float(np.mean([level.flow - leak * level.dp for level in levels]))
         return zero, max(level.se for level in levels)
-    rest = test.q[readings_at_rest(test, u_max)]
+    rest = test.q[at_rest]
     if rest.size < FEWEST_AT_REST:
         return 0.0, 0.0
-    zero, error = float(np.median(rest)), _error_of_median(rest)
+    zero, error = median(rest), _error_of_median(rest)
     stands_out = abs(zero) > max(ZERO_ERRORS * error, ZERO_SHARE * float(np.abs(test.q).max()))
     return (zero, error) if stands_out else (0.0, 0.0)
 
 
-def _levels(number: int, test: RampTest, u_max: float) -> Iterator[_Rest]:
+def _levels(number: int, test: RampTest, at_rest: np.ndarray) -> Iterator[_Rest]:
     """Yield what a recording reads at rest, at each of its pressure drops."""
     if test.dp is None:
         return
-    rows = readings_at_rest(test, u_max)
-    rows = rows[test.dp[rows] > 0]
+    rows = at_rest[test.dp[at_rest] > 0]
     order = rows[np.argsort(test.dp[rows], kind="stable")]
     jumps = np.flatnonzero(test.dp[order][1:] > TWO_PRESSURES * test.dp[order][:-1]) + 1
     for part in np.split(order, jumps):
@@ -132,7 +133,7 @@ def _levels(number: int, test: RampTest, u_max: float) -> Iterator[_Rest]:
         blocks = np.array([block.mean() for block in np.array_split(q, BLOCKS)])
         white = robust_sigma(q) ** 2 * BLOCKS / q.size
         colour = float(np.var(blocks, ddof=1) / white) if white > 0 else 1.0
-        yield _Rest(number, float(np.median(test.dp[part])), float(np.median(q)), _error_of_median(q), colour)
+        yield _Rest(number, median(test.dp[part]), median(q), _error_of_median(q), colour)
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +202,7 @@ def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
 def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
     before = int(np.argmin(at_rest)) if not at_rest.all() else 0
     third, fourth = test.q[before // 2 : 3 * before // 4], test.q[3 * before // 4 : before]
-    drifts = third.size >= 5 and abs(np.median(third) - np.median(fourth)) > 5 * _error_of_median(fourth)
+    drifts = third.size >= 5 and abs(median(third) - median(fourth)) > 5 * _error_of_median(fourth)
     return np.flatnonzero(at_rest & (np.arange(at_rest.size) >= (before if drifts else before // 2)))
 
 

@@ -11,6 +11,7 @@ from dzdesign.identify.knees.gated_line import PreparedBranch
 from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, largest_flow
 from dzdesign.identify.ramps.branches import Branch
+from dzdesign.identify.ramps.medians import median
 
 #: A flow that rises with the command has readings between these shares of the largest where its mean is between them.
 MIDDLE = (0.15, 0.45)
@@ -53,7 +54,7 @@ def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: f
     for branch in filter(None, branches):
         bottom = branch.q[branch.u <= branch.u.min() + 0.05 * np.ptp(branch.u)]
         noise = robust_sigma(bottom)
-        rise = largest_flow([branch], u_max) - float(np.median(bottom))
+        rise = largest_flow([branch], u_max) - median(bottom)
         least = max(6 * noise, 0.01 * L_MIN)
         if rise > least:
             continue

@@ -62,20 +62,21 @@ class Bins:
     u_censored: np.ndarray
 
 
-def bin_index(u: np.ndarray, u_max: float) -> tuple[np.ndarray, int]:
-    """Return the number of each sample's bin of `BIN_WIDTH` u_max, empty ones not counted, and how many there are."""
+def bin_index(u: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the number of each sample's bin of `BIN_WIDTH` u_max, empty ones not counted, and the samples of each."""
     index = np.floor(u / (BIN_WIDTH * u_max)).astype(int)
     index -= index.min()
-    filled = np.bincount(index) > 0
-    return np.cumsum(filled)[index] - 1, int(filled.sum())
+    count = np.bincount(index)
+    filled = count > 0
+    return (index, count) if filled.all() else ((np.cumsum(filled) - 1)[index], count[filled])
 
 
 def bin_branch(u: np.ndarray, y: np.ndarray, censored: np.ndarray, u_max: float) -> Bins:
     """Gather samples, which are `censored` where the meter read below its floor, in bins of `BIN_WIDTH` u_max."""
-    index, size = bin_index(u, u_max)
+    index, count = bin_index(u, u_max)
 
     def total(weight: np.ndarray, where: np.ndarray) -> np.ndarray:
-        return np.bincount(index[where], weights=weight[where], minlength=size)
+        return np.bincount(index[where], weights=weight[where], minlength=count.size)
 
     seen = ~censored
     n, cut = total(np.ones_like(u), seen), total(np.ones_like(u), censored)

@@ -16,9 +16,9 @@ SPIKE, SPIKE_STEPS = 0.02, 10
 
 def without_command_spikes(test: RampTest) -> RampTest:
     """Leave out samples whose command stands alone: their flow belongs to another command."""
-    away = np.abs(test.u - despiked(test.u))
+    smooth = despiked(test.u)
     usual = float(np.median(np.abs(np.diff(test.u))))
-    kept = away <= max(SPIKE * np.ptp(despiked(test.u)), SPIKE_STEPS * usual)
+    kept = np.abs(test.u - smooth) <= max(SPIKE * np.ptp(smooth), SPIKE_STEPS * usual)
     return test if kept.all() else test.part(kept)
 
 
@@ -64,20 +64,27 @@ def sweep_direction(u: np.ndarray) -> np.ndarray:
     thinned = despiked(np.median(blocks, axis=1))
     threshold = TURN * np.ptp(thinned)
     direction = np.zeros(u.size, dtype=int)
-    low = high = start = 0
-    heading = 0
-    values = thinned.tolist()  # one number after the other: a list is several times faster than an array
-    for index, value in enumerate(values):
-        low = index if value < values[low] else low
-        high = index if value > values[high] else high
-        if heading >= 0 and values[high] - value > threshold:
-            direction[start * step : high * step] = -1 if heading == 0 and _holds(thinned[: high + 1], threshold) else 1
-            heading, start, low = -1, high, index
-        elif heading <= 0 and value - values[low] > threshold:
-            direction[start * step : low * step] = 1 if heading == 0 and _holds(thinned[: low + 1], threshold) else -1
-            heading, start, high = 1, low, index
-    direction[start * step :] = heading
+    turns = {way: _next_turn(thinned, way, threshold) for way in (1, -1)}
+    heading = min(turns, key=lambda way: turns[way][1])
+    turn, seen = turns[heading]
+    if seen < thinned.size:
+        direction[: turn * step] = -heading if _holds(thinned[: turn + 1], threshold) else heading
+    while seen < thinned.size:
+        start, heading = turn, -heading
+        direction[start * step :] = heading
+        turn, seen = (start + index for index in _next_turn(thinned[start:], heading, threshold))
     return direction
+
+
+def _next_turn(u: np.ndarray, way: int, threshold: float) -> tuple[int, int]:
+    """Return the extreme on a way (1: up, -1: down), and where the command has gone back from it by the threshold.
+
+    The second lies beyond the end where it never does.
+    """
+    furthest = np.maximum.accumulate(way * u)
+    back = furthest - way * u > threshold
+    seen = int(np.argmax(back)) if back.any() else u.size
+    return int(np.argmax(furthest == furthest[min(seen, u.size - 1)])), seen
 
 
 def _holds(u: np.ndarray, turn: float) -> bool:

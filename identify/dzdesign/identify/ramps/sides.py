@@ -18,16 +18,13 @@ def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[Ra
     """Return the recordings that show one side (1: positive commands, -1: negative ones), mirrored to positive."""
     found = []
     for test in tests:
-        both = [_reaches(test, side, u_max) for side in (1, -1)]
+        smooth = despiked(test.u)
+        both = [smooth.size > 0 and (side * smooth).max() >= SMALLEST_SWEEP * u_max for side in (1, -1)]
         # What shows neither side is refused with the positive one.
         if both[0 if sign > 0 else 1] or (sign > 0 and not any(both)):
             one = _without_the_other(test, sign, u_max) if all(both) else test
             found.append(_mirrored(one) if sign < 0 else one)
     return found
-
-
-def _reaches(test: RampTest, sign: int, u_max: float) -> bool:
-    return test.u.size > 0 and bool((sign * despiked(test.u)).max() >= SMALLEST_SWEEP * u_max)
 
 
 def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:

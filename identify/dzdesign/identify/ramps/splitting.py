@@ -25,6 +25,7 @@ from dzdesign.identify.ramps.command import (
     sweep_direction,
     without_command_spikes,
 )
+from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.ramps.sweep_pressure import (
     Reason,
@@ -206,14 +207,13 @@ def _off_level(group: Sequence[_Sweep], test: RampTest) -> np.ndarray:
     """Return which samples of a ramp were not run at its pressure drop (N,)."""
     sure = [sweep.level for sweep in group if sweep.level.sure]
     found = []
+    lowest = min(float(despiked(sweep.test.u).min()) for sweep in group) + SHUT * float(np.ptp(test.u))
     for sweep in group:
         level = sweep.level
         if not level.sure and sure:
             level = replace(level, dp=sure[0].dp, spread=sure[0].spread, sure=True)
         part = sweep.test if sweep.test.dp is None else replace(sweep.test, dp=despiked(sweep.test.dp))
-        lowest = min(float(despiked(one.test.u).min()) for one in group)
-        at_bottom = part.u <= lowest + SHUT * np.ptp(test.u)
-        found.append(off_level(part, at_bottom, level))
+        found.append(off_level(part, part.u <= lowest, level))
     return np.concatenate(found)
 
 
@@ -231,7 +231,7 @@ def nominal_dp(test: RampTest) -> float | None:
     if test.dp is None:
         return None
     shut = test.dp[(test.u >= 0) & (test.u <= SHUT * max(test.u.max(), 0))]
-    return float(np.median(shut if shut.size >= 5 else test.dp[test.q <= np.quantile(test.q, 0.1)]))
+    return median(shut if shut.size >= 5 else test.dp[test.q <= np.quantile(test.q, 0.1)])
 
 
 def _branch(test: RampTest, u: np.ndarray, known: np.ndarray, rows: slice, direction: int) -> Branch:

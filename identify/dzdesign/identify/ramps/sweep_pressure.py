@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.left_out import LeftOut
 
@@ -78,7 +79,7 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
     """
     top = float(test.u.max())
     full = _largest_flow(test.q[test.u >= 0.9 * top])
-    noise = 1.4826 * float(np.median(np.abs(np.diff(test.q)))) / 2**0.5 if test.q.size > 1 else 0.0
+    noise = 1.4826 * median(np.abs(np.diff(test.q))) / 2**0.5 if test.q.size > 1 else 0.0
     flows = full > max(FLOW_SIGNIFICANCE * noise, 0.01 * L_MIN)
     shut_below = max(SHUT_FLOW * full, FLOW_SIGNIFICANCE * noise)
     unknown = SweepLevel(dp=nominal, sure=False, flows=flows, shut_below=shut_below, spread=0.0)
@@ -88,8 +89,8 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
     first = (test.q > max(low, shut_below)) & (test.q < high)
     if np.count_nonzero(first) < FIRST_SAMPLES:
         return unknown
-    at_first, edge = float(np.median(test.dp[first])), float(np.median(test.u[first]))
-    halves = [float(np.median(half)) for half in np.array_split(test.dp[first], 2)]
+    at_first, edge = median(test.dp[first]), median(test.u[first])
+    halves = [median(half) for half in np.array_split(test.dp[first], 2)]
     if at_first <= 0 or abs(halves[0] - halves[1]) > ONE_LEVEL * at_first:
         return unknown
     goes_with = (test.q <= shut_below) & (np.abs(test.dp - at_first) <= GOES_WITH * at_first)

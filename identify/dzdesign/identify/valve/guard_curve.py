@@ -10,8 +10,14 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.identify.constants import Premise
+from dzdesign.identify.constants import REFUSED, Premise
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
+from dzdesign.identify.valve.estimated_curvature import (
+    END_FACTOR_OF_THREE,
+    FEWEST_FOR_CURVATURE,
+    bends_of,
+    estimated_curvature,
+)
 from dzdesign.identify.valve.quantity_types import (
     PressureDrop,
     Probability,
@@ -27,6 +33,8 @@ Guard = Literal["closing", "mean", "opening"]
 GUARDS: tuple[Guard, ...] = get_args(Guard)
 #: Numbers of the file are right to seven decimals; a comparison of two allows ten times that.
 ROUNDING_V = 1e-6
+#: What a number of the file may be off by, with double precision's error.
+ROUNDING = 1e-7
 #: Where a single test stands whose pressure drop is unknown, MPa: nothing depends on it.
 ANYWHERE = (1.0,)
 
@@ -124,14 +132,43 @@ class CertifiedCurve:
                 f"the premise is '{self.premise}' and {len(self.curvature_V_MPa2)} values of M stand beside "
                 f"{len(self.u_lower_V)} tests, expected {bends}"
             )
-        if self.premise == "line" and any(self.curvature_V_MPa2):
-            raise RuleError("a straight threshold has M = 0")
         if (self.premise == "smooth") != (self.curvature_is is not None):
             raise RuleError("where M is from must be said of a smooth curve, and of no other")
         if any(low > high + ROUNDING_V for low, high in zip(self.u_lower_V, self.u_threshold_V, strict=True)):
             raise RuleError("a lower bound lies above the threshold that it bounds")
+        self._check_premise()
         if not self.u_min0_V > 0 or min(self.offset_V) <= 0:
             raise RuleError(f"u_min0 is {self.u_min0_V:g} V, expected a positive threshold")
+
+    def _check_premise(self) -> None:
+        """Check that the tests allow the premise, and that M is what follows from them where it was estimated."""
+        check = next((each for each in self.premises if each.premise == self.premise), None)
+        if check is None:
+            raise RuleError(f"the premise is '{self.premise}', expected one of those that the tests allow")
+        # `monotone` pays for steps the wrong way: its bounds are lowered.
+        if self.premise != "monotone" and check.lack_of_fit_p is not None and check.lack_of_fit_p < REFUSED:
+            raise RuleError(f"the premise is '{self.premise}', which the tests refuse (p = {check.lack_of_fit_p:.2g})")
+        stated = np.array(self.curvature_V_MPa2)
+        if self.premise == "line" and stated.any():
+            raise RuleError("a straight threshold has M = 0")
+        if self.curvature_is == "declared" and len(set(self.curvature_V_MPa2)) > 1:
+            raise RuleError("a declared M is one and the same between all tests")
+        if self.premise == "monotone" or self.curvature_is == "declared" or not self.dp_MPa:
+            return
+        found, errors = bends_of(self.dp_MPa, self.u_threshold_V, ROUNDING)
+        if self.premise == "line":
+            if np.any(np.abs(found) > errors):
+                raise RuleError("the premise is 'line', but the thresholds do not lie on a straight line")
+            return
+        if len(self.dp_MPa) < FEWEST_FOR_CURVATURE:
+            raise RuleError(f"M is estimated from {len(self.dp_MPa)} tests, expected {FEWEST_FOR_CURVATURE} or more")
+        allowed = estimated_curvature(found)
+        if np.any(np.abs(stated - allowed) > ROUNDING + END_FACTOR_OF_THREE * errors.max()):
+            row = int(np.argmax(np.abs(stated - allowed)))
+            raise RuleError(
+                f"M is {1e3 * stated[row]:.4g} mV/MPa² from {self.dp_MPa[row]:g} to {self.dp_MPa[row + 1]:g} MPa, but "
+                f"{1e3 * allowed[row]:.4g} follows from the thresholds at the tests, of which it is estimated"
+            )
 
     @property
     def u_offset_V(self) -> tuple[float, ...]:
@@ -153,6 +190,8 @@ class CertifiedCurve:
         if self.premise == "line":
             return f"Premise line: the threshold is straight over the pressure drop ({tested})"
         if self.premise == "smooth":
+            if self.curvature_is == "estimated":
+                tested = "from these very tests, so no test of it"
             bends = [1e3 * value for value in self.curvature_V_MPa2]
             inner, ends = min(bends), (bends[0], bends[-1])
             first, last = (units.number(end, ".3g mV/MPa²") for end in ends)

@@ -43,11 +43,12 @@ def spread_figure(name: str, spreads: Sequence[Spread], caption: str, *, one_sca
         len(spreads), 1 + many, sharex="col", sharey="all" if one_scale else "row", squeeze=False,
         width_ratios=(5, 1) if many else None, gridspec_kw={"wspace": 0.03, "hspace": 0.32},
     )  # fmt: skip
-    for (axes, *beside), spread in zip(panels, spreads, strict=True):
+    drawn = [spread.shown() for spread in spreads]
+    for (axes, *beside), spread in zip(panels, drawn, strict=True):
         _draw_order(axes, spread)
         for shape in beside:
             _draw_bars(shape, spread)
-    for row, spread in zip(panels, spreads, strict=True):  # where no panel widens a common scale any more
+    for row, spread in zip(panels, drawn, strict=True):  # where no panel widens a common scale any more
         _name_far(row[0], spread)
     panels[-1][0].set_xlabel("valve, in the order of the names")
     if many:
@@ -66,7 +67,7 @@ def spread_figure(name: str, spreads: Sequence[Spread], caption: str, *, one_sca
 
 def _in_words(spread: Spread) -> str:
     """Say how a quantity scatters, for who can't see the figure."""
-    low, middle, high = map(spread.quantity.text, (spread.at.least, spread.at.median, spread.at.largest))
+    low, middle, high = map(spread.text, (spread.at.least, spread.at.median, spread.at.largest))
     return f"{spread.heading}: {len(spread.values)} valves from {low} to {high}, median {middle}"
 
 

@@ -14,6 +14,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import Tool, schema_of
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.input_files import MOST_DOCUMENT
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.summary import AGAIN, OK, SUMMARY_NAME, LotSummary, UnfinishedLot
 from dzdesign.report.lot.table import HASHED, TABLE, TableRow, read_table
@@ -47,6 +48,11 @@ class Lot:
     missing: tuple[str, ...] = ()
     compared: bool = False
     warning_texts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def units(self) -> RecordedUnits:
+        """In which its valves were recorded."""
+        return self.summary.recorded_units if self.summary else AS_COMPUTED
 
     @property
     def sides(self) -> tuple[str, ...]:

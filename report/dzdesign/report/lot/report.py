@@ -27,7 +27,7 @@ def report_of_lot(folder: Path) -> Report:
 def make_lot_report(lot: Lot) -> Report:
     """Make the report of a lot."""
     verdict = lot_headline(lot)
-    spreads = spreads_of(lot.rows)
+    spreads = spreads_of(lot.rows, lot.units)
     missing = list(lot.missing)
     if lot.summary and lot.calibrated and not lot.summary.verified:
         missing.append("the evidence of each valve: `dzdesign batch --verify` makes it")
@@ -50,7 +50,7 @@ def lot_headline(lot: Lot) -> Headline:
     if simulated:
         lines.insert(0, f"SIMULATED recordings, not of measured valves: {and_more(simulated, IN_VERDICT)}")
     if lot.summary and lot.summary.lot_setting:
-        lines += untested_lines(lot.summary.lot_setting)
+        lines += untested_lines(lot.summary.lot_setting, lot.units)
     more = len(anomalies) - ANOMALIES_IN_VERDICT
     lines += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
     return replace(_verdict(lot), cautions=tuple(lines), some_failed=bool(lot.failed))
@@ -133,12 +133,12 @@ def _look(lot: Lot, spreads: Sequence[Spread]) -> Figure:
 
 def _spread_figure(label: str, note: str, spreads: Sequence[Spread]) -> Figure:
     """Return median, the middle nine tenths and the largest of a quantity, of each side."""
-    unit, digits = spreads[0].quantity.unit, spreads[0].quantity.digits
-    medians = " and ".join(f"{spread.at.median:.{digits}f}" for spread in spreads)
+    unit = spreads[0].quantity.unit_in(spreads[0].units)
+    medians = " and ".join(spread.text(spread.at.median) for spread in spreads)
     parts = []
     for spread in spreads:
         at = spread.at
-        least, low, high, most = (f"{value:.{digits}f}" for value in (at.least, at.q05, at.q95, at.largest))
+        least, low, high, most = map(spread.text, (at.least, at.q05, at.q95, at.largest))
         side = f"{spread.side}: " if spread.side else ""
         if len(spread.values) < TWENTY:
             parts.append(f"{side}all from {least} to {most} {unit}")

@@ -115,11 +115,14 @@ def _lot_lines(lot: Lot) -> list[str]:
             continue
         trends = Counter(each.trend or "not known" for each in tested)
         counts = ", ".join(f"{word} in {whole(count)}" for word, count in trends.most_common())
-        dp0 = from_to([each.dp0_MPa for each in tested], ".3g")
-        highest = from_to([each.highest_dp_MPa for each in tested], ".3g")
+        dp0, highest = (
+            from_to([None if one is None else lot.units.convert(one, "MPa") for one in known], ".3g")
+            for known in ([each.dp0_MPa for each in tested], [each.highest_dp_MPa for each in tested])
+        )
+        unit = lot.units.label("MPa")
         lines.append(
-            f"{of}dP0 is {dp0} MPa, the highest tested pressure drop {highest} MPa. Threshold over the pressure drop: "
-            f"{counts} valves."
+            f"{of}dP0 is {dp0} {unit}, the highest tested pressure drop {highest} {unit}. Threshold over the pressure "
+            f"drop: {counts} valves."
         )
     return lines
 
@@ -154,9 +157,10 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     costs = [spread for spread in spreads if spread.quantity.column == EXTRA]
     lines = (
         "The largest offset that over-compensates none of the valves, certified for each of them "
-        f"{span(*setting.dp_MPa)}, is in {setting.file}; its trend is that of {setting.carrier}.",
-        f"{_sentence(checked_line(setting))} The C made of the file is compared with all bounds by dzdesign verify.",
-        *(f"{line}." for line in untested_lines(setting)),
+        f"{span(*setting.dp_MPa, lot.units)}, is in {setting.file}; its trend is that of {setting.carrier}.",
+        f"{_sentence(checked_line(setting, lot.units))} The C made of the file is compared with all bounds by dzdesign "
+        "verify.",
+        *(f"{line}." for line in untested_lines(setting, lot.units)),
         *map(_sentence, cost_lines(lot.summary)),
         f"It is held down by {and_more(setting.binding, NAMED)}.",
         *_without_lines(setting.without_binding, len(lot.calibrated)),

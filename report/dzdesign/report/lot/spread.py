@@ -1,9 +1,10 @@
 """How a quantity scatters over a lot, and which valves lie far from the rest of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
 from statistics import median
 
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.report.lot.summary import Quantiles
 from dzdesign.report.lot.table import TableRow, column_of
 from dzdesign.report.lot.valve_names import by_name
@@ -25,6 +26,7 @@ TWENTY = 20
 class Quantity:
     """A column of the table that scatters, without its side: in words, as a heading, unit (empty of a ratio), decimals.
 
+    What is in V is shown in the units of the recordings.
     A valve can be far from the rest in it if it is judged. The cost of the lot setting is not: it follows from the
     offsets, and its least is no merit.
     """
@@ -36,23 +38,24 @@ class Quantity:
     digits: int
     judged: bool = True
 
-    @property
-    def heading(self) -> str:
-        """Label and unit, as on an axis."""
-        return self.label + self._in_unit
+    def heading(self, units: RecordedUnits) -> str:
+        """Return label and unit, as on an axis."""
+        return self.label + self._in_brackets(units)
 
-    @property
-    def short_heading(self) -> str:
-        """The same for the head of a narrow column."""
-        return self.short_label + self._in_unit
+    def short_heading(self, units: RecordedUnits) -> str:
+        """Return the same for the head of a narrow column."""
+        return self.short_label + self._in_brackets(units)
 
-    @property
-    def _in_unit(self) -> str:
-        return f" ({self.unit})" if self.unit else ""
+    def unit_in(self, units: RecordedUnits) -> str:
+        """Return the name of the unit in which it is shown."""
+        return units.label("V") if self.unit == "V" else self.unit
 
-    def text(self, value: float) -> str:
+    def _in_brackets(self, units: RecordedUnits) -> str:
+        return f" ({self.unit_in(units)})" if self.unit else ""
+
+    def text(self, value: float, units: RecordedUnits) -> str:
         """Return a value with its decimals."""
-        return f"{value:.{self.digits}f}"
+        return units.number(value, f".{self.digits}f V") if self.unit == "V" else f"{value:.{self.digits}f}"
 
 
 #: What a lot setting costs a valve.
@@ -86,11 +89,32 @@ class Spread:
     values: tuple[float, ...]
     at: Quantiles
     deviation: float
+    #: In which its side is shown.
+    units: RecordedUnits = AS_COMPUTED
 
     @property
     def heading(self) -> str:
         """What stands on its axis."""
-        return (f"{self.side} side: " if self.side else "") + self.quantity.heading
+        return (f"{self.side} side: " if self.side else "") + self.quantity.heading(self.units)
+
+    def text(self, value: float) -> str:
+        """Return a value with its decimals, as it is shown."""
+        return self.quantity.text(value, self.units)
+
+    def shown(self) -> "Spread":
+        """Return it with the numbers in the units of the recordings, to be drawn."""
+        if self.quantity.unit != "V":
+            return self
+        values, at = (
+            [float(self.units.convert(one, "V")) for one in known] for known in (self.values, astuple(self.at))
+        )
+        names = (each.name for each in fields(Quantiles))
+        return replace(
+            self,
+            values=tuple(values),
+            at=Quantiles(**dict(zip(names, sorted(at), strict=True))),  # a reading may fall where the command rises
+            deviation=float(self.units.convert(self.deviation, "dV")),
+        )
 
     @property
     def column(self) -> str:
@@ -147,7 +171,9 @@ def _between(known: Sequence[float], place: float) -> float:
     return round(known[index] + share * (known[index + 1] - known[index]), 7)
 
 
-def spread_of(rows: Sequence[TableRow], column: str, side: str) -> Spread | None:
+def spread_of(
+    rows: Sequence[TableRow], column: str, side: str, units: RecordedUnits = AS_COMPUTED
+) -> Spread | None:
     """Return how a column of `QUANTITIES` scatters on a side; None where none of these valves has it."""
     known = {row.name: value for row in rows if (value := row.number(side, column)) is not None}
     if not known:
@@ -162,11 +188,13 @@ def spread_of(rows: Sequence[TableRow], column: str, side: str) -> Spread | None
         values=values,
         at=at,
         deviation=deviation if len(values) >= FEWEST else 0.0,
+        units=units.of_side(side),
     )
 
 
-def spreads_of(rows: Sequence[TableRow]) -> tuple[Spread, ...]:
+def spreads_of(rows: Sequence[TableRow], units: RecordedUnits = AS_COMPUTED) -> tuple[Spread, ...]:
     """Return how every quantity scatters that some calibrated valve has, side by side."""
     calibrated = [row for row in rows if row.calibrated]
-    found = (spread_of(calibrated, column, side) for side in rows[0].sides for column in QUANTITIES) if rows else ()
+    sides = rows[0].sides if rows else ()
+    found = (spread_of(calibrated, column, side, units) for side in sides for column in QUANTITIES)
     return tuple(spread for spread in found if spread is not None)

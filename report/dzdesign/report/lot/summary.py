@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, Final, Literal
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, RuleError, quantity
+from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 
 #: File of either type below.
 SUMMARY_NAME = "batch.json"
@@ -167,6 +168,9 @@ class LotSummary(Artefact):
         LotSettingSummary | None, Meta(description="One setting that is safe for each calibrated valve; null of none.")
     ]
     why_no_lot_setting: Annotated[str | None, Meta(description="Why there is none; null if there is one.")]
+    recorded_units: Annotated[
+        RecordedUnits, Meta(description="Units of the valves' recordings; the numbers here are in V and MPa.")
+    ] = AS_COMPUTED
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "calibrated", self.valves - len(self.failed))

@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import astuple, fields, replace
 
 from dzdesign.core.errors import and_more
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.lot.folder import Lot
 from dzdesign.report.lot.reasons import ReasonGroup
@@ -11,7 +12,7 @@ from dzdesign.report.lot.spread import EXTRA, QUANTITIES, Quantity, Spread
 from dzdesign.report.lot.summary import LotSettingSummary, Quantiles
 from dzdesign.report.lot.table import TABLE, TableRow, safe_cell
 from dzdesign.report.lot.valve_names import short
-from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, table_of, whole
+from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, recorded, table_of, whole
 
 #: Valves that a cell names, and rows that a table has in the page; all of them stand in the CSV.
 NAMED, ROWS = 40, 100
@@ -44,17 +45,25 @@ def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[TableRow]) -> T
     )
 
 
+def _cell(quantity: Quantity, value: float | None, units: RecordedUnits) -> Cell:
+    """Return a value of a quantity, in the unit of the recordings."""
+    if quantity.unit == "V":
+        return recorded(value, f".{quantity.digits}f V", units)
+    return number(value, quantity.digits)
+
+
 def spread_table(spreads: Sequence[Spread]) -> Table:
     """Return quantiles of every quantity, with the names of the extreme valves."""
 
     def quantile(name: str) -> Callable[[Spread], Cell]:
-        return lambda spread: number(getattr(spread.at, name), spread.quantity.digits)
+        return lambda spread: _cell(spread.quantity, getattr(spread.at, name), spread.units)
 
     def end(name: str, place: int) -> Callable[[Spread], Cell]:
         return lambda spread: replace(quantile(name)(spread), more=short(spread.ends[place]))
 
     def deviation(spread: Spread) -> Cell:
-        return number(spread.deviation if spread.limits else None, spread.quantity.digits + 1)
+        known, digits = spread.deviation if spread.limits else None, spread.quantity.digits + 1
+        return recorded(known, f".{digits}f dV", spread.units) if spread.quantity.unit == "V" else number(known, digits)
 
     def csv_row(spread: Spread) -> list[object]:
         known = (round(spread.deviation, 7), len(spread.far())) if spread.limits else (None, None)
@@ -91,8 +100,8 @@ def far_table(spreads: Sequence[Spread]) -> Table | None:
         found[:ROWS],
         ("valve", lambda one: one[1]),
         ("quantity", lambda one: one[0].heading),
-        ("value", lambda one: number(one[2], one[0].quantity.digits)),
-        ("median of the lot", lambda one: number(one[0].at.median, one[0].quantity.digits)),
+        ("value", lambda one: _cell(one[0].quantity, one[2], one[0].units)),
+        ("median of the lot", lambda one: _cell(one[0].quantity, one[0].at.median, one[0].units)),
         ("robust s.d. from the median", lambda one: number(one[0].distance(one[2]), 1, "+")),
         csv=csv_text(
             ("valve", "quantity", "value", "median", "robust_sd_from_median"),
@@ -131,12 +140,15 @@ def holding_table(lot: Lot, setting: LotSettingSummary) -> Table:
     """Return the valves that hold the lot setting down."""
     rows = {row.name: row for row in lot.rows}
 
-    def figure_of(side: str, column: str, digits: int) -> Callable[[str], Cell]:
-        return lambda name: number(rows[name].number(side, column) if name in rows else None, digits)
+    def figure_of(side: str, column: str) -> Callable[[str], Cell]:
+        units = lot.units.of_side(side)
+        shown = QUANTITIES[column]
+        return lambda name: _cell(shown, rows[name].number(side, column) if name in rows else None, units)
 
     def margins(name: str) -> Cell:
         found = setting.smallest_margin_V.get(name, ())
-        return in_number_font(" and ".join(f"{1e3 * margin:.3f}" for margin in found) or "–")
+        shown = [lot.units.number(1e3 * margin, ".3f mV") for margin in found]
+        return in_number_font(" and ".join(shown) or "–")
 
     caption = "Valves that hold the lot setting down"
     if len(setting.binding) > ROWS:
@@ -146,9 +158,12 @@ def holding_table(lot: Lot, setting: LotSettingSummary) -> Table:
         caption,
         setting.binding[:ROWS],
         ("valve", lambda name: name),
-        ("margin under its own ceiling (mV)", margins),
-        *((f"own offset at dP0{words} (V)", figure_of(side, "offset_V", 3)) for side, words in of.items()),
-        *((f"extra dead zone{words} (%)", figure_of(side, EXTRA, 2)) for side, words in of.items()),
+        (f"margin under its own ceiling ({lot.units.label('mV')})", margins),
+        *(
+            (f"own offset at dP0{words} ({lot.units.label('V')})", figure_of(side, "offset_V"))
+            for side, words in of.items()
+        ),
+        *((f"extra dead zone{words} (%)", figure_of(side, EXTRA)) for side, words in of.items()),
         notes=(
             "A valve's own ceiling, which its own offset may not exceed, runs straight between its tests, at its "
             "bounds or under them: this margin is no larger than that valve's margin under its bounds, which is said "
@@ -172,7 +187,7 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
     embedded = len(lot.table) <= EMBEDDED
 
     def figure_of(side: str, quantity: Quantity) -> Callable[[TableRow], Cell]:
-        return lambda row: number(row.number(side, quantity.column), quantity.digits)
+        return lambda row: _cell(quantity, row.number(side, quantity.column), lot.units.of_side(side))
 
     return table_of(
         caption,
@@ -181,7 +196,7 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
         *((("serial", lambda row: _serial(row) or "–"),) if any(map(_serial, lot.rows)) else ()),
         ("status", lambda row: Cell(text="✓ ok", kind="good") if row.calibrated else _failed(row.status)),
         *(
-            (f"{side} {quantity.short_heading}".lstrip(), figure_of(side, quantity))
+            (f"{side} {quantity.short_heading(lot.units)}".lstrip(), figure_of(side, quantity))
             for side in lot.sides
             for quantity in QUANTITIES.values()
         ),

@@ -106,7 +106,7 @@ def rounding_table(compensator: Compensator) -> Table:
         rows += [
             ("one step of a node of β" + of, f"1/{compensator.beta_denominator}", "rounded down", -1e3 * float(node)),
             (
-                "offset under the certified curve, mean" + of, "few nodes, rounding, the converter's error",
+                "offset under the certified curve, mean" + of, "few nodes, rounding to codes and to counts",
                 f"largest {1e3 * certificate.largest_loss_V:.2f} mV", -1e3 * certificate.mean_loss_V,
             ),
         ]  # fmt: skip

@@ -192,8 +192,14 @@ def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         (f"at zero, at the end ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
         (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
-        ("required", lambda one: "must be shut at the end" if one.must_shut else "no core can know: not required"),
+        ("required", lambda one: _required(one, units) if one.must_shut else "no core can know: not required"),
     )
+
+
+def _required(scenario: ScenarioResult, units: RecordedUnits) -> str:
+    """Say what may flow at the end of a scenario."""
+    allowed = scenario.allowed_at_zero_L_min
+    return "must be shut at the end" if allowed is None else f"{units.text(allowed, '.3g L/min')} at most at the end"
 
 
 def series_table(series: MonteCarlo | None, units: RecordedUnits) -> Table | None:

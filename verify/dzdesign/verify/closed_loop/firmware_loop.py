@@ -76,6 +76,7 @@ def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tu
                     tested_MPa=tested,
                     command_error=compensator.command_error,
                     has_zero_band=compensator.zero_band_codes > 0,
+                    hides_excess=side.trend == "increasing" and bool(compensator.signals.hidden_excess(sign)),
                     units=valve.recorded_units,
                 )
             )

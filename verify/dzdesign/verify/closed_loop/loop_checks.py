@@ -8,6 +8,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
+from dzdesign.verify.closed_loop.scenarios import EXCESS
 from dzdesign.verify.loop_results import PressureResult, ScenarioResult
 from dzdesign.verify.requirements import (
     PLANT_IS_THE_VALVE,
@@ -176,11 +177,11 @@ def shut_after_scenarios(
     text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: "
     text += f"{_flow(worst, worst.q_zero_L_min, units)} ({worst.name}, at {_at(worst, units)}){_allowed(worst, units)}"
     if hidden := [each for each in scenarios if not each.must_shut]:
-        leak = max(hidden, key=lambda each: each.q_zero_L_min)
-        text += (
-            f"; not required, as no core can know of it or it has no zero band: {leak.name}, "
-            f"{_flow(leak, leak.q_zero_L_min, units)}"
-        )
+        worst_of = {each.name: each for each in sorted(hidden, key=lambda each: each.q_zero_L_min)}
+        found = [f"{name}, {_flow(each, each.q_zero_L_min, units)}" for name, each in worst_of.items()]
+        text += f"; not required, as no core can know of it or it has no zero band: {', and '.join(found[::-1])}"
+        if EXCESS in worst_of:
+            text += "; signals with a live zero and room above the span would show the failed sensor"
     if not plant_given and not any(each.is_load_step for each in scenarios):
         text += "; load steps and frozen sensors were not tried: that needs ramps at two pressure drops, or --plant"
     if zero_flow.holds is None:

@@ -29,6 +29,8 @@ OILS = {"cold oil, 8 times the viscosity": (8.0, 1.03), "hot oil, a quarter of t
 
 #: Lowest and highest tested pressure drop, MPa.
 Ends = tuple[float, float]
+#: A failure that reads as a large pressure drop.
+EXCESS = "sensor ahead shows full, or the one behind breaks"
 NO_FIGURES: Mapping[str, float] = MappingProxyType({})
 
 
@@ -49,6 +51,9 @@ class Scene:
     #: Of a zero command's code; and whether the law has a zero band against it.
     command_error: CommandError
     has_zero_band: bool
+    #: Whether a sensor may fail so that the core must take a pressure drop for larger than it is, and that opens the
+    #: valve: the threshold grows with the pressure drop, and the failed sensor's code is a valid one.
+    hides_excess: bool = False
     #: In which a scenario's name has its pressures.
     units: RecordedUnits = AS_COMPUTED
 
@@ -186,11 +191,12 @@ def _load_step_in_motion(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
 def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
     """A sensor fails in mid-ramp: its wire breaks, or it shows full pressure."""
     beyond = 1e3  # MPa: the converter's end
-    for name, signal_MPa in (
-        ("sensor ahead breaks, or the one behind shows full", -beyond),
-        ("sensor ahead shows full, or the one behind breaks", beyond),
+    for name, signal_MPa, must_shut in (
+        ("sensor ahead breaks, or the one behind shows full", -beyond, True),
+        (EXCESS, beyond, not scene.hides_excess),
     ):
-        yield scene.result(name, _changed_in_mid_ramp(scene, signal_MPa, scene.dp_MPa)[0])
+        run, _ = _changed_in_mid_ramp(scene, signal_MPa, scene.dp_MPa)
+        yield scene.result(name, run, must_shut=must_shut)
 
 
 def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:

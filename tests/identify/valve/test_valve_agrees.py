@@ -1,0 +1,131 @@
+"""What in valve.json follows from the rest of it is recomputed: the recorded curve, an estimated M, a straight line."""
+
+import json
+from copy import deepcopy
+
+import numpy as np
+import pytest
+
+from dzdesign.core.artefact_reading import read_artefact, rounded
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.errors import InputError
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.model import DECIMALS, ValveModel
+from tests.support.repeatable_valves import identify
+from tests.support.synthetic import Truth, synthetic_ramp
+
+TESTED = (0.5, 1.0, 2.0, 3.5, 5.0)
+
+
+def valve_json(**options):
+    """Return valve.json of a straight valve with hysteresis, as a document."""
+    ramps = [synthetic_ramp(dp, Truth(), seed=seed) for seed, dp in enumerate(TESTED)]
+    valve = identify(ramps, IdentifyOptions(meter_lag=0.0, **options))
+    return json.loads(to_json_bytes(rounded(valve, DECIMALS)))
+
+
+@pytest.fixture(scope="module")
+def smooth():
+    return valve_json(curve="smooth")
+
+
+def read(document):
+    return read_artefact(json.dumps(document).encode(), ValveModel, "valve.json")
+
+
+def side_of(document):
+    return document["sides"]["positive"]
+
+
+def refused(document):
+    with pytest.raises(InputError) as caught:
+        read(document)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("premise", ["line", "smooth", "monotone"])
+def test_what_identify_writes_is_read(premise):
+    document = valve_json(curve=premise)
+    assert side_of(document)["certified"]["closing"]["premise"] == premise
+    read(document)
+
+
+class TestRecordedCurve:
+    @pytest.mark.parametrize("branch", ["rising", "falling"])
+    @pytest.mark.parametrize("shift", [-0.3, 0.3])
+    def test_a_curve_that_begins_elsewhere_is_refused(self, smooth, branch, shift):
+        document = deepcopy(smooth)
+        recorded = side_of(document)["tests"][2]["recorded"][branch]
+        recorded["u_V"] = [u + shift for u in recorded["u_V"]]
+        recorded["u_seen_V"] += shift
+        text = refused(document)
+        assert "begins at" in text or "straight to zero" in text
+
+    def test_a_curve_that_is_shifted_where_flow_is_seen_alone_is_refused(self, smooth):
+        document = deepcopy(smooth)
+        recorded = side_of(document)["tests"][2]["recorded"]["falling"]
+        first, onset, *seen = recorded["u_V"]
+        recorded["u_V"] = [first, onset, *[u + 0.3 for u in seen]]
+        recorded["u_seen_V"] += 0.3
+        assert "straight" in refused(document)
+
+    def test_a_first_flow_that_is_none_of_the_curve_is_refused(self, smooth):
+        document = deepcopy(smooth)
+        side_of(document)["tests"][2]["recorded"]["falling"]["u_seen_V"] += 0.4
+        assert "u_seen_V" in refused(document)
+
+    def test_a_curve_that_is_less_steep_about_its_knee_is_refused(self, smooth):
+        document = deepcopy(smooth)
+        test = side_of(document)["tests"][2]
+        for branch in ("rising", "falling"):
+            recorded = test["recorded"][branch]
+            flow = np.array(recorded["q_L_min"])
+            recorded["q_L_min"] = np.minimum(flow, test["noise_level_L_min"] + 0.8 * flow).tolist()
+        assert "slope" in refused(document)
+
+    def test_a_curve_that_never_comes_to_its_straight_part_is_refused(self, smooth):
+        document = deepcopy(smooth)
+        recorded = side_of(document)["tests"][2]["recorded"]["falling"]
+        recorded["q_L_min"] = [min(flow, 0.1) for flow in recorded["q_L_min"]]
+        recorded["error_L_min"] = 1.0
+        assert "straight part" in refused(document)
+
+
+class TestPremise:
+    def test_an_estimated_curvature_is_recomputed(self, smooth):
+        document = deepcopy(smooth)
+        curve = side_of(document)["certified"]["closing"]
+        assert max(curve["curvature_V_MPa2"]) > 0
+        curve["curvature_V_MPa2"] = [0.0] * 4
+        assert "estimated" in refused(document)
+        curve["curvature_is"] = "declared"
+        read(document)  # what was declared stands in no recording
+
+    def test_a_declared_curvature_is_one(self, smooth):
+        document = deepcopy(smooth)
+        curve = side_of(document)["certified"]["closing"]
+        curve |= {"curvature_V_MPa2": [1.0, 1.0, 0.0, 1.0], "curvature_is": "declared"}
+        assert "one and the same" in refused(document)
+
+    def test_a_line_is_straight(self, smooth):
+        document = deepcopy(smooth)
+        curve = side_of(document)["certified"]["closing"]
+        curve |= {"premise": "line", "curvature_V_MPa2": [0.0] * 4, "curvature_is": None}
+        for check in curve["premises"]:
+            check["lack_of_fit_p"] = 0.5
+        assert "straight line" in refused(document)
+
+    @pytest.mark.parametrize("p_value", [0.009, 0.02])
+    def test_a_premise_that_the_tests_refuse_is_not_taken(self, smooth, p_value):
+        document = deepcopy(smooth)
+        for check in side_of(document)["certified"]["closing"]["premises"]:
+            check["lack_of_fit_p"] = p_value
+        if p_value < 0.01:
+            assert "refuse" in refused(document)
+        else:
+            read(document)
+
+    def test_a_premise_that_was_never_tried_is_refused(self, smooth):
+        document = deepcopy(smooth)
+        side_of(document)["certified"]["closing"]["premises"] = []
+        assert "allow" in refused(document)
