@@ -21,6 +21,7 @@ import on_cortex_m4
 import on_x86
 from contender import our_forms
 from goals import goals, zero_band_goals
+from interrupt import interrupt_goals
 from measuring import Measured, measure
 from rival_cores import rivals
 from scoreboard import keep_rows, markdown, markdown_rows, say
@@ -56,6 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
             say(f"{contender.name} ...")
             results.append(measure(contender, compensator, inputs, expected, Path(folder) / str(index)))
         with_band = _with_zero_band(compensator, Path(folder))
+        of_interrupt = interrupt_goals(design(compensator.valve), Path(folder) / "interrupt")
     nodes, compare_max = len(compensator.positive.beta), compensator.signals.compare_max
     print(
         f"\nLaw `{compensator.law}`, {nodes} nodes of beta, compare 0..{compare_max}. Counts from its first "
@@ -65,7 +67,7 @@ def main(arguments: list[str] | None = None) -> int:
     print(markdown(Measured.HEADINGS, [result.cells() for result in (*results, *with_band)]))
     print("\nHow each was made:\n")
     print("\n".join(f"- {contender.name}: {contender.made}" for contender in contenders))
-    rows = [*goals(results), *zero_band_goals(with_band)]
+    rows = [*goals(results), *zero_band_goals(with_band), *of_interrupt]
     keep_rows(rows, chosen.rows)
     print("\n" + markdown_rows(rows))
     missed = sum(row.verdict == "MISSES" for row in rows)

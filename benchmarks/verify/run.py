@@ -12,6 +12,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
 
 from all_inputs import print_inputs  # noqa: E402
+from current_loop import print_current_loop  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from plant import print_plant  # noqa: E402
@@ -26,6 +27,7 @@ PARTS = {
     "hysteresis": (print_hysteresis, 404),
     "mutants": (print_mutants, 202),
     "proof": (print_proof, 0),
+    "current": (print_current_loop, 0),
 }
 
 

@@ -9,6 +9,7 @@ import pytest
 from building import Counts
 from contender import Contender, our_forms
 from goals import goals
+from interrupt import count_interrupt, with_current
 from measuring import Measured
 from rival_cores import rivals
 from tried_inputs import exact_rows_header, expected_compares, tried_inputs
@@ -174,3 +175,13 @@ def test_each_machine_judges_the_form_that_is_fastest_there():
     for slow, missed in (((900, 900), 0), ((900, 901), 1)):
         rows = goals([fast, measured("slow", slow, ours=True), *others])
         assert [row.verdict for row in rows].count("MISSES") == missed
+
+
+@needs(on_cortex_m4.CORTEX_M4)
+def test_the_whole_interrupt_is_counted_from_its_first_instruction(example_compensator, inputs, tmp_path):
+    """With a new sample it takes the law's instructions more, and between two samples the same for every input."""
+    controlled, some = with_current(example_compensator), [each for each in inputs if each[0] <= 4095][::40]
+    held = count_interrupt(controlled, some, tmp_path / "held", fresh=False)
+    fresh = count_interrupt(controlled, some, tmp_path / "fresh", fresh=True)
+    assert held.least == held.most <= 160
+    assert fresh.least > held.most + 60

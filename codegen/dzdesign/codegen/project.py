@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.codegen.banner import Banner, banner_of, board_lines
 from dzdesign.codegen.core.certificate_text import zero_command
+from dzdesign.codegen.core.current_files import CURRENT_HEADERS, CURRENT_SOURCES, FAULT_BITS, current_files
 from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core_files
 from dzdesign.codegen.provenance import constants_of
 from dzdesign.codegen.target import Target, folder_of
@@ -111,6 +112,9 @@ def generate(
     document = compensator_bytes or to_json_bytes(compensator)
     digest = sha256_of(document)
     core = {f"core/{name}": file for name, file in core_files(compensator, target.arithmetic).items()}
+    if (drive := compensator.current_drive) is not None:
+        target.check_current_control()
+        core |= {f"core/{name}": file for name, file in current_files(drive.loop).items()}
     banner = banner_of(compensator, digest)
     files = {
         path: _render(PACKAGE, file.template, banner.lines(file.template), file.values) for path, file in core.items()
@@ -137,6 +141,7 @@ def generate(
 def target_files(compensator: Compensator, target: Target, banner: Banner) -> dict[str, str]:
     """Return the files around the core, path to text."""
     signals = compensator.signals
+    current = compensator.current_drive
     levels, full_V = signals.code_max + 1, target.converter.full_V
     if target.takes_any_signals and compensator.target:  # a target without a converter of its own takes any
         full_V = compensator.target.converter.full_V
@@ -148,8 +153,14 @@ def target_files(compensator: Compensator, target: Target, banner: Banner) -> di
         "drive": compensator.drive_functions,
         "limited": compensator.drive_functions.compare_limit < signals.compare_max,
         "at_zero": {sign: zero_command(compensator, sign) for sign in signals.signs},
-        "core_sources": (*(CORE_SOURCES[sign] for sign in signals.signs), "dz_drive.c"),
-        "core_headers": CORE_HEADERS,
+        "core_sources": (
+            *(CORE_SOURCES[sign] for sign in signals.signs),
+            "dz_drive.c",
+            *(CURRENT_SOURCES if current else ()),
+        ),
+        "core_headers": (*CORE_HEADERS, *(CURRENT_HEADERS if current else ())),
+        "current": current,
+        "current_faults": FAULT_BITS,
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,

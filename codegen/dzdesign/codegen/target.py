@@ -17,7 +17,7 @@ ARITHMETICS = ("wide", "narrow")
 #: Names that the renderer itself passes to every template; a target's context may not use them.
 RENDERER_NAMES = frozenset(
     {"banner", "project", "signals", "u_max_V", "drive", "limited", "at_zero", "bipolar", "wiring", "lot_setting"}
-    | {"core_sources", "core_headers", "firmware_origin"}
+    | {"core_sources", "core_headers", "firmware_origin", "current", "current_faults"}
 )
 
 
@@ -51,6 +51,8 @@ class Target:
     takes_any_signals: bool = False
     #: Whether it takes samples and ticks by a timer of its own, at `sample_Hz` and `tick_Hz` and no other rate.
     has_timer: bool = True
+    #: Whether its files sample and control the current of a solenoid.
+    controls_current: bool = False
     #: Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     board: frozenset[str] = frozenset()
     #: The serial line of its telemetry, if it sends any.
@@ -96,6 +98,14 @@ class Target:
             sample_Hz=self.sample_Hz,
             tick_Hz=self.tick_Hz,
         )
+
+    def check_current_control(self) -> None:
+        """Refuse a compensator with current control where the target's files have none."""
+        if not self.controls_current:
+            raise InputError(
+                f"the compensator controls the current, but the files of target {self.name} do not; "
+                "design it again with --drive duty, or generate it for host or cortex-m4"
+            )
 
     def check_signals(self, signals: Signals) -> None:
         """Refuse a compensator that was designed for another converter or PWM: the first scaling that differs."""

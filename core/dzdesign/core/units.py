@@ -21,6 +21,7 @@ SI_UNIT = {
     "ratio": "",
     "current": "A",
     "resistance": "ohm",
+    "inductance": "H",
     "curvature": "V/Pa**2",
 }
 EXAMPLES = {
@@ -33,6 +34,7 @@ EXAMPLES = {
     "ratio": "%",
     "current": "mA, A",
     "resistance": "ohm, kohm",
+    "inductance": "mH, H",
     "curvature": "mV/MPa^2, mV/bar^2",
 }
 #: Spellings of data-acquisition programs that pint does not read.

@@ -14,6 +14,7 @@ from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
+from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot.valves import LotValve
@@ -77,6 +78,10 @@ class Compensator(ShownInNotebooks, Artefact):
     drive_functions: Annotated[DriveFunctions, Meta(description="Ramps, dither and the like.")] = field(
         default_factory=DriveFunctions
     )
+    current_drive: Annotated[
+        CurrentDrive | None,
+        Meta(description="Current control of the drive; null: the law's output is the PWM's duty."),
+    ] = None
     costs: Annotated[tuple[str, ...], Meta(description="What the safe choices cost, in words.")]
     valve_sha256: Annotated[
         str, Meta(description="SHA-256 of `valve` as `identify` writes it: a change of it is seen.")
@@ -124,6 +129,11 @@ class Compensator(ShownInNotebooks, Artefact):
         if limit > self.signals.compare_max:
             raise RuleError(f"the compare limit is {limit}, above full drive, {self.signals.compare_max}")
         longest = max(abs(code - command.zero_code) for code in command.valid_codes)
+        if (drive := self.current_drive) is not None:
+            if self.negative is not None:
+                raise RuleError("current control is for one solenoid, expected a command of one sign")
+            if (drive.loop.full_counts, drive.sampling.tick_Hz) != (self.signals.compare_max, self.signals.tick_Hz):
+                raise RuleError("the current loop's full drive or PWM rate is not that of the signals")
         if self.drive_functions.has_ramp and longest > RAMPED_CODES:
             raise RuleError(f"a ramp counts up to {RAMPED_CODES} codes of command from zero on; use a shorter signal")
 

@@ -48,8 +48,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     RequirementError
         If a proof fails.
     """
-    options = options or DesignOptions()
-    signals = options.signals
+    signals = (options := options or DesignOptions()).signals
     law(options.law)
     u_max = _full_command(valve, options)
     transition_codes = _transition_codes(valve, options)
@@ -82,6 +81,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         zero_band_codes=options.error.zero_band_codes if transition_codes else 0,
         command_error=options.error,
         drive_functions=functions,
+        current_drive=options.current_drive(),
         costs=(),
         valve=valve,
     )

@@ -8,6 +8,7 @@ from dzdesign.core.dither import parted
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
+from dzdesign.design.current.current_texts import current_request
 from dzdesign.design.design_choices import DEFAULTS, HYSTERESIS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal
@@ -66,6 +67,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         reading_flow_L_min=_flow_L_min(text["reading_flow"], "--reading-flow") if text["reading_flow"] else None,
         full_command_V=full_command_V(signal),
         accept=tuple(text["accept"].replace(",", " ").split()),
+        current=current_request(text, target),
         request=DesignRequest(target=target, options=text),
     )
 

@@ -6,6 +6,7 @@ from math import ceil, floor
 
 from dzdesign.core.dither import HIGHEST_HZ, LARGEST_PEAK, LOWEST_HZ
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.design.current.drive import CurrentDrive, CurrentRequest, design_current_drive
 from dzdesign.design.design_choices import BELOW_DP0, BelowDp0, DesignRequest
 from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
 from dzdesign.design.signals import Signals
@@ -61,6 +62,8 @@ class DesignOptions:
         Full command that the signal states, V.
     accept : tuple of str
         Codes of warnings, of `ACCEPTABLE`, for which the valve is not refused.
+    current : CurrentRequest or None
+        Coil, supply and sensor of a drive that controls the current; None: the law's output is the PWM's duty.
     request : DesignRequest or None
         The target and the texts that these were read from, to be kept in compensator.json.
     """
@@ -80,6 +83,7 @@ class DesignOptions:
     reading_flow_L_min: float | None = None
     full_command_V: Fraction | None = None
     accept: tuple[str, ...] = ()
+    current: CurrentRequest | None = None
     request: DesignRequest | None = None
 
     def __post_init__(self) -> None:
@@ -162,6 +166,15 @@ class DesignOptions:
     def error(self) -> CommandError:
         """The command's error: what was declared, or that of the F28335's converter."""
         return self.command_error or command_error_of("", Converter(), self.signals.command)
+
+    def current_drive(self) -> CurrentDrive | None:
+        """Return the current control that is asked for, its loop chosen."""
+        if self.current is None:
+            return None
+        if len(self.signals.signs) == 2:
+            raise InputError("--drive current is for one solenoid, but the command has both signs; give --drive duty")
+        converter = self.request.target.converter if self.request else Converter()
+        return design_current_drive(self.current, converter, self.signals.compare_max)
 
     def drive_functions(self, transition_codes: int) -> DriveFunctions:
         """Return what the drive does around the law, in the firmware's integers."""

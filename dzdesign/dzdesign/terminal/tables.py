@@ -212,6 +212,8 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"zero band: commands up to {band:.2%} count as zero; transition: from the {guard} to the opening "
             f"threshold over those from there to {end:.2%}"
         )
+    if compensator.current_drive is not None:
+        lines += compensator.current_drive.in_words()
     hidden = hidden_failures(compensator)
     elsewhere = {*hidden, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
     console = console or new_console()

@@ -14,6 +14,7 @@ DEVIATIONS = {
     "interface's limits are for those who call the core; not every firmware needs all of them.",
     "dz_drive.h": "deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE: it is for those who call the "
     "drive; who is told of a new sample does without.",
+    "dz_current.h": "deviation from rule 2.5 (advisory) in DZ_CURRENT_SAMPLES: it is for those who take the codes.",
 }
 
 

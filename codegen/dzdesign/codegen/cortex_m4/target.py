@@ -43,6 +43,7 @@ TARGET = Target(
     compare_max=COMPARE_MAX,
     converter=Converter(full_V=ADC_SPAN_V, levels=2**ADC_BITS),
     takes_any_signals=True,
+    controls_current=True,
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in OWN_FILES + OTHER_FILES},
     board=frozenset(f"{FOLDER}/{file}" for file in BOARD_FILES),
     context={

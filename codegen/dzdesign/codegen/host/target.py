@@ -21,6 +21,7 @@ TARGET = Target(
     # Of the F28335, so that the library answers as that firmware does unless another target's design is given.
     compare_max=60_000,
     takes_any_signals=True,
+    controls_current=True,
     has_timer=False,
     templates={f"host/{file}": f"{file}.jinja" for file in (*FILES, *SHARED_FILES, "CMakeLists.txt", "README.md")},
     context={

@@ -75,6 +75,8 @@ def _text(path: Path) -> str:
 def constants_in(text: str) -> Iterator[tuple[str, Value]]:
     """Yield name and value of the constants in C: of a table its rows, of what is no number its text.
 
+    A number of a table without rows is a row that does not change.
+
     Examples
     --------
     >>> list(constants_in("#define SHIFT 6u" + chr(10) + "static const struct s t[2] = {{UINT32_C(5), 0u}, {1, 2},};"))
@@ -85,7 +87,8 @@ def constants_in(text: str) -> Iterator[tuple[str, Value]]:
         sign = -1 if one["sign"] else 1
         yield one["name"], sign * int(one["digits"]) if one["digits"] else one["other"]
     for one in TABLE.finditer(code):
-        yield one["name"], tuple(_row(row[1]) for row in ROW.finditer(one["rows"]))
+        rows = tuple(_row(row[1]) for row in ROW.finditer(one["rows"]))
+        yield one["name"], rows or tuple((number, 0) for number in _row(one["rows"]))  # or plain numbers
 
 
 def _row(text: str) -> tuple[int, ...]:

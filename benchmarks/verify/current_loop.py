@@ -1,0 +1,110 @@
+"""The current loop of the example's coil: margins, steps, steady error and limit cycles at every corner; its states.
+
+The coil is exact between two edges of the PWM, and the controller is the C.
+"""
+
+from time import perf_counter
+
+import numpy as np
+from scoreboard import Row, print_rows, say
+
+from dzdesign.codegen.core.current_files import current_texts
+from dzdesign.design.current.choosing import (
+    LEAST_PHASE_DEG,
+    CurrentSensor,
+    choose_loop,
+    gains_of,
+    sensor_line,
+    worst_step,
+)
+from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.margins import worst_margins
+from dzdesign.design.current.step_response import step_responses
+from dzdesign.design.target_inputs import Converter
+from dzdesign.verify.current.coil_simulation import CoilSimulation
+from dzdesign.verify.current.state_check import check_states, hashes_on
+from dzdesign.verify.toolchain.machines import CORTEX_M4
+
+COIL = CoilCircuit(resistance_ohm=3.5, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))
+CONVERTER, SAMPLING = Converter(), CurrentSampling()
+#: Sensor, and the limit of the rise.
+FORMS = {
+    "supply unknown": (CurrentSensor(V_per_A=2.0, offset_V=0.15), 10.0),
+    "supply measured": (CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.075), 5.0),
+}
+SHARES = (0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
+SECONDS, SETTLE_S = 10, 1
+STATES, QUICK_STATES = 10_000_000, 500_000
+
+
+def print_current_loop(quick: bool = False, seed: int = 0) -> list[Row]:
+    """Judge both forms of the loop, print and return the rows."""
+    rows = []
+    for name, (sensor, limit_ms) in FORMS.items():
+        say(f"current loop, {name} ...")
+        loop = choose_loop(COIL, sensor, CONVERTER, SAMPLING, compare_max=60000)
+        core = current_texts(loop)
+        phase, gain = worst_margins(COIL, SAMPLING, gains_of(loop, COIL))
+        steps = step_responses(loop, COIL, SAMPLING, sensor_line(sensor, CONVERTER))
+        slowest, largest = worst_step(steps)
+        missing = LEAST_PHASE_DEG - phase.phase_deg
+        rows += [
+            Row(what=f"{name}: phase margin below {LEAST_PHASE_DEG:g} degrees, worst corner and current", value=missing,
+                limit=0, unit="deg", note=f"{phase.phase_deg:.1f} degrees at {phase.crossover_rad_s:.0f} rad/s"),
+            Row(what=f"{name}: gain margin, worst corner and current", value=gain.gain),
+            Row(what=f"{name}: 10-90 % of rated current, slowest corner", value=1e3 * slowest.rise_s, limit=limit_ms,
+                unit="ms", note=f"{1e3 * slowest.least_s:.1f} ms at full duty; {slowest.corner}"),
+            Row(what=f"{name}: overshoot of that step, worst corner", value=100 * largest.overshoot, limit=10, unit="%",
+                note=f"{largest.corner}"),
+            *_settled(name, CoilSimulation(loop, core, COIL, sensor, CONVERTER, SAMPLING), sensor, quick),
+            *_states(name, loop, core, QUICK_STATES if quick else STATES),
+        ]  # fmt: skip
+    print_rows("Current loop: coil of 3.5 + 0.5 ohm and 40 mH, R x 0.75-1.35, L x 0.5-1.5, 18-32 V", rows)
+    return rows
+
+
+def _settled(name: str, simulation: CoilSimulation, sensor: CurrentSensor, quick: bool) -> list[Row]:
+    """Return the rows of ten seconds at a constant set point, at every corner."""
+    codes_per_A = sensor.V_per_A * CONVERTER.levels / float(CONVERTER.full_V)
+    seconds = SETTLE_S + (1 if quick else SECONDS)
+    settle = SETTLE_S * SAMPLING.tick_Hz
+    worst = np.zeros(4)
+    for corner in COIL.end_corners() if quick else COIL.corners():
+        for share in SHARES:
+            counts = round(share * simulation.loop.full_counts)
+            found = simulation.run(corner, [counts] * (seconds * SAMPLING.tick_Hz))
+            if found.faults:
+                return [Row(what=f"{name}: faults at {corner}", value=found.faults, limit=0)]
+            mean = found.mean_A[settle:] * codes_per_A
+            read = (found.total[settle:].astype(float) - simulation.loop.offset_nominal) / SAMPLING.samples
+            asked = share * codes_per_A
+            now = (np.ptp(mean), np.ptp(read), abs(read.mean() - asked), abs(mean.mean() - asked))
+            worst = np.maximum(worst, now)
+    return [
+        Row(what=f"{name}: limit cycle of the mean current in {seconds - SETTLE_S} s", value=worst[0], limit=2,
+            unit="codes"),
+        Row(what=f"{name}: limit cycle of the codes' mean", value=worst[1], limit=2, unit="codes"),
+        Row(what=f"{name}: steady error of the codes' mean", value=worst[2], limit=1, unit="codes"),
+        Row(what=f"{name}: steady error of the current itself", value=worst[3], unit="codes",
+            note="with rounding of the offset and of codes without noise, and the ripple between two samples"),
+    ]  # fmt: skip
+
+
+def _states(name: str, loop, core, states: int) -> list[Row]:
+    """Return the rows of the comparison state by state."""
+    start = perf_counter()
+    found = check_states(loop, core, states)
+    rows = [
+        Row(what=f"{name}: of {found.states} states other than the exact controller's, host", value=found.wrong,
+            limit=0, note=found.first or f"{perf_counter() - start:.0f} s")
+    ]  # fmt: skip
+    if missing := CORTEX_M4.missing():
+        return [*rows, Row(what=f"{name}: the same on a Cortex-M4", value=1, limit=0, note=missing)]
+    start = perf_counter()
+    other = hashes_on(CORTEX_M4, loop, core, states)
+    wrong = sum(one != two for one, two in zip(other, found.hashes, strict=True))
+    note = f"a hash for each 10000 states, {len(other)}; {perf_counter() - start:.0f} s"
+    return [
+        *rows,
+        Row(what=f"{name}: hashes of states on a Cortex-M4 other than the host's", value=wrong, limit=0, note=note),
+    ]

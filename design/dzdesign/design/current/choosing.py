@@ -1,0 +1,243 @@
+"""Coil, supply, sampling and sensor in; the integers of the current loop that meets its margins at every corner out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import ceil, floor, log
+from typing import Annotated
+
+from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.errors import InputError
+from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.loop import CORRECTION_SHIFT, LARGEST_ERROR, LARGEST_GAIN, CurrentLoop, SupplyCorrection
+from dzdesign.design.current.margins import SEARCH_GRID, Gains, worst_margins
+from dzdesign.design.current.step_response import SensorLine, StepResponse, step_responses
+from dzdesign.design.target_inputs import Converter
+
+#: Phase margin that the gains are chosen for, and the least that a loop may have.
+CHOSEN_PHASE_DEG, LEAST_PHASE_DEG = 55.0, 45.0
+#: The integral's time constant over that of the declared coil.
+INTEGRAL_TIME = 2.0
+#: Overshoot of a step that the set point's rate is chosen for, and the rates that are tried: PWM periods for the rated
+#: current.
+CHOSEN_OVERSHOOT = 0.08
+RATE_PERIODS = (4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 25, 32, 40, 50, 64, 80, 100, 125, 160, 200, 250, 320, 400, 500)
+#: Share of the rated current above which it is too high, and for how long it may be, s.
+OVER_SHARE, OVER_S = 1.2, 2e-3
+#: Shares of the converter's range and of the rated current beyond which the load counts as shorted, the lower one.
+SHORT_RANGE, SHORT_SHARE = 0.98, 1.45
+#: Share of the rated current below which none seems to flow, and how many times that must flow where one is missed.
+OPEN_SHARE, OPEN_TIMES, OPEN_PATIENCE = 0.02, 3.0, 4.0
+#: Of the converter's range, by which the sensor's zero may be off.
+OFFSET_SHARE = 0.02
+OFFSET_SHIFT = 6
+#: Codes of the supply between two nodes of its correction.
+SUPPLY_STEP = 64
+#: Of the supply's range, by which a measured one may leave it before it counts as its end.
+SUPPLY_BEYOND = 0.1
+STEPS_OF_SEARCH = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentSensor:
+    """Voltage at the converter's pin for a current, and for the supply where that is measured."""
+
+    V_per_A: Annotated[float, quantity("V/A", "Shunt times amplifier gain.", gt=0)]
+    offset_V: Annotated[float, quantity("V", "Voltage at the pin without current.", ge=0)] = 0.0
+    supply_divider: Annotated[
+        float, quantity("1", "Voltage divider of the supply; 0: the supply is not measured.", ge=0)
+    ] = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.V_per_A > 0 or self.offset_V < 0 or not 0 <= self.supply_divider < 1:
+            raise RuleError(
+                "the current's sensor needs a positive gain, an offset of zero or more, a divider below one"
+            )
+
+
+def choose_gains(circuit: CoilCircuit, sampling: CurrentSampling, supply_measured: bool) -> Gains:
+    """Return the largest gains with the phase margin that is asked for at every corner.
+
+    The feed-forward is that of the corner that needs least: more would overshoot there. The integral brings the rest.
+    """
+    nominal = circuit.nominal
+    per_period = sampling.period_s * nominal.resistance_ohm / nominal.inductance_H / INTEGRAL_TIME
+
+    def gains(proportional: float) -> Gains:
+        return Gains(
+            proportional=proportional,
+            integral=proportional * per_period,
+            feed_forward=min(
+                corner.resistance_ohm * (1 if supply_measured else circuit.nominal_V / corner.supply_V)
+                for corner in circuit.corners()
+            ),
+            supply_measured=supply_measured,
+        )
+
+    low, high = 1e-3 * nominal.resistance_ohm, 1e4 * nominal.resistance_ohm
+    for _ in range(STEPS_OF_SEARCH):
+        middle = (low * high) ** 0.5
+        if worst_margins(circuit, sampling, gains(middle), SEARCH_GRID)[0].phase_deg >= CHOSEN_PHASE_DEG:
+            low = middle
+        else:
+            high = middle
+    return gains(low)
+
+
+def choose_loop(
+    circuit: CoilCircuit,
+    sensor: CurrentSensor,
+    converter: Converter,
+    sampling: CurrentSampling,
+    *,
+    compare_max: int,
+    compare_limit: int | None = None,
+) -> CurrentLoop:
+    """Return the current loop in integers; a coil or a sensor that allows none is an `InputError`."""
+    gains = choose_gains(circuit, sampling, sensor.supply_divider > 0)
+    sums = _Sums(circuit=circuit, sensor=sensor, converter=converter, sampling=sampling)
+    counts = circuit.rated_A / circuit.nominal_V  # of the PWM for a count of current, over V/A
+    real = {name: getattr(gains, name) * counts for name in ("proportional", "integral", "feed_forward")}
+    gain_shift = min(13, floor(log(LARGEST_GAIN / max(real.values()), 2)))
+    if gain_shift < 1 or round(real["integral"] * 2**gain_shift) < 8:
+        raise InputError(
+            f"the current loop needs gains from {min(real.values()):.2g} to {max(real.values()):.2g} counts a count, "
+            "which 13 bits do not hold; check the coil's resistance, inductance and rated current"
+        )
+    current_gain, current_shift = sums.gain(compare_max)
+    hot = max(circuit.corners(), key=lambda corner: corner.resistance_ohm / corner.supply_V)
+    open_duty = circuit.duty(hot, OPEN_TIMES * OPEN_SHARE * circuit.rated_A)
+    slowest_s = max(corner.inductance_H / corner.resistance_ohm for corner in circuit.corners())
+    loop = CurrentLoop(
+        full_counts=compare_max,
+        rate=min(compare_max, 65535),
+        compare_limit=compare_max if compare_limit is None else compare_limit,
+        samples=sampling.samples,
+        current_gain=current_gain,
+        current_shift=current_shift,
+        gain_shift=gain_shift,
+        **{name: round(value * 2**gain_shift) for name, value in real.items()},
+        integral_limit=1 << (compare_max.bit_length() - 1),  # a power of two is one instruction
+        offset_nominal=sums.offset,
+        offset_tolerance=round(OFFSET_SHARE * converter.levels) * sampling.samples,
+        offset_shift=OFFSET_SHIFT,
+        short_sum=sums.short(current_gain, current_shift),
+        over_sum=sums.above(OVER_SHARE),
+        over_ticks=ceil(OVER_S * sampling.tick_Hz),
+        open_sum=max(1, sums.above(OPEN_SHARE)),
+        open_compare=ceil(open_duty * compare_max),
+        open_ticks=ceil(OPEN_PATIENCE * slowest_s * log(OPEN_TIMES / (OPEN_TIMES - 1)) * sampling.tick_Hz),
+        supply=_supply_correction(circuit, sensor, converter),
+    )
+    return _with_rate(loop, circuit, sampling, sensor_line(sensor, converter))
+
+
+def sensor_line(sensor: CurrentSensor, converter: Converter) -> SensorLine:
+    """Return the codes of a current and of a supply."""
+    return SensorLine(
+        V_per_A=sensor.V_per_A,
+        offset_V=sensor.offset_V,
+        codes_per_V=converter.levels / float(converter.full_V),
+        code_max=converter.code_max,
+        supply_divider=sensor.supply_divider,
+    )
+
+
+def _with_rate(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, line: SensorLine) -> CurrentLoop:
+    """Return the loop with the fastest set point whose step does not overshoot too far at any corner."""
+    for periods in RATE_PERIODS:
+        tried = replace(loop, rate=max(1, loop.full_counts // periods))
+        if worst_step(step_responses(tried, circuit, sampling, line, ends_only=True))[1].overshoot <= CHOSEN_OVERSHOOT:
+            return tried
+    raise InputError(
+        f"the current overshoots by more than {CHOSEN_OVERSHOOT:.0%} however slowly the set point moves; declare "
+        "narrower ranges of resistance, inductance or supply, or measure the supply"
+    )
+
+
+def worst_step(steps: Sequence[StepResponse]) -> tuple[StepResponse, StepResponse]:
+    """Return the slowest step, and the one that overshoots most."""
+    return max(steps, key=lambda step: step.rise_s), max(steps, key=lambda step: step.overshoot)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sums:
+    """Sums of codes of a period for currents."""
+
+    circuit: CoilCircuit
+    sensor: CurrentSensor
+    converter: Converter
+    sampling: CurrentSampling
+
+    def __post_init__(self) -> None:
+        top_V, full_V = self.sensor.offset_V + OVER_SHARE * self.rated_V, float(self.converter.full_V)
+        if top_V > SHORT_RANGE * full_V:
+            raise InputError(
+                f"at {OVER_SHARE:.0%} of the rated current its sensor gives {top_V:.4g} V, expected at most "
+                f"{SHORT_RANGE * full_V:.4g} V of the converter's {full_V:g} V; lower the shunt or its gain"
+            )
+        if self.sampling.samples * self.converter.code_max > 65535:
+            raise InputError(f"{self.sampling.samples} samples of the current do not fit a sum of 16 bits")
+
+    @property
+    def rated_V(self) -> float:
+        """Voltage of the rated current, without the offset."""
+        return self.sensor.V_per_A * self.circuit.rated_A
+
+    @property
+    def offset(self) -> int:
+        """Sum without current."""
+        return self.sampling.samples * self.converter.code(Fraction(self.sensor.offset_V))
+
+    def above(self, share: float) -> int:
+        """Return the sum of a share of the rated current, less the offset."""
+        codes = share * self.rated_V * self.converter.levels / float(self.converter.full_V)
+        return round(self.sampling.samples * codes)
+
+    def gain(self, full_counts: int) -> tuple[int, int]:
+        """Return counts of current for a code of the sum, as an integer and its binary places."""
+        exact = full_counts / (
+            self.sampling.samples * self.rated_V * self.converter.levels / float(self.converter.full_V)
+        )
+        shift = min(15, floor(log(65535 / exact, 2)))
+        if shift < 1:
+            raise InputError("the current's sensor is too weak: raise the shunt or its gain")
+        return round(exact * 2**shift), shift
+
+    def short(self, current_gain: int, current_shift: int) -> int:
+        """Return the sum from which the load is shorted: below what the controller's 31 bits hold."""
+        by_range = floor(SHORT_RANGE * self.converter.levels) * self.sampling.samples
+        by_bits = ((LARGEST_ERROR << current_shift) - (1 << current_shift)) // current_gain
+        return min(by_range, self.offset + self.above(SHORT_SHARE), by_bits)
+
+
+def _supply_correction(circuit: CoilCircuit, sensor: CurrentSensor, converter: Converter) -> SupplyCorrection | None:
+    if not sensor.supply_divider:
+        return None
+    codes_per_V = sensor.supply_divider * converter.levels / float(converter.full_V)
+    low = floor(circuit.supply_V[0] * (1 - SUPPLY_BEYOND) * codes_per_V)
+    high = ceil(circuit.supply_V[1] * (1 + SUPPLY_BEYOND) * codes_per_V)
+    if high > converter.code_max:
+        raise InputError(
+            f"a supply of {circuit.supply_V[1] * (1 + SUPPLY_BEYOND):.4g} V is beyond the converter's "
+            f"{float(converter.full_V):g} V; lower the divider of {sensor.supply_divider:g}"
+        )
+    nodes = (high - low) // SUPPLY_STEP + 2
+    factors = (
+        circuit.nominal_V * codes_per_V / (low + 0.5 + node * SUPPLY_STEP) * (1 << CORRECTION_SHIFT)
+        for node in range(nodes)
+    )
+    return SupplyCorrection(
+        valid_codes=(low, high), step_codes=SUPPLY_STEP, nodes=tuple(min(round(factor), 65535) for factor in factors)
+    )
+
+
+def gains_of(loop: CurrentLoop, circuit: CoilCircuit) -> Gains:
+    """Return the gains that the integers are, in units of the circuit."""
+    unit = circuit.nominal_V / circuit.rated_A / (1 << loop.gain_shift)
+    return Gains(
+        proportional=loop.proportional * unit,
+        integral=loop.integral * unit,
+        feed_forward=loop.feed_forward * unit,
+        supply_measured=loop.supply is not None,
+    )

@@ -1,0 +1,35 @@
+"""What `design` is told of current control, in the engineer's words. Light on imports: the command line reads it."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from dzdesign.core.options import DRIVE, Option, Text
+
+DRIVES = ("duty", "current")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurrentChoices:
+    """Options of `design` on how the solenoid is driven."""
+
+    drive: Annotated[Text, Option("D", DRIVE, "duty", choices=DRIVES)] = None
+    """What the law's output is: duty, the PWM's share of the supply, or current, the set point of a current loop in
+    the firmware, for one solenoid; full drive is then the rated current."""
+    coil: Annotated[Text, Option("C", DRIVE, example="3.5 ohm 40 mH")] = None
+    """Coil for --drive current, such as "3.5 ohm 40 mH" or "3.5 + 0.5 ohm x 0.75..1.35, 40 mH x 0.5..1.5": resistance
+    with that of switch and shunt (default: 0.5 ohm), inductance, and their ranges (default: these)."""
+    rated_current: Annotated[Text, Option("I", DRIVE, example="1 A")] = None
+    """Current of full drive, for --drive current."""
+    supply: Annotated[Text, Option("V", DRIVE, example="18..32 V")] = None
+    """Lowest and highest supply voltage of the coil, for --drive current."""
+    current_signal: Annotated[Text, Option("S", DRIVE, example="0..1.2 A on 2 ohm + 0.15 V")] = None
+    """Current sensor at the converter, such as "0..1.2 A on 2 ohm + 0.15 V", a shunt times its amplifier's gain and
+    the voltage without current, for --drive current."""
+    supply_signal: Annotated[Text, Option("S", DRIVE, example="0..36 V x 0.075")] = None
+    """Supply voltage at the converter, such as "0..36 V x 0.075", for --drive current: the loop gets faster (default:
+    not measured)."""
+
+
+#: Options that only current control has a use for, and those that it needs.
+OF_CURRENT = ("coil", "rated_current", "supply", "current_signal", "supply_signal")
+NEEDED = OF_CURRENT[:4]

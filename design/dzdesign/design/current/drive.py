@@ -1,0 +1,92 @@
+"""`CurrentDrive`: current control as compensator.json keeps it, with what it was designed for and what it holds."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.design.current.choosing import (
+    LEAST_PHASE_DEG,
+    CurrentSensor,
+    choose_loop,
+    gains_of,
+    sensor_line,
+    worst_step,
+)
+from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.current.margins import worst_margins
+from dzdesign.design.current.step_response import step_responses
+from dzdesign.design.target_inputs import Converter
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentDrive:
+    """The law's output is the set point of a current: full drive is the rated one."""
+
+    circuit: Annotated[CoilCircuit, Meta(description="Coil and supply, as declared.")]
+    sensor: Annotated[CurrentSensor, Meta(description="Voltages at the converter's pins.")]
+    sampling: Annotated[CurrentSampling, Meta(description="When the current is sampled and the interrupt comes.")]
+    loop: Annotated[CurrentLoop, Meta(description="The controller in the firmware's integers.")]
+    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin of all corners and currents.")]
+    gain_margin: Annotated[float, quantity("1", "Least gain margin of all corners and currents.")]
+    rise_s: Annotated[float, quantity("s", "10 to 90 % of the rated current at the slowest corner.")]
+    least_rise_s: Annotated[float, quantity("s", "The same at that corner with the switch on all the time.")]
+    fall_s: Annotated[float, quantity("s", "90 to 10 % at the slowest corner: the freewheeling diode decides.")]
+    overshoot: Annotated[float, quantity("1", "Largest overshoot of the step up, of its height.")]
+
+    def __post_init__(self) -> None:
+        if self.phase_margin_deg < LEAST_PHASE_DEG:
+            raise RuleError(
+                f"the current loop's phase margin is {self.phase_margin_deg:.1f} degrees, expected {LEAST_PHASE_DEG:g}"
+            )
+
+    def in_words(self) -> tuple[str, ...]:
+        """Return lines for a person."""
+        circuit, loop = self.circuit, self.loop
+        low, high = circuit.supply_V
+        measured = "measured" if loop.supply else "not measured"
+        return (
+            f"drive: current control, full drive is {circuit.rated_A:g} A; coil {circuit.resistance_ohm:g} + "
+            f"{circuit.series_ohm:g} ohm (x {_ends(circuit.resistance_factors)}), {1e3 * circuit.inductance_H:g} mH (x "
+            f"{_ends(circuit.inductance_factors)}), supply {low:g}..{high:g} V, {measured}",
+            f"current loop: phase margin {self.phase_margin_deg:.0f} degrees, gain margin {self.gain_margin:.1f} at "
+            f"the worst corner; 10 to 90 % in {1e3 * self.rise_s:.1f} ms at the slowest ({1e3 * self.least_rise_s:.1f} "
+            f"ms with the switch on all the time), overshoot up to {self.overshoot:.1%}; 90 to 10 % takes up to "
+            f"{1e3 * self.fall_s:.0f} ms, as the freewheeling diode alone brakes",
+        )
+
+
+def _ends(factors: tuple[float, float]) -> str:
+    return f"{factors[0]:g}..{factors[1]:g}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentRequest:
+    """What an engineer declares for current control."""
+
+    circuit: CoilCircuit
+    sensor: CurrentSensor
+    sampling: CurrentSampling
+
+
+def design_current_drive(request: CurrentRequest, converter: Converter, compare_max: int) -> CurrentDrive:
+    """Choose the loop of a coil, and compute what it holds."""
+    circuit, sensor, sampling = request.circuit, request.sensor, request.sampling
+    loop = choose_loop(circuit, sensor, converter, sampling, compare_max=compare_max)
+    phase, gain = worst_margins(circuit, sampling, gains_of(loop, circuit))
+    slowest, largest = worst_step(step_responses(loop, circuit, sampling, sensor_line(sensor, converter)))
+    high, low = 0.9 * circuit.rated_A, 0.1 * circuit.rated_A
+    return CurrentDrive(
+        circuit=circuit,
+        sensor=sensor,
+        sampling=sampling,
+        loop=loop,
+        phase_margin_deg=round(phase.phase_deg, 3),
+        gain_margin=round(gain.gain, 4),
+        rise_s=round(slowest.rise_s, 9),
+        least_rise_s=round(slowest.least_s, 9),
+        fall_s=round(max(circuit.fastest_fall_s(corner, high, low) for corner in circuit.corners()), 9),
+        overshoot=round(largest.overshoot, 6),
+    )

@@ -1,0 +1,108 @@
+"""`CurrentLoop`: the current controller of the drive as the integers that the firmware uses."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError
+
+#: Largest gain: with an error of `LARGEST_ERROR` counts, full command and the integral the sum stays within 31 bits.
+LARGEST_GAIN = 8191
+LARGEST_ERROR = 90_000
+#: The correction of a supply's voltage has this many binary places.
+CORRECTION_SHIFT = 14
+
+Count = Annotated[int, Meta(ge=0, le=65535)]
+Gain = Annotated[int, Meta(ge=0, le=LARGEST_GAIN)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SupplyCorrection:
+    """Nominal supply voltage over the measured one, straight between nodes over the converter's codes."""
+
+    valid_codes: Annotated[
+        tuple[Count, Count], Meta(description="Codes of the supply; one outside counts as the nearest of them.")
+    ]
+    step_codes: Annotated[int, Meta(description="Codes between two nodes, a power of two.", ge=1, le=4096)]
+    nodes: Annotated[
+        tuple[Count, ...],
+        Meta(description="Nominal over measured voltage times 16384 at valid_codes[0], one step further and so on."),
+    ]
+
+    def __post_init__(self) -> None:
+        low, high = self.valid_codes
+        if not 0 <= low < high:
+            raise RuleError(f"the supply's codes {low} to {high} do not rise")
+        if self.step_codes < 1 or self.step_codes & (self.step_codes - 1):
+            raise RuleError(f"step_codes is {self.step_codes}, expected a power of two")
+        needed = (high - low) // self.step_codes + 2
+        if len(self.nodes) != needed:
+            raise RuleError(f"the supply's correction has {len(self.nodes)} nodes, expected {needed}")
+        if max(self.nodes) * self.step_codes >= 2**31 or max(self.nodes) > 65535 or min(self.nodes) < 1:
+            raise RuleError("a node of the supply's correction is outside 1 to 65535, or too far from the next")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentLoop:
+    """An integer PI controller with feed-forward, limit, anti-windup and detection of faults.
+
+    Set points are counts: `full_counts` stands for the rated current. The converter's codes come as the sum of those
+    taken in a PWM period.
+    """
+
+    full_counts: Annotated[int, Meta(description="Set point of the rated current, counts.", ge=1, le=65535)]
+    compare_limit: Annotated[Count, Meta(description="Largest compare value of the PWM.")]
+    rate: Annotated[int, Meta(description="Largest change of the set point in a PWM period, counts.", ge=1, le=65535)]
+    samples: Annotated[int, Meta(description="Codes of the current in a PWM period, a power of two.", ge=1, le=16)]
+    current_gain: Annotated[
+        int, Meta(description="Counts of current for the sum of codes less its offset, over 2^current_shift.", ge=1)
+    ]
+    current_shift: Annotated[int, Meta(description="Binary places of current_gain.", ge=1, le=15)]
+    gain_shift: Annotated[int, Meta(description="Binary places of the three gains.", ge=1, le=13)]
+    proportional: Annotated[Gain, Meta(description="PWM counts for a count of error, over 2^gain_shift.")]
+    integral: Annotated[Gain, Meta(description="The same, added in every PWM period.")]
+    feed_forward: Annotated[Gain, Meta(description="PWM counts for a count of set point, over 2^gain_shift.")]
+    integral_limit: Annotated[Count, Meta(description="Largest integral to either side, PWM counts.")]
+    offset_nominal: Annotated[Count, Meta(description="Sum of codes without current, as designed.")]
+    offset_tolerance: Annotated[Count, Meta(description="Largest deviation of it that is calibrated away.")]
+    offset_shift: Annotated[
+        int, Meta(description="The offset is the mean over two to this power PWM periods.", ge=0, le=12)
+    ]
+    short_sum: Annotated[Count, Meta(description="Sum of codes from which the load counts as shorted, at once.")]
+    over_sum: Annotated[Count, Meta(description="Sum less offset from which the current counts as too high.")]
+    over_ticks: Annotated[int, Meta(description="PWM periods of it in a row that are a fault.", ge=1, le=65535)]
+    open_sum: Annotated[Count, Meta(description="Sum less offset below which no current seems to flow.")]
+    open_compare: Annotated[Count, Meta(description="Compare value from which a current must flow.")]
+    open_ticks: Annotated[int, Meta(description="PWM periods of it in a row that are a fault.", ge=1, le=65535)]
+    supply: Annotated[SupplyCorrection | None, Meta(description="Correction by the supply's voltage, if measured.")] = (
+        None
+    )
+
+    def __post_init__(self) -> None:
+        for name in ("proportional", "integral", "feed_forward"):
+            if not 0 <= getattr(self, name) <= LARGEST_GAIN:
+                raise RuleError(f"{name} is {getattr(self, name)}, expected 0 to {LARGEST_GAIN}")
+        if self.samples & (self.samples - 1) or not 1 <= self.samples <= 16:
+            raise RuleError(f"samples is {self.samples}, expected a power of two up to 16: the sum has 16 bits")
+        if self.largest_current > LARGEST_ERROR:
+            raise RuleError(
+                f"the sensor's range is {self.largest_current} counts of current, expected at most {LARGEST_ERROR}: "
+                "one and a half times the rated current of 60000 counts"
+            )
+        if not 1 <= self.current_gain <= 65535 or not 1 <= self.current_shift <= 15:
+            raise RuleError(f"the gain of the current is {self.current_gain} over 2^{self.current_shift}")
+        if self.integral_limit << self.gain_shift > 65535 * 8192:
+            raise RuleError("the integral's limit and the gains' binary places need more than 31 bits")
+        if self.offset_nominal + self.offset_tolerance > 65535:
+            raise RuleError("the offset's tolerance reaches past the end of the sum")
+        if not 0 < self.open_sum < self.over_sum < self.short_sum <= 65535:
+            raise RuleError("the sums of open load, over-current and short must rise in this order")
+        for name in ("over_ticks", "open_ticks", "rate"):
+            if not 1 <= getattr(self, name) <= 65535:
+                raise RuleError(f"{name} is {getattr(self, name)}, expected 1 to 65535")
+
+    @property
+    def largest_current(self) -> int:
+        """Counts of current of the largest sum that is no short, without an offset: beyond it the output is off."""
+        return (self.short_sum * self.current_gain + (1 << (self.current_shift - 1))) >> self.current_shift

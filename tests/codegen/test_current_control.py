@@ -1,0 +1,145 @@
+"""Current control through `design` and `codegen`: options, compensator.json, the projects for host and cortex-m4."""
+
+import subprocess
+from dataclasses import replace
+
+import pytest
+
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import RuleError, to_json_bytes
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.verify.toolchain.machines import CORTEX_M4
+from tests.support.example_coil import COIL, SENSORS, example_loop
+from tests.support.synthetic import needs_compiler
+
+TEXTS = {
+    "drive": "current",
+    "coil": "3.5 ohm 40 mH",
+    "rated_current": "1 A",
+    "supply": "18..32 V",
+    "current_signal": "0..1.2 A on 2 ohm + 0.15 V",
+}
+MEASURED = TEXTS | {"supply_signal": "0..36 V x 0.075"}
+
+
+def options(texts, target="cortex-m4"):
+    return options_of(texts, target_named(target).inputs())
+
+
+@pytest.fixture(scope="module", params=SENSORS)
+def controlled(request, example_valve) -> Compensator:
+    """The example's compensator with current control, without and with the supply measured."""
+    return design(example_valve, options(TEXTS if request.param == "supply unknown" else MEASURED))
+
+
+def test_the_words_are_the_declared_coil():
+    plain, measured = (options(texts).current for texts in (TEXTS, MEASURED))
+    assert plain.circuit == COIL == measured.circuit
+    assert [plain.sensor, measured.sensor] == list(SENSORS.values())
+    ranged = options(TEXTS | {"coil": "2 + 0.3 ohm x 0.8..1.2, 0.01 H x 0.6..1.1"}).current.circuit
+    assert (ranged.resistance_ohm, ranged.series_ohm, ranged.inductance_H) == (2.0, 0.3, 0.01)
+    assert (ranged.resistance_factors, ranged.inductance_factors) == ((0.8, 1.2), (0.6, 1.1))
+
+
+def test_without_a_word_the_drive_is_by_duty(example_compensator):
+    assert options({}).current is None and example_compensator.current_drive is None
+    assert not [path for path in generate(example_compensator, "f28335").files if "dz_current" in path]
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"drive": "curent"}, "--drive"),
+        ({"drive": "duty"}, "--coil"),
+        ({"coil": ""}, "--coil"),
+        ({"coil": "3.5 ohm"}, "--coil"),
+        ({"coil": "3.5 V 40 mH"}, "--coil"),
+        ({"coil": "0 ohm 40 mH"}, "--coil"),
+        ({"supply": "32..18 V"}, "--supply"),
+        ({"supply": "24 V"}, "--supply"),
+        ({"rated_current": "1"}, "--rated-current"),
+        ({"current_signal": "0..1.2 A on 4 ohm"}, "4"),
+    ],
+)
+def test_words_that_are_none_are_refused(changed, said):
+    with pytest.raises(InputError) as refused:
+        options(TEXTS | changed)
+    assert said in str(refused.value)
+
+
+def test_a_command_of_both_signs_is_refused(example_valve):
+    both = options(TEXTS | {"command_signal": "-10..10 V x 0.15 + 1.5 V"})
+    with pytest.raises(InputError, match="--drive"):
+        both.current_drive()
+
+
+def test_compensator_json_keeps_the_drive(controlled):
+    assert read_artefact(to_json_bytes(controlled), Compensator, "compensator.json") == controlled
+    name = "supply unknown" if controlled.current_drive.loop.supply is None else "supply measured"
+    assert controlled.current_drive.loop == example_loop(name)
+    assert controlled.current_drive.phase_margin_deg >= 45 and controlled.current_drive.overshoot <= 0.1
+    with pytest.raises(RuleError, match="full drive"):
+        replace(controlled, signals=replace(controlled.signals, tick_Hz=5000))
+
+
+def test_the_law_is_the_same_with_either_drive(controlled, example_valve):
+    assert replace(controlled, current_drive=None, options=None, target=None, costs=()) == replace(
+        design(example_valve, options({})), options=None, target=None, costs=()
+    )
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "target",
+    [
+        "host",
+        pytest.param("cortex-m4", marks=pytest.mark.skipif(bool(CORTEX_M4.missing()), reason=CORTEX_M4.missing())),
+    ],
+)
+def test_the_project_builds_without_a_warning_and_its_selftest_holds(controlled, target, tmp_path):
+    """On the Cortex-M4 real interrupts must write what dz_current_tick() gives, from the offset's calibration on."""
+    firmware = generate(controlled, target)
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    folder = tmp_path / "fw" / target.replace("-", "_")
+    command = ["make", "-C", str(folder), "check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    printed = done.stdout + done.stderr
+    assert done.returncode == 0, printed
+    assert "warning" not in printed
+    assert target == "host" or "89 interrupts, compare values of dz_current_tick()" in printed
+
+
+def test_the_manifest_states_every_constant_of_the_controller(controlled, tmp_path):
+    from dzdesign.verify.firmware.manifest import manifest_follows
+
+    firmware = generate(controlled, "host", to_json_bytes(controlled))
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    check = manifest_follows(tmp_path / "fw", firmware.manifest, controlled)
+    assert check.holds, check.text
+    source = tmp_path / "fw" / "core" / "dz_current.c"
+    source.write_text(source.read_text().replace("#define RATE UINT32_C(", "#define RATE UINT32_C(1"))
+    assert not manifest_follows(tmp_path / "fw", firmware.manifest, controlled).holds
+
+
+def test_a_table_of_plain_numbers_is_compared_with_the_manifest(example_valve, tmp_path):
+    from dzdesign.verify.firmware.manifest import manifest_follows
+
+    firmware = generate(play := design(example_valve, options({"hysteresis": "play"})), "host", to_json_bytes(play))
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    assert manifest_follows(tmp_path / "fw", firmware.manifest, play).holds
+    source = tmp_path / "fw" / "core" / "dz_drive.c"
+    text = source.read_text()
+    start = text.index("play_positive[")
+    source.write_text(text[:start] + text[start:].replace("u, ", "1u, ", 1))
+    assert "play_positive" in manifest_follows(tmp_path / "fw", firmware.manifest, play).text
+
+
+@pytest.mark.parametrize("target", ["f28335", "f280049c", "avr"])
+def test_a_target_without_current_control_is_refused(controlled, target):
+    with pytest.raises(InputError):
+        generate(replace(controlled, target=None, options=None), target)

@@ -1,0 +1,130 @@
+"""The current loop that `design` chooses: its exact transfer function, margins and steps at every corner."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dzdesign.core.artefact_types import RuleError
+from dzdesign.core.errors import InputError
+from dzdesign.design.current.choosing import (
+    LEAST_PHASE_DEG,
+    CurrentSensor,
+    choose_loop,
+    gains_of,
+    sensor_line,
+    worst_step,
+)
+from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
+from dzdesign.design.current.margins import Gains, impulse_response, loop_transfer, margins, worst_margins
+from dzdesign.design.current.step_response import Coils, run_loop, step_responses
+from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
+
+on_both = pytest.mark.parametrize("name", SENSORS)
+RISE_S = {"supply unknown": 10e-3, "supply measured": 5e-3}
+
+
+def mean_codes(corner: Corner, sampling: CurrentSampling, duties: np.ndarray) -> np.ndarray:
+    """What the interrupt of each period is given, in A, the PWM resolved; settled before the first."""
+    coils, last, found = Coils(COIL, [corner], sampling), np.zeros((sampling.samples, 1)), []
+    for duty in [duties[0]] * 400 + list(duties):
+        now, _ = coils.period(np.array([duty]))
+        found.append(float((now[: sampling.before].sum() + last[sampling.before :].sum()) / sampling.samples))
+        last = now
+    return np.array(found[400:])
+
+
+@pytest.mark.parametrize(
+    "sampling", [SAMPLING, CurrentSampling(samples=8, before=3), CurrentSampling(samples=1, before=1)]
+)
+@pytest.mark.parametrize("current", [0.15, 0.6, 1.0])
+def test_the_impulse_response_is_that_of_a_small_change_of_one_pulse(sampling, current):
+    corner = Corner(5.225, 0.02, 18.0)
+    duty, small = COIL.duty(corner, current), 1e-7
+    duties = np.full(12, duty)
+    changed = duties.copy()
+    changed[0] += small
+    steady = mean_codes(corner, sampling, duties)
+    coils_change = (mean_codes_after(corner, sampling, duty, changed) - steady) / small
+    now, following, last, decay = impulse_response(COIL, corner, sampling, duty)
+    expected = [now, following, *(last * decay**k for k in range(10))]
+    assert coils_change == pytest.approx(expected, rel=1e-4, abs=1e-4)
+
+
+def mean_codes_after(corner: Corner, sampling: CurrentSampling, settled: float, duties: np.ndarray) -> np.ndarray:
+    return mean_codes(corner, sampling, np.concatenate([[settled], duties]))[1:]
+
+
+@on_both
+def test_every_corner_has_its_margins_step_and_little_overshoot(name):
+    loop = example_loop(name)
+    phase, gain = worst_margins(COIL, SAMPLING, gains_of(loop, COIL))
+    assert phase.phase_deg >= LEAST_PHASE_DEG and gain.gain > 2
+    steps = step_responses(loop, COIL, SAMPLING, sensor_line(SENSORS[name], CONVERTER))
+    slowest, largest = worst_step(steps)
+    assert len(steps) == 27
+    assert slowest.rise_s <= RISE_S[name] and largest.overshoot <= 0.10
+    assert all(step.rise_s > step.least_s for step in steps)
+
+
+def test_gains_beyond_the_gain_margin_oscillate_and_gains_within_do_not():
+    """The margin is of the transfer function; the oscillation is that of coil, PWM, sampling and limits."""
+    name = "supply unknown"
+    loop, line = example_loop(name), sensor_line(SENSORS[name], CONVERTER)
+    corner = Corner(3.125, 0.02, 32.0)
+    margin = margins(COIL, corner, SAMPLING, gains_of(loop, COIL), 0.5).gain
+    spread = {}
+    for factor in (0.93, 1.07):
+        shift = loop.gain_shift - 2  # as the gains are larger than their bits
+        louder = replace(
+            loop,
+            gain_shift=shift,
+            **{gain: round(getattr(loop, gain) / 4 * margin * factor) for gain in ("proportional", "integral")},
+            feed_forward=round(loop.feed_forward / 4),
+        )
+        means, _ = run_loop(louder, COIL, [corner], SAMPLING, line, [30000] * 1500)
+        spread[factor] = float(np.ptp(means[-100:]))
+    assert spread[0.93] < 0.003 < 0.03 < spread[1.07]
+
+
+def test_every_delay_is_counted():
+    """Sampling once at the period's end and sampling at its begin differ by that time; so does an output put off."""
+    gains, corner = Gains(proportional=20.0, integral=0.0, feed_forward=0.0), Corner(4.0, 0.04, 24.0)
+    omega = np.array([500.0])
+    phase = {
+        before: np.angle(
+            loop_transfer(
+                COIL, corner, CurrentSampling(samples=16, before=before), gains, COIL.duty(corner, 0.5), omega
+            )
+        )[0]
+        for before in (2, 14)
+    }
+    between_s = CurrentSampling(samples=16, before=2).delay_s - CurrentSampling(samples=16, before=14).delay_s
+    assert phase[14] - phase[2] == pytest.approx(500 * between_s, rel=0.02)
+
+
+def test_a_wider_supply_costs_speed():
+    wide = choose_loop(
+        replace(COIL, supply_V=(12.0, 40.0)), SENSORS["supply unknown"], CONVERTER, SAMPLING, compare_max=60000
+    )
+    assert gains_of(wide, COIL).proportional * 24 < gains_of(example_loop("supply unknown"), COIL).proportional * 24
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        CurrentSensor(V_per_A=2.6, offset_V=0.15),
+        CurrentSensor(V_per_A=2.0, supply_divider=0.1),
+    ],
+)
+def test_a_sensor_beyond_the_converter_is_refused(sensor):
+    with pytest.raises(InputError):
+        choose_loop(COIL, sensor, CONVERTER, SAMPLING, compare_max=60000)
+
+
+@pytest.mark.parametrize("changed", [{"rated_A": 0.0}, {"supply_V": (32.0, 18.0)}, {"series_ohm": -1.0}])
+def test_a_circuit_that_is_none_is_refused(changed):
+    with pytest.raises(RuleError):
+        CoilCircuit(
+            **{"resistance_ohm": 3.5, "inductance_H": 0.04, "rated_A": 1.0, "supply_V": (18.0, 32.0), **changed}
+        )

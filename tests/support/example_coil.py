@@ -1,0 +1,22 @@
+"""The example's coil (examples/paper_valve/plant.toml) and the loop that is chosen for it; once for all tests."""
+
+from functools import cache
+
+from dzdesign.design.current.choosing import CurrentSensor, choose_loop
+from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.target_inputs import Converter
+
+COIL = CoilCircuit(resistance_ohm=3.5, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))
+CONVERTER, SAMPLING = Converter(), CurrentSampling()
+#: With and without the supply measured.
+SENSORS = {
+    "supply unknown": CurrentSensor(V_per_A=2.0, offset_V=0.15),
+    "supply measured": CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.075),
+}
+
+
+@cache
+def example_loop(name: str) -> CurrentLoop:
+    """Return the loop that `design` chooses."""
+    return choose_loop(COIL, SENSORS[name], CONVERTER, SAMPLING, compare_max=60000)

@@ -1,0 +1,229 @@
+"""The current controller in C equals the exact one, state by state, on three machines; wrong ones are seen."""
+
+import shutil
+import subprocess
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from dzdesign.codegen.core.current_files import current_texts
+from dzdesign.core.artefact_types import RuleError
+from dzdesign.verify.current.exact_controller import NO_OFFSET, OPEN, OVER, SENSOR, SHORT, ExactController
+from dzdesign.verify.current.state_check import (
+    COMPARED,
+    HostStates,
+    check_states,
+    exact_controllers,
+    given_of,
+    hashes_on,
+)
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
+from tests.codegen.core.test_misra import CPPCHECK, FINDING, justified, symbol_of
+from tests.support.current_loops import LOOPS, PLAIN, SUPPLY
+from tests.support.synthetic import needs_compiler
+
+STATES = 300_000
+on_every_loop = pytest.mark.parametrize("name", LOOPS)
+
+
+@needs_compiler
+@on_every_loop
+def test_c_equals_the_exact_controller_state_by_state(name):
+    found = check_states(LOOPS[name], current_texts(LOOPS[name]), STATES)
+    assert found.wrong == 0, found.first
+    assert found.states > STATES
+
+
+@needs_compiler
+@on_every_loop
+def test_the_states_reach_every_part_of_the_controller(name):
+    """Each fault, an output at its end, a wound-up integral at either end, and most states without a fault."""
+    loop = LOOPS[name]
+    periods, _ = HostStates(loop, current_texts(loop)).periods(1, 50_000)
+    after = periods["after"]
+    for bit in (OPEN, SHORT, OVER):
+        fresh = (after["faults"] & bit != 0) & (periods["before"]["faults"] & bit == 0)
+        assert np.count_nonzero(fresh) > 50
+    assert np.mean(after["faults"] == 0) > 0.3
+    ends = (0, loop.integral_limit << (loop.gain_shift + 1))
+    reached = [(after["integral"] == end) & (periods["before"]["integral"] != end) for end in ends]
+    # With a larger limit the output is at its end before the integral is at its own.
+    assert loop.integral_limit > 5000 or min(map(np.count_nonzero, reached)) > 20
+    assert np.count_nonzero(after["compare"] == loop.compare_limit) > 500
+    assert np.count_nonzero((after["compare"] > 0) & (after["compare"] < loop.compare_limit)) > 500
+
+
+@needs_compiler
+@on_every_loop
+def test_both_forms_of_the_exact_controller_agree(name):
+    loop = LOOPS[name]
+    periods, _ = HostStates(loop, current_texts(loop)).periods(7, 3_000)
+    zero = loop.integral_limit << loop.gain_shift
+    for exact, after in zip(exact_controllers(loop, given_of(periods, loop)), periods["after"], strict=True):
+        integral = exact.integral * (1 << loop.gain_shift) + zero
+        found = (integral, exact.compare, exact.faults, exact.over_ticks, exact.open_ticks, exact.ramped)
+        assert found == tuple(int(after[field]) for field in COMPARED)
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("machine", "states"),
+    [
+        pytest.param(machine, states, id=machine.name, marks=pytest.mark.skipif(bool(why), reason=why))
+        for machine, states in ((CORTEX_M4, 100_000), (AVR, 2_000))
+        for why in [machine.missing()]
+    ],
+)
+@on_every_loop
+def test_other_machines_give_the_same_hashes(name, machine, states):
+    """An int of 16 bits among them; the host's states are those that were compared above."""
+    core = current_texts(LOOPS[name])
+    hashes = hashes_on(machine, LOOPS[name], core, states)
+    if states < 10_000:
+        periods, hashed = HostStates(LOOPS[name], core).periods(22, states)
+        assert len(periods) == states and hashes[0] == hashed
+    else:
+        host = check_states(LOOPS[name], core, states)
+        assert hashes == host.hashes
+
+
+SEEDED = {
+    "rounding of the output": ("+ GAIN_HALF)", ")"),
+    "rounding of the current": ("* CURRENT_GAIN) + CURRENT_HALF", "* CURRENT_GAIN)"),
+    "no anti-windup": ("(error * INTEGRAL) & ~past_end", "error * INTEGRAL"),
+    "anti-windup at one end": ("(negative(asked) & negative(error))", "0u"),
+    "another limit": ("smaller(counts, COMPARE_LIMIT) & on", "smaller(counts, COMPARE_LIMIT + 1u) & on"),
+    "integral without end": ("smaller(integral & ~negative(integral), INTEGRAL_END)", "integral"),
+    "integral kept at zero": ("(limited & on) | (INTEGRAL_ZERO & ~on)", "limited"),
+    "output on at a fault": ("~negative(0u - faults)", "~0u"),
+    "output on at no set point": ("negative(0u - (uint32_t)set_point) & ~neg", "~neg"),
+    "rate of one sign": ("way & ~negative(way)", "way & 0xFFFFu"),
+    "fault forgotten": ("faults = loop->faults |", "faults ="),
+    "over-current a period late": (
+        "reached(over_ticks - OVER_TICKS)",
+        "reached((uint32_t)loop->over_ticks - OVER_TICKS)",
+    ),
+    "open load at any output": (" & ~negative((uint32_t)loop->compare - OPEN_COMPARE)", ""),
+    "a period too many": ("smaller((uint32_t)ticks + 1u, end)", "((uint32_t)ticks + 1u)"),
+    "short one code late": ("(uint32_t)sum - SHORT_SUM", "(uint32_t)sum - 1u - SHORT_SUM"),
+    "offset not rounded": ("(loop->offset_total + OFFSET_HALF)", "(loop->offset_total)"),
+    "offset never wrong": ("? DZ_CURRENT_SENSOR : 0u", "? 0u : 0u"),
+    "feed-forward of the current": ("(aim * FEED", "(current * FEED"),
+    "set point without its rate": ("RATE + RATE)) - RATE", "RATE + RATE + 1u)) - RATE"),
+    "supply between nodes": ("correction[node + 1u] * past", "correction[node] * past"),
+    "supply above its range": ("SUPPLY_LOW), SUPPLY_HIGH - SUPPLY_LOW)", "SUPPLY_LOW), SUPPLY_HIGH - SUPPLY_LOW - 9u)"),
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("fault", SEEDED)
+def test_a_wrong_controller_is_seen(fault):
+    loop = LOOPS["supply"]
+    core = current_texts(loop)
+    right, wrong = SEEDED[fault]
+    assert core["dz_current.c"].count(right) == 1
+    core["dz_current.c"] = core["dz_current.c"].replace(right, wrong)
+    assert check_states(loop, core, 100_000).wrong > 0
+
+
+@pytest.mark.skipif(bool(AVR.missing()), reason=AVR.missing())
+def test_a_difference_of_16_bits_is_seen_where_int_has_16():
+    """A PC takes the difference of two codes in 32 bits, whatever their type."""
+    loop = LOOPS["plain"]
+    core = current_texts(loop)
+    wrong = core | {"dz_current.c": core["dz_current.c"].replace("(uint32_t)sum - SHORT_SUM", "sum - SHORT_SUM")}
+    assert check_states(loop, wrong, 10_000).wrong == 0
+    _, hashed = HostStates(loop, core).periods(22, 2_000)
+    assert hashes_on(AVR, loop, wrong, 2_000)[0] != hashed
+
+
+@pytest.mark.skipif(shutil.which("cppcheck") is None, reason="no cppcheck on the path; apt install cppcheck")
+@on_every_loop
+def test_misra_finds_nothing_that_is_not_stated(name, tmp_path):
+    for file, text in current_texts(LOOPS[name]).items():
+        (tmp_path / file).write_text(text)
+    done = subprocess.run(
+        [*CPPCHECK, FINDING, str(tmp_path / "dz_current.c")], capture_output=True, text=True, check=False, timeout=300
+    )
+    places = [line.rsplit(":", 2) for line in done.stderr.splitlines() if "misra" in line]
+    shown = [(name, path, (tmp_path / path).read_text().splitlines()[int(at) - 1]) for path, at, name in places]
+    stated = justified((tmp_path / "dz_current.h").read_text())
+    assert [each for each in shown if (each[0].removeprefix("misra-c2012-"), symbol_of(each[2])) not in stated] == []
+
+
+def settled(controller: ExactController) -> ExactController:
+    """Calibrate a controller at its nominal offset."""
+    for _ in range(1 << controller.loop.offset_shift):
+        controller.calibrate(controller.loop.offset_nominal)
+    return controller
+
+
+def test_nothing_is_driven_before_the_offset_is_known():
+    controller = ExactController(PLAIN)
+    controller.tick(30000, PLAIN.offset_nominal)
+    assert (controller.compare, controller.faults) == (0, NO_OFFSET)
+    settled(controller).tick(30000, PLAIN.offset_nominal)
+    assert controller.compare > 0 and controller.faults == 0
+
+
+def test_an_offset_beyond_its_tolerance_is_a_fault():
+    controller = ExactController(PLAIN)
+    for _ in range(1 << PLAIN.offset_shift):
+        controller.calibrate(PLAIN.offset_nominal + PLAIN.offset_tolerance + 1)
+    controller.tick(30000, PLAIN.offset_nominal)
+    assert (controller.compare, controller.faults) == (0, SENSOR)
+
+
+@pytest.mark.parametrize(
+    ("above", "ticks", "fault"),
+    [(PLAIN.over_sum, PLAIN.over_ticks, OVER), (0, PLAIN.open_ticks + 1, OPEN), (PLAIN.short_sum, 1, SHORT)],
+)
+def test_a_fault_latches_after_its_periods_in_a_row(above, ticks, fault):
+    controller = settled(ExactController(PLAIN))
+    for _ in range(ticks):
+        assert controller.faults == 0
+        controller.tick(30000, PLAIN.offset_nominal + above)
+    assert (controller.compare, controller.faults, controller.integral) == (0, fault, 0)
+    controller.tick(30000, PLAIN.offset_nominal + 9000)
+    assert (controller.compare, controller.faults) == (0, fault)
+
+
+def test_a_wound_up_integral_leaves_the_end_at_once():
+    """At the output's end the integral stands, so that the first error of the other sign takes the output back."""
+    controller = settled(ExactController(replace(PLAIN, open_ticks=65535)))
+    for _ in range(1000):
+        controller.tick(60000, PLAIN.offset_nominal)
+    assert controller.compare == PLAIN.compare_limit
+    assert controller.integral < PLAIN.compare_limit
+    controller.tick(60000, PLAIN.offset_nominal + 25000)
+    assert controller.compare < PLAIN.compare_limit
+
+
+def test_the_supply_scales_the_output():
+    outputs = []
+    for code in (1638, 2457, 3276, 100, 4095):
+        controller = settled(ExactController(LOOPS["supply"], ramped=30000))
+        controller.tick(30000, PLAIN.offset_nominal + 8000, code)
+        outputs.append(controller.compare)
+    low, middle, high, below, above = outputs
+    assert Fraction(low, high) == pytest.approx(2, rel=1e-3) and Fraction(low, middle) == pytest.approx(1.5, rel=1e-3)
+    assert (below, above) == (low, high)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"proportional": 8192}, {"samples": 3}, {"current_gain": 30000}, {"over_sum": 100}, {"offset_tolerance": 65500},
+        {"integral_limit": 65535, "gain_shift": 14}, {"open_ticks": 0},
+    ],
+)  # fmt: skip
+def test_integers_that_could_overflow_are_refused(changed):
+    with pytest.raises(RuleError):
+        replace(PLAIN, **changed)
+
+
+def test_a_correction_of_too_few_nodes_is_refused():
+    with pytest.raises(RuleError):
+        replace(SUPPLY, nodes=SUPPLY.nodes[:-1])

@@ -1,0 +1,124 @@
+/* Half of all values are at or beside the ends that matter, of edges.h; the rest are anything. Three of four periods
+ * go on from the last one, with new inputs, of those with a fault one of eight; the others from any state. */
+#include <stddef.h>
+
+#include "current_states.h"
+#include "edges.h"
+#include "tick.h"
+
+static uint32_t random_state;
+
+static uint32_t any(void)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 17;
+    random_state ^= random_state << 5;
+    return random_state;
+}
+
+static uint16_t drawn(const uint16_t *edges, uint16_t count)
+{
+    const uint32_t random = any();
+
+    if ((random & 1u) != 0u) {
+        return (uint16_t)(edges[(random >> 8) % count] + (uint16_t)((random >> 4) % 5u) - 2u);
+    }
+    return (uint16_t)(random >> 16);
+}
+
+static void any_state(struct dz_current *loop)
+{
+    const uint32_t random = any();
+
+    dz_current_init(loop);
+    switch (random & 3u) {
+    case 0u:
+        loop->integral = any() % (INTEGRAL_MOST + 1u);
+        break;
+    case 1u:
+        loop->integral = any() % 1000u;
+        break;
+    case 2u:
+        loop->integral = INTEGRAL_MOST - (any() % 1000u);
+        break;
+    default:
+        loop->integral = (INTEGRAL_MOST / 2u) + (any() % 200000u) - 100000u;
+        break;
+    }
+    loop->faults = ((random & 0x70u) == 0u) ? (uint16_t)((random >> 8) & 31u) : 0u;
+    loop->offset = drawn(offset_edges, COUNT(offset_edges));
+    loop->compare = drawn(compare_edges, COUNT(compare_edges));
+    loop->over_ticks = drawn(over_tick_edges, COUNT(over_tick_edges));
+    loop->open_ticks = drawn(open_tick_edges, COUNT(open_tick_edges));
+    loop->ramped = drawn(set_point_edges, COUNT(set_point_edges));
+}
+
+static uint32_t folded(uint32_t hash, uint32_t word)
+{
+    return (((hash << 5) | (hash >> 27)) ^ word) * 0x9E3779B1u;
+}
+
+static uint32_t hash_of(uint32_t hash, const struct dz_current *loop)
+{
+    hash = folded(hash, loop->integral);
+    hash = folded(hash, ((uint32_t)loop->compare << 16) | loop->faults);
+    hash = folded(hash, ((uint32_t)loop->over_ticks << 16) | loop->open_ticks);
+    hash = folded(hash, loop->ramped);
+    return folded(hash, ((uint32_t)loop->offset << 16) | loop->offset_ticks);
+}
+
+uint32_t current_states(uint32_t seed, uint32_t count, struct period *periods)
+{
+    struct dz_current loop;
+    uint32_t hash = seed;
+
+    random_state = seed | 1u;
+    for (uint32_t k = 0u; k < count; k++) {
+        uint16_t set_point, sum, supply;
+        struct dz_current before;
+
+        if ((k == 0u) || ((any() & 0x300u) == 0u) || ((loop.faults != 0u) && ((any() & 0x7000u) != 0u))) {
+            any_state(&loop);
+        }
+        set_point = drawn(set_point_edges, COUNT(set_point_edges));
+        if ((any() & 0x300u) == 0u) { /* a step of the rate at most */
+            set_point = (uint16_t)(loop.ramped + (uint16_t)(any() % (2u * RATE_EDGE + 9u)) - (uint16_t)(RATE_EDGE + 4u));
+        }
+        sum = ((any() & 0xC00u) == 0u) ? drawn(sum_edges, COUNT(sum_edges))
+                                       : (uint16_t)(loop.offset + (drawn(above_edges, COUNT(above_edges)) >> 1));
+        supply = drawn(supply_edges, COUNT(supply_edges));
+        before = loop;
+        TICK(&loop, set_point, sum, supply);
+        hash = hash_of(hash, &loop);
+        if (periods != NULL) {
+            periods[k] = (struct period){before, loop, set_point, sum, supply};
+        }
+    }
+    return hash;
+}
+
+uint32_t current_offsets(uint32_t seed, uint32_t count, struct dz_current *ends, uint16_t *sums)
+{
+    uint32_t hash = seed;
+
+    random_state = seed | 1u;
+    for (uint32_t k = 0u; k < count; k++) {
+        struct dz_current loop;
+
+        dz_current_init(&loop);
+        for (uint16_t tick = 0u; tick <= DZ_CURRENT_OFFSET_TICKS; tick++) {
+            const uint16_t sum = drawn(offset_edges, COUNT(offset_edges));
+
+            dz_current_calibrate(&loop, sum);
+            hash = hash_of(hash, &loop);
+            if (sums != NULL) {
+                *sums = sum;
+                sums++;
+            }
+        }
+        if (ends != NULL) {
+            ends[k] = loop;
+        }
+    }
+    return hash;
+}
