@@ -14,9 +14,9 @@ INNER_FACTOR = 4.0
 #: In the first and the last interval only one test shows a kink, and of one near the end but a small part; with three
 #: tests that one is the only one there is.
 END_FACTOR, END_FACTOR_OF_THREE = 32.0, 64.0
-#: Up to so many tests a second difference counts whatever its sign: a bend down at a test hides one up beside it. Of 200
-#: falling curves with two kinks 13 (three tests) and 2 (four) had an offset above them somewhere; so 1 and none has, and
-#: of six tests none either way.
+#: Up to so many tests a second difference counts whatever its sign: a bend down at a test hides one up beside it. Of
+#: 200 falling curves with two kinks 13 (three tests) and 2 (four) had an offset above them somewhere; so 1 and none
+#: has, and of six tests none either way.
 FEW_TESTS = 4
 #: Fewest tests from which a curvature can be estimated.
 FEWEST_FOR_CURVATURE = 3
