@@ -129,12 +129,30 @@ def test_verify_itself_sees_a_stand_in_that_is_not_the_recording(
             ).result
             for test in (example_valve.positive.tests[0], example_valve.positive.tests[-1])
         ]
-        return stand_in_is_the_recording(results, AS_COMPUTED)
+        return stand_in_is_the_recording(results, example_valve)
 
     assert checked(example_valve.positive).holds
     wrong = checked(fault(example_valve.positive))
     assert wrong.holds is False
     wording.of_test(wrong.text)
+
+
+@pytest.mark.parametrize("shift_V", [-0.3, 0.3])
+def test_a_recorded_curve_that_is_not_that_of_the_thresholds_is_no_stand_in(
+    example_valve, firmware, example_compensator, shift_V
+):
+    """The loop takes valve.json's curve as the valve, and its flow is that curve's: only the thresholds tell."""
+    side = example_valve.positive
+    *others, last = side.tests
+    falling = last.recorded.falling
+    moved = replace(falling, u_V=tuple(u + shift_V for u in falling.u_V), u_seen_V=falling.u_seen_V + shift_V)
+    tests = (*others, replace(last, recorded=replace(last.recorded, falling=moved)))
+    shifted = replace(example_valve, sides={"positive": replace(side, tests=tests)})
+    loop = ClosedLoop(stand_in_of(shifted.positive, shifted.u_max_V), firmware, example_compensator)
+    run = compare_at_pressure(loop, last.dp_MPa, 1.0, QUICK, reading_flow_L_min=0.6, recorded=tests[-1].recorded).result
+    assert run.flow_miss < LIMIT
+    check = stand_in_is_the_recording([run], shifted)
+    assert check.holds is False and last.source in check.text
 
 
 class _Tests:

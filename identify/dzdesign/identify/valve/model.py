@@ -12,7 +12,6 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.identify.valve.quantity_types import Flow, Probability
-from dzdesign.identify.valve.recorded_agreement import check_recorded
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST_ENTRIES, checked_record
 
@@ -133,8 +132,6 @@ class ValveModel(ShownInNotebooks, Artefact):
         if self.simulated != any(warning.code == "simulated" for warning in self.warnings):
             stated, there = ("true", "lacks the") if self.simulated else ("false", "has a")
             raise RuleError(f"'simulated' is {stated}, but 'warnings' {there} warning of that code")
-        for side in self.sides.values():
-            check_recorded(side, self.u_max_V)
         object.__setattr__(self, "record", checked_record(self.record.items(), "the record"))
         object.__setattr__(self, "untested_sides", tuple(name for name in SIDES if name not in self.sides))
 

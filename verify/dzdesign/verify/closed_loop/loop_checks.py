@@ -3,9 +3,11 @@ than was declared."""
 
 from collections.abc import Sequence
 
+from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.recorded_agreement import check_recorded
 from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.scenarios import EXCESS
@@ -33,7 +35,7 @@ def loop_checks(
     units = valve.recorded_units
     return (
         plant_opens(ramps, units),
-        plant_is_the_valve(ramps, valve) if plant_given else stand_in_is_the_recording(ramps, units),
+        plant_is_the_valve(ramps, valve) if plant_given else stand_in_is_the_recording(ramps, valve),
         zero_flow,
         shut_after_scenarios(scenarios, zero_flow, units, plant_given=plant_given),
     )
@@ -69,11 +71,22 @@ def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Ch
     return PLANT_IS_THE_VALVE.check(holds=holds, text=text)
 
 
-def stand_in_is_the_recording(ramps: Sequence[PressureResult], units: RecordedUnits) -> Check:
-    """Tell whether the flow of a stand-in is that of valve.json at the tests, over the command and on both branches."""
+def stand_in_is_the_recording(ramps: Sequence[PressureResult], valve: ValveModel) -> Check:
+    """Tell whether a stand-in is the identified valve: its curve that of the thresholds, its flow that of the curve."""
     worst = max(ramps, key=lambda ramp: ramp.flow_miss)
-    holds = worst.flow_miss <= SAME_FLOW
-    return PLANT_IS_THE_VALVE.check(holds=holds, text=f"{_miss(worst, units)}; expected {SAME_FLOW:.0%} at most")
+    try:
+        for side in {ramp.side for ramp in ramps}:
+            check_recorded(valve.sides[side], valve.u_max_V)
+    except RuleError as error:
+        return PLANT_IS_THE_VALVE.check(
+            holds=False,
+            text=f"{error}. So this plant says nothing of the valve, as where outliers are many: record it again, or "
+            "give a plant (--plant)",
+        )
+    return PLANT_IS_THE_VALVE.check(
+        holds=worst.flow_miss <= SAME_FLOW,
+        text=f"{_miss(worst, valve.recorded_units)}; expected {SAME_FLOW:.0%} at most",
+    )
 
 
 def _at(where: PressureResult | ScenarioResult, units: RecordedUnits) -> str:
