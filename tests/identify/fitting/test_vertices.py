@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+import curve_choice
 import numpy as np
 import pytest
-from curve_choice import certify, draw_curve
+from curve_choice import certify, draw_curve, unsaid
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
@@ -145,3 +146,11 @@ class TestDraws:
         found = [certify(draw_curve(shape, dp, rng), 4, rng) for _ in range(60)]
         assert all(each.certified and each.above <= 0 for each in found)
         assert sum(each.certified.vertex is not None for each in found) <= 3
+
+
+@pytest.mark.parametrize("premise", ["line", "smooth", "monotone"])
+def test_a_premise_that_the_tests_break_by_three_margins_is_not_certified_in_silence(premise, monkeypatch):
+    draws = 40
+    assert unsaid(premise, 4, draws, np.random.default_rng(7)) <= curve_choice.UNSAID * draws
+    monkeypatch.setattr(curve_choice, "VISIBLE", 0.05)  # what the errors hide is not said: the count can fail
+    assert unsaid(premise, 4, draws, np.random.default_rng(7)) > curve_choice.UNSAID * draws
