@@ -14,6 +14,7 @@ from bench_plant import commanded, lagged, ramp, with_play
 from recorded_ramps import L_MIN, recorded
 from scoreboard import Row, print_rows, say
 
+from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -121,16 +122,21 @@ def print_soft_edges(*, quick: bool, seed: int) -> list[Row]:
     rows = []
     for number, (name, (draw, guard)) in enumerate(CASES.items()):
         say(f"soft edges: {name}, {count} valves")
-        results = []
+        results, refused = [], []
         for valve in range(count):
             rng = np.random.default_rng([seed, number, valve])
-            results.append(examine(draw(rng), guard, rng))
+            try:
+                results.append(examine(draw(rng), guard, rng))
+            except InputError as error:
+                refused.append(f"valve {valve}: {error}")
         opened, below = (sum(result[at] for result in results) for at in (0, 1))
         left, level = (float(np.mean([result[at] for result in results])) for at in (2, 3))
         note = f"of {count}; offset {1e3 * left:.0f} mV under the knee, level {level:.2f} L/min"
         rows.append(Row(what=f"{name}: flow above the level", value=opened, limit=LIMIT, note=note))
         if "floor" in name:
             rows.append(Row(what=f"{name}: level below the meter's floor", value=below, limit=LIMIT))
+        if refused:
+            rows.append(Row(what=f"{name}: refused", value=len(refused), limit=LIMIT, note=refused[0]))
     print_rows(f"13. Flow above the stated level at zero command, soft edges (seed {seed})", rows)
     return rows
 
