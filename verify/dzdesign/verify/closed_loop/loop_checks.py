@@ -7,9 +7,9 @@ from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.identify.valve.recorded_agreement import check_recorded
 from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
+from dzdesign.verify.closed_loop.recorded_agreement import check_recorded
 from dzdesign.verify.closed_loop.scenarios import EXCESS
 from dzdesign.verify.loop_results import PressureResult, ScenarioResult
 from dzdesign.verify.requirements import (
