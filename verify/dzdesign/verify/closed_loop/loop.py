@@ -12,6 +12,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.verify.closed_loop.coil_in_loop import HOLDING_H, coil_sources, nominal_coil
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.stand_in import StandIn
@@ -105,7 +106,7 @@ class ClosedLoop:
     ) -> None:
         driver = files("dzdesign.verify.closed_loop")
         sources = {"plant_motion.h": motion_header()}
-        for name in ("loop.c", "plant_period.h", "plant_curve.h", "plant_stops.h"):
+        for name in ("loop.c", "plant_coil.h", "plant_period.h", "plant_curve.h", "plant_stops.h"):
             sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
             sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
@@ -114,6 +115,9 @@ class ClosedLoop:
         else:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")
+        #: Of a drive by current the coil, at a supply.
+        self._coil = nominal_coil(compensator) if firmware and compensator else None
+        sources |= coil_sources(self._coil)
         self._library = load_library(sources, "the closed loop", FLOATING)
         #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
         self._dither = dither or _recorded_dither(compensator)
@@ -135,7 +139,10 @@ class ClosedLoop:
         self._take(plant)
 
     def _take(self, plant: Plant | StandIn) -> None:
-        self._plant = numbers_of(plant.parameters, self._signals.compare_max)
+        parameters, counts = plant.parameters, self._signals.compare_max
+        self._plant = numbers_of(parameters, counts)
+        #: The same, moved by a given current.
+        self._of_current = numbers_of(replace(parameters, L_c_H=HOLDING_H), counts) if self._coil else self._plant
         #: Of a stand-in its recorded characteristic.
         self._curve = plant.table if isinstance(plant, StandIn) else None
         #: Full command, V.
@@ -185,6 +192,25 @@ class ClosedLoop:
         other._take(plant)
         return other
 
+    def with_coil(
+        self, *, resistance: float = 1.0, inductance: float = 1.0, supply_V: float | None = None
+    ) -> "ClosedLoop":
+        """Return the same loop with another coil or supply; nothing is compiled again.
+
+        Resistance and inductance are factors of the declared coil's; without a supply it is the nominal one. For a
+        drive by current only.
+        """
+        if self._coil is None:
+            raise InputError("this loop's drive is by duty; a coil and its supply belong to one by current")
+        other = copy.copy(self)
+        other._coil = self._coil.at(resistance=resistance, inductance=inductance, supply_V=supply_V)
+        return other
+
+    @property
+    def controls_current(self) -> bool:
+        """Whether the law's output is the set point of a current, in a coil that `with_coil` may change."""
+        return self._coil is not None
+
     def run(
         self,
         command: np.ndarray,
@@ -211,7 +237,8 @@ class ClosedLoop:
             seen_MPa = np.full(command.shape, dp_frozen_MPa)
         seen = np.full(command.shape, np.nan) if seen_MPa is None else np.ascontiguousarray(seen_MPa, dtype=float)
         record = np.empty((command.size, len(RECORDED)))
-        signals, plant, negative = self._signals, self._plant, self._negative
+        coil = self._coil if mode != "direct" else None
+        signals, plant, negative = self._signals, self._of_current if coil else self._plant, self._negative
         span, highest = float(self._scalings[2][1:].min()), float(supply.max())
         back_MPa = min(BACK_PRESSURE_MPA, span - highest)
         if back_MPa < 0:
@@ -221,12 +248,13 @@ class ClosedLoop:
             *self._wave(), signals.code_max, signals.compare_max,
         )  # fmt: skip
         series = (np.array(choices, dtype=np.int32), command, supply, seen)
-        given = (*self._scalings, plant.flat, plant.coarse, plant.fine, self._curve, record)
+        given = (*self._scalings, plant.flat, plant.coarse, plant.fine, self._curve)
         pointers = [
             [None if array is None else array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
-            for arrays in (series, given)
+            for arrays in (series, given, (record,))
         ]
-        self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1])
+        coil_and_sensor = coil.pointers() if coil else (None, None)
+        self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1], *coil_and_sensor, *pointers[2])
         recorded = dict(zip(RECORDED, record.T, strict=True))
         time = np.arange(command.size) * periods_per_record * PWM_PERIOD_S
         return LoopRun(time=time, command=command, position_mm=1e3 * recorded.pop("position_m"), **recorded)
