@@ -10,8 +10,8 @@ from dzdesign.core.option_readers import quantity_range, with_tolerance
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.drive import CurrentRequest
+from dzdesign.design.machine.choices import FURTHER
 from dzdesign.design.machine.machine import COPPER_PER_K, REFERENCE_C, DriveKind, Machine
-from dzdesign.design.machine.machine_choices import FURTHER
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter, TargetInputs
 
