@@ -22,8 +22,8 @@ PERIODS_PER_RECORD = 25
 RECORD_S = PERIODS_PER_RECORD * PWM_PERIOD_S
 #: Numbers in a record, as loop.c has them.
 RECORDED = ("compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m")
-#: Pressure behind the edge: what both sensors see beside the drop.
-BACK_PRESSURE_MPA = 1.0
+#: Pressure behind the edge where none is given, as on a bench: what both sensors see beside the drop.
+BENCH_BACK_MPA = 1.0
 #: Flow at zero command below this is none: the edge is shut, only the last bits of a number remain.
 NO_FLOW_L_MIN = 1e-9
 #: The command's ramps are longer than the drive's own by this factor.
@@ -50,6 +50,25 @@ class RampSequence:
         corners = np.cumsum([0, self.rest, self.ramp, self.top, self.ramp, self.rest])
         time = np.arange(0, corners[-1], RECORD_S)
         return np.interp(time, corners, [0, 0, 1, 1, 0, 0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadingErrors:
+    """What the converter, and the sensors before it, read wrong; of command, sensor A and sensor B, (3,) each.
+
+    The noise is white: whole codes from minus its peak to plus it, drawn anew at every sample of the core.
+    """
+
+    offset_codes: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    #: At the converter's largest code.
+    gain_codes: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    #: Peak.
+    noise_codes: tuple[int, int, int] = (0, 0, 0)
+    #: Of the noise.
+    seed: int = 1
+
+
+NO_ERRORS = ReadingErrors()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,6 +139,8 @@ class ClosedLoop:
         #: Without a compensator no code is read, and any scaling serves.
         self._signals = compensator.signals if compensator else Signals()
         self._negative = sign < 0
+        #: Whether sensor B stands ahead of the edge.
+        self.swapped = self._negative and self._signals.swapped
         command, sensors = self._signals.command, (self._signals.pressure_a, self._signals.pressure_b)
         full = command.zero_code + command.direction(sign) * command.span(sign)
         #: Codes of command and pressures at zero and at their spans, and these (1, MPa, MPa).
@@ -132,6 +153,8 @@ class ClosedLoop:
         self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
         self._side = compensator.valve.sides.get(SIDE_NAMES[sign]) if compensator else None
+        #: Added to the plant's drive, V of command.
+        self._added_V = 0.0
         self._take(plant)
 
     def _take(self, plant: Plant | StandIn) -> None:
@@ -151,6 +174,11 @@ class ClosedLoop:
         if self._dither is None:
             return 0, 1, False
         return (0, 1, True) if self._stand_in else (*self._dither, False)
+
+    @property
+    def is_stand_in(self) -> bool:
+        """Whether a recorded characteristic stands in for the plant."""
+        return self._stand_in is not None
 
     @property
     def has_dither(self) -> bool:
@@ -179,6 +207,35 @@ class ClosedLoop:
         middle: np.ndarray = (codes + 0.5 * way) / (span + 1)  # of the code: it is rounded down, whichever way it runs
         return middle
 
+    def with_added_drive(self, added_V: float) -> "ClosedLoop":
+        """Return the same loop with so much added to the plant's drive, V of command."""
+        other = copy.copy(self)
+        other._added_V = added_V
+        return other
+
+    def back_within_span(self, back_MPa: float, dp_MPa: float) -> float:
+        """Return a pressure behind the edge, or the largest that leaves a pressure drop within the sensors' spans."""
+        span = float(self._scalings[2][1:].min())
+        if dp_MPa > span:
+            raise InputError(f"a pressure drop of {dp_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
+        return min(back_MPa, span - dp_MPa)
+
+    def pressure_codes(self, dp_MPa: float | np.ndarray, back_MPa: float | np.ndarray) -> np.ndarray:
+        """Return the codes of sensors A and B at a pressure drop and a pressure behind the edge, (..., 2)."""
+        back = np.asarray(back_MPa, dtype=float)
+        ahead = back + dp_MPa
+        zeros, fulls, spans = (scaling[1:] for scaling in self._scalings)
+        values = np.stack([back, ahead] if self.swapped else [ahead, back], axis=-1)
+        codes = np.floor(zeros + values * (fulls - zeros + 1) / spans)
+        return np.clip(codes, 0, self._signals.code_max).astype(np.int32)
+
+    @property
+    def codes_per_MPa(self) -> tuple[float, float]:
+        """Codes of sensors A and B for 1 MPa."""
+        zeros, fulls, spans = (scaling[1:] for scaling in self._scalings)
+        a, b = map(float, (fulls - zeros) / spans)
+        return a, b
+
     def with_plant(self, plant: Plant | StandIn) -> "ClosedLoop":
         """Return the same loop with another plant; nothing is compiled again."""
         other = copy.copy(self)
@@ -192,41 +249,46 @@ class ClosedLoop:
         mode: str = "direct",
         dp_frozen_MPa: float = 0.0,
         *,
-        seen_MPa: np.ndarray | None = None,
+        back_MPa: float | np.ndarray | None = None,
+        added_V: float | np.ndarray | None = None,
+        shown: np.ndarray | None = None,
+        errors: ReadingErrors = NO_ERRORS,
         periods_per_record: int = PERIODS_PER_RECORD,
     ) -> LoopRun:
         """Run the loop from rest, in one of `MODES`.
 
         `command` (N,) is a share of u_max, one value a record of `periods_per_record` periods of the PWM; `supply_MPa`
-        is the pressure drop at no flow, (N,) where it changes. Of sensors that fail `seen_MPa` (N,) is what they show;
-        not a number: the plant's own. Mode "without beta" shows `dp_frozen_MPa` to the core.
+        is the pressure drop at no flow and `back_MPa` the pressure behind the edge, (N,) where they change; without one
+        that of a bench, as far as the sensors span it. `added_V` is added to the plant's drive, V of command. Of
+        sensors that fail `shown` (N, 2) are the codes of A and B; below zero: the plant's own. Pressures above a
+        sensor's span read as the converter's largest code. Mode "without beta" shows `dp_frozen_MPa` to the core.
         """
         if mode not in MODES:
             raise ValueError(f"mode is '{mode}', expected one of {', '.join(MODES)}")
         if mode != "direct" and not self._has_core:
             raise InputError("this loop was built without a compensator; give the firmware folder")
         command = np.ascontiguousarray(command, dtype=float)
-        supply = np.ascontiguousarray(np.broadcast_to(supply_MPa, command.shape), dtype=float)
+        if back_MPa is None:
+            back_MPa = self.back_within_span(BENCH_BACK_MPA, float(np.max(supply_MPa)))
+        supply, back, bias = (
+            np.ascontiguousarray(np.broadcast_to(each, command.shape), dtype=float)
+            for each in (supply_MPa, back_MPa, self._added_V if added_V is None else added_V)
+        )
         if mode == "without beta":
-            seen_MPa = np.full(command.shape, dp_frozen_MPa)
-        seen = np.full(command.shape, np.nan) if seen_MPa is None else np.ascontiguousarray(seen_MPa, dtype=float)
+            shown = self.pressure_codes(dp_frozen_MPa, back)
+        codes = np.full((command.size, 2), -1) if shown is None else shown
         record = np.empty((command.size, len(RECORDED)))
         signals, plant, negative = self._signals, self._plant, self._negative
-        span, highest = float(self._scalings[2][1:].min()), float(supply.max())
-        back_MPa = min(BACK_PRESSURE_MPA, span - highest)
-        if back_MPa < 0:
-            raise InputError(f"a pressure drop of {highest:g} MPa exceeds the sensors' span of {span:g} MPa")
         choices = (
-            command.size, periods_per_record, mode != "direct", negative, negative and signals.swapped,
-            *self._wave(), signals.code_max, signals.compare_max,
+            command.size, periods_per_record, mode != "direct", negative, self.swapped, *self._wave(),
+            signals.code_max, signals.compare_max, errors.seed,
         )  # fmt: skip
-        series = (np.array(choices, dtype=np.int32), command, supply, seen)
-        given = (*self._scalings, plant.flat, plant.coarse, plant.fine, self._curve, record)
-        pointers = [
-            [None if array is None else array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
-            for arrays in (series, given)
-        ]
-        self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1])
+        wrong = np.array([errors.offset_codes, errors.gain_codes, errors.noise_codes], dtype=float).T
+        given = (
+            np.array(choices, dtype=np.int32), command, supply, back, bias, np.ascontiguousarray(codes, dtype=np.int32),
+            *self._scalings, np.ascontiguousarray(wrong), plant.flat, plant.coarse, plant.fine, self._curve, record,
+        )  # fmt: skip
+        self._library.dz_loop(*(None if each is None else each.ctypes.data_as(ctypes.c_void_p) for each in given))
         recorded = dict(zip(RECORDED, record.T, strict=True))
         time = np.arange(command.size) * periods_per_record * PWM_PERIOD_S
         return LoopRun(time=time, command=command, position_mm=1e3 * recorded.pop("position_m"), **recorded)
