@@ -17,6 +17,7 @@ from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.tolerances import Tolerances
+from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
@@ -94,14 +95,16 @@ def verify(
     say("compiling the core with every warning an error")
     # A compiler's time, not ours.
     building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
-    core, loop = _try_core(folder, manifest, compensator, say), FirmwareLoop()
+    core, loop, current = _try_core(folder, manifest, compensator, say), FirmwareLoop(), CurrentChecks()
     if core.inputs:
+        current = current_checks(folder, compensator, say)
         loop = close_the_loop(building.result(), compensator, plant, sequence or RampSequence(), tolerances, say, watch)
     board, law = board_compiles(folder, manifest, include), law_follows(compensator)
     checks = (
         files_unchanged(folder, manifest),
         manifest_follows(folder, manifest, compensator),
         *core.checks,
+        *current.checks,
         *loop.checks,
         certificate_follows(compensator),
         law,
@@ -120,6 +123,7 @@ def verify(
         closed_loop=loop.result(plant, plant_source, plant_sha256),
         scenarios=loop.scenarios,
         monte_carlo=loop.monte_carlo,
+        current_loop=current.result,
         mutants=None,
     )
     derived = compensator if law.holds else None

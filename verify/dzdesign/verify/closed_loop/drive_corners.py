@@ -5,13 +5,15 @@ comes at a duty of R / V times that on the bench. An amplifier, or the firmware'
 its declared error instead.
 
 What is done to a plant: a stand-in's drive is multiplied, and only by what changes the current; a plant of equations
-has the coil's resistance itself, and its PWM's voltage goes with the supply where the duty is the coil's voltage.
+has the coil's resistance itself, and its PWM's voltage goes with the supply where the duty is the coil's voltage. Under
+the firmware's current control the coil is the declared one, in the loop with the C, and the plant's own is left alone.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.current.circuit import CoilCircuit
 from dzdesign.design.machine.machine import Machine
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.scene import Scene
@@ -35,6 +37,8 @@ class DriveCorner:
     #: Of the coil's resistance, and of the voltage that full duty puts on it; 1 on the bench.
     resistance_ratio: float = 1.0
     voltage_ratio: float = 1.0
+    #: Of a coil in the loop with the C: its supply, V.
+    supply_V: float | None = None
     #: Of the current that an amplifier, or the firmware's control, holds; 1 on the bench.
     current_ratio: float = 1.0
     #: What is added to that current, share of full drive.
@@ -60,21 +64,22 @@ def resistance_ratio(coil_C: float, bench_coil_C: float) -> float:
 
 def holds_current(compensator: Compensator) -> bool:
     """Return whether an amplifier, or the firmware, holds the current; else the duty is the coil's voltage."""
-    return compensator.current_drive is not None or (
-        compensator.machine is not None and compensator.machine.drive != "duty"
-    )
+    machine = compensator.machine
+    return compensator.current_drive is not None or (machine is not None and machine.drive != "duty")
 
 
 def drive_corners(compensator: Compensator) -> Iterator[DriveCorner]:
     """Give the corners of a declared machine, and usual ones of what was not declared."""
     machine = compensator.machine
     here = _End(name="", ratio=1.0)
-    (cold, hot), (low, high) = _coils(machine), _supplies(machine)
+    drive = compensator.current_drive
+    (cold, hot), (low, high) = (_coils(machine), _supplies(machine)) if drive is None else _circuit_ends(drive.circuit)
     for coil, supply in ((cold, here), (hot, here), (here, low), (here, high), (cold, high), (hot, low)):
         yield DriveCorner(
             name=", ".join(filter(None, (coil.name, supply.name))),
             resistance_ratio=coil.ratio,
             voltage_ratio=supply.ratio,
+            supply_V=supply.supply_V,
             not_required=coil.not_required or supply.not_required,
         )
     yield from _current_corners(machine)
@@ -87,12 +92,13 @@ class _End:
     name: str
     ratio: float
     not_required: str = ""
+    supply_V: float | None = None
 
 
 def _coils(machine: Machine | None) -> tuple[_End, _End]:
     """Return the coil's resistance cold and hot."""
-    if machine is not None and machine.coil_temperature_C is not None and machine.bench_coil_C is not None:
-        bench_C = machine.bench_coil_C
+    if machine is not None and machine.coil_temperature_C is not None:
+        bench_C = COPPER_AT_C if machine.bench_coil_C is None else machine.bench_coil_C
         cold, hot = (
             _End(name=f"coil at {end:g} °C", ratio=resistance_ratio(end, bench_C)) for end in machine.coil_temperature_C
         )
@@ -116,6 +122,15 @@ def _supplies(machine: Machine | None) -> tuple[_End, _End]:
     return low, high
 
 
+def _circuit_ends(circuit: CoilCircuit) -> tuple[tuple[_End, _End], tuple[_End, _End]]:
+    """Return the declared ends of the coil and the supply that the current loop was designed for."""
+    cold, hot = (
+        _End(name=f"coil of {factor:g} times the resistance", ratio=factor) for factor in circuit.resistance_factors
+    )
+    low, high = (_End(name=f"supply at {end:g} V", ratio=1.0, supply_V=end) for end in circuit.supply_V)
+    return (cold, hot), (low, high)
+
+
 def _current_corners(machine: Machine | None) -> Iterator[DriveCorner]:
     """Give the ends of a current that is held: its error on the machine, and that of the bench."""
     if machine is None or machine.drive == "duty":
@@ -131,6 +146,9 @@ def _current_corners(machine: Machine | None) -> Iterator[DriveCorner]:
 
 def at_corner(scene: Scene, corner: DriveCorner) -> Scene | None:
     """Return the scene with its plant at a corner; None where the corner changes nothing of it."""
+    if scene.loop.controls_current and corner.current_ratio == 1.0:
+        coil = scene.loop.with_coil(resistance=corner.resistance_ratio, supply_V=corner.supply_V)
+        return replace(scene, loop=coil)
     held = holds_current(scene.compensator)
     # Of a stand-in the current alone counts, and a held one does not know of resistance and supply.
     resistance = 1.0 if held and scene.loop.is_stand_in else corner.resistance_ratio

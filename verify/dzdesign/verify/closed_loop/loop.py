@@ -12,8 +12,10 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.verify.closed_loop.coil_in_loop import HOLDING_H, coil_sources, nominal_coil
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
 from dzdesign.verify.toolchain.host_compiler import load_library
 
@@ -50,25 +52,6 @@ class RampSequence:
         corners = np.cumsum([0, self.rest, self.ramp, self.top, self.ramp, self.rest])
         time = np.arange(0, corners[-1], RECORD_S)
         return np.interp(time, corners, [0, 0, 1, 1, 0, 0])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadingErrors:
-    """What the converter, and the sensors before it, read wrong; of command, sensor A and sensor B, (3,) each.
-
-    The noise is white: whole codes from minus its peak to plus it, drawn anew at every sample of the core.
-    """
-
-    offset_codes: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    #: At the converter's largest code.
-    gain_codes: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    #: Peak.
-    noise_codes: tuple[int, int, int] = (0, 0, 0)
-    #: Of the noise.
-    seed: int = 1
-
-
-NO_ERRORS = ReadingErrors()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,9 +105,9 @@ class ClosedLoop:
         sign: int = 1,
         dither: tuple[int, int] | None = None,
     ) -> None:
-        driver = files("dzdesign.verify.closed_loop")
+        driver = files(__package__) / "programs"
         sources = {"plant_motion.h": motion_header()}
-        for name in ("loop.c", "plant_period.h", "plant_curve.h", "plant_stops.h"):
+        for name in ("loop.c", "plant_coil.h", "plant_period.h", "plant_curve.h", "plant_stops.h"):
             sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
             sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
@@ -133,22 +116,17 @@ class ClosedLoop:
         else:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")
+        #: Of a drive by current the coil, at a supply.
+        self._coil = nominal_coil(compensator) if firmware and compensator else None
+        sources |= coil_sources(self._coil)
         self._library = load_library(sources, "the closed loop", FLOATING)
         #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
         self._dither = dither or _recorded_dither(compensator)
         #: Without a compensator no code is read, and any scaling serves.
         self._signals = compensator.signals if compensator else Signals()
         self._negative = sign < 0
-        #: Whether sensor B stands ahead of the edge.
-        self.swapped = self._negative and self._signals.swapped
-        command, sensors = self._signals.command, (self._signals.pressure_a, self._signals.pressure_b)
-        full = command.zero_code + command.direction(sign) * command.span(sign)
-        #: Codes of command and pressures at zero and at their spans, and these (1, MPa, MPa).
-        self._scalings = (
-            np.array([command.zero_code, *(sensor.zero_code for sensor in sensors)], dtype=np.int32),
-            np.array([full, *(sensor.full_code for sensor in sensors)], dtype=np.int32),
-            np.array([1.0, *(float(sensor.span_MPa) for sensor in sensors)]),
-        )
+        #: Command, sensor A, sensor B.
+        self.channels = Channels(self._signals, sign)
         #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
@@ -158,7 +136,10 @@ class ClosedLoop:
         self._take(plant)
 
     def _take(self, plant: Plant | StandIn) -> None:
-        self._plant = numbers_of(plant.parameters, self._signals.compare_max)
+        parameters, counts = plant.parameters, self._signals.compare_max
+        self._plant = numbers_of(parameters, counts)
+        #: The same, moved by a given current.
+        self._of_current = numbers_of(replace(parameters, L_c_H=HOLDING_H), counts) if self._coil else self._plant
         #: Of a stand-in its recorded characteristic.
         self._curve = plant.table if isinstance(plant, StandIn) else None
         #: Full command, V.
@@ -197,16 +178,6 @@ class ClosedLoop:
         """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""
         return None if self._stand_in is None else self._stand_in.unseen_below_L_min(dp_MPa)
 
-    def command_of_codes(self, codes: np.ndarray) -> np.ndarray:
-        """Return the commands, shares of full, that the converter reads as so many codes from zero, (N,) whole numbers.
-
-        They may lie below zero: then the command is one of the other sign, or none that the signal has.
-        """
-        zero, full = int(self._scalings[0][0]), int(self._scalings[1][0])
-        span, way = abs(full - zero), 1 if full > zero else -1
-        middle: np.ndarray = (codes + 0.5 * way) / (span + 1)  # of the code: it is rounded down, whichever way it runs
-        return middle
-
     def with_added_drive(self, added_V: float) -> "ClosedLoop":
         """Return the same loop with so much added to the plant's drive, V of command."""
         other = copy.copy(self)
@@ -215,32 +186,35 @@ class ClosedLoop:
 
     def back_within_span(self, back_MPa: float, dp_MPa: float) -> float:
         """Return a pressure behind the edge, or the largest that leaves a pressure drop within the sensors' spans."""
-        span = float(self._scalings[2][1:].min())
+        span = float(self.channels.spans[1:].min())
         if dp_MPa > span:
             raise InputError(f"a pressure drop of {dp_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
         return min(back_MPa, span - dp_MPa)
-
-    def pressure_codes(self, dp_MPa: float | np.ndarray, back_MPa: float | np.ndarray) -> np.ndarray:
-        """Return the codes of sensors A and B at a pressure drop and a pressure behind the edge, (..., 2)."""
-        back = np.asarray(back_MPa, dtype=float)
-        ahead = back + dp_MPa
-        zeros, fulls, spans = (scaling[1:] for scaling in self._scalings)
-        values = np.stack([back, ahead] if self.swapped else [ahead, back], axis=-1)
-        codes = np.floor(zeros + values * (fulls - zeros + 1) / spans)
-        return np.clip(codes, 0, self._signals.code_max).astype(np.int32)
-
-    @property
-    def codes_per_MPa(self) -> tuple[float, float]:
-        """Codes of sensors A and B for 1 MPa."""
-        zeros, fulls, spans = (scaling[1:] for scaling in self._scalings)
-        a, b = map(float, (fulls - zeros) / spans)
-        return a, b
 
     def with_plant(self, plant: Plant | StandIn) -> "ClosedLoop":
         """Return the same loop with another plant; nothing is compiled again."""
         other = copy.copy(self)
         other._take(plant)
         return other
+
+    def with_coil(
+        self, *, resistance: float = 1.0, inductance: float = 1.0, supply_V: float | None = None
+    ) -> "ClosedLoop":
+        """Return the same loop with another coil or supply; nothing is compiled again.
+
+        Resistance and inductance are factors of the declared coil's; without a supply it is the nominal one. For a
+        drive by current only.
+        """
+        if self._coil is None:
+            raise InputError("this loop's drive is by duty; a coil and its supply belong to one by current")
+        other = copy.copy(self)
+        other._coil = self._coil.at(resistance=resistance, inductance=inductance, supply_V=supply_V)
+        return other
+
+    @property
+    def controls_current(self) -> bool:
+        """Whether the law's output is the set point of a current, in a coil that `with_coil` may change."""
+        return self._coil is not None
 
     def run(
         self,
@@ -275,20 +249,24 @@ class ClosedLoop:
             for each in (supply_MPa, back_MPa, self._added_V if added_V is None else added_V)
         )
         if mode == "without beta":
-            shown = self.pressure_codes(dp_frozen_MPa, back)
+            shown = self.channels.pressure_codes(dp_frozen_MPa, back)
         codes = np.full((command.size, 2), -1) if shown is None else shown
         record = np.empty((command.size, len(RECORDED)))
-        signals, plant, negative = self._signals, self._plant, self._negative
+        channels, coil = self.channels, self._coil if mode != "direct" else None
+        signals, plant, negative = self._signals, self._of_current if coil else self._plant, self._negative
         choices = (
-            command.size, periods_per_record, mode != "direct", negative, self.swapped, *self._wave(),
+            command.size, periods_per_record, mode != "direct", negative, channels.swapped, *self._wave(),
             signals.code_max, signals.compare_max, errors.seed,
         )  # fmt: skip
-        wrong = np.array([errors.offset_codes, errors.gain_codes, errors.noise_codes], dtype=float).T
-        given = (
+        series = (
             np.array(choices, dtype=np.int32), command, supply, back, bias, np.ascontiguousarray(codes, dtype=np.int32),
-            *self._scalings, np.ascontiguousarray(wrong), plant.flat, plant.coarse, plant.fine, self._curve, record,
+            channels.zeros, channels.fulls, channels.spans, errors.table,
+            plant.flat, plant.coarse, plant.fine, self._curve,
         )  # fmt: skip
-        self._library.dz_loop(*(None if each is None else each.ctypes.data_as(ctypes.c_void_p) for each in given))
+        *given, recording = (
+            None if each is None else each.ctypes.data_as(ctypes.c_void_p) for each in (*series, record)
+        )
+        self._library.dz_loop(*given, *(coil.pointers() if coil else (None, None)), recording)
         recorded = dict(zip(RECORDED, record.T, strict=True))
         time = np.arange(command.size) * periods_per_record * PWM_PERIOD_S
         return LoopRun(time=time, command=command, position_mm=1e3 * recorded.pop("position_m"), **recorded)

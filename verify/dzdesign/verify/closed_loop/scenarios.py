@@ -10,7 +10,8 @@ import numpy as np
 
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, coil_and_supply
-from dzdesign.verify.closed_loop.loop import LoopRun, ReadingErrors
+from dzdesign.verify.closed_loop.loop import LoopRun
+from dzdesign.verify.closed_loop.readings import ReadingErrors
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW, SETTLE_S, STEP_S, Ends, Scene, ramp
 from dzdesign.verify.closed_loop.sensor_failures import sensor_failures
 from dzdesign.verify.loop_results import ScenarioResult
@@ -102,7 +103,7 @@ def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     low, high = tested_MPa
     first, then = (scene.units.text(dp_MPa, ".2f MPa") for dp_MPa in tested_MPa)
     name = f"sensors frozen at {first}, then {then}"
-    run, _ = _changed_in_mid_ramp(scene, scene.loop.pressure_codes(low, scene.back_MPa), high)
+    run, _ = _changed_in_mid_ramp(scene, scene.loop.channels.pressure_codes(low, scene.back_MPa), high)
     return scene.result(name, run, not_required=NO_CORE_CAN_KNOW, end_MPa=high)
 
 
@@ -169,7 +170,7 @@ def _converter_off_at_zero(scene: Scene) -> Iterator[ScenarioResult]:
         (f"zero command read {off} low", -error.offset_codes),
         ("noise across zero command", 0),
     ):
-        wrong = scene.loop.command_of_codes(offset + noise)
+        wrong = scene.loop.channels.command_of_codes(offset + noise)
         # The valve closes onto the wrong zero: from a true one the spool would have to open first.
         before = np.concatenate([ramp(0, 1), scene.held(1), ramp(1, float(np.mean(wrong)))])
         run = scene.run(np.concatenate([before, wrong]))
@@ -195,10 +196,10 @@ def readings_off(scene: Scene) -> Iterator[ScenarioResult]:
         else (converter.offset_codes, converter.gain_codes, converter.noise_codes)
     )
     own_MPa = (machine.pressure_error_a_MPa, machine.pressure_error_b_MPa) if machine else (0.0, 0.0)
-    own = [error * codes for error, codes in zip(own_MPa, scene.loop.codes_per_MPa, strict=True)]
+    own = [error * codes for error, codes in zip(own_MPa, scene.loop.channels.codes_per_MPa, strict=True)]
     command = scene.opened_and_closed()
     for name, way in (("low", -1), ("high", 1)):
-        a, b = (-way, way) if scene.loop.swapped else (way, -way)
+        a, b = (-way, way) if scene.loop.channels.swapped else (way, -way)
         errors = ReadingErrors(
             offset_codes=(0.0, a * (offset + own[0]), b * (offset + own[1])),
             gain_codes=(0.0, a * gain, b * gain),

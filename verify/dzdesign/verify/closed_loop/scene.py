@@ -8,8 +8,9 @@ import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.closed_loop.loop import NO_ERRORS, ClosedLoop, LoopRun, ReadingErrors
+from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.closed_loop.readings import NO_ERRORS, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
 from dzdesign.verify.loop_results import ScenarioResult, Side
 

@@ -26,14 +26,14 @@ def _failed(scene: Scene, sensor: int, code: int, name: str, back_MPa: float) ->
     command, change = _mid_ramp(scene)
     shown = np.full((command.size, 2), -1)
     shown[change:, sensor] = code
-    codes = scene.loop.pressure_codes(scene.dp_MPa, back_MPa)
+    codes = scene.loop.channels.pressure_codes(scene.dp_MPa, back_MPa)
     run = scene.run(command, back_MPa=back_MPa, shown=shown)
     return scene.result(name, run, back_MPa=back_MPa, not_required=_unknowable(scene, codes, sensor, code))
 
 
 def _stuck(scene: Scene, sensor: int, back_MPa: float, ends_MPa: Ends) -> Iterator[ScenarioResult]:
     """The sensor goes on showing what it shows, and the pressure at it goes from one end to the other."""
-    behind = (sensor == 1) != scene.loop.swapped
+    behind = (sensor == 1) != scene.loop.channels.swapped
     if behind:
         changes = [(scene.dp_MPa, back_MPa, then) for then in ends_MPa if then != back_MPa]
     elif scene.tested_MPa:
@@ -49,7 +49,7 @@ def _stuck(scene: Scene, sensor: int, back_MPa: float, ends_MPa: Ends) -> Iterat
 def _stuck_over(scene: Scene, sensor: int, supply_MPa: Ends, back_MPa: Ends) -> ScenarioResult:
     command, change = _mid_ramp(scene)
     before, after = (
-        scene.loop.pressure_codes(dp, back) for dp, back in zip(supply_MPa, back_MPa, strict=True)
+        scene.loop.channels.pressure_codes(dp, back) for dp, back in zip(supply_MPa, back_MPa, strict=True)
     )
     supply, back = (np.where(np.arange(command.size) < change, *pair) for pair in (supply_MPa, back_MPa))
     shown = np.full((command.size, 2), -1)
