@@ -69,6 +69,7 @@ def verify(
     plant_sha256: str | None = None,
     sequence: RampSequence | None = None,
     tolerances: Tolerances | None = None,
+    backs_MPa: Sequence[float] | None = None,
     include: Sequence[Path] = (),
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
@@ -77,7 +78,8 @@ def verify(
 
     Without a `plant` the recorded characteristic stands in for the valve in the closed loop; `plant_source` and
     `plant_sha256` are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about
-    it. `sequence` is the command over time, by default 0-10 V in 100 s and back. In `include` lie headers of the user's
+    it. `sequence` is the command over time, by default 0-10 V in 100 s and back; `backs_MPa` are the pressures behind
+    the edge. In `include` lie headers of the user's
     board files.
     `say` is told each stage before it begins; `watch` is handed the pieces of a long one and their number, and gives
     them back one by one, as they are done.
@@ -91,7 +93,8 @@ def verify(
     compensator = read_compensator(folder)
     host_compiler()
     say("compiling the core with every warning an error")
-    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)  # a compiler's time, not ours
+    # A compiler's time, not ours.
+    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
     core, loop, current = _try_core(folder, manifest, compensator, say), FirmwareLoop(), CurrentChecks()
     if core.inputs:
         current = current_checks(folder, compensator, say)
