@@ -184,7 +184,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     chosen, units = law(compensator.law), compensator.valve.recorded_units
     lines = [
         f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
-        *signals_in_words(compensator.signals, float(compensator.u_max_V)),
+        *signals_in_words(compensator.signals, float(compensator.u_max_V), units),
     ]
     for sign in compensator.signals.signs:
         side = compensator.side(sign)
@@ -213,7 +213,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"threshold over those from there to {end:.2%}"
         )
     if compensator.current_drive is not None:
-        lines += compensator.current_drive.in_words()
+        lines += compensator.current_drive.in_words(units)
     hidden = hidden_failures(compensator)
     elsewhere = {*hidden, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
     console = console or new_console()

@@ -148,7 +148,8 @@ def _threshold(valve: ValveModel) -> Figure:
     name, side = next(iter(valve.sides.items()))
     units = valve.recorded_units
     # A share of a signal that is not zero at zero command is no share of its reading.
-    of = "of full command" if units.command.at_zero else f"of {units.text(valve.u_max_V, 'g V')}"
+    unnamed = units.command.at_zero or units.command.unit == "%"
+    of = "of full command" if unnamed else f"of {units.text(valve.u_max_V, 'g V')}"
     opens = [100 * (test.u_knee_rising_V or test.u_guard_V) / valve.u_max_V for test in side.tests]
     span = f"; {min(opens):.1f} to {max(opens):.1f} % over {len(opens)} pressure drops"
     return Figure(
