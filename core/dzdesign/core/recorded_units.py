@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, final, overload
 
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.core.artefact_types import RuleError, quantity
 
@@ -119,7 +119,9 @@ class RecordedUnits:
     command: Annotated[CommandUnit, Meta(description="Unit of the command.")] = CommandUnit()
     pressure: Annotated[PressureUnit, Meta(description="Unit of the pressure drop.")] = PressureUnit()
     flow: Annotated[FlowUnit, Meta(description="Unit of the flow.")] = FlowUnit()
-    current: Annotated[CurrentUnit, Meta(description="Unit of a solenoid's current.")] = CurrentUnit()
+    current: Annotated[
+        CurrentUnit | UnsetType, Meta(description="Unit of a solenoid's current; missing: A.")
+    ] = UNSET
     differ: Annotated[
         tuple[Quantity, ...],
         Meta(description="Quantities that the recordings have in different units: shown in V, MPa or L/min."),
@@ -140,6 +142,10 @@ class RecordedUnits:
     def falling(self) -> bool:
         """Whether the reading of the command falls where the valve opens."""
         return self.command.factor < 0
+
+    @property
+    def _current(self) -> CurrentUnit:
+        return self.current or CurrentUnit()
 
     def text(self, value: float, form: str) -> str:
         """Return a number with its unit.
@@ -174,7 +180,7 @@ class RecordedUnits:
         if self._as_computed(kind):
             return kind.name
         return kind.label.format(
-            u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit, i=self.current.unit
+            u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit, i=self._current.unit
         )
 
     @overload
@@ -209,7 +215,7 @@ class RecordedUnits:
             parts.append(f"command in {command.unit}{declared}{counted}")
         parts += [f"pressure drop in {self.pressure.unit}"] if self.pressure.factor != 1 else []
         parts += [f"flow in {self.flow.unit}"] if self.flow.factor != 1 else []
-        parts += [f"currents in {self.current.unit}"] if self.current.factor != 1 else []
+        parts += [f"currents in {self._current.unit}"] if self._current.factor != 1 else []
         differing = f"the recordings differ in the unit of {' and '.join(self.differ)}, shown in " + " and ".join(
             {"command": "V", "pressure": "MPa", "flow": "L/min"}[name] for name in self.differ
         )
@@ -223,13 +229,13 @@ class RecordedUnits:
             (kind.u and (command.unit, command.at_zero, command.factor) != ("V", 0.0, 1.0))
             or (kind.dp and (self.pressure.unit, self.pressure.factor) != ("MPa", 1.0))
             or (kind.q and (self.flow.unit, self.flow.factor) != ("L/min", 1.0))
-            or (kind.i and (self.current.unit, self.current.factor) != ("A", 1.0))
+            or (kind.i and (self._current.unit, self._current.factor) != ("A", 1.0))
         )
 
     def _gain(self, kind: _Kind) -> float:
         """Return the factor of a unit; that of a difference is positive: it counts from zero command outwards."""
         factor = self.command.factor if kind.reading else abs(self.command.factor)
-        others = self.pressure.factor**kind.dp * self.flow.factor**kind.q * self.current.factor**kind.i
+        others = self.pressure.factor**kind.dp * self.flow.factor**kind.q * self._current.factor**kind.i
         return kind.scale * factor**kind.u * others
 
 

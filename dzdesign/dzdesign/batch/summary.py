@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.worded import in_units
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, common_units
+from dzdesign.core.worded import in_units
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.compensator_sides import SIGNS
 from dzdesign.report.lot.spread import quantiles, spreads_of

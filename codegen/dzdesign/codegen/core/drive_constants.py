@@ -26,7 +26,8 @@ def interface_constants(compensator: Compensator) -> list[Define]:
     share = limit / signals.compare_max
     return [
         Define(symbol="DZ_COMPARE_MAX", value=signals.compare_max, equation="Eq. (32), PWM compare value of u_max",
-                 engineering=f"{units.text(u_max_V, 'g V')}, 100 % duty", data=("signals.compare_max", "u_max_V"), generator=SIGNALS),
+                 engineering=f"{units.text(u_max_V, 'g V')}, 100 % duty", data=("signals.compare_max", "u_max_V"),
+                 generator=SIGNALS),
         Define(symbol="DZ_COMPARE_LIMIT", value=limit, equation="largest compare value that is put out",
                  engineering=f"{units.text(share * u_max_V, '.4g V')}, {share:.1%} duty", rounding="rounded down",
                  data=("drive_functions.compare_limit", "signals.compare_max", "u_max_V"), generator=OPTIONS),
@@ -62,7 +63,8 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     if bipolar or functions.has_ramp or compensator.zero_band_codes:
         found.append(
             Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
-                     equation="Eq. (29), code of zero command", engineering=compensator.valve.recorded_units.text(0.0, "g V"),
+                     equation="Eq. (29), code of zero command",
+                     engineering=compensator.valve.recorded_units.text(0.0, "g V"),
                      rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
                      generator=SIGNALS)
         )  # fmt: skip
@@ -120,7 +122,8 @@ def _play(compensator: Compensator) -> list[Define]:
                engineering=share_of_command(compensator, functions.play_noise_codes),
                data=("drive_functions.play_noise_codes", "signals.command", "u_max_V"), generator=PLAY),
         Define(symbol="PLAY_CODES", value=codes, literal="int32",
-               equation="codes of travel from the one branch to the other", engineering=share_of_command(compensator, codes),
+               equation="codes of travel from the one branch to the other",
+               engineering=share_of_command(compensator, codes),
                data=("drive_functions.play_codes", "signals.command", "u_max_V"), rounding="a power of two",
                generator=PLAY),
         Define(symbol="PLAY_SHIFT", value=(codes * band).bit_length() - 1,

@@ -37,15 +37,16 @@ class SignalConstants:
         def reading(code: int) -> str:
             return units.text(direction * (code - command.zero_code) / span * u_max_V + 0.0, ".4g V")
 
-        low, high = command.valid_codes
+        zero, (low, high) = command.zero_code, command.valid_codes
         keys = ("signals.command.zero_code", f"signals.command.{full_key}", "u_max_V")
         valid = ("signals.command.valid_codes", *keys)
-        full = self._signal("COMMAND_SPAN", span, "Eq. (29), codes from zero to full command", units.text(u_max_V, "g V"), keys)
+        full = self._signal("COMMAND_SPAN", span, "Eq. (29), codes from zero to full command",
+                            units.text(u_max_V, "g V"), keys)  # fmt: skip
         return [
-            self._signal("COMMAND_ZERO", command.zero_code, "Eq. (29), code of zero command", reading(command.zero_code),
-                         keys[:1], DOWN),
+            self._signal("COMMAND_ZERO", zero, "Eq. (29), code of zero command", reading(zero), keys[:1], DOWN),
             self._signal("COMMAND_LOW", low, "Eq. (29), least valid code of the command", reading(low), valid, DOWN),
-            self._signal("COMMAND_HIGH", high, "Eq. (29), largest valid code of the command", reading(high), valid, DOWN),
+            self._signal("COMMAND_HIGH", high, "Eq. (29), largest valid code of the command", reading(high), valid,
+                         DOWN),
             *([full] if self.passes_full else []),
             *self._sensor("A", signals.pressure_a),
             *self._sensor("B", signals.pressure_b),
@@ -58,7 +59,7 @@ class SignalConstants:
                 engineering=f"bit {self.word_bits - 1} of {self.word_bits}",
                 generator=HERE,
             ),
-        ]
+        ]  # fmt: skip
 
     def _signal(
         self, symbol: str, value: int, equation: str, engineering: str, data: tuple[str, ...], rounding: str = EXACT
@@ -139,8 +140,8 @@ class SignalConstants:
         error = c.command_error
         return [
             Define(symbol="ZERO_BAND", value=c.zero_band_codes, equation="codes of command that count as zero, u_z",
-                   engineering=f"{share_of_command(c, c.zero_band_codes, self.sign)}; error of a zero command, {error.offset_codes} + "
-                   f"{error.noise_codes} codes", data=("zero_band_codes", "command_error"),
+                   engineering=f"{share_of_command(c, c.zero_band_codes, self.sign)}; error of a zero command, "
+                   f"{error.offset_codes} + {error.noise_codes} codes", data=("zero_band_codes", "command_error"),
                    generator="design/dzdesign/design/zero_band.py"),
             Define(symbol="TRANSITION_CODES", value=c.transition_codes,
                    equation="codes of command that the transition takes, u_t - u_z",

@@ -119,7 +119,8 @@ def _levels(output: np.ndarray) -> np.ndarray:
     low, high = float(output.min()), float(output.max())
     power = 10.0 ** np.floor(np.log10(max(high - low, 1e-12) / 12))
     step = next(step * power for step in (1.0, 2.5, 5.0, 10.0) if (high - low) / (step * power) <= 12)
-    return step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
+    levels: np.ndarray = step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
+    return levels
 
 
 def _draw_zero_strip(axes: "Axes", zero: Curves | None, units: RecordedUnits) -> int:

@@ -17,7 +17,8 @@ def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
     units = compensator.valve.recorded_units.of_side(name)
     low, high = map(float, certificate.dp_MPa)
     figure, axes = titled_axes(3.2, name, both)
-    axes.plot([0, 100], units.convert(np.array([0.0, u_max]), "V"), ":", color=LIGHT["soft"], lw=1.3, label="without compensator")
+    bare = units.convert(np.array([0.0, u_max]), "V")
+    axes.plot([0, 100], bare, ":", color=LIGHT["soft"], lw=1.3, label="without compensator")
     rows = []
     for dp_MPa, dash, hue in ((low, "-", "blue"), (high, "--", "vermilion")):
         corners = exact.corners(exact.betas(round(compensator.signals.dp_code(Fraction(dp_MPa)))))
@@ -26,8 +27,8 @@ def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
         shown = units.convert(np.array(volts), "V")
         axes.plot(percent, shown, dash, color=LIGHT[hue], lw=1.8, label=f"at {units.text(dp_MPa, '.2f MPa')}")
         rows += [[round(dp_MPa, 4), round(x, 4), round(y, 6)] for x, y in zip(percent, volts, strict=True)]
-    bound = min(compensator.valve.sides[name].certified[certificate.guard].u_lower_V)
-    axes.axhline(units.convert(bound, "V"), color=LIGHT["green"], lw=1.2, ls="-.", label="least lower bound of the threshold")
+    bound = units.convert(min(compensator.valve.sides[name].certified[certificate.guard].u_lower_V), "V")
+    axes.axhline(bound, color=LIGHT["green"], lw=1.2, ls="-.", label="least lower bound of the threshold")
     label = f"output u_O ({units.label('V')})"
     axes.set(xlabel="command u_i (% of full)", ylabel=label, xlim=(0, 100))
     if units.falling:

@@ -93,7 +93,7 @@ def _origin(constant: FirmwareConstant) -> str:
 def rounding_table(compensator: Compensator) -> Table:
     """Return what turning the law into integers costs."""
     u_max, units = compensator.u_max_V, compensator.valve.recorded_units
-    rows = []
+    rows: list[tuple[str, str, str, float]] = []
     for name, side in laws_of(compensator).items():
         certificate = side.certificate
         offset = side.u_min0_over_u_max * u_max
@@ -101,8 +101,8 @@ def rounding_table(compensator: Compensator) -> Table:
         of = f" ({name})" if len(laws_of(compensator)) > 1 else ""
         if not compensator.transition_codes:  # which counts from the opening threshold, the valve's curve does not
             wanted = Fraction(repr(compensator.valve.sides[name].certified[certificate.guard].u_min0_V))
-            volts = tuple(units.of_side(name).text(float(value), ".6f V") for value in (offset, wanted))
-            rows.append(("u_min0" + of, *volts, 1e3 * float(offset - wanted)))
+            in_c, exact = (units.of_side(name).text(float(value), ".6f V") for value in (offset, wanted))
+            rows.append(("u_min0" + of, in_c, exact, 1e3 * float(offset - wanted)))
         rows += [
             ("one step of a node of β" + of, f"1/{compensator.beta_denominator}", "rounded down", -1e3 * float(node)),
             (

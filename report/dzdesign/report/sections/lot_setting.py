@@ -104,7 +104,8 @@ def _worst(evidence: Evidence | None, units: RecordedUnits) -> Figure:
         label=f"Worst valve of the lot: {worst.worst}",
         value=units.text(1e3 * worst.smallest_margin_V, ".3f mV"),
         note="margin of the C's compare values at zero command under its own lower bound, at "
-        f"{units.text(worst.worst_dp_MPa, '.2f MPa')}; {len(over)} of {min(each.valves for each in found)} valves over-compensated",
+        f"{units.text(worst.worst_dp_MPa, '.2f MPa')}; {len(over)} of {min(each.valves for each in found)} valves "
+        "over-compensated",
         kind="bad" if over else "text",
     )
 
