@@ -5,6 +5,7 @@ from textwrap import wrap
 from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.machine.words import taken_off
 from dzdesign.design.signals import SIDE_NAMES
 
 
@@ -22,7 +23,7 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     low, high = certificate.dp_MPa
     where = units.span(float(low), float(high), ".2f MPa") + (", between the tests too" if low < high else "")
     text = (
-        f"Certificate: {where}, that lies below the "
+        f"Certificate of {compensator.certified_of}: {where}, that lies below the "
         f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold, by "
         f"{units.text(1e3 * float(certificate.smallest_margin_V), '.3g mV')} at the least beyond "
         f"{_counted(compensator)}"
@@ -34,9 +35,21 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
         text += f", so that less than {flow} flows: what the recordings can't show."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
-    text += " Errors of the pressure sensors and of their converters beyond rounding are not in it."
+    text += f" {_machine(compensator, sign)}"
     lot = lot_in_words(compensator)
     return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
+
+
+def _machine(compensator: Compensator, sign: int) -> str:
+    """Return what of a machine is counted."""
+    budget = compensator.side(sign).budget
+    if compensator.machine is None or budget is None:
+        return (
+            "No machine was declared: its coil temperature, supply, pressure sensors and converters beyond rounding, "
+            "oil and ageing are not in it."
+        )
+    words = taken_off(budget, compensator.valve.recorded_units.of_side(SIDE_NAMES[sign]))
+    return f"{words[0].upper()}{words[1:]}; compensator.json lists all of it."
 
 
 def _counted(compensator: Compensator) -> str:
