@@ -197,7 +197,8 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate of {compensator.certified_of}: the offset stays below the "
-            f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold {units.span(low, high, '.3f MPa')}, at every pressure code; "
+            f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
+            f"{units.span(low, high, '.3f MPa')}, at every pressure code; "
             + (
                 f"flow below {units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of "
                 "the largest flow) counts as none"
