@@ -11,6 +11,7 @@ from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
+from dzdesign.design.broken_sensor import ACCEPTED, refuse_hidden_failures
 from dzdesign.design.certificate import certify, guarded_curve, hold_below
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
@@ -93,6 +94,8 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
+    if ACCEPTED not in options.accept:
+        refuse_hidden_failures(compensator)
     compensator = _with_play(compensator, options)
     return replace(compensator, costs=costs_of(compensator))
 
