@@ -18,6 +18,7 @@ from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
@@ -204,7 +205,11 @@ class Compensator(ShownInNotebooks, Artefact):
     @property
     def dither_reserve_counts(self) -> int:
         """Counts by which the offset stays lower for the dither; next to none where the ramps were recorded with it."""
-        return self.drive_functions.dither(self.signals).reserve(self.valve.dither)
+        return dither_reserve(self.drive_functions.dither(self.signals), self.valve.dither, self.machine)
+
+    def allowance(self, sign: int) -> Allowance:
+        """Return what the offset of a side leaves free under the certified curve."""
+        return allowance_of(self.signals, self.machine, sign=sign, dither_counts=self.dither_reserve_counts)
 
     @property
     def transition_end(self) -> int:

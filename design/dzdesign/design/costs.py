@@ -6,6 +6,7 @@ from dzdesign.design.broken_sensor import ACCEPTED, hidden_failure
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.machine.costs import machine_costs
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.reading_flow import default_reading_flow
@@ -19,6 +20,7 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
     for sign in compensator.signals.signs:
         side, label = valve.sides[SIDE_NAMES[sign]], _side_label(compensator, sign)
         lines += lines_of_tests(compensator, sign)
+        lines += [label + line for line in machine_costs(compensator, sign)]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
     units = valve.recorded_units
