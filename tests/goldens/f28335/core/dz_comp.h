@@ -4,7 +4,7 @@
 /*
  * The compensation law of a proportional valve's dead zone: what to call, and what goes in and comes out.
  *
- *     u_i      command, 0 to u_max = 10 V
+ *     u_i      command, 0 to u_max; full command is 10 V
  *     u_O      what the valve is driven with, 0 to u_max; the PWM's duty is u_O/u_max
  *     dP       pressure drop over the metering edge
  *     u_min0   offset at the reference pressure drop, near where the valve opens; zero command gives less (transition)
