@@ -152,7 +152,7 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     leave, end = compensator.drive_functions.leave_zero_codes, compensator.transition_end
     return [
         f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero, "
-        f"{declared}; from rest the drive leaves at more than {leave} codes ({leave / span:.2%}), and up to {end} codes "
+        f"{declared}; from rest the drive leaves at more than {leave} codes ({leave / span:.2%}), and up to {end} "
         f"({end / span:.2%}) it runs from the {compensator.positive.certificate.guard} to the opening threshold"
     ]
 

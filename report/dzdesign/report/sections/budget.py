@@ -54,7 +54,7 @@ def budget_table(budget: Budget, name: str, both: bool, units: RecordedUnits) ->
              "price_percent"),
             _rows(budget),
         ),
-        name=f"budget-{name}",
+        name=f"budget-components-{name}",
         notes=(
             "Contribution: by how much the component alone lowers what is certified. Sensitivity: that for one unit of "
             "its half-width, from the least to the most over the pressure drops.",
