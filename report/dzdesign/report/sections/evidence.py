@@ -179,20 +179,21 @@ def loops_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Ta
 
 def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> Table | None:
     """Return each scenario at the pressure drop where it is worst; None if there are none."""
-    worst: dict[str, ScenarioResult] = {}
+    worst: dict[tuple[str, str], ScenarioResult] = {}
     for each in sorted(scenarios, key=lambda one: (one.q_zero_L_min, one.q_peak_at_zero_L_min, one.dp_MPa)):
-        worst[each.name] = each
+        worst[each.name, each.not_required] = each
     if not worst:
         return None
     flow = units.label("L/min")
     return table_of(
-        "Beside ramps: each scenario at the pressure drop where it is worst",
-        [worst[name] for name in dict.fromkeys(each.name for each in scenarios)],
+        "Beside ramps: each scenario at the pressures where it is worst",
+        [worst[key] for key in dict.fromkeys((each.name, each.not_required) for each in scenarios)],
         ("scenario", lambda one: one.name),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
+        (f"behind the edge ({units.label('MPa')})", lambda one: recorded(one.back_MPa, ".2f MPa", units)),
         (f"at zero, at the end ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
         (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
-        ("required", lambda one: _required(one, units) if one.must_shut else "no core can know: not required"),
+        ("required", lambda one: _required(one, units) if one.must_shut else f"{one.not_required}: not required"),
     )
 
 
