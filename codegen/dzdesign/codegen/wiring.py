@@ -73,6 +73,16 @@ class PressureWiring:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentWiring:
+    """The sensor of a solenoid's current, without current and at the rated one, at the converter's pin."""
+
+    zero_V: float
+    rated_V: float
+    zero_code: int
+    rated_code: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Wiring:
     """What a target's templates print of the signals' wiring."""
 
@@ -85,6 +95,8 @@ class Wiring:
     no_voltage: str
     no_voltage_drives: bool
     pressures: tuple[PressureWiring, ...]
+    #: With current control alone.
+    current: CurrentWiring | None
 
 
 def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
@@ -99,6 +111,7 @@ def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
         no_voltage=_no_voltage(command, signals.signs),
         no_voltage_drives=any(command.from_zero(0, sign) for sign in signals.signs) and command.valid_codes[0] == 0,
         pressures=(_pressure("A", signals.pressure_a, converter), _pressure("B", signals.pressure_b, converter)),
+        current=_current(compensator, converter),
     )
 
 
@@ -140,3 +153,16 @@ def _percent(share: Fraction) -> str:
 def _pressure(name: str, signal: PressureSignal, converter: Converter) -> PressureWiring:
     zero, full = (PinReading(code=code, converter=converter) for code in (signal.zero_code, signal.full_code))
     return PressureWiring(name=name, signal=signal, zero=zero, full=full, shunt_ohm=zero.shunt_ohm(full.code))
+
+
+def _current(compensator: Compensator, converter: Converter) -> CurrentWiring | None:
+    if (drive := compensator.current_drive) is None:
+        return None
+    sensor = drive.sensor
+    rated_V = sensor.offset_V + sensor.V_per_A * drive.circuit.rated_A
+    return CurrentWiring(
+        zero_V=sensor.offset_V,
+        rated_V=rated_V,
+        zero_code=converter.code(Fraction(sensor.offset_V)),
+        rated_code=converter.code(Fraction(rated_V)),
+    )

@@ -40,6 +40,11 @@ static void show_registers(void)
     SHOW("ADCTRL3", AdcRegs.ADCTRL3.all);
     SHOW("ADCMAXCONV", AdcRegs.ADCMAXCONV.all);
     SHOW("ADCCHSELSEQ1", AdcRegs.ADCCHSELSEQ1.all);
+    SHOW("ADCCHSELSEQ3", AdcRegs.ADCCHSELSEQ3.all);
+    SHOW("ADCCHSELSEQ4", AdcRegs.ADCCHSELSEQ4.all);
+    SHOW("GPIO13_MUX", GpioCtrlRegs.GPAMUX1.bit.GPIO13);
+    SHOW("TRIGGER_CMPA", EPwm2Regs.CMPA.half.CMPA);
+    SHOW("TRIGGER_ETPS", EPwm2Regs.ETPS.all);
     SHOW("HISPCP", SysCtrlRegs.HISPCP.all);
     SHOW("PLLCR", SysCtrlRegs.PLLCR.all);
     SHOW("TBCLKSYNC", SysCtrlRegs.PCLKCR0.bit.TBCLKSYNC);
@@ -104,11 +109,17 @@ static void run(const char *events)
         const struct tick tick = device_period(*events);
         printf("tick event=%c output=%s duty=%u served=%u resets=%u reset_busy=%u pieack=%u cmpa=%u forced=%u "
                "without=%u released=%u fault=%u held=%u begins=%u falls=%u duty_b=%u cmpb=%u forced_b=%u "
-               "samples=%u drive_ticks=%u\n",
+               "samples=%u drive_ticks=%u",
                *events, tick.output, tick.duty, tick.served, tick.resets, tick.reset_busy, tick.acknowledged,
                EPwm1Regs.CMPA.half.CMPA, EPwm1Regs.TZFLG.bit.OST, dz_state.ticks_without_sample, dz_state.released,
                dz_state.fault, tick.held, tick.begins, tick.falls, tick.duty_b, EPwm2Regs.CMPA.half.CMPA,
                EPwm2Regs.TZFLG.bit.OST, device_drive_samples, device_drive_ticks);
+#ifdef DZ_CURRENT_REST_TICKS
+        printf(" converted=%u before=%u first=%u apart=%u current=%u sum=%u offset=%u current_faults=%u set_point=%u",
+               tick.converted, tick.before, tick.first, tick.apart, tick.current_mA, dz_state.current_sum,
+               dz_state.current_offset, dz_state.current_faults, dz_state.set_point);
+#endif
+        puts("");
     }
 }
 

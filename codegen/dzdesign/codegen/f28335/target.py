@@ -12,6 +12,7 @@ from dzdesign.codegen.c2000 import (
     PWM_HZ,
     SAMPLE_HZ,
     c2000_target,
+    current_timing,
     exact,
     printed,
     pwm_timing,
@@ -75,6 +76,10 @@ def converter() -> dict[str, str]:
     held_s = (ADC_TRIGGER_ADCCLKS + ACQ_PS + 1) / adcclk_hz  # the first channel, the command: end of its window
     results = ADC_RESULT_ADCCLKS + (CHANNELS - 1) * next_channel
     sequence_s = within(held_s + results / adcclk_hz, 0, ISR_DELAY_S / 2, "the sequence of three, in s,")
+    of_four_s = sequence_s + next_channel / adcclk_hz
+    current = current_timing(sysclkout_hz, held_s, held_s + ADC_RESULT_ADCCLKS / adcclk_hz)
+    # The sequence of the sample must be over before the first conversion of the current starts.
+    within(of_four_s, 0, Fraction(current["current_start"]) / sysclkout_hz, "the sequence of four, in s,")
     period_s = Fraction(1, PWM_HZ)
     # The value is written before the period ends and loaded at its end; the latest falling edge is one count before
     # the next end. Between two samples the value is used once more.
@@ -93,6 +98,8 @@ def converter() -> dict[str, str]:
         "delay_to_period_us": in_us(to_period_s),
         "delay_to_edge_us": in_us(to_edge_s),
         "delay_to_last_edge_us": in_us(to_edge_s + (held_periods - 1) * period_s),
+        "sequence_of_four_us": printed(of_four_s * 10**6),
+        **current,
         "adc_codes": str(2**ADC_BITS),
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": str(ADC_SPAN_V),

@@ -59,6 +59,8 @@ STATUS_BITS = {
     0x0002: "trip input went low",
     0x0004: "watchdog reset",
     0x0008: "crystal or PLL not as expected",
+    0x0010: "current not converted in time",
+    0x0020: "current sensor, open load, short or over-current",
     0x0100: "command outside its valid range",
     0x0200: "pressure A outside its valid range",
     0x0400: "pressure B outside its valid range",
