@@ -2,9 +2,11 @@
 
 from fractions import Fraction
 
+from dzdesign.design.broken_sensor import ACCEPTED, hidden_failure
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.machine.costs import machine_costs
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.reading_flow import default_reading_flow
@@ -18,6 +20,7 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
     for sign in compensator.signals.signs:
         side, label = valve.sides[SIDE_NAMES[sign]], _side_label(compensator, sign)
         lines += lines_of_tests(compensator, sign)
+        lines += [label + line for line in machine_costs(compensator, sign)]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
     units = valve.recorded_units
@@ -51,12 +54,15 @@ def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
     """Return one line for each failure of a signal that the firmware can't see; the first of `costs_of`."""
     lines = unseen_failures(compensator.signals)
     for sign in compensator.signals.signs:
-        if compensator.valve.sides[SIDE_NAMES[sign]].trend == "increasing":
-            hidden = " and ".join(compensator.signals.hidden_excess(sign))
-            remedy = f"{hidden} can't be told; give signals with a live zero and room above the span, or "
+        label, name = _side_label(compensator, sign), SIDE_NAMES[sign]
+        hidden = hidden_failure(compensator, sign)
+        if hidden is not None:
+            what = hidden.text(compensator.valve.recorded_units.of_side(name))
+            lines.append(f"accepted, {ACCEPTED}: {label}{what}; have the sensors supervised outside")
+        elif compensator.valve.sides[name].trend == "increasing":
             lines.append(
-                f"{_side_label(compensator, sign)}the threshold grows with the pressure drop, so a pressure signal "
-                f"that reads too high raises the offset: {remedy if hidden else ''}monitor the sensors outside"
+                f"{label}the threshold grows with the pressure drop, so a pressure signal that reads too high raises "
+                "the offset: monitor the sensors outside"
             )
     return tuple(lines)
 
@@ -138,7 +144,8 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     if not compensator.transition_codes:
         return [
             f"no transition, so no zero band: a zero command that reads {error.zero_band_codes} codes too high "
-            f"({declared}) lifts the drive by {_lift_V(compensator):.3f} V, which the certificate does not count"
+            f"({declared}) lifts the drive by {compensator.valve.recorded_units.text(_lift_V(compensator), '.3f dV')}, "
+            "which the certificate does not count"
         ]
     leave = compensator.drive_functions.leave_zero_codes
     return [

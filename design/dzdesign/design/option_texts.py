@@ -10,8 +10,15 @@ from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.texts import current_request
 from dzdesign.design.design_choices import DEFAULTS, HYSTERESIS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
+from dzdesign.design.machine.texts import machine_of
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal
+from dzdesign.design.signal_text import (
+    command_signal,
+    full_command_V,
+    live_zero_signal,
+    parse_signal,
+    pressure_signal,
+)
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
 from dzdesign.design.zero_band import command_error_of
@@ -32,7 +39,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     full_V = float(converter.full_V)
     text["command_signal"] = text["command_signal"] or f"0..10 V x {full_V / 10:.12g}"
     for name in ("pressure_a", "pressure_b"):
-        text[name] = text[name] or f"0..{full_V:.12g} V"
+        text[name] = text[name] or live_zero_signal(converter)
     span = Fraction(round(parse_quantity(text["pressure_span"], "pressure", "--pressure-span")), 10**6)
     if span <= 0:
         raise InputError(f"--pressure-span is '{text['pressure_span']}', expected more than zero")
@@ -43,17 +50,19 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     signal = parse_signal(text["command_signal"], "--command-signal")
     command = command_signal(signal, converter, inverted=text["polarity"] == "inverted")
     dither_Hz, dither_peak = _dither(text["dither"])
+    signals = Signals(
+        code_max=converter.code_max,
+        compare_max=target.compare_max,
+        sample_Hz=target.sample_Hz,
+        tick_Hz=target.tick_Hz,
+        command=command,
+        swapped=text["negative_dp"] == "swapped",
+        **sensors,
+    )
+    current = current_request(text, target)
     return DesignOptions(
         law=text["law"],
-        signals=Signals(
-            code_max=converter.code_max,
-            compare_max=target.compare_max,
-            sample_Hz=target.sample_Hz,
-            tick_Hz=target.tick_Hz,
-            command=command,
-            swapped=text["negative_dp"] == "swapped",
-            **sensors,
-        ),
+        signals=signals,
         guard=cast(Guard, text["guard"]),
         below_dp0=cast(BelowDp0, text["below_dp0"]),
         transition=_transition(text["transition"]),
@@ -67,7 +76,8 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         reading_flow_L_min=_flow_L_min(text["reading_flow"], "--reading-flow") if text["reading_flow"] else None,
         full_command_V=full_command_V(signal),
         accept=tuple(text["accept"].replace(",", " ").split()),
-        current=current_request(text, target),
+        current=current,
+        machine=machine_of(text, target, signals, current),
         request=DesignRequest(target=target, options=text),
     )
 
