@@ -61,10 +61,10 @@
  * A pressure drop, A less B, below -0.196 MPa means a failed sensor and gives the smallest beta too.
  *
  * At zero command it is 19824 to 20628, by the pressure drop.
- * Certificate: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of the closing
- * threshold, by 0.0182 mV at the least beyond the rounding of readings to codes and of the drive to counts, so that
- * less than 0.13 L/min flows: what the recordings can't show. Errors of the pressure sensors and of their converters
- * beyond rounding are not in it.
+ * Certificate of the recording: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of
+ * the closing threshold, by 0.0182 mV at the least beyond the rounding of readings to codes and of the drive to counts,
+ * so that less than 0.13 L/min flows: what the recordings can't show. No machine was declared: its coil temperature,
+ * supply, pressure sensors and converters beyond rounding, oil and ageing are not in it.
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 

@@ -61,10 +61,11 @@
  * A pressure drop, A less B, below -0.246 MPa means a failed sensor and gives the smallest beta too.
  *
  * At zero command it is 29700 to 30902, by the pressure drop.
- * Certificate: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of the closing
- * threshold, by 0.0104 mV at the least beyond the rounding of readings to codes and of the drive to counts and the
- * dither's peak of 100 mV, which dz_drive adds to it, so that less than 0.13 L/min flows: what the recordings can't
- * show. Errors of the pressure sensors and of their converters beyond rounding are not in it.
+ * Certificate of the recording: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of
+ * the closing threshold, by 0.0104 mV at the least beyond the rounding of readings to codes and of the drive to counts
+ * and the dither's peak of 100 mV, which dz_drive adds to it, so that less than 0.13 L/min flows: what the recordings
+ * can't show. No machine was declared: its coil temperature, supply, pressure sensors and converters beyond rounding,
+ * oil and ageing are not in it.
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
@@ -72,10 +73,11 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
  * The pressure drop is B less A.
  *
  * At zero command it is 16453 to 17407, by the pressure drop.
- * Certificate: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of the closing
- * threshold, by 0.191 mV at the least beyond the rounding of readings to codes and of the drive to counts and the
- * dither's peak of 100 mV, which dz_drive adds to it, so that less than 0.13 L/min flows: what the recordings can't
- * show. Errors of the pressure sensors and of their converters beyond rounding are not in it.
+ * Certificate of the recording: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of
+ * the closing threshold, by 0.191 mV at the least beyond the rounding of readings to codes and of the drive to counts
+ * and the dither's peak of 100 mV, which dz_drive adds to it, so that less than 0.13 L/min flows: what the recordings
+ * can't show. No machine was declared: its coil temperature, supply, pressure sensors and converters beyond rounding,
+ * oil and ageing are not in it.
  */
 uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
