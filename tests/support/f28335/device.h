@@ -33,6 +33,8 @@ extern int device_side;
 extern unsigned device_drive_samples, device_drive_ticks;
 
 void device_power_up(void);
+/* All registers of ePWM and ADC as another program may have left them, before this one starts. */
+void device_leave_behind(uint16_t value);
 /* SCI-A after so many counts more. */
 void device_transmit(unsigned counts);
 void device_settle(void);
