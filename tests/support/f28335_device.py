@@ -56,8 +56,8 @@ def run(program: Path, *words: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def registers(program: Path) -> dict[str, int]:
-    lines = (line.split() for line in run(program, "registers"))
+def registers(program: Path, *left_behind: str) -> dict[str, int]:
+    lines = (line.split() for line in run(program, "registers", *left_behind))
     return {words[0]: int(words[1], 16) for words in lines if len(words) == 2}
 
 

@@ -73,6 +73,11 @@ struct EPWM_REGS
     uint16_t CMPB;
     REGISTER(AQCTL_REG, uint16_t ZRO : 2; uint16_t PRD : 2; uint16_t CAU : 2; uint16_t CAD : 2; uint16_t CBU : 2;
              uint16_t CBD : 2;) AQCTLA;
+    REGISTER(AQCTLB_REG, uint16_t ZRO : 2;) AQCTLB;
+    REGISTER(DBCTL_REG, uint16_t OUT_MODE : 2; uint16_t POLSEL : 2; uint16_t IN_MODE : 2;) DBCTL;
+    REGISTER(PCCTL_REG, uint16_t CHPEN : 1;) PCCTL;
+    REGISTER(TZEINT_REG, uint16_t rsvd1 : 1; uint16_t CBC : 1; uint16_t OST : 1;) TZEINT;
+    REGISTER(HRCNFG_REG, uint16_t EDGMODE : 2; uint16_t CTLMODE : 1; uint16_t HRLOAD : 1;) HRCNFG;
     REGISTER(AQSFRC_REG, uint16_t ACTSFA : 2; uint16_t OTSFA : 1; uint16_t ACTSFB : 2; uint16_t OTSFB : 1;
              uint16_t RLDCSF : 2;) AQSFRC;
     REGISTER(AQCSFRC_REG, uint16_t CSFA : 2; uint16_t CSFB : 2;) AQCSFRC;

@@ -32,7 +32,7 @@ struct protected_registers
     struct SYS_CTRL_REGS sys_ctrl;
     struct GPIO_CTRL_REGS gpio_ctrl;
     struct PIE_VECT_TABLE vectors;
-    uint16_t tzsel[2], tzctl[2], tzclr[2], tzfrc[2];
+    uint16_t tzsel[2], tzctl[2], tzclr[2], tzfrc[2], tzeint[2], hrcnfg[2];
 };
 
 static volatile struct EPWM_REGS *const pwms[2] = {&EPwm1Regs, &EPwm2Regs};
@@ -55,6 +55,8 @@ static struct protected_registers protected_now(void)
         now.tzctl[i] = pwms[i]->TZCTL.all;
         now.tzclr[i] = pwms[i]->TZCLR.all;
         now.tzfrc[i] = pwms[i]->TZFRC.all;
+        now.tzeint[i] = pwms[i]->TZEINT.all;
+        now.hrcnfg[i] = pwms[i]->HRCNFG.all;
     }
     return now;
 }
@@ -70,6 +72,8 @@ void device_settle(void)
         pwms[i]->TZCTL.all = kept.tzctl[i];
         pwms[i]->TZCLR.all = kept.tzclr[i];
         pwms[i]->TZFRC.all = kept.tzfrc[i];
+        pwms[i]->TZEINT.all = kept.tzeint[i];
+        pwms[i]->HRCNFG.all = kept.hrcnfg[i];
     }
 }
 
@@ -195,6 +199,22 @@ void device_power_up(void)
     kept = protected_now();
 }
 
+void device_leave_behind(uint16_t value)
+{
+    EALLOW;
+    for (unsigned i = 0u; i < 2u; i++)
+    {
+        volatile struct EPWM_REGS *const pwm = pwms[i];
+
+        pwm->TBCTL.all = pwm->TBPRD = pwm->CMPCTL.all = pwm->CMPB = pwm->AQCTLA.all = pwm->AQCTLB.all = value;
+        pwm->AQSFRC.all = pwm->AQCSFRC.all = pwm->DBCTL.all = pwm->PCCTL.all = pwm->ETSEL.all = pwm->ETPS.all = value;
+        pwm->TZSEL.all = pwm->TZCTL.all = pwm->TZEINT.all = pwm->HRCNFG.all = value;
+        pwm->TBPHS.all = pwm->CMPA.all = (uint32_t)value << 16 | value;
+    }
+    AdcRegs.ADCTRL1.all = AdcRegs.ADCTRL2.all = AdcRegs.ADCMAXCONV.all = AdcRegs.ADCCHSELSEQ1.all = value;
+    EDIS;
+}
+
 void InitSysCtrl(void)
 {
     puts("InitSysCtrl");
@@ -265,7 +285,7 @@ unsigned device_drive_samples, device_drive_ticks;
 
 void dz_drive_init(struct dz_drive *drive)
 {
-    const struct dz_drive at_rest = {0u, 0u, 0u, 0};
+    const struct dz_drive at_rest = {0u, 0u, 0u, 0u, 0};
     *drive = at_rest;
     device_drive_samples = device_drive_ticks = 0u;
 }

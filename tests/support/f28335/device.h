@@ -38,6 +38,8 @@ extern int device_side;
 extern unsigned device_drive_samples, device_drive_ticks;
 
 void device_power_up(void);
+/* All registers of ePWM and ADC as another program may have left them, before this one starts. */
+void device_leave_behind(uint16_t value);
 
 /* The solenoid and the conversions of its current, in current.c: the pin is high for `duty` counts of the period, the
  * interrupt comes at `at`. Both halves of a period, before the interrupt and from it on; 1 if a conversion runs then. */

@@ -36,6 +36,8 @@ LINE_LOAD_MAX = Fraction(1, 2)
 # Bound of what the main loop spends on one frame: tests/codegen/telemetry/test_frame.py holds it on an AVR, whose
 # 8 bits take several instructions where the C28x takes one.
 FRAME_CYCLES = 6_000
+#: WDFLAG: crystal periods from a falling XRS to the look at it, and those for which a watchdog reset holds it low.
+WDFLAG_PERIODS, WDRST_PERIODS = 4 * 8192 + 512, 512
 EVENT_PRESCALE = {1: "ET_1ST", 2: "ET_2ND", 3: "ET_3RD"}
 
 
@@ -58,6 +60,9 @@ def timing() -> dict[str, str]:
     return {
         **figures,
         "sysclkout_mhz": printed(sysclkout_hz / 10**6),
+        "wdflag_cycles": str(WDFLAG_PERIODS),
+        "wdflag_ms": f"{1e3 * WDFLAG_PERIODS / CRYSTAL_HZ:.2f}",
+        "wdrst_us": f"{1e6 * WDRST_PERIODS / CRYSTAL_HZ:.0f}",
         "crystal_mhz": printed(Fraction(CRYSTAL_HZ, 10**6)),
         "pll_div": str(PLL_DIV),
         "pll_divsel": str(PLL_DIVSEL),
