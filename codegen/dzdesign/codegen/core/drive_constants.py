@@ -60,7 +60,8 @@ def drive_interface_constants(compensator: Compensator) -> list[Define]:
                  engineering=f"{signals.tick_Hz} periods and {signals.sample_Hz} samples a second",
                  data=("signals.tick_Hz", "signals.sample_Hz"), generator=HERE),
         Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=signals.command.zero_code,
-                 equation="Eq. (29), code of zero command", engineering=compensator.valve.recorded_units.text(0.0, "g V"),
+                 equation="Eq. (29), code of zero command",
+                 engineering=compensator.valve.recorded_units.text(0.0, "g V"),
                  rounding="the converter's code, rounded down", data=("signals.command.zero_code",), generator=SIGNALS),
         *(
             Define(symbol=f"DZ_STATUS_{name}", value=1 << place, equation=f"bit {place} of the drive's status word",
