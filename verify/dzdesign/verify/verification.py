@@ -54,8 +54,11 @@ class Verification(ShownInNotebooks):
 
     @property
     def verdict(self) -> str:
-        """In words: what does not hold goes before what could not be checked."""
-        return self.evidence.verdict
+        """In words: what does not hold goes before what could not be checked, and what the certificate is of last."""
+        words = self.evidence.verdict
+        if not self.holds or self.derived is None:
+            return words
+        return f"{words.removesuffix('.')}; the certificate is of {self.derived.certified_of}."
 
     def with_checks(self, *checks: Check) -> "Verification":
         """Return the verification with further requirements."""
@@ -69,6 +72,7 @@ def verify(
     plant_sha256: str | None = None,
     sequence: RampSequence | None = None,
     tolerances: Tolerances | None = None,
+    backs_MPa: Sequence[float] | None = None,
     include: Sequence[Path] = (),
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
@@ -77,7 +81,8 @@ def verify(
 
     Without a `plant` the recorded characteristic stands in for the valve in the closed loop; `plant_source` and
     `plant_sha256` are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about
-    it. `sequence` is the command over time, by default 0-10 V in 100 s and back. In `include` lie headers of the user's
+    it. `sequence` is the command over time, by default 0-10 V in 100 s and back; `backs_MPa` are the pressures behind
+    the edge. In `include` lie headers of the user's
     board files.
     `say` is told each stage before it begins; `watch` is handed the pieces of a long one and their number, and gives
     them back one by one, as they are done.
@@ -91,7 +96,8 @@ def verify(
     compensator = read_compensator(folder)
     host_compiler()
     say("compiling the core with every warning an error")
-    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)  # a compiler's time, not ours
+    # A compiler's time, not ours.
+    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
     core, loop, current = _try_core(folder, manifest, compensator, say), FirmwareLoop(), CurrentChecks()
     if core.inputs:
         current = current_checks(folder, compensator, say)

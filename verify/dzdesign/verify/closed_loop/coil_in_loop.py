@@ -53,6 +53,6 @@ def nominal_coil(compensator: Compensator) -> CoilAtSupply | None:
 def coil_sources(coil: CoilAtSupply | None) -> dict[str, str]:
     """Return what plant_coil.h includes: the coil, or what stands in for it where the drive is by duty."""
     if coil is None:
-        return {"coil.h": files(__package__).joinpath("no_coil.h").read_text(encoding="utf-8")}
+        return {"coil.h": (files(__package__) / "programs" / "no_coil.h").read_text(encoding="utf-8")}
     coil_h = (PROGRAMS / "coil.h").read_text(encoding="utf-8")
     return {"coil.h": coil_h, "tick.h": tick_macro(coil.around.loop)}

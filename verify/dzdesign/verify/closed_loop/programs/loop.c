@@ -13,27 +13,51 @@
 #define EXPORT
 #endif
 
-/* One channel of the converter: code of zero, codes a unit of what it measures, its largest code. */
+/* One channel of the converter: code of zero, codes a unit of what it measures, its largest code; and its errors. */
 struct channel
 {
     double zero;
     double codes;
     double largest;
+    double offset; /* codes */
+    double gain;   /* 1: none */
+    double noise;  /* peak, whole codes */
 };
 
-static struct channel channel_of(int32_t zero, int32_t full, double span, int32_t code_max)
+/* errors: offset, codes; gain error, codes at the largest code; peak of the noise, codes. */
+static struct channel channel_of(int32_t zero, int32_t full, double span, int32_t code_max, const double *errors)
 {
     const double codes = (double)(full - zero);
-    const struct channel channel = {(double)zero, (codes + ((codes > 0.0) ? 1.0 : -1.0)) / span, (double)code_max};
+    const struct channel channel = {(double)zero,
+                                    (codes + ((codes > 0.0) ? 1.0 : -1.0)) / span,
+                                    (double)code_max,
+                                    errors[0],
+                                    1.0 + errors[1] / (double)code_max,
+                                    errors[2]};
 
     return channel;
 }
 
-/* The code of a value: rounded down as converters do, limited to the converter's range. */
-static uint16_t convert(const struct channel *channel, double value)
+/* White noise: whole codes from -peak to peak, each as likely (Marsaglia's xorshift). */
+static double white(uint32_t *seed, double peak)
 {
-    const double code = channel->zero + value * channel->codes;
+    uint32_t next = *seed;
 
+    next ^= next << 13;
+    next ^= next >> 17;
+    next ^= next << 5;
+    *seed = next;
+    return (double)(next % (2u * (uint32_t)peak + 1u)) - peak;
+}
+
+/* The code of a value: rounded down as converters do, limited to the converter's range. */
+static uint16_t convert(const struct channel *channel, double value, uint32_t *seed)
+{
+    double code = (channel->zero + value * channel->codes) * channel->gain + channel->offset;
+
+    if (channel->noise > 0.0) {
+        code += white(seed, channel->noise);
+    }
     return (uint16_t)(int32_t)((code < 0.0) ? 0.0 : ((code > channel->largest) ? channel->largest : code));
 }
 
@@ -50,8 +74,10 @@ struct task
     int32_t mean;      /* the plant has the drive's dither in it already: it takes the law without it */
     const double *command;    /* share of u_max */
     const double *supply_MPa; /* pressure drop at no flow */
-    const double *seen_MPa;   /* pressure drop that the sensors show; not a number: the plant's */
-    double back_MPa;          /* pressure behind the edge */
+    const double *back_MPa;   /* pressure behind the edge */
+    const double *bias_V;     /* drive that is added to the plant's, of another valve or a current's error */
+    const int32_t *shown;     /* codes of sensors A and B; below zero: of the plant's own pressures */
+    uint32_t seed;            /* of the noise, not zero */
     struct channel channels[3]; /* command, pressures A and B */
     const struct coil *coil;    /* what the law's output is the set point of the current in; null: it is the duty */
     const struct sensor *sensor; /* of that current */
@@ -69,35 +95,49 @@ static int32_t waved(const struct task *task, int32_t direct, int32_t place, int
     return (compare < 0) ? 0 : ((compare > counts) ? counts : compare);
 }
 
+/* The codes of sensors A and B. */
+static void read_pressures(const struct task *task, const struct plant *plant, int32_t k, uint32_t *seed, uint16_t *codes)
+{
+    const double back_MPa = task->back_MPa[k];
+    const double ahead_MPa = back_MPa + plant->dp_MPa;
+
+    for (int32_t sensor = 0; sensor < 2; sensor++) {
+        const int32_t shown = task->shown[2 * k + sensor];
+        const double own_MPa = (sensor == task->swapped) ? ahead_MPa : back_MPa;
+
+        codes[sensor] = (shown < 0) ? convert(&task->channels[1 + sensor], own_MPa, seed) : (uint16_t)shown;
+    }
+}
+
 static inline void run(const struct task *task, struct plant *plant, double *record, int linear)
 {
     struct dz_drive drive;
     struct coil_run coil;
     uint16_t compare = 0u;
     int32_t tick = 0;
+    uint32_t seed = task->seed;
 
     dz_drive_init(&drive);
     if (task->coil != NULL) {
         coil_at_rest(&coil, task->coil, task->sensor);
     }
     for (int32_t k = 0; k < task->n; k++) {
-        const uint16_t u_code = convert(&task->channels[0], task->command[k]);
         const uint16_t direct = (uint16_t)(int32_t)(task->command[k] * (double)plant->counts + 0.5);
-        const double seen_MPa = task->seen_MPa[k];
         double sum = 0.0;
         double largest = 0.0;
 
         plant_supply(plant, task->supply_MPa[k]);
+        plant->bias = task->bias_V[k];
         for (int32_t j = 0; j < task->every; j++) {
             const int32_t in_force = (int32_t)compare; /* written in the last period, in force in this one */
 
             if (task->amplifier) {
                 if (tick == 0) {
-                    const double ahead = task->back_MPa + ((seen_MPa == seen_MPa) ? seen_MPa : plant->dp_MPa);
-                    const uint16_t a = convert(&task->channels[1], task->swapped ? task->back_MPa : ahead);
-                    const uint16_t b = convert(&task->channels[2], task->swapped ? ahead : task->back_MPa);
+                    uint16_t pressures[2];
+                    const uint16_t u_code = convert(&task->channels[0], task->command[k], &seed);
 
-                    dz_drive_sample(&drive, u_code, a, b);
+                    read_pressures(task, plant, k, &seed, pressures);
+                    dz_drive_sample(&drive, u_code, pressures[0], pressures[1]);
                     tick = (int32_t)DZ_DRIVE_TICKS_PER_SAMPLE;
                 }
                 tick--;
@@ -126,22 +166,24 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
     }
 }
 
-/* choices: n, every, amplifier, negative, swapped, wave, its ticks, mean, largest code, largest compare value. series,
- * channels: see `task`.
+/* choices: n, every, amplifier, negative, swapped, wave, its ticks, mean, largest code, largest compare value, seed.
+ * series, channels: see `task`; errors: three numbers a channel, see `channel_of`.
  * p, coarse, fine: the plant, see motion.py; curve: its recorded characteristic, see stand_in.py, or null; coil, sensor:
  * of a drive by current, or null.
  * record[n][6]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m. */
-EXPORT void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *seen_MPa,
-                    double back_MPa, const int32_t *zeros, const int32_t *fulls, const double *spans, const double *p,
-                    const double *coarse, const double *fine, const double *curve, const struct coil *coil,
-                    const struct sensor *sensor, double *record)
+EXPORT void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *back_MPa,
+                    const double *bias_V, const int32_t *shown, const int32_t *zeros, const int32_t *fulls,
+                    const double *spans, const double *errors, const double *p, const double *coarse,
+                    const double *fine, const double *curve, const struct coil *coil, const struct sensor *sensor,
+                    double *record)
 {
     struct plant plant;
-    struct task task = {choices[0], choices[1], choices[2], choices[3], choices[4], choices[5], choices[6], choices[7],
-                        command,    supply_MPa, seen_MPa,   back_MPa,   {{0.0, 0.0, 0.0}}, coil, sensor};
+    struct task task = {choices[0], choices[1], choices[2], choices[3], choices[4], choices[5],
+                        choices[6], choices[7], command,    supply_MPa, back_MPa,   bias_V,
+                        shown,      (uint32_t)choices[10],  {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0}}, coil, sensor};
 
     for (int index = 0; index < 3; index++) {
-        task.channels[index] = channel_of(zeros[index], fulls[index], spans[index], choices[8]);
+        task.channels[index] = channel_of(zeros[index], fulls[index], spans[index], choices[8], &errors[3 * index]);
     }
     plant_at_rest(&plant, p, coarse, fine, curve, choices[9], supply_MPa[0]);
     if (p[PLANT_LINEAR] > 0.5) {
