@@ -9,7 +9,7 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.current.circuit import CoilCircuit
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, ClosedLoop, RampSequence
-from dzdesign.verify.closed_loop.scenarios import Scene
+from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.current.results import ValveAtCorners
 from dzdesign.verify.loop_results import flow_in_words
 from dzdesign.verify.requirements import CURRENT_VALVE, Check
