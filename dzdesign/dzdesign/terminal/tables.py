@@ -179,6 +179,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     from dzdesign.design.costs import hidden_failures, lines_of_tests
     from dzdesign.design.signal_descriptions import signals_in_words
     from dzdesign.design.signals import SIDE_NAMES
+    from dzdesign.terminal.budget_table import print_budgets
     from dzdesign.terminal.cost_table import print_costs_at_tests
 
     chosen, units = law(compensator.law), compensator.valve.recorded_units
@@ -221,6 +222,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     for line in (*(f"warning: {line}" for line in hidden), *lines):
         put_line(console, line)
     print_costs_at_tests(compensator, console)
+    print_budgets(compensator, console)
     for line in compensator.costs:
         if line not in elsewhere:
             put_line(console, f"cost: {line}")
