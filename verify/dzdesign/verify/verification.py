@@ -126,7 +126,7 @@ def verify(
         closed_loop=loop.result(plant, plant_source, plant_sha256),
         scenarios=loop.scenarios,
         monte_carlo=loop.monte_carlo,
-        current_loop=current.result,
+        current_loop=current.result and replace(current.result, valve=loop.valve_at_corners),
         mutants=None,
     )
     derived = compensator if law.holds else None
