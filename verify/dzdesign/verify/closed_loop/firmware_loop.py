@@ -13,11 +13,12 @@ from dzdesign.verify.closed_loop.dead_zone import LoopComparison, compare_at_pre
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.closed_loop.population import run_population
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
-from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, ScenarioResult, Side
+from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, Population, ScenarioResult, Side
 from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
@@ -40,6 +41,7 @@ class FirmwareLoop:
     backs_MPa: tuple[float, ...] = ()
     loops: tuple[LoopComparison, ...] = ()
     scenarios: tuple[ScenarioResult, ...] = ()
+    population: Population | None = None
     monte_carlo: MonteCarlo | None = None
 
     def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
@@ -128,15 +130,21 @@ def close_the_loop(
         done = pool.map(lambda scene: tuple(run_scenarios(scene)), scenes)
         scenarios = tuple(result for results in watch(done, len(scenes)) for result in results)
     series = None
-    if tolerances and plant:
+    population = None
+    if tolerances and tolerances.machines:
+        say(f"running {tolerances.machines} machines drawn from the budget (seed {tolerances.seed})")
+        population = run_population(scenes, tolerances.machines, tolerances.seed)
+    if tolerances and tolerances.spreads and plant:
         say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
         pieces = watch(scenes, len(scenes))
         series = monte_carlo(tolerances, [scatter(s.loop, plant, tolerances, s.dp_MPa, s.side) for s in pieces])
+    results = [loop.result for loop in loops]
     return FirmwareLoop(
-        checks=loop_checks([loop.result for loop in loops], scenarios, compensator, plant_given=plant is not None),
+        checks=loop_checks(results, scenarios, compensator, population, plant_given=plant is not None),
         dynamics=scenes[0].plant.parameters if scenes else None,
         backs_MPa=scenes[0].backs_MPa if scenes else (),
         loops=loops,
         scenarios=scenarios,
+        population=population,
         monte_carlo=series,
     )
