@@ -11,6 +11,7 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.worded import worded
 from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import CertifiedBound
@@ -90,8 +91,12 @@ def offset_ceiling(curve: OffsetCurve, u_max_V: Fraction, allowance: Allowance) 
     code_max = signals.largest_difference(allowance.sign)
     if last > code_max:
         raise InputError(
-            f"the sensor's span of {float(signals.pressure_a.span_MPa):g} MPa ends below the tested pressure drop of "
-            f"{float(curve.dp_MPa[-1]):g} MPa; give the real span with --pressure-span"
+            worded(
+                "the sensor's span of {span:g MPa} ends below the tested pressure drop of {tested:g MPa}; give the "
+                "real span with --pressure-span",
+                span=float(signals.pressure_a.span_MPa),
+                tested=float(curve.dp_MPa[-1]),
+            )
         )
     low, high = allowance.window
     factor, kept = allowance.factor / u_max_V, allowance.kept
@@ -107,8 +112,13 @@ def certified_V(curve: OffsetCurve, dp_MPa: Fraction) -> Fraction:
         return offset
     if offset > bound + DECIMALS:
         raise RequirementError(
-            f"beta u_min0 is {float(offset):.4f} V at {float(dp_MPa):.3f} MPa, above the threshold's lower bound "
-            f"of {float(bound):.4f} V; make valve.json again with `dzdesign identify`"
+            worded(
+                "beta u_min0 is {offset:.4f V} at {dp:.3f MPa}, above the threshold's lower bound of {bound:.4f V}; "
+                "make valve.json again with `dzdesign identify`",
+                offset=float(offset),
+                dp=float(dp_MPa),
+                bound=float(bound),
+            )
         )
     return min(offset, bound)
 

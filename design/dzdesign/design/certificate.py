@@ -8,6 +8,7 @@ from dataclasses import fields
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.worded import in_units
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.accounting import budget_of
@@ -76,7 +77,8 @@ def prove_certificates(compensator: Compensator) -> None:
                 denominator=compensator.beta_denominator,
             )
         except RequirementError as error:
-            raise InputError(f"the {name} side's certificate does not hold: {error}; design it again") from error
+            reason = in_units(error, compensator.valve.recorded_units)
+            raise InputError(f"the {name} side's certificate does not hold: {reason}; design it again") from error
         for field in fields(Certificate):
             claim, found = getattr(stated, field.name), getattr(proved, field.name)
             if claim != found:

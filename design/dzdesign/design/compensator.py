@@ -113,6 +113,8 @@ class Compensator(ShownInNotebooks, Artefact):
         if self.u_max_V != Fraction(repr(self.valve.u_max_V)):
             raise RuleError(f"'u_max_V' is {float(self.u_max_V):g}, not that of its valve, {self.valve.u_max_V:g} V")
         self._check_codes()
+        if self.machine is not None and (self.machine.drive == "current") != (self.current_drive is not None):
+            raise RuleError(f"the machine's drive is '{self.machine.drive}', not the one of the compensator")
         if len(self.lot) == 1:
             raise RuleError("the lot has 1 valve, expected none, or two and more")
         if len({valve.name for valve in self.lot}) < len(self.lot):

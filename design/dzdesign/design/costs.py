@@ -144,7 +144,8 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     if not compensator.transition_codes:
         return [
             f"no transition, so no zero band: a zero command that reads {error.zero_band_codes} codes too high "
-            f"({declared}) lifts the drive by {_lift_V(compensator):.3f} V, which the certificate does not count"
+            f"({declared}) lifts the drive by {compensator.valve.recorded_units.text(_lift_V(compensator), '.3f dV')}, "
+            "which the certificate does not count"
         ]
     leave = compensator.drive_functions.leave_zero_codes
     return [

@@ -6,6 +6,7 @@ from fractions import Fraction
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import errors_in, worded
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
@@ -52,7 +53,12 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     RequirementError
         If a proof fails.
     """
-    signals = (options := options or DesignOptions()).signals
+    with errors_in(valve.recorded_units):
+        return _designed(valve, options or DesignOptions(), valve_bytes)
+
+
+def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | None) -> Compensator:
+    signals = options.signals
     law(options.law)
     u_max = _full_command(valve, options)
     if options.current is not None and (machine := options.machine) is not None:
@@ -165,7 +171,9 @@ def _side_law(
     # Half a count less, because the compare value of the offset may be rounded up.
     u_min0 = over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
     if u_min0 <= 0:
-        raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
+        raise InputError(
+            worded("u_min0 is {top:.4f V}, less than one count of the PWM: no dead zone", top=float(top))
+        )
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
 
     def table(under: OffsetCeiling) -> tuple[int, ...]:
@@ -201,10 +209,14 @@ def _refuse_crossed_branches(side: SideModel) -> None:
     for test in side.tests:
         if test.closes_above_opening:
             raise InputError(
-                f"'{test.source}': the valve closes ({test.u_knee_falling_V:.3f} V) above where it opens "
-                f"({test.u_knee_rising_V:.3f} V), as no valve does, so flow at zero command is possible; run "
-                "`identify` again with the meter's true --meter-lag or a right column of time, or take it as it is by "
-                "--accept branch-order"
+                worded(
+                    "'{source}': the valve closes ({closes:.3f V}) above where it opens ({opens:.3f V}), as no valve "
+                    "does, so flow at zero command is possible; run `identify` again with the meter's true "
+                    "--meter-lag or a right column of time, or take it as it is by --accept branch-order",
+                    source=test.source,
+                    closes=test.u_knee_falling_V,
+                    opens=test.u_knee_rising_V,
+                )
             )
 
 

@@ -55,8 +55,11 @@ class Verification(ShownInNotebooks):
 
     @property
     def verdict(self) -> str:
-        """In words: what does not hold goes before what could not be checked."""
-        return self.evidence.verdict
+        """In words: what does not hold goes before what could not be checked, and what the certificate is of last."""
+        words = self.evidence.verdict
+        if not self.holds or self.derived is None:
+            return words
+        return f"{words.removesuffix('.')}; the certificate is of {self.derived.certified_of}."
 
     def with_checks(self, *checks: Check) -> "Verification":
         """Return the verification with further requirements."""

@@ -116,10 +116,10 @@ def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:
     margins = lot_margins(compensator)
     above = sorted((each for each in margins if each.margin_V < 0), key=lambda each: each.margin_V)
     if above:
-        worst = above[0]
+        worst, units = above[0], compensator.valve.recorded_units
         raise RequirementError(
             f"the lot setting over-compensates {len(above)} of {len(margins)} valves of its lot: "
-            f"{and_more([each.name for each in above], NAMED)}; {worst.name} by {-1e3 * float(worst.margin_V):.3f} mV "
-            f"at {float(worst.dp_MPa):.2f} MPa"
+            f"{and_more([each.name for each in above], NAMED)}; {worst.name} by "
+            f"{units.text(-1e3 * float(worst.margin_V), '.3f mV')} at {units.text(float(worst.dp_MPa), '.2f MPa')}"
         )
     return margins

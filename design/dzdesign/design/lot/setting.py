@@ -17,6 +17,7 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.worded import worded
 from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling, pressures_MPa
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
@@ -176,8 +177,14 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
     _, high, lowest = min(ends, key=lambda one: one[1])
     if low > high:
         raise InputError(
-            f"the valves have no tested pressure drop in common ({highest} begins at {float(low):g} MPa, {lowest} ends "
-            f"at {float(high):g} MPa), so no setting is certified for all"
+            worded(
+                "the valves have no tested pressure drop in common ({highest} begins at {low:g MPa}, {lowest} ends at "
+                "{high:g MPa}), so no setting is certified for all",
+                highest=highest,
+                low=float(low),
+                lowest=lowest,
+                high=float(high),
+            )
         )
     return float(low), float(high)
 

@@ -53,7 +53,7 @@ def inputs_section(chain: Chain) -> Section:
     lines, missing = [], ""
     for each in chain.evidence.inputs:
         side = each.side
-        lines += _input_lines(each)
+        lines += _input_lines(each, chain.recorded_units)
         law = laws_of(chain.compensator).get(side)
         map_curves, zero_curves = (_curves(chain, name(side)) for name in (input_map_name, zero_command_name))
         if map_curves and law and chain.compensator:
@@ -68,12 +68,12 @@ def inputs_section(chain: Chain) -> Section:
     return Section(figures=figures, lines=tuple(lines), missing=missing)
 
 
-def _input_lines(found: InputCheck) -> list[str]:
+def _input_lines(found: InputCheck, units: RecordedUnits) -> list[str]:
     line = (
         f"{found.side.capitalize()} commands: {whole(found.inputs)} pairs of command and pressure-difference code "
         f"compared with the exactly rounded law, {whole(found.wrong)} wrong, largest error {found.largest_error} "
         f"counts; {found.over_compensated} pressure codes over-compensated, smallest margin of the C's compare values "
-        f"{1e3 * found.smallest_margin_V:.3f} mV."
+        f"{units.text(1e3 * found.smallest_margin_V, '.3f mV')}."
     )
     return [line, f"First wrong: {found.first_wrong}."] if found.first_wrong else [line]
 
