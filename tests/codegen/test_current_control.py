@@ -113,7 +113,7 @@ def test_the_project_builds_without_a_warning_and_its_selftest_holds(controlled,
     printed = done.stdout + done.stderr
     assert done.returncode == 0, printed
     assert "warning" not in printed
-    assert target == "host" or "89 interrupts, compare values of dz_current_tick()" in printed
+    assert target == "host" or "99 interrupts, compare values of dz_current_tick()" in printed
 
 
 def test_the_manifest_states_every_constant_of_the_controller(controlled, tmp_path):
