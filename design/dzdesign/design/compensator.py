@@ -18,6 +18,7 @@ from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
@@ -81,6 +82,13 @@ class Compensator(ShownInNotebooks, Artefact):
     current_drive: Annotated[
         CurrentDrive | None,
         Meta(description="Current control of the drive; null: the law's output is the PWM's duty."),
+    ] = None
+    machine: Annotated[
+        Machine | None,
+        Meta(
+            description="By how much the machine may differ from the bench, as declared; null: the certificate is of "
+            "the recording, and counts neither coil, supply, sensors, converter, oil nor ageing."
+        ),
     ] = None
     costs: Annotated[tuple[str, ...], Meta(description="What the safe choices cost, in words.")]
     valve_sha256: Annotated[
@@ -175,6 +183,11 @@ class Compensator(ShownInNotebooks, Artefact):
     def negative(self) -> SideLaw | None:
         """The law of negative commands, of a valve with two solenoids."""
         return self.sides.negative
+
+    @property
+    def certified_of(self) -> str:
+        """What the certificate is of: the recording, or the recording and the declared machine."""
+        return "the recording" if self.machine is None else "the recording and the declared machine"
 
     @property
     def valve_json_sha256(self) -> str:

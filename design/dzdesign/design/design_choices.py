@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, Option, Text, arguments_of
 from dzdesign.derivation.laws import LAW_NAMES
-from dzdesign.design.current.current_choices import CurrentChoices
+from dzdesign.design.current.choices import CurrentChoices
 
 if TYPE_CHECKING:
     from dzdesign.design.target_inputs import TargetInputs

@@ -8,7 +8,7 @@ from dzdesign.core.dither import parted
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
-from dzdesign.design.current.current_texts import current_request
+from dzdesign.design.current.texts import current_request
 from dzdesign.design.design_choices import DEFAULTS, HYSTERESIS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal

@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.design.machine.budget import Budget
 from dzdesign.identify.valve.guard_curve import Guard
 
 Node = Annotated[int, Meta(ge=1, le=2**31)]
@@ -79,6 +80,10 @@ class SideLaw:
         ),
     ] = None
     certificate: Annotated[Certificate, Meta(description="What is proved.")]
+    budget: Annotated[
+        Budget | None,
+        Meta(description="What keeps the offset under the identified threshold, component by component."),
+    ] = None
 
     def __post_init__(self) -> None:
         if not 0 < self.u_min0_over_u_max < 1:

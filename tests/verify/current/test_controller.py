@@ -56,6 +56,14 @@ def test_the_states_reach_every_part_of_the_controller(name):
 
 
 @needs_compiler
+def test_no_two_blocks_have_the_same_states():
+    """Seeds of neighbours once began alike: of ten million states only five were different ones."""
+    host = HostStates(PLAIN, current_texts(PLAIN))
+    inputs = {host.periods(seed, 50)[0]["total"].tobytes() for seed in range(2_000)}
+    assert len(inputs) == 2_000
+
+
+@needs_compiler
 @on_every_loop
 def test_both_forms_of_the_exact_controller_agree(name):
     loop = LOOPS[name]

@@ -12,7 +12,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.verify.current.exact_controller import ExactController, exact_ticks
 from dzdesign.verify.toolchain.host_compiler import load_library
-from dzdesign.verify.toolchain.machines import CORTEX_M4, Machine
+from dzdesign.verify.toolchain.machines import Machine
 
 PROGRAMS = Path(str(files("dzdesign.verify.current"))) / "programs"
 BLOCK = 10_000
@@ -153,8 +153,8 @@ def hashes_on(
     machine: Machine, loop: CurrentLoop, core: Mapping[str, str], states: int, seed: int = SEED
 ) -> tuple[int, ...]:
     """Return the hashes of the same states by the machine code of another machine."""
-    main = "on_cortex_m4.c" if machine.name == CORTEX_M4.name else "on_avr.c"
-    sources = {name: text.encode() for name, text in program_files(loop, core, main).items()}
+    main = "on_machine.c"
+    sources = {name: text.encode() for name, text in program_files(loop, core, main).items()} | machine.headers
     counts = {"BLOCKS": -(-states // BLOCK), "BLOCK": min(states, BLOCK), "OFFSETS": OFFSETS, "SEED": seed}
     defined = tuple(f"-D{name}=UINT32_C({count})" for name, count in counts.items())
     objects = [machine.compile("dz_current.c", sources, machine.core_flags, "the current controller")]
@@ -164,7 +164,7 @@ def hashes_on(
     ]
     what = f"the current controller ({machine.name})"
     printed = machine.run(machine.link(objects, what), [], what)
-    hashes = tuple(row[0] for row in printed if len(row) == 1)
+    hashes = tuple(printed[0]) if printed else ()
     if len(hashes) != counts["BLOCKS"] + 1:
         raise RequirementError(f"{what} reported {len(hashes)} hashes, expected {counts['BLOCKS'] + 1}")
     return hashes

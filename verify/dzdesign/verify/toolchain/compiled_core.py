@@ -61,7 +61,7 @@ class CompiledCore:
         core = self.compiled(machine)
         called = (f"-DDZ_{name.upper()}=dz_{name}{self._ending}" for name in ("status", "beta"))
         flags = (*machine.check_flags, f"-DDZ_CORE=dz_comp{self._ending}", *called)
-        check = {name: _read(PROGRAMS / name) for name in (*CHECK, machine.main)}
+        check = {name: _read(PROGRAMS / name) for name in (*CHECK, machine.main)} | machine.headers
         units = [name for name in check if name.endswith(".c")]
         objects = [core, *(machine.compile(name, check, flags, "the check") for name in units)]
         arguments = []

@@ -41,6 +41,8 @@ class Machine:
     check_flags: tuple[str, ...]
     #: The program's file in programs/.
     main: str
+    #: File there with how a program starts, puts numbers and ends, which it includes as machine.h; empty: not needed.
+    start_up: str = ""
     #: ``{programs}`` is the folder of that name.
     link_flags: tuple[str, ...] = ()
     #: Of the prepared inputs in the program; empty: they are a file that it reads.
@@ -59,6 +61,11 @@ class Machine:
         absent = [program for program in self.needs if not shutil.which(program)]
         packages = sorted({self.needs[program] for program in absent})
         return f"{' and '.join(absent)} not found; apt install {' '.join(packages)}" if absent else ""
+
+    @property
+    def headers(self) -> dict[str, bytes]:
+        """What a program's own file includes of the machine, by name."""
+        return {"machine.h": (PROGRAMS / self.start_up).read_bytes()} if self.start_up else {}
 
     @property
     def _compiler(self) -> str:
@@ -112,6 +119,7 @@ CORTEX_M4 = Machine(
     core_flags=(*_M4, "-std=c99", "-ffreestanding", "-ffunction-sections", "-fdata-sections", "-O2"),
     check_flags=(*_M4, "-std=gnu99", "-ffreestanding", "-ffunction-sections", "-O2", "-funroll-loops"),
     main="cortex_m4.c",
+    start_up="start_cortex_m4.h",
     link_flags=(*_M4, "-nostartfiles", "-nostdlib", "-T", "{programs}/cortex_m4.ld", "-Wl,--gc-sections", "-lgcc"),
     section='.section .rodata, "a", %progbits',
     runner=(
@@ -130,6 +138,7 @@ AVR = Machine(
     # Without -fno-ivopts GCC 5.4 ends with an internal error where tables lie in program memory.
     check_flags=(*_AVR, "-std=gnu99", "-O2", "-fno-ivopts"),
     main="avr.c",
+    start_up="start_avr.h",
     link_flags=(*_AVR, "-Wl,--gc-sections"),
     section='.section .progmem.data, "a", @progbits',
     runner=("simavr", "-m", CHIP, "-f", str(CLOCK_HZ)),

@@ -16,6 +16,12 @@ static uint32_t any(void)
     return random_state;
 }
 
+/* Neighbouring seeds must not begin alike: an odd number that spreads over all bits. */
+static void begin(uint32_t seed)
+{
+    random_state = ((seed << 1) | 1u) * 0x9E3779B1u;
+}
+
 static uint16_t drawn(const uint16_t *edges, uint16_t count)
 {
     const uint32_t random = any();
@@ -72,7 +78,7 @@ uint32_t current_states(uint32_t seed, uint32_t count, struct period *periods)
     struct dz_current loop;
     uint32_t hash = seed;
 
-    random_state = seed | 1u;
+    begin(seed);
     for (uint32_t k = 0u; k < count; k++) {
         uint16_t set_point, sum, supply;
         struct dz_current before;
@@ -101,7 +107,7 @@ uint32_t current_offsets(uint32_t seed, uint32_t count, struct dz_current *ends,
 {
     uint32_t hash = seed;
 
-    random_state = seed | 1u;
+    begin(seed);
     for (uint32_t k = 0u; k < count; k++) {
         struct dz_current loop;
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
+from dzdesign.design.current.choices import DRIVES, NEEDED, OF_CURRENT
 from dzdesign.design.current.choosing import CurrentSensor
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
-from dzdesign.design.current.current_choices import DRIVES, NEEDED, OF_CURRENT
 from dzdesign.design.current.drive import CurrentRequest
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.design.target_inputs import TargetInputs

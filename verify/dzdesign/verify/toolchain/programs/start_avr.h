@@ -1,11 +1,12 @@
-/* Hashes of blocks of states on an ATmega1280 in simavr, whose int has 16 bits: to the UART. */
+/* A program on an ATmega1280 in simavr, whose int has 16 bits: what it puts goes to the UART. */
+#ifndef DZ_MACHINE_H
+#define DZ_MACHINE_H
+
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>
 
-#include <stddef.h>
-
-#include "current_states.h"
+#include <stdint.h>
 
 static void put_letter(char letter)
 {
@@ -14,6 +15,7 @@ static void put_letter(char letter)
     UDR0 = (uint8_t)letter;
 }
 
+/* One number; all of them stand in one line. */
 static void put(uint32_t value)
 {
     char digits[10];
@@ -27,19 +29,21 @@ static void put(uint32_t value)
         put_letter(digits[--count]);
     }
     put_letter(' ');
-    put_letter('\n');
 }
+
+/* What the program does, written behind this. */
+static void program(void);
 
 int main(void)
 {
     UCSR0B = _BV(TXEN0);
     UBRR0 = 0;
-    for (uint32_t block = 0u; block < BLOCKS; block++) {
-        put(current_states(block + SEED, BLOCK, NULL));
-    }
-    put(current_offsets(SEED, OFFSETS, NULL, NULL));
+    program();
+    put_letter('\n');
     cli();
     sleep_enable();
     sleep_cpu(); /* with interrupts off: simavr ends */
     return 0;
 }
+
+#endif

@@ -1,0 +1,103 @@
+"""`Budget`: what lowers the offset under the identified threshold, in the form of the GUM (JCGM 100), of one side.
+
+Component, origin, half-width, sensitivity, contribution. All of it is systematic and one-sided: nothing averages out,
+so nothing is added in squares. The drive, oil and ageing multiply, the pressures' half-widths add before the least
+bound over them is taken, and the counts of the drive are subtracted last.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, quantity
+
+#: How the contributions add, for a person.
+ADDED_IN_FULL = (
+    "systematic and one-sided, so added in full: half-widths of the pressures add up before the least bound over them "
+    "is taken, drive, oil and ageing multiply it, counts and the current's rest are subtracted last"
+)
+Origin = Literal["measured", "declared", "default"]
+#: Components, in the order of the table.
+Component = Literal[
+    "recording",
+    "bench pressure drop",
+    "pressure sensor A",
+    "pressure sensor B",
+    "pressure converter offset",
+    "pressure converter gain",
+    "pressure converter noise",
+    "coil temperature",
+    "supply",
+    "amplifier",
+    "current",
+    "current's rest",
+    "bench current",
+    "oil",
+    "ageing",
+    "rounding of pressures",
+    "rounding of the drive",
+    "dither",
+]
+#: Of a number in mV: below every error here.
+DIGITS_mV = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BudgetLine:
+    """One component."""
+
+    component: Annotated[Component, Meta(description="What may differ.")]
+    origin: Annotated[Origin, Meta(description="Measured from the recordings, declared, or a default.")]
+    source: Annotated[str, Meta(description="Where it is from, in words: an option, or whose default.")]
+    half_width: Annotated[float, Meta(description="By how much, in `unit`; of a range its end that lowers the offset.")]
+    unit: Annotated[str, Meta(description="Unit of the half-width: V, MPa, codes, counts, K, V or 1 (a share).")]
+    sensitivity_mV: Annotated[
+        tuple[float, ...], quantity("mV", "Contribution for one unit, at each tested pressure drop.")
+    ]
+    contribution_mV: Annotated[
+        tuple[float, ...],
+        quantity("mV", "By how much it alone lowers the certified threshold, at each tested pressure drop."),
+    ]
+    price: Annotated[
+        float,
+        quantity(
+            "1",
+            "By how much the offset would rise if this component alone were zero, over full command, at most of the "
+            "tested pressure drops: what its dead zone costs.",
+        ),
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """Uncertainty budget of one side, at its tested pressure drops."""
+
+    dp_MPa: Annotated[tuple[float, ...], quantity("MPa", "Tested pressure drops.")]
+    threshold_V: Annotated[tuple[float, ...], quantity("V", "Guarded threshold there, as the recordings have it.")]
+    ceiling_V: Annotated[
+        tuple[float, ...], quantity("V", "Largest offset there that the certificate allows: all of the budget less.")
+    ]
+    lines: Annotated[tuple[BudgetLine, ...], Meta(description="The components.")]
+
+    def __post_init__(self) -> None:
+        tables: list[Sequence[float]] = [self.threshold_V, self.ceiling_V]
+        tables += [each for line in self.lines for each in (line.sensitivity_mV, line.contribution_mV)]
+        if any(len(each) != len(self.dp_MPa) for each in tables):
+            raise RuleError(f"the budget's columns are not of its {len(self.dp_MPa)} pressure drops")
+
+    @property
+    def combined_mV(self) -> tuple[float, ...]:
+        """What all components together take from the threshold at each tested pressure drop."""
+        pairs = zip(self.threshold_V, self.ceiling_V, strict=True)
+        return tuple(round(1e3 * (threshold - ceiling), DIGITS_mV) for threshold, ceiling in pairs)
+
+    def line(self, component: Component) -> BudgetLine | None:
+        """Return a component's line; None where it does not count."""
+        return next((line for line in self.lines if line.component == component), None)
+
+    @property
+    def largest(self) -> BudgetLine:
+        """The component that costs most."""
+        return max(self.lines, key=lambda line: line.price)

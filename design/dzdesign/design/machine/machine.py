@@ -1,0 +1,171 @@
+"""`Machine`: by how much a machine may differ from the bench on which the valve was recorded, as declared.
+
+The valve's threshold is a current. What the firmware puts out for it differs from machine to machine with the coil's
+resistance, the supply and the sensors; oil and ageing move the threshold itself.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import RuleError, quantity
+
+#: Temperature coefficient of copper about 20 degC, 1/K (IEC 60028): R = R20 (1 + alpha (T - 20)).
+COPPER_PER_K = Fraction("0.00393")
+REFERENCE_C = 20
+#: Temperatures that a solenoid's coil survives, and supplies, V.
+COIL_C, SUPPLY_V = (-60.0, 250.0), (1.0, 1000.0)
+#: Larger relative errors are no tolerance.
+LARGEST_SHARE = 0.5
+LARGEST_MPa = 100.0
+
+#: What stands between the law's output and the coil.
+DriveKind = Literal["duty", "amplifier", "current"]
+#: Keys that are null for another drive; temperature and supply may be declared for any.
+NEEDED_BY: Mapping[str, tuple[DriveKind, ...]] = {
+    "coil_temperature_C": ("duty",),
+    "supply_V": ("duty",),
+    "amplifier_error": ("amplifier",),
+    "current_error": ("current",),
+    "current_rest_error": ("current",),
+    "bench_current_error": ("current",),
+}
+Share = Annotated[float, Meta(ge=0, le=LARGEST_SHARE)]
+Pressure = Annotated[float, Meta(ge=0, le=LARGEST_MPa)]
+Error = Annotated[int, Meta(ge=0, le=4095)]
+Temperature = Annotated[float, Meta(ge=COIL_C[0], le=COIL_C[1])]
+Supply = Annotated[float, Meta(ge=SUPPLY_V[0], le=SUPPLY_V[1])]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Machine:
+    """By how much the machine may differ from the bench; every error is a half-width, and systematic."""
+
+    drive: Annotated[
+        DriveKind,
+        Meta(
+            description="duty: the PWM switches the coil itself, so the threshold as a duty goes with R/V. amplifier: "
+            "one that controls the current stands between. current: the firmware controls it."
+        ),
+    ]
+    coil_temperature_C: Annotated[
+        tuple[Temperature, Temperature],
+        quantity("degC", "Coldest and hottest coil; null where the current is controlled and nobody declared it."),
+    ] | None = None
+    bench_coil_C: Annotated[
+        Temperature, quantity("degC", "Coil while the ramps were recorded; null with its range.")
+    ] | None = None
+    supply_V: Annotated[
+        tuple[Supply, Supply],
+        quantity("V", "Lowest and highest supply; null where an amplifier was declared and it was not."),
+    ] | None = None
+    bench_supply_V: Annotated[
+        Supply, quantity("V", "Supply while the ramps were recorded; null with its range.")
+    ] | None = None
+    amplifier_error: Annotated[
+        Share,
+        quantity("1", "By how much the amplifier's current for a drive may differ from that of the bench; else null."),
+    ] | None = None
+    current_error: Annotated[
+        Share,
+        quantity(
+            "1", "Error of the controlled current, of its value: shunt, amplifier, converter's gain; null by duty."
+        ),
+    ] | None = None
+    current_rest_error: Annotated[
+        Share,
+        quantity(
+            "1", "What rounding and the calibrated offset leave of it, of the rated current; null by duty."
+        ),
+    ] | None = None
+    bench_current_error: Annotated[
+        Share,
+        quantity("1", "Error of the bench's current at a recorded command, of its value; null by duty."),
+    ] | None = None
+    pressure_error_a_MPa: Annotated[
+        Pressure, quantity("MPa", "Error of the sensor ahead of the metering edge, offset and gain together.")
+    ]
+    pressure_error_b_MPa: Annotated[Pressure, quantity("MPa", "The same of the sensor behind it.")]
+    bench_pressure_error_MPa: Annotated[Pressure, quantity("MPa", "Error of the recorded pressure drop.")]
+    pressure_offset_codes: Annotated[Error, Meta(description="Offset of the converter on each pressure channel.")]
+    pressure_gain_codes: Annotated[
+        Error, Meta(description="Its gain error on each pressure channel, at the top of its range.")
+    ]
+    pressure_noise_codes: Annotated[Error, Meta(description="Peak of its noise on each pressure channel.")]
+    oil_error: Annotated[Share, quantity("1", "By how much the oil's temperature moves the threshold, of its value.")]
+    ageing_error: Annotated[Share, quantity("1", "By how much ageing moves the threshold, of its value.")]
+    defaults: Annotated[
+        Mapping[str, str], Meta(description="Keys above that nobody declared, and whose value each one took.")
+    ]
+
+    def __post_init__(self) -> None:
+        _check_ends("the coil's temperature", "degC", self.coil_temperature_C, self.bench_coil_C)
+        _check_ends("the supply", "V", self.supply_V, self.bench_supply_V)
+        for name, drives in NEEDED_BY.items():
+            missing = getattr(self, name) is None
+            if missing and self.drive in drives:
+                raise RuleError(f"{name} is missing in a machine whose drive is '{self.drive}'")
+            if not missing and self.drive not in drives and not name.endswith(("_C", "_V")):
+                raise RuleError(f"{name} stands in a machine whose drive is '{self.drive}'")
+        if unknown := set(self.defaults) - set(self.__slots__):
+            raise RuleError(f"'defaults' names {sorted(unknown)[0]!r}, expected a key of the machine")
+
+    def drive_factor(
+        self, temperature_C: float = float(REFERENCE_C), supply_V: float = 0.0, current_ratio: float = 1.0
+    ) -> Fraction:
+        """Return the threshold as a drive on the machine over that on the bench, exactly.
+
+        Parameters
+        ----------
+        temperature_C, supply_V : float
+            Of the machine; they count where the duty goes straight to the coil.
+        current_ratio : float
+            Current for a drive over that on the bench; it counts with an amplifier or a controlled current.
+        """
+        if self.drive != "duty":
+            return 1 / _exact(current_ratio)
+        bench_C, bench_V = _exact(self.bench_coil_C or 0.0), _exact(self.bench_supply_V or 0.0)
+        return _resistance(_exact(temperature_C)) / _resistance(bench_C) * bench_V / _exact(supply_V)
+
+    @property
+    def drive_factors(self) -> tuple[Fraction, Fraction]:
+        """The least and the largest of `drive_factor` over all that is declared."""
+        if self.drive == "duty":
+            corners = product(self.coil_temperature_C or (), self.supply_V or ())
+            factors = [self.drive_factor(temperature_C, supply_V) for temperature_C, supply_V in corners]
+        else:
+            error = _exact((self.amplifier_error if self.drive == "amplifier" else self.current_error) or 0.0)
+            bench = _exact(self.bench_current_error or 0.0)
+            factors = [(1 - bench) / (1 + error), (1 + bench) / (1 - error)]
+        return min(factors), max(factors)
+
+    @property
+    def least_factor(self) -> Fraction:
+        """The least threshold over that on the bench: drive, oil and ageing all at their worst."""
+        return self.drive_factors[0] * (1 - _exact(self.oil_error)) * (1 - _exact(self.ageing_error))
+
+    @property
+    def largest_factor(self) -> Fraction:
+        """The largest threshold over that on the bench."""
+        return self.drive_factors[1] * (1 + _exact(self.oil_error)) * (1 + _exact(self.ageing_error))
+
+
+def _exact(value: float) -> Fraction:
+    """Return the decimal number that stands in the file."""
+    return Fraction(repr(value))
+
+
+def _resistance(temperature_C: Fraction) -> Fraction:
+    """Return a copper coil's resistance over that at 20 degC."""
+    return 1 + COPPER_PER_K * (temperature_C - REFERENCE_C)
+
+
+def _check_ends(what: str, unit: str, ends: tuple[float, float] | None, bench: float | None) -> None:
+    if (ends is None) != (bench is None):
+        raise RuleError(f"{what} needs both, its range on the machine and its value on the bench")
+    if ends is not None and ends[0] > ends[1]:
+        raise RuleError(f"{what} runs from {ends[0]:g} to {ends[1]:g} {unit}, expected the lower end first")
