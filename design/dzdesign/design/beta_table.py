@@ -9,6 +9,7 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.above_tests import OffsetAbove
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 
@@ -18,6 +19,8 @@ STEP_CODES = 64
 DECIMALS = Fraction(1, 10**6)
 #: Distance kept from the bounds for the LP solver's tolerance; the exact proof below does not rely on it.
 SOLVER_MARGIN = 1e-7
+#: Worth of a code above the tests beside one of a tested pressure drop.
+WORTH_ABOVE = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,13 +45,17 @@ class OffsetCurve:
     certified: CertifiedBound | None
     #: Up to this dP0 the offset is at most the one there, as Eq. (7) holds beta = 1; None follows the tests.
     hold_below_MPa: Fraction | None
+    #: How it goes on above the tests; None: the last offset is held, and nothing is certified.
+    above: OffsetAbove | None = None
 
     def at(self, dp_MPa: Fraction) -> Fraction:
         """Return the offset in V by the selector of Eq. (7).
 
         For dP <= dP0 the paper holds beta = 1; where the threshold grows with dP that would over-compensate, so there
-        the smaller of the two is taken. Outside the tested interval the nearest node is held.
+        the smaller of the two is taken. Below the tested interval the first node is held.
         """
+        if self.above is not None and dp_MPa > self.dp_MPa[-1]:
+            return self.above.at(dp_MPa)
         value = self._straight(dp_MPa)
         if self.hold_below_MPa is not None and dp_MPa <= self.hold_below_MPa:
             value = min(value, self._straight(self.hold_below_MPa))
@@ -65,7 +72,9 @@ class OffsetCurve:
         return offset[right - 1] + share * (offset[right] - offset[right - 1])
 
     def bound(self, dp_MPa: Fraction) -> Fraction | None:
-        """Return the lower bound of the guarded threshold at dP in V, or None outside the tested interval."""
+        """Return the lower bound of the guarded threshold at dP in V, or None where nothing is certified."""
+        if self.above is not None and dp_MPa > self.dp_MPa[-1]:
+            return self.above.bound_at(dp_MPa)
         return None if self.certified is None else self.certified.at(dp_MPa)
 
 
@@ -107,8 +116,21 @@ def offset_ceiling(
     return OffsetCeiling(limit=limit, certified=range(ceil(first), floor(last) + 1))
 
 
+def with_release(ceiling: OffsetCeiling, u_min0: Fraction, denominator: int) -> OffsetCeiling:
+    """Return a ceiling that above the tests leaves room for the least beta: one unit, an offset that is let go."""
+    least, above = u_min0 / denominator, ceiling.certified.stop
+    limit = (value if code < above else max(value, least) for code, value in enumerate(ceiling.limit))
+    return OffsetCeiling(limit=tuple(limit), certified=ceiling.certified)
+
+
 def choose_beta_table(
-    ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, *, denominator: int, above_one: bool
+    ceiling: OffsetCeiling,
+    u_min0: Fraction,
+    trend: str | None,
+    *,
+    denominator: int,
+    above_one: bool,
+    turns_at: int | None = None,
 ) -> tuple[int, ...]:
     """Choose the nodes of beta that give the largest offset under the ceiling: a linear programme, then integers.
 
@@ -124,6 +146,8 @@ def choose_beta_table(
         Of the nodes.
     above_one : bool
         Whether beta may exceed 1: where the threshold grows with dP, or the tests below dP0 are followed.
+    turns_at : int, optional
+        Code of the last test where beta falls above it, whatever the trend. What it has at the tests comes first then.
 
     Returns
     -------
@@ -143,27 +167,36 @@ def choose_beta_table(
     limit = np.array([float(value / u_min0) for value in ceiling.limit]) - SOLVER_MARGIN
     beta = cp.Variable(size)
     constraints = [weights @ beta <= limit, beta <= (2 - 2 / denominator if above_one else 1)]
+    last = size - 1 if turns_at is None else min(turns_at // STEP_CODES, size - 1)
+    steps = cp.diff(beta[: last + 1]) if last else np.zeros(1)
     if trend == "decreasing":
-        constraints.append(cp.diff(beta) <= 0)
+        constraints.append(steps <= 0)
     elif trend == "increasing":
-        constraints.append(cp.diff(beta) >= 0)
+        constraints.append(steps >= 0)
     else:
-        constraints.append(cp.diff(beta) == 0)
-    problem = cp.Problem(cp.Maximize(cp.sum(weights @ beta) + beta[-1]), constraints)
+        constraints.append(steps == 0)
+    worth = np.ones(codes.size)
+    if turns_at is not None:
+        # Of the segment in which the tests end the upper node is already above them.
+        falls_from = last + 1 if trend == "increasing" else last
+        if falls_from + 1 < size:
+            constraints.append(cp.diff(beta[falls_from:]) <= 0)
+        worth[turns_at + 1 :] = WORTH_ABOVE
+    problem = cp.Problem(cp.Maximize(worth @ (weights @ beta) + worth[-1] * beta[-1]), constraints)
     problem.solve(solver=cp.HIGHS)  # a simplex ends in a vertex: no interior-point fuzz to round away
     if problem.status != cp.OPTIMAL:
         raise RequirementError(f"no table of beta lies under the certified offset (solver: {problem.status})")
     # A thousandth of a count, so that a beta of 1 to within the solver's error stays 1.
-    nodes = [int(np.floor(value * denominator + 1e-3)) for value in beta.value]
+    nodes = [max(int(np.floor(value * denominator + 1e-3)), 1) for value in beta.value]
     # Rounding down keeps the direction; a last node above its neighbour by the solver's error is put right.
     for position in range(1, size):
-        if trend != "increasing":
+        if trend != "increasing" or position > last + 1:
             nodes[position] = min(nodes[position], nodes[position - 1])
-    return _lower_until_proved(nodes, ceiling, u_min0, trend, denominator)
+    return _lower_until_proved(nodes, ceiling, u_min0, trend, denominator, last)
 
 
 def _lower_until_proved(
-    nodes: list[int], ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, denominator: int
+    nodes: list[int], ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, denominator: int, last: int
 ) -> tuple[int, ...]:
     """Lower nodes by single counts until every code is proved, in exact arithmetic, to lie under the ceiling."""
     scale = denominator * STEP_CODES
@@ -174,10 +207,8 @@ def _lower_until_proved(
             nodes[high] -= 1
             if nodes[high] <= 0:
                 raise RequirementError("no positive offset lies under the certified one; check valve.json")
-    order = range(len(nodes) - 1, 0, -1) if trend == "increasing" else range(1, len(nodes))
-    for position in order:
-        if trend == "increasing":
-            nodes[position - 1] = min(nodes[position - 1], nodes[position])
-        else:
-            nodes[position] = min(nodes[position], nodes[position - 1])
+    for position in range(last, 0, -1) if trend == "increasing" else ():
+        nodes[position - 1] = min(nodes[position - 1], nodes[position])
+    for position in range(last + 2 if trend == "increasing" else 1, len(nodes)):
+        nodes[position] = min(nodes[position], nodes[position - 1])
     return tuple(nodes)

@@ -9,15 +9,17 @@ from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
-from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
-from dzdesign.design.certificate import certify, guarded_curve, hold_below
+from dzdesign.design.above_tests import AboveChoice
+from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, choose_beta_table, offset_ceiling, with_release
+from dzdesign.design.certificate import certify, guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
+from dzdesign.design.opening_offset import opening_ceiling, opening_offset
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
 from dzdesign.design.quantise import Units, finest_units, fits
 from dzdesign.design.side_law import SideLaw, Sides
-from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.reading_flow import default_reading_flow
@@ -25,8 +27,6 @@ from dzdesign.identify.valve.side_model import SideModel
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
-#: Standard errors by which the transition's end stands above the opening threshold.
-OPENING_ERRORS = 3
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
@@ -70,6 +70,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         options=request.options if request else None,
         law=options.law,
         below_dp0=options.below_dp0,
+        above=options.above,
         signals=signals,
         u_max_V=u_max,
         sides=Sides(positive=laws[1], negative=laws.get(-1)),
@@ -141,8 +142,9 @@ def _side_law(
     signals = options.signals
     if "branch-order" not in options.accept:
         _refuse_crossed_branches(side)
-    certified = guarded_curve(side, options.guard, options.below_dp0)
-    opening = _opening_curve(side, options) if transition_codes else None
+    above = AboveChoice(choice=options.above, signals=signals, sign=sign, step_codes=STEP_CODES)
+    certified = guarded_curve(side, options.guard, options.below_dp0, above)
+    opening = opening_offset(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))
     top = (opening or certified).at(reference)
     # Half a count less, because the compare value of the offset may be rounded up.
@@ -151,16 +153,22 @@ def _side_law(
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
     ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither_counts)
+    turns_at = None
+    if certified.above is not None:
+        ceiling, turns_at = with_release(ceiling, u_min0, units.beta), ceiling.certified.stop - 1
     if min(ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 
     def table(under: OffsetCeiling) -> tuple[int, ...]:
-        return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
+        return choose_beta_table(
+            under, u_min0, side.trend, denominator=units.beta, above_one=above_one, turns_at=turns_at
+        )
 
     beta = table(ceiling)
     transition_beta = None
     if opening is not None:
-        upper = table(_opening_ceiling(opening, signals, u_max, sign))
+        at_opening = opening_ceiling(opening, certified, ceiling.certified, signals, u_max, sign)
+        upper = table(at_opening if turns_at is None else with_release(at_opening, u_min0, units.beta))
         transition_beta = tuple(map(max, upper, beta))
     return SideLaw(
         drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
@@ -211,33 +219,6 @@ def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
         + (f"take --guard {common[0]}, or " if common else "no guard serves both sides: ")
         + "record both branches of both sides"
     )
-
-
-def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
-    """Return where the transition ends and the law goes on: the opening threshold, and its error on top.
-
-    A law that starts above the threshold only shortens the dead zone that is left; one that starts below lengthens it.
-    """
-    opening = side.opening_curve
-    if opening is None:
-        raise InputError(
-            "a transition ends at the opening threshold, of which valve.json has no curve; record the rising branch "
-            "with a column of dP, make valve.json again, or give --transition off"
-        )
-    error = max(opening.u_se_V)
-    offset = [Fraction(repr(value)) + OPENING_ERRORS * Fraction(repr(error)) for value in opening.u_V]
-    return OffsetCurve(
-        dp_MPa=tuple(Fraction(repr(value)) for value in opening.dp_MPa),
-        offset_V=tuple(offset),
-        certified=None,
-        hold_below_MPa=hold_below(side, options.below_dp0),
-    )
-
-
-def _opening_ceiling(opening: OffsetCurve, signals: Signals, u_max: Fraction, sign: int) -> OffsetCeiling:
-    """Return the opening threshold at every pressure code: no bound, so rounding to codes does not count."""
-    codes = range(signals.largest_difference(sign) + 1)
-    return OffsetCeiling(limit=tuple(opening.at(signals.dp_MPa(code)) / u_max for code in codes), certified=range(0))
 
 
 def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:

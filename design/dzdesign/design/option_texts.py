@@ -9,7 +9,15 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.texts import current_request
-from dzdesign.design.design_choices import DEFAULTS, HYSTERESIS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
+from dzdesign.design.design_choices import (
+    DEFAULTS,
+    HYSTERESIS,
+    NEGATIVE_DP,
+    POLARITIES,
+    Above,
+    BelowDp0,
+    DesignRequest,
+)
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
@@ -56,6 +64,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         ),
         guard=cast(Guard, text["guard"]),
         below_dp0=cast(BelowDp0, text["below_dp0"]),
+        above=cast(Above, text["above"]),
         transition=_transition(text["transition"]),
         command_error=command_error_of(text["command_error"], converter, command),
         ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),

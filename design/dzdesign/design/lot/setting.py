@@ -17,7 +17,16 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling, pressures_MPa
+from dzdesign.design.above_tests import AboveChoice
+from dzdesign.design.beta_table import (
+    STEP_CODES,
+    OffsetCeiling,
+    OffsetCurve,
+    choose_beta_table,
+    offset_ceiling,
+    pressures_MPa,
+    with_release,
+)
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
@@ -35,7 +44,7 @@ from dzdesign.identify.valve.side_model import SideModel
 CLEAR = 1e-6
 #: What all compensators of a batch must have in common.
 SHARED = (
-    "law", "below_dp0", "signals", "u_max_V",
+    "law", "below_dp0", "above", "signals", "u_max_V",
     "beta_denominator", "transition_codes", "command_error", "drive_functions",
 )  # fmt: skip
 
@@ -185,7 +194,8 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     dither = first.dither_reserve_counts
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
-    curves = {name: guarded_curve(model, guard, first.below_dp0) for name, model in models.items()}
+    above = AboveChoice(choice=first.above, signals=signals, sign=sign, step_codes=STEP_CODES)
+    curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
     low, high = _common_interval([curves])
     least, near = _near_the_least(curves, signals, float(u_max), sign)
     exact = {
@@ -196,7 +206,7 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     limits = zip(*(each.limit for each in exact.values()), strict=True)
     certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
     ceiling = OffsetCeiling(limit=tuple(map(min, limits)), certified=certified)
-    if min(ceiling.limit) <= 0:
+    if min(ceiling.limit[: certified.stop]) <= 0:
         raise InputError("one of the valves leaves no positive offset for a lot setting")
     return _Side(sign=sign, models=models, curves=curves, exact=exact, least=ceiling, nearness=least)
 
@@ -221,6 +231,8 @@ def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
     """Return in doubles what `offset_ceiling` limits the offset to, V: the curve and, where tested, its bound."""
     nodes, offset = (np.array([float(value) for value in values]) for values in (curve.dp_MPa, curve.offset_V))
     value: np.ndarray = np.interp(dp_MPa, nodes, offset)
+    if curve.above is not None:
+        value = np.where(dp_MPa > nodes[-1], curve.above.in_doubles(dp_MPa), value)
     if curve.hold_below_MPa is not None:
         hold = float(curve.hold_below_MPa)
         value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
@@ -246,12 +258,14 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
     if u_min0 <= 0:
         raise InputError("the least offset of all valves is less than one count of the PWM")
+    held = all(curve.above is None for curve in side.curves.values())
     table = choose_beta_table(
-        side.least,
+        side.least if held else with_release(side.least, u_min0, first.beta_denominator),
         u_min0,
         model.trend,
         denominator=first.beta_denominator,
         above_one=model.trend == "increasing" or first.below_dp0 == "extend",
+        turns_at=None if held else side.least.certified.stop - 1,
     )
     # The longest travel: full command fully opens every valve.
     longest = max(travel(each, u_max, top) for each in side.models.values())

@@ -1,0 +1,105 @@
+"""The offset above the last tested pressure drop: held, lowered with the continued bound, or let go.
+
+Let go means a beta of one unit: the compensation ends, and the command drives the valve on. A drive of zero would shut
+a valve that a pressure spike reaches at full command, which is a motion of its own; without an offset the dead zone is
+back, and nothing else.
+"""
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import accumulate
+from math import floor
+
+import numpy as np
+
+from dzdesign.design.design_choices import Above
+from dzdesign.design.signals import Signals
+from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
+from dzdesign.identify.valve.guard_curve import CertifiedCurve
+
+#: Segments of the table in which an offset that is let go comes down, beside that in which the tests end: a table is
+#: straight between its nodes, and the tests keep their offset.
+RELEASE_SEGMENTS = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetAbove:
+    """How the offset goes on above the last test: under the continued bound, never rising, never below zero."""
+
+    #: From the last test on.
+    bound: CertifiedBound
+    certified: bool
+    #: Offset at the last test, V, and the least of it and the bound up to the end of each piece.
+    last_V: Fraction
+    least_V: tuple[Fraction, ...]
+    #: From there on there is none; None: where the bound ends.
+    released_from_MPa: Fraction | None
+
+    @classmethod
+    def under(
+        cls, bound: CertifiedBound, last_V: Fraction, *, certified: bool, released_from_MPa: Fraction | None
+    ) -> "OffsetAbove":
+        """Return the largest such offset."""
+        lows = (piece.least(piece.from_MPa, piece.to_MPa) for piece in bound.pieces)
+        least = tuple(accumulate(lows, min, initial=last_V))
+        return cls(
+            bound=bound, certified=certified, last_V=last_V, least_V=least, released_from_MPa=released_from_MPa
+        )
+
+    def at(self, dp_MPa: Fraction) -> Fraction:
+        """Return the offset at a pressure drop above the last test, V."""
+        pieces = self.bound.pieces
+        if dp_MPa > pieces[-1].to_MPa or (self.released_from_MPa is not None and dp_MPa >= self.released_from_MPa):
+            return Fraction(0)
+        place = bisect_left(pieces, dp_MPa, key=lambda piece: piece.to_MPa)
+        return max(min(self.least_V[place], pieces[place].least(pieces[place].from_MPa, dp_MPa)), Fraction(0))
+
+    def bound_at(self, dp_MPa: Fraction) -> Fraction | None:
+        """Return the certified bound there, V; None where there is none, and 0 where it says nothing any more."""
+        found = self.bound.at(dp_MPa) if self.certified else None
+        return None if found is None else max(found, Fraction(0))
+
+    def in_doubles(self, dp_MPa: np.ndarray) -> np.ndarray:
+        """Return the offset at many pressure drops, which rise, in double precision; the last test's below it."""
+        ends = np.array([float(piece.to_MPa) for piece in self.bound.pieces])
+        bound = self.bound.in_doubles(np.minimum(dp_MPa, ends[-1]))
+        passed = np.array([float(value) for value in self.least_V])[np.searchsorted(ends, dp_MPa)]
+        value = np.minimum(np.minimum.accumulate(np.minimum(bound, float(self.last_V))), passed)
+        last = ends[-1] if self.released_from_MPa is None else min(float(self.released_from_MPa), ends[-1])
+        found: np.ndarray = np.where(dp_MPa > last, 0.0, np.maximum(value, 0.0))
+        return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AboveChoice:
+    """What is to happen above the tests, of one sign of command."""
+
+    choice: Above
+    signals: Signals
+    sign: int
+    #: Codes between two nodes of the table.
+    step_codes: int
+
+    def of(self, curve: CertifiedCurve) -> OffsetAbove | None:
+        """Return how the offset of a curve goes on above its last test; None: it is held.
+
+        One test says nothing of a slope, so its offset can't be lowered: it is held, and nothing is certified there.
+        """
+        continued = curve.above
+        if self.choice == "hold" or not curve.offset_dp_MPa or (self.choice == "lower" and continued is None):
+            return None
+        last_MPa, last_V = (Fraction(repr(values[-1])) for values in (curve.offset_dp_MPa, curve.offset_V))
+        released = self._released_from(last_MPa) if self.choice == "release" else None
+        if continued is not None:
+            bound, certified = continued.bound(), continued.certified
+        else:
+            until = last_MPa if released is None else released
+            bound, certified = CertifiedBound(pieces=(BoundPiece(last_MPa, until, last_V, last_V, Fraction(0)),)), False
+        return OffsetAbove.under(bound, last_V, certified=certified, released_from_MPa=released)
+
+    def _released_from(self, last_MPa: Fraction) -> Fraction:
+        """Return from where on there is no offset, MPa: beyond all that the node before it may stand for."""
+        node = (floor(self.signals.dp_code(last_MPa)) // self.step_codes + 1 + RELEASE_SEGMENTS) * self.step_codes
+        _, high = self.signals.difference_error(self.sign)
+        return self.signals.dp_MPa(node + high + 1)
