@@ -9,18 +9,18 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate
-from math import floor
 
 import numpy as np
 
 from dzdesign.design.design_choices import Above
-from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
 
 #: Segments of the table in which an offset that is let go comes down, beside that in which the tests end: a table is
 #: straight between its nodes, and the tests keep their offset.
 RELEASE_SEGMENTS = 1
+#: Beyond the span of any sensor.
+FURTHEST_MPa = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,24 +33,18 @@ class OffsetAbove:
     #: Offset at the last test, V, and the least of it and the bound up to the end of each piece.
     last_V: Fraction
     least_V: tuple[Fraction, ...]
-    #: From there on there is none; None: where the bound ends.
-    released_from_MPa: Fraction | None
 
     @classmethod
-    def under(
-        cls, bound: CertifiedBound, last_V: Fraction, *, certified: bool, released_from_MPa: Fraction | None
-    ) -> "OffsetAbove":
+    def under(cls, bound: CertifiedBound, last_V: Fraction, *, certified: bool) -> "OffsetAbove":
         """Return the largest such offset."""
         lows = (piece.least(piece.from_MPa, piece.to_MPa) for piece in bound.pieces)
         least = tuple(accumulate(lows, min, initial=last_V))
-        return cls(
-            bound=bound, certified=certified, last_V=last_V, least_V=least, released_from_MPa=released_from_MPa
-        )
+        return cls(bound=bound, certified=certified, last_V=last_V, least_V=least)
 
     def at(self, dp_MPa: Fraction) -> Fraction:
         """Return the offset at a pressure drop above the last test, V."""
         pieces = self.bound.pieces
-        if dp_MPa > pieces[-1].to_MPa or (self.released_from_MPa is not None and dp_MPa >= self.released_from_MPa):
+        if dp_MPa > pieces[-1].to_MPa:
             return Fraction(0)
         place = bisect_left(pieces, dp_MPa, key=lambda piece: piece.to_MPa)
         return max(min(self.least_V[place], pieces[place].least(pieces[place].from_MPa, dp_MPa)), Fraction(0))
@@ -66,8 +60,7 @@ class OffsetAbove:
         bound = self.bound.in_doubles(np.minimum(dp_MPa, ends[-1]))
         passed = np.array([float(value) for value in self.least_V])[np.searchsorted(ends, dp_MPa)]
         value = np.minimum(np.minimum.accumulate(np.minimum(bound, float(self.last_V))), passed)
-        last = ends[-1] if self.released_from_MPa is None else min(float(self.released_from_MPa), ends[-1])
-        found: np.ndarray = np.where(dp_MPa > last, 0.0, np.maximum(value, 0.0))
+        found: np.ndarray = np.where(dp_MPa > ends[-1], 0.0, np.maximum(value, 0.0))
         return found
 
 
@@ -76,8 +69,6 @@ class AboveChoice:
     """What is to happen above the tests, of one sign of command."""
 
     choice: Above
-    signals: Signals
-    sign: int
     #: Codes between two nodes of the table.
     step_codes: int
 
@@ -90,16 +81,16 @@ class AboveChoice:
         if self.choice == "hold" or not curve.offset_dp_MPa or (self.choice == "lower" and continued is None):
             return None
         last_MPa, last_V = (Fraction(repr(values[-1])) for values in (curve.offset_dp_MPa, curve.offset_V))
-        released = self._released_from(last_MPa) if self.choice == "release" else None
         if continued is not None:
-            bound, certified = continued.bound(), continued.certified
-        else:
-            until = last_MPa if released is None else released
-            bound, certified = CertifiedBound(pieces=(BoundPiece(last_MPa, until, last_V, last_V, Fraction(0)),)), False
-        return OffsetAbove.under(bound, last_V, certified=certified, released_from_MPa=released)
+            return OffsetAbove.under(continued.bound(), last_V, certified=continued.certified)
+        held = BoundPiece(last_MPa, last_MPa + FURTHEST_MPa, last_V, last_V, Fraction(0))
+        return OffsetAbove.under(CertifiedBound(pieces=(held,)), last_V, certified=False)
 
-    def _released_from(self, last_MPa: Fraction) -> Fraction:
-        """Return from where on there is no offset, MPa: beyond all that the node before it may stand for."""
-        node = (floor(self.signals.dp_code(last_MPa)) // self.step_codes + 1 + RELEASE_SEGMENTS) * self.step_codes
-        _, high = self.signals.difference_error(self.sign)
-        return self.signals.dp_MPa(node + high + 1)
+    def released_from(self, tested: range) -> int | None:
+        """Return the code from which on an offset is let go that was tested at codes in a range; None: it is not.
+
+        It is that of a node of the table: the offset comes down in the segment before it, under the continued bound.
+        """
+        if self.choice != "release":
+            return None
+        return ((tested.stop - 1) // self.step_codes + 1 + RELEASE_SEGMENTS) * self.step_codes

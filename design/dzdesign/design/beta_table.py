@@ -9,7 +9,7 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.above_tests import OffsetAbove
+from dzdesign.design.above_tests import AboveChoice, OffsetAbove
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 
@@ -116,10 +116,11 @@ def offset_ceiling(
     return OffsetCeiling(limit=limit, certified=range(ceil(first), floor(last) + 1))
 
 
-def with_release(ceiling: OffsetCeiling, u_min0: Fraction, denominator: int) -> OffsetCeiling:
-    """Return a ceiling that above the tests leaves room for the least beta: one unit, an offset that is let go."""
-    least, above = u_min0 / denominator, ceiling.certified.stop
-    limit = (value if code < above else max(value, least) for code, value in enumerate(ceiling.limit))
+def _with_release(ceiling: OffsetCeiling, least: Fraction, above: AboveChoice) -> OffsetCeiling:
+    """Return a ceiling that above the tests leaves room for the least offset, and for no other where it is let go."""
+    limit, released_from = list(ceiling.limit), above.released_from(ceiling.certified)
+    for code in range(ceiling.certified.stop, len(limit)):
+        limit[code] = least if released_from is not None and code >= released_from else max(limit[code], least)
     return OffsetCeiling(limit=tuple(limit), certified=ceiling.certified)
 
 
@@ -130,7 +131,7 @@ def choose_beta_table(
     *,
     denominator: int,
     above_one: bool,
-    turns_at: int | None = None,
+    above: AboveChoice | None = None,
 ) -> tuple[int, ...]:
     """Choose the nodes of beta that give the largest offset under the ceiling: a linear programme, then integers.
 
@@ -146,8 +147,9 @@ def choose_beta_table(
         Of the nodes.
     above_one : bool
         Whether beta may exceed 1: where the threshold grows with dP, or the tests below dP0 are followed.
-    turns_at : int, optional
-        Code of the last test where beta falls above it, whatever the trend. What it has at the tests comes first then.
+    above : AboveChoice, optional
+        What is to happen above the tests: there beta falls, whatever the trend, and what it has at the tests comes
+        first. Without it the trend goes on to the last code.
 
     Returns
     -------
@@ -157,6 +159,9 @@ def choose_beta_table(
     import cvxpy as cp
     from scipy.sparse import csr_array
 
+    turns_at = None
+    if above is not None:
+        ceiling, turns_at = _with_release(ceiling, u_min0 / denominator, above), ceiling.certified.stop - 1
     codes = np.arange(len(ceiling.limit))
     index, share = codes // STEP_CODES, (codes % STEP_CODES) / STEP_CODES
     size = int(index[-1]) + 2

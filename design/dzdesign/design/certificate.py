@@ -63,7 +63,7 @@ def prove_certificates(compensator: Compensator) -> None:
         if model is None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
         stated = law.certificate
-        above = AboveChoice(choice=compensator.above, signals=signals, sign=sign, step_codes=STEP_CODES)
+        above = AboveChoice(choice=compensator.above, step_codes=STEP_CODES)
         curve = guarded_curve(model, stated.guard, compensator.below_dp0, above)
         ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, dither_counts=dither)
         try:

@@ -10,7 +10,7 @@ from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.above_tests import AboveChoice
-from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, choose_beta_table, offset_ceiling, with_release
+from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, choose_beta_table, offset_ceiling
 from dzdesign.design.certificate import certify, guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
@@ -142,7 +142,7 @@ def _side_law(
     signals = options.signals
     if "branch-order" not in options.accept:
         _refuse_crossed_branches(side)
-    above = AboveChoice(choice=options.above, signals=signals, sign=sign, step_codes=STEP_CODES)
+    above = AboveChoice(choice=options.above, step_codes=STEP_CODES)
     certified = guarded_curve(side, options.guard, options.below_dp0, above)
     opening = opening_offset(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))
@@ -153,22 +153,20 @@ def _side_law(
         raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
     ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither_counts)
-    turns_at = None
-    if certified.above is not None:
-        ceiling, turns_at = with_release(ceiling, u_min0, units.beta), ceiling.certified.stop - 1
-    if min(ceiling.limit) <= 0:
+    tested, goes_on = ceiling.certified, certified.above is not None
+    if min(ceiling.limit[: tested.stop] if goes_on else ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 
     def table(under: OffsetCeiling) -> tuple[int, ...]:
+        beyond = above if goes_on else None
         return choose_beta_table(
-            under, u_min0, side.trend, denominator=units.beta, above_one=above_one, turns_at=turns_at
+            under, u_min0, side.trend, denominator=units.beta, above_one=above_one, above=beyond
         )
 
     beta = table(ceiling)
     transition_beta = None
     if opening is not None:
-        at_opening = opening_ceiling(opening, certified, ceiling.certified, signals, u_max, sign)
-        upper = table(at_opening if turns_at is None else with_release(at_opening, u_min0, units.beta))
+        upper = table(opening_ceiling(opening, certified, tested, signals, u_max, sign))
         transition_beta = tuple(map(max, upper, beta))
     return SideLaw(
         drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),

@@ -39,10 +39,11 @@ def opening_ceiling(
 ) -> OffsetCeiling:
     """Return the opening threshold at every pressure code: no bound, so rounding to codes does not count.
 
-    Above the tests it comes down with the certified offset, so that a transition is never higher than at the tests.
+    Above the tests it comes down in proportion to the certified offset, so that a transition is never higher than at
+    the last test, and ends with the offset.
     """
     pressures = [signals.dp_MPa(code) for code in range(signals.largest_difference(sign) + 1)]
     limit = [opening.at(dp_MPa) for dp_MPa in pressures]
     for code in range(tested.stop, len(limit)) if certified.above is not None else ():
-        limit[code] -= certified.offset_V[-1] - certified.at(pressures[code])
+        limit[code] *= certified.at(pressures[code]) / certified.offset_V[-1]
     return OffsetCeiling(limit=tuple(value / u_max for value in limit), certified=tested)

@@ -63,6 +63,7 @@ STATUS_BITS = {
     0x0200: "pressure A outside its valid range",
     0x0400: "pressure B outside its valid range",
     0x0800: "pressure drop not plausible",
+    0x1000: "pressure drop above the tests",
 }
 #: The output is in use; without it the trip zone holds the pin low, whatever the compare value.
 STATUS_RELEASED = 0x0080

@@ -25,7 +25,6 @@ from dzdesign.design.beta_table import (
     choose_beta_table,
     offset_ceiling,
     pressures_MPa,
-    with_release,
 )
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
@@ -194,7 +193,7 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     dither = first.dither_reserve_counts
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
-    above = AboveChoice(choice=first.above, signals=signals, sign=sign, step_codes=STEP_CODES)
+    above = AboveChoice(choice=first.above, step_codes=STEP_CODES)
     curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
     low, high = _common_interval([curves])
     least, near = _near_the_least(curves, signals, float(u_max), sign)
@@ -258,14 +257,14 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
     if u_min0 <= 0:
         raise InputError("the least offset of all valves is less than one count of the PWM")
-    held = all(curve.above is None for curve in side.curves.values())
+    goes_on = any(curve.above is not None for curve in side.curves.values())
     table = choose_beta_table(
-        side.least if held else with_release(side.least, u_min0, first.beta_denominator),
+        side.least,
         u_min0,
         model.trend,
         denominator=first.beta_denominator,
         above_one=model.trend == "increasing" or first.below_dp0 == "extend",
-        turns_at=None if held else side.least.certified.stop - 1,
+        above=AboveChoice(choice=first.above, step_codes=STEP_CODES) if goes_on else None,
     )
     # The longest travel: full command fully opens every valve.
     longest = max(travel(each, u_max, top) for each in side.models.values())
