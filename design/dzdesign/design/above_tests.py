@@ -12,9 +12,12 @@ from itertools import accumulate
 
 import numpy as np
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.design_choices import Above
+from dzdesign.design.side_law import Certificate
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
+from dzdesign.identify.valve.side_model import SideModel
 
 #: Segments of the table in which an offset that is let go comes down, beside that in which the tests end: a table is
 #: straight between its nodes, and the tests keep their offset.
@@ -94,3 +97,39 @@ class AboveChoice:
         if self.choice != "release":
             return None
         return ((tested.stop - 1) // self.step_codes + 1 + RELEASE_SEGMENTS) * self.step_codes
+
+
+def above_in_words(choice: Above, certificate: Certificate, side: SideModel, units: RecordedUnits) -> str:
+    """Return what the law does above the tests, up to where that is certified, and on what premise."""
+    curve, last = side.certified[certificate.guard], units.text(float(certificate.dp_MPa[1]), ".2f MPa")
+    if choice == "hold" or (choice == "lower" and curve.above is None):
+        why = "" if choice == "hold" else " (one test shows no slope to lower it by)"
+        return (
+            f"above {last} the offset of the highest test is held{why} and nothing is certified: where the threshold "
+            "falls, flow at zero command is possible"
+        )
+    released = certificate.released_from_MPa
+    text = f"above {last} the offset is lowered with the continued bound"
+    if choice == "release":
+        text = f"above {last} the offset is let go"
+    if released is not None:
+        at = units.text(float(released), ".3g MPa")
+        text += f", and none is left from {at} on: the dead zone is back, and the command drives the valve on"
+    holds_to = certificate.holds_to_MPa
+    if curve.above is None:
+        return f"{text}; not certified: one test shows no slope"
+    rests = curve.above.in_words(curve.premise, side.trend or "flat", units)
+    return f"{text}; {rests}" + (
+        f", up to {units.text(float(holds_to), '.3g MPa')}" if holds_to > certificate.dp_MPa[1] else ""
+    )
+
+
+def below_in_words(certificate: Certificate, side: SideModel, units: RecordedUnits) -> str:
+    """Return what the law does below the lowest test, and what is known of the threshold there."""
+    first = units.text(float(certificate.dp_MPa[0]), ".2f MPa")
+    text = f"below {first} the offset of the lowest test is held and nothing is certified"
+    if side.trend == "increasing":
+        return f"{text}: the threshold grows with the pressure drop, so flow at zero command is possible there"
+    if side.trend == "decreasing":
+        return f"{text}; a threshold that goes on growing towards no pressure drop stays above it"
+    return text

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from math import ceil, floor
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.above_tests import AboveChoice, OffsetAbove
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import CertifiedBound
+
+if TYPE_CHECKING:
+    import cvxpy as cp
 
 #: Pressure codes between neighbouring nodes: a power of two, so that the firmware finds a node by a shift.
 STEP_CODES = 64
@@ -159,9 +163,8 @@ def choose_beta_table(
     import cvxpy as cp
     from scipy.sparse import csr_array
 
-    turns_at = None
     if above is not None:
-        ceiling, turns_at = _with_release(ceiling, u_min0 / denominator, above), ceiling.certified.stop - 1
+        ceiling = _with_release(ceiling, u_min0 / denominator, above)
     codes = np.arange(len(ceiling.limit))
     index, share = codes // STEP_CODES, (codes % STEP_CODES) / STEP_CODES
     size = int(index[-1]) + 2
@@ -172,21 +175,11 @@ def choose_beta_table(
     limit = np.array([float(value / u_min0) for value in ceiling.limit]) - SOLVER_MARGIN
     beta = cp.Variable(size)
     constraints = [weights @ beta <= limit, beta <= (2 - 2 / denominator if above_one else 1)]
-    last = size - 1 if turns_at is None else min(turns_at // STEP_CODES, size - 1)
-    steps = cp.diff(beta[: last + 1]) if last else np.zeros(1)
-    if trend == "decreasing":
-        constraints.append(steps <= 0)
-    elif trend == "increasing":
-        constraints.append(steps >= 0)
-    else:
-        constraints.append(steps == 0)
-    worth = np.ones(codes.size)
-    if turns_at is not None:
-        # Of the segment in which the tests end the upper node is already above them.
-        falls_from = last + 1 if trend == "increasing" else last
-        if falls_from + 1 < size:
-            constraints.append(cp.diff(beta[falls_from:]) <= 0)
-        worth[turns_at + 1 :] = WORTH_ABOVE
+    last, worth = size - 1, np.ones(codes.size)
+    if above is not None:
+        last = min((ceiling.certified.stop - 1) // STEP_CODES, size - 1)
+        worth[ceiling.certified.stop :] = WORTH_ABOVE
+    constraints += _one_way(beta, trend, last)
     problem = cp.Problem(cp.Maximize(worth @ (weights @ beta) + worth[-1] * beta[-1]), constraints)
     problem.solve(solver=cp.HIGHS)  # a simplex ends in a vertex: no interior-point fuzz to round away
     if problem.status != cp.OPTIMAL:
@@ -198,6 +191,20 @@ def choose_beta_table(
         if trend != "increasing" or position > last + 1:
             nodes[position] = min(nodes[position], nodes[position - 1])
     return _lower_until_proved(nodes, ceiling, u_min0, trend, denominator, last)
+
+
+def _one_way(beta: "cp.Variable", trend: str | None, last: int) -> list["cp.Constraint"]:
+    """Return that beta runs the way of the trend up to the node `last`, and falls behind it.
+
+    The tests end between that node and the next, which lies above them: where they rise it may be either way.
+    """
+    import cvxpy as cp
+
+    steps = cp.diff(beta[: last + 1]) if last else np.zeros(1)
+    of_trend = {"decreasing": steps <= 0, "increasing": steps >= 0}.get(trend or "", steps == 0)
+    falls_from = last + 1 if trend == "increasing" else last
+    found = [of_trend] if last else []
+    return [*found, cp.diff(beta[falls_from:]) <= 0] if falls_from + 1 < beta.size else found
 
 
 def _lower_until_proved(

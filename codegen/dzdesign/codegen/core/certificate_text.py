@@ -6,6 +6,7 @@ from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.units import span_MPa
+from dzdesign.design.above_tests import above_in_words, below_in_words
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import SIDE_NAMES
 
@@ -34,9 +35,17 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
         text += f", so that less than {certificate.level_L_min:.2f} L/min flows: what the recordings can't show."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
+    text += f" {_beyond(compensator, sign)}"
     text += " Errors of the pressure sensors and of their converters beyond rounding are not in it."
     lot = lot_in_words(compensator)
     return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
+
+
+def _beyond(compensator: Compensator, sign: int) -> str:
+    """Return what is certified above the tests, and what there is below them."""
+    certificate, side = compensator.side(sign).certificate, compensator.valve.sides[SIDE_NAMES[sign]]
+    above = above_in_words(compensator.above, certificate, side, AS_COMPUTED)
+    return f"{above[0].upper()}{above[1:]}; {below_in_words(certificate, side, AS_COMPUTED)}."
 
 
 def _counted(compensator: Compensator) -> str:
