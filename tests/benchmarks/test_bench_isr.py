@@ -179,9 +179,9 @@ def test_each_machine_judges_the_form_that_is_fastest_there():
 
 @needs(on_cortex_m4.CORTEX_M4)
 def test_the_whole_interrupt_is_counted_from_its_first_instruction(example_compensator, inputs, tmp_path):
-    """With a new sample it takes the law's instructions more, and between two samples the same for every input."""
+    """With a new sample it takes the law's instructions more; either takes the same for every input."""
     controlled, some = with_current(example_compensator), [each for each in inputs if each[0] <= 4095][::40]
     held = count_interrupt(controlled, some, tmp_path / "held", fresh=False)
     fresh = count_interrupt(controlled, some, tmp_path / "fresh", fresh=True)
     assert held.least == held.most <= 160
-    assert fresh.least > held.most + 60
+    assert held.most + 60 < fresh.least == fresh.most <= 260

@@ -150,7 +150,7 @@ def test_host_library_shows_four_names_and_answers_as_the_law(copy):
     compensator = golden_compensator("host")
     assert library.dz_compare_max() == compensator.signals.compare_max
     assert library.dz_adc_code_max() == compensator.signals.code_max
-    inputs = [(0, 0, 0), (1, 4095, 0), (2047, 1500, 1000), (4095, 900, 850), (3000, 0, 4095)]
+    inputs = [(0, 764, 764), (1, 4000, 764), (2047, 1500, 1000), (4095, 900, 850), (3000, 764, 4000)]
     expected = [compensator.compare(u, p_a - p_b) for u, p_a, p_b in inputs]
     assert [library.dz_comp(*codes) for codes in inputs] == expected
     arrays = [(ctypes.c_uint16 * len(inputs))(*column) for column in zip(*inputs, strict=True)]

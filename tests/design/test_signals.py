@@ -8,7 +8,7 @@ import pytest
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
+from dzdesign.design.signal_text import command_signal, live_zero_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
 from dzdesign.design.target_inputs import Converter
 
@@ -23,9 +23,9 @@ def sensor(text: str, span: int = 20) -> PressureSignal:
     return pressure_signal(parse_signal(text, "--pressure-a"), ADC, Fraction(span))
 
 
-def test_the_defaults_are_the_converters_whole_range():
+def test_the_defaults_are_a_whole_range_of_command_and_live_zero_sensors():
     assert command("0..10 V x 0.3") == CommandSignal()
-    assert sensor("0..3 V") == PressureSignal()
+    assert sensor(live_zero_signal(ADC)) == PressureSignal()
 
 
 def test_a_command_of_both_signs_has_its_zero_between():

@@ -29,8 +29,11 @@ def exact_line(compensator: Compensator, grid: tuple[str, int, int]) -> str:
     for command in codes(command_step, signals.code_max):
         for p_a in pressures:
             for p_b in pressures:
-                possible = max(p_a, p_b) <= signals.code_max
-                answer = compare(command, max(p_a - p_b, failed) if possible else failed)
+                possible = all(
+                    sensor.valid_codes[0] <= code <= sensor.valid_codes[1]
+                    for sensor, code in ((signals.pressure_a, p_a), (signals.pressure_b, p_b))
+                )
+                answer = compare(command, max(signals.difference(p_a, p_b), failed) if possible else failed)
                 if command > signals.code_max:
                     answer = 0
                 for byte in (answer & 0xFF, answer >> 8):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.above_tests import AboveChoice, OffsetAbove
+from dzdesign.design.offset.above_tests import AboveChoice, OffsetAbove
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 

@@ -8,9 +8,9 @@ from dataclasses import fields
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.above_tests import AboveChoice
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.side_law import Certificate
 from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard

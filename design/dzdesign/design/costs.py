@@ -2,10 +2,11 @@
 
 from fractions import Fraction
 
-from dzdesign.design.above_tests import above_in_words, below_in_words
+from dzdesign.design.broken_sensor import ACCEPTED, hidden_failure
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.reading_flow import default_reading_flow
@@ -49,12 +50,15 @@ def hidden_failures(compensator: Compensator) -> tuple[str, ...]:
     """Return one line for each failure of a signal that the firmware can't see; the first of `costs_of`."""
     lines = unseen_failures(compensator.signals)
     for sign in compensator.signals.signs:
-        if compensator.valve.sides[SIDE_NAMES[sign]].trend == "increasing":
-            hidden = " and ".join(compensator.signals.hidden_excess(sign))
-            remedy = f"{hidden} can't be told; give signals with a live zero and room above the span, or "
+        label, name = _side_label(compensator, sign), SIDE_NAMES[sign]
+        hidden = hidden_failure(compensator, sign)
+        if hidden is not None:
+            what = hidden.text(compensator.valve.recorded_units.of_side(name))
+            lines.append(f"accepted, {ACCEPTED}: {label}{what}; have the sensors supervised outside")
+        elif compensator.valve.sides[name].trend == "increasing":
             lines.append(
-                f"{_side_label(compensator, sign)}the threshold grows with the pressure drop, so a pressure signal "
-                f"that reads too high raises the offset: {remedy if hidden else ''}monitor the sensors outside"
+                f"{label}the threshold grows with the pressure drop, so a pressure signal that reads too high raises "
+                "the offset: monitor the sensors outside"
             )
     return tuple(lines)
 

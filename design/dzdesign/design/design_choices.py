@@ -49,7 +49,8 @@ class DesignChoices(CurrentChoices):
     output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %")] = None
     """Largest drive, in percent of full drive."""
     accept: Annotated[Text, Option("CODE", LAW, choices="dzdesign.design.options:ACCEPTABLE")] = None
-    """Design in spite of this warning: branch-order (default: refuse)."""
+    """Design in spite of this: branch-order, a valve that seems to close above where it opens; or broken-sensor,
+    pressure signals whose failure raises the offset unseen; or both with a comma (default: refuse)."""
     command_signal: Annotated[Text, Option("S", CONNECTIONS, example="0..10 V x 0.3")] = None
     """Command at the converter: range, shunt, attenuator, offset and what it stands for, such as "-10..10 V x 0.15 +
     1.5 V" or "4..20 mA on 150 ohm = -10..10 V", which have both signs (default: 0 to 10 V over the converter's whole
@@ -58,11 +59,11 @@ class DesignChoices(CurrentChoices):
     """Polarity of the command: normal, or inverted, which counts the other way."""
     pressure_span: Annotated[Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa")] = None
     """Span of both pressure sensors."""
-    pressure_a: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 150 ohm")] = None
-    """Sensor ahead of the metering edge, such as "4..20 mA on 150 ohm = 25 MPa" (default: the whole range of the
-    converter)."""
-    pressure_b: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 150 ohm")] = None
-    """Sensor behind the metering edge (default: the whole range of the converter)."""
+    pressure_a: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
+    """Sensor ahead of the metering edge, such as "4..20 mA on 140 ohm = 25 MPa" (default: 4..20 mA on a
+    shunt with which 21 mA still stand within the converter's range, 140 ohm for 3 V)."""
+    pressure_b: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
+    """Sensor behind the metering edge (default: as ahead of it)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "same", choices=NEGATIVE_DP)] = None
     """Pressure drop of negative commands: same, or swapped, which is B less A."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None

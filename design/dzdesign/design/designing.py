@@ -9,12 +9,13 @@ from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
-from dzdesign.design.above_tests import AboveChoice
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, choose_beta_table, offset_ceiling
+from dzdesign.design.broken_sensor import ACCEPTED, refuse_hidden_failures
 from dzdesign.design.certificate import certify, guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
-from dzdesign.design.opening_offset import opening_ceiling, opening_offset
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.opening import opening_ceiling, opening_offset
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
 from dzdesign.design.quantise import Units, finest_units, fits
@@ -88,6 +89,8 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     )
     for sign in signals.signs:
         prove_monotone(compensator, sign)
+    if ACCEPTED not in options.accept:
+        refuse_hidden_failures(compensator)
     compensator = _with_play(compensator, options)
     return replace(compensator, costs=costs_of(compensator))
 

@@ -19,7 +19,13 @@ from dzdesign.design.design_choices import (
     DesignRequest,
 )
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signal_text import command_signal, full_command_V, parse_signal, pressure_signal
+from dzdesign.design.signal_text import (
+    command_signal,
+    full_command_V,
+    live_zero_signal,
+    parse_signal,
+    pressure_signal,
+)
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
 from dzdesign.design.zero_band import command_error_of
@@ -40,7 +46,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     full_V = float(converter.full_V)
     text["command_signal"] = text["command_signal"] or f"0..10 V x {full_V / 10:.12g}"
     for name in ("pressure_a", "pressure_b"):
-        text[name] = text[name] or f"0..{full_V:.12g} V"
+        text[name] = text[name] or live_zero_signal(converter)
     span = Fraction(round(parse_quantity(text["pressure_span"], "pressure", "--pressure-span")), 10**6)
     if span <= 0:
         raise InputError(f"--pressure-span is '{text['pressure_span']}', expected more than zero")

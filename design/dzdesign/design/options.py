@@ -23,8 +23,8 @@ DITHER_HZ = (LOWEST_HZ, HIGHEST_HZ)
 LONGEST_RAMP_S = 600.0
 #: Beyond any flow that a valve of a control passes.
 MOST_L_MIN = 1e6
-#: Warnings of `identify` for which a valve is refused unless they are accepted.
-ACCEPTABLE = ("branch-order",)
+#: What a design is refused for unless it is accepted: a warning of `identify`, and what its signals hide.
+ACCEPTABLE = ("branch-order", "broken-sensor")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ class DesignOptions:
     full_command_V : Fraction or None
         Full command that the signal states, V.
     accept : tuple of str
-        Codes of warnings, of `ACCEPTABLE`, for which the valve is not refused.
+        Codes of `ACCEPTABLE` for which the design is not refused.
     current : CurrentRequest or None
         Coil, supply and sensor of a drive that controls the current; None: the law's output is the PWM's duty.
     request : DesignRequest or None
@@ -102,8 +102,8 @@ class DesignOptions:
         for code in self.accept:
             if code not in ACCEPTABLE:
                 raise InputError(
-                    f"the warning to accept is '{code}'{nearest(code, ACCEPTABLE)}, expected "
-                    f"{' or '.join(ACCEPTABLE)}: no other one stops a design"
+                    f"what to accept is '{code}'{nearest(code, ACCEPTABLE)}, expected {' or '.join(ACCEPTABLE)}: "
+                    "nothing else can be accepted"
                 )
         for what, share, limit in (
             ("transition", self.transition or Fraction(0), LARGEST_TRANSITION),

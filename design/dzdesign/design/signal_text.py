@@ -12,6 +12,8 @@ from dzdesign.design.target_inputs import Converter
 #: A sound signal may pass its ends by as much as the field's 3.6 mA and 21 mA pass those of 4-20 mA.
 BELOW_LIVE_ZERO = Fraction(9, 10)
 ABOVE_SPAN = Fraction(21, 20)
+#: Largest current of a sound 4 to 20 mA, A, which a shunt leaves room for; shunts come in steps of this, ohm.
+LARGEST_A, SHUNT_STEP_OHM = Fraction(21, 1000), 10
 EXAMPLE = "'0..10 V x 0.3', '-10..10 V x 0.15 + 1.5 V' or '4..20 mA on 150 ohm = 25 MPa'"
 COMMAND_EXAMPLE = "'4..20 mA on 150 ohm = -10..10 V'"
 
@@ -80,6 +82,17 @@ def parse_signal(text: str, option: str) -> PinSignal:
         offset_V=found.offset_V,
         meaning=found.meaning,
     )
+
+
+def live_zero_signal(converter: Converter) -> str:
+    """Return the pressure signal where nothing is said: 4 to 20 mA, and room above it for what no pressure makes.
+
+    Examples
+    --------
+    >>> live_zero_signal(Converter())
+    '4..20 mA on 140 ohm'
+    """
+    return f"4..20 mA on {converter.full_V / LARGEST_A // SHUNT_STEP_OHM * SHUNT_STEP_OHM} ohm"
 
 
 def command_signal(signal: PinSignal, converter: Converter, *, inverted: bool = False) -> CommandSignal:

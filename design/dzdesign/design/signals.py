@@ -21,6 +21,10 @@ WEIGHT_SHIFT = 12
 WEIGHT_UNIT = 1 << WEIGHT_SHIFT
 #: Differences of pressure codes fit 16 bits of the firmware, sign apart.
 LARGEST_DIFFERENCE = 32767
+#: A pressure sensor where nothing is said: 4 to 20 mA on 140 ohm at the F28335's 3 V, no wiring fault of which reads as
+#: a pressure: codes of its ends, of a sound signal, and the error of a code of one that spans 20 MPa.
+LIVE_ZERO_CODES, LIVE_ZERO_VALID = (764, 3822), (688, 4014)
+LIVE_ZERO_ERROR_MPA = (Fraction(-25, 4096), Fraction(155, 57344))
 
 Code = Annotated[int, Meta(ge=0, le=CODE_LIMIT)]
 
@@ -83,18 +87,18 @@ class PressureSignal:
     span_MPa: Annotated[
         Fraction, quantity("MPa", "Pressure at the code of full pressure; that of zero is no pressure.")
     ] = field(default_factory=lambda: Fraction(20))
-    zero_code: Annotated[Code, Meta(description="Code of no pressure.")] = 0
-    full_code: Annotated[Code, Meta(description="Code of full pressure.")] = 4095
+    zero_code: Annotated[Code, Meta(description="Code of no pressure.")] = LIVE_ZERO_CODES[0]
+    full_code: Annotated[Code, Meta(description="Code of full pressure.")] = LIVE_ZERO_CODES[1]
     valid_codes: Annotated[
         tuple[Code, Code],
         Meta(description="First and last code of a valid signal: outside them the smallest beta is used."),
-    ] = (0, 4095)
+    ] = LIVE_ZERO_VALID
     error_MPa: Annotated[
         tuple[Fraction, Fraction],
         quantity(
             "MPa", "Least and largest distance from the pressure that a code is taken for to one that may have made it."
         ),
-    ] = field(default_factory=lambda: (-Fraction(20, 4096), Fraction(20, 4096)))
+    ] = field(default_factory=lambda: LIVE_ZERO_ERROR_MPA)
 
     def __post_init__(self) -> None:
         if self.span_MPa <= 0:
@@ -178,13 +182,33 @@ class Signals:
     def hidden_excess(self, sign: int) -> tuple[str, ...]:
         """Return the failures of a sensor that make the pressure difference read too high with codes that are valid."""
         sensors = {"A": self.pressure_a, "B": self.pressure_b}
-        ahead, behind = ("B", "A") if sign < 0 and self.swapped else ("A", "B")
+        ahead, behind = self._ahead_and_behind(sign)
         found = []
         if sensors[behind].valid_codes[0] == 0:
             found.append(f"a broken wire of sensor {behind}")
         if sensors[ahead].valid_codes[1] == self.code_max:
             found.append(f"a reading of sensor {ahead} above its span")
         return tuple(found)
+
+    def hidden_shortfall(self, sign: int) -> tuple[str, ...]:
+        """Return the failures of a sensor that make the pressure difference read too low with codes that are valid.
+
+        A broken wire ahead reads as a drop of nothing while the pressure behind is next to none: a valve that is open
+        to tank. A sensor behind that reads its converter's top makes a negative difference, which is a failure by
+        itself, unless the one ahead spans more.
+        """
+        sensors = {"A": self.pressure_a, "B": self.pressure_b}
+        ahead, behind = self._ahead_and_behind(sign)
+        found = []
+        if sensors[ahead].valid_codes[0] == 0:
+            found.append(f"a broken wire of sensor {ahead}")
+        full = {ahead: sensors[ahead].full_code, behind: self.code_max}
+        if sensors[behind].valid_codes[1] == self.code_max and self.difference(full["A"], full["B"], sign) > 0:
+            found.append(f"a reading of sensor {behind} above its span")
+        return tuple(found)
+
+    def _ahead_and_behind(self, sign: int) -> tuple[str, str]:
+        return ("B", "A") if sign < 0 and self.swapped else ("A", "B")
 
     def largest_difference(self, sign: int) -> int:
         """Return the largest difference that sound codes make."""

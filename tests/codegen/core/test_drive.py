@@ -80,6 +80,7 @@ def options_named(name: str) -> DesignOptions:
         "turned, same pressures": replace(
             full, signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), swapped=False)
         ),
+        "one solenoid alone": plain,
         "one solenoid, ramps": replace(plain, ramp_up_s=(0.3, 0.0), ramp_down_s=(0.9, 0.0)),
         "one solenoid, turned, live zero, dither": replace(
             plain,
@@ -98,7 +99,7 @@ def options_named(name: str) -> DesignOptions:
 
 
 SETS = (
-    "everything", "two solenoids alone", "turned, same pressures", "one solenoid, ramps",
+    "everything", "two solenoids alone", "turned, same pressures", "one solenoid alone", "one solenoid, ramps",
     "one solenoid, turned, live zero, dither", "quick ramps, small error",
     "two solenoids, play",
     "two solenoids, no transition",
@@ -137,12 +138,12 @@ def test_the_firmware_does_what_the_model_does(name):
 ONE_SIDE = "one solenoid, turned, live zero, dither"
 FAULTS = [
     ("(command > LEAVE_ZERO)", "(command >= LEAVE_ZERO)", "everything"),
-    ("(away > LEAVE_ZERO)", "(away >= LEAVE_ZERO)", "two solenoids alone"),
-    ("(away > LEAVE_ZERO)", "(away > ZERO_BAND)", "two solenoids alone"),
-    ("(away <= ZERO_BAND)", "(away <= LEAVE_ZERO)", "two solenoids alone"),
-    ("(drive->side < 0) ? -command : command", "command", "two solenoids alone"),
-    ("(drive->at_rest != 0u) ? (uint16_t)COMMAND_ZERO : ", "", "two solenoids alone"),
-    ("(command <= ZERO_BAND)", "(command <= LEAVE_ZERO)", "one solenoid, ramps"),
+    ("(LEAVE_ZERO + 1)", "LEAVE_ZERO", "two solenoids alone"),
+    ("(LEAVE_ZERO + 1)", "(ZERO_BAND + 1)", "two solenoids alone"),
+    ("(ZERO_BAND + 1)", "(LEAVE_ZERO + 1)", "two solenoids alone"),
+    ("(drive->side < 0) ? -command : command, gone", "command, gone", "two solenoids alone"),
+    ("u_law = code_at(at_rest, u_adc)", "u_law = u_adc", "two solenoids alone"),
+    ("(ZERO_BAND + 1)", "(LEAVE_ZERO + 1)", "one solenoid, ramps"),
     ("towards - PLAY_NOISE,", "towards,", "two solenoids, play"),
     ("(PLAY_CODES - rising)", "rising", "two solenoids, play"),
     ("0, PLAY_CODES);", "0, PLAY_CODES - 1);", "two solenoids, play"),
@@ -153,8 +154,10 @@ FAULTS = [
     ("drive->ticks < DITHER_TICKS", "drive->ticks <= DITHER_TICKS", "everything"),
     ("(drive->side < 0) ? (uint16_t)compare : 0u", "(uint16_t)compare", "everything"),
     ("RAMP_UP_NEGATIVE, RAMP_DOWN_NEGATIVE)", "RAMP_UP_POSITIVE, RAMP_DOWN_NEGATIVE)", "everything"),
-    ("        drive->ramped = 0;\n    } else", "    } else", "everything"),
-    ("        drive->side = 0;\n        drive->at", "        drive->at", "everything"),
+    ("(gone != 0u) ? 0 : ramp(", "ramp(", "everything"),
+    ("        drive->side = 0;\n    } else", "    } else", "everything"),
+    (" | (gone & 1u)", "", "one solenoid alone"),
+    ("_adc) & ~gone", "_adc)", "one solenoid alone"),
     ("if (compare > DZ_COMPARE_LIMIT)", "if (compare > 65535u)", "everything"),
     ("if (compare == 0u)", "if (compare == 1u)", ONE_SIDE),
     ("compare -= DITHER_COUNTS;", ";", ONE_SIDE),

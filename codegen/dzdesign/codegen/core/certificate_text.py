@@ -6,8 +6,8 @@ from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.core.units import span_MPa
-from dzdesign.design.above_tests import above_in_words, below_in_words
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.design.signals import SIDE_NAMES
 
 

@@ -32,7 +32,6 @@ def current_files(loop: CurrentLoop) -> dict[str, CoreFile]:
         "samples": loop.samples,
         "offset_ticks": 1 << loop.offset_shift,
         "gain_unit": 1 << loop.gain_shift,
-        "integral_zero": loop.integral_limit << loop.gain_shift,
     }
     source = {
         **words,
@@ -93,10 +92,8 @@ def current_constants(loop: CurrentLoop) -> list[Define]:
          f"{loop.integral / unit:.6g}", ("integral", "gain_shift")),
         ("FEED_FORWARD", loop.feed_forward, "plain", f"{per_count}set point, over 2^GAIN_SHIFT: R i over the supply",
          f"{loop.feed_forward / unit:.6g}", ("feed_forward", "gain_shift")),
-        ("INTEGRAL_ZERO", loop.integral_limit << loop.gain_shift, "uint32", "what stands for no integral",
-         f"{loop.integral_limit} PWM counts, its limit to either side", ("integral_limit", "gain_shift")),
-        ("INTEGRAL_END", loop.integral_limit << (loop.gain_shift + 1), "uint32", "largest integral",
-         f"{loop.integral_limit} PWM counts above INTEGRAL_ZERO", ("integral_limit", "gain_shift")),
+        ("INTEGRAL_LIMIT", loop.integral_limit << loop.gain_shift, "uint32", "largest integral to either side",
+         f"{loop.integral_limit} PWM counts", ("integral_limit", "gain_shift")),
         ("OFFSET_NOMINAL", loop.offset_nominal, "plain", "sum without current", "as designed", ("offset_nominal",)),
         ("OFFSET_LOW", max(loop.offset_nominal - loop.offset_tolerance, 0), "plain", "lowest plausible offset", "",
          ("offset_nominal", "offset_tolerance")),

@@ -17,7 +17,6 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.above_tests import AboveChoice
 from dzdesign.design.beta_table import (
     STEP_CODES,
     OffsetCeiling,
@@ -32,6 +31,7 @@ from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import design, over, prove_monotone, travel
 from dzdesign.design.lot.margins import LotMargin, prove_lot
 from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.side_law import Certificate, SideLaw, Sides

@@ -63,6 +63,30 @@ static int32_t ramp(int32_t at, int32_t to)
 }
 
 
+/* All ones unless x is 0; x is below 2^31. */
+static uint32_t all_ones(uint32_t x)
+{
+    return 0u - ((0u - x) >> 31);
+}
+
+/* 1 if the command counts as zero, `towards` being its codes from zero on. Between the band's two ends the drive stays
+ * as it was; without a command it is at rest. */
+static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
+{
+    const uint32_t in_band = (uint32_t)(towards - (ZERO_BAND + 1)) >> 31; /* 1: not beyond the band's inner end */
+    const uint32_t stays = (uint32_t)(towards - (LEAVE_ZERO + 1)) >> 31;  /* 1: not beyond its outer end */
+
+    return ((at_rest | in_band) & stays) | (gone & 1u);
+}
+
+/* The code that the law is given. */
+static uint16_t code_at(uint32_t at_rest, uint16_t code)
+{
+    const uint32_t awake = at_rest - 1u; /* all ones, or 0 */
+
+    return (uint16_t)((code & awake) | ((uint32_t)COMMAND_ZERO & ~awake));
+}
+
 void dz_drive_init(struct dz_drive *drive)
 {
     drive->compare_a = 0u;
@@ -79,48 +103,38 @@ void dz_drive_init(struct dz_drive *drive)
 
 void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
-    drive->status = dz_status(u_adc, p_a_adc, p_b_adc);
-    if ((drive->status & DZ_STATUS_COMMAND) != 0u) {
-        /* No command: let go at once, and start from rest when it comes back. */
-        drive->law = 0u;
+    const uint16_t status = dz_status(u_adc, p_a_adc, p_b_adc);
+    /* All ones without a command: let go at once, and start from rest when it comes back. */
+    const uint32_t gone = all_ones((uint32_t)status & DZ_STATUS_COMMAND);
+    const int32_t asked = (int32_t)u_adc - COMMAND_ZERO; /* codes from zero, positive ones above */
+    const int32_t ramped = (gone != 0u) ? 0 : ramp(drive->ramped, asked * RAMP_UNIT);
+    const int32_t command = ramped / RAMP_UNIT;
+    const int32_t code = COMMAND_ZERO + command;
+    const uint16_t u_ramped = (uint16_t)code; /* between zero and a valid code, so a code itself */
+    uint32_t at_rest;
+    uint16_t u_law;
+
+    drive->status = status;
+    drive->ramped = ramped;
+    if (gone != 0u) {
         drive->side = 0;
-        drive->at_rest = 1u;
-        drive->ramped = 0;
+    } else if (command > LEAVE_ZERO) {
+        drive->side = 1;
+    } else if (command < -LEAVE_ZERO) {
+        drive->side = -1;
     } else {
-        const int32_t asked = (int32_t)u_adc - COMMAND_ZERO; /* codes from zero, positive ones above */
-        const int32_t ramped = ramp(drive->ramped, asked * RAMP_UNIT);
-        const int32_t command = ramped / RAMP_UNIT;
-        const int32_t code = COMMAND_ZERO + command;
-        const uint16_t u_ramped = (uint16_t)code; /* between zero and a valid code, so a code itself */
-        uint16_t u_law;
-
-        drive->ramped = ramped;
-        if (command > LEAVE_ZERO) {
-            drive->side = 1;
-        } else if (command < -LEAVE_ZERO) {
-            drive->side = -1;
-        } else {
-            /* about zero: the side stays, so that noise does not throw the spool to and fro */
-        }
-        /* At rest the command counts as zero; between the band's two ends the drive stays as it was. */
-        const int32_t away = (drive->side < 0) ? -command : command;
-
-        if (away > LEAVE_ZERO) {
-            drive->at_rest = 0u;
-        } else if (away <= ZERO_BAND) {
-            drive->at_rest = 1u;
-        } else {
-            /* between the ends */
-        }
-        u_law = (drive->at_rest != 0u) ? (uint16_t)COMMAND_ZERO : u_ramped;
-        if (drive->side > 0) {
-            drive->law = dz_comp(u_law, p_a_adc, p_b_adc);
-        } else if (drive->side < 0) {
-            drive->status = dz_status_negative(u_adc, p_a_adc, p_b_adc);
-            drive->law = dz_comp_negative(u_law, p_a_adc, p_b_adc);
-        } else {
-            drive->law = 0u;
-        }
+        /* about zero: the side stays, so that noise does not throw the spool to and fro */
+    }
+    at_rest = rest(drive->at_rest, (drive->side < 0) ? -command : command, gone);
+    u_law = code_at(at_rest, u_ramped);
+    drive->at_rest = (uint16_t)at_rest;
+    if (drive->side > 0) {
+        drive->law = dz_comp(u_law, p_a_adc, p_b_adc);
+    } else if (drive->side < 0) {
+        drive->status = dz_status_negative(u_adc, p_a_adc, p_b_adc);
+        drive->law = dz_comp_negative(u_law, p_a_adc, p_b_adc);
+    } else {
+        drive->law = 0u;
     }
 }
 

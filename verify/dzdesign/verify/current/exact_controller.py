@@ -74,9 +74,9 @@ class ExactController:
         loop = self.loop
         if total >= loop.short_sum:
             self.faults |= SHORT
-        self.over_ticks = min(self.over_ticks + 1, loop.over_ticks) if above >= loop.over_sum else 0
+        self.over_ticks = self.over_ticks + 1 if above >= loop.over_sum else 0
         dead = above < loop.open_sum and self.compare >= loop.open_compare
-        self.open_ticks = min(self.open_ticks + 1, loop.open_ticks) if dead else 0
+        self.open_ticks = self.open_ticks + 1 if dead else 0
         if self.over_ticks >= loop.over_ticks:
             self.faults |= OVER
         if self.open_ticks >= loop.open_ticks:
@@ -103,8 +103,8 @@ def exact_ticks(loop: CurrentLoop, given: Columns) -> dict[str, np.ndarray]:
     aim = given["ramped"] + np.clip(given["set_point"] - given["ramped"], -loop.rate, loop.rate)
     error = aim - _rounded(loop.current_gain * above, 1 << loop.current_shift)
     too_high, dead = above >= loop.over_sum, (above < loop.open_sum) & (given["compare"] >= loop.open_compare)
-    over_ticks = np.where(too_high, np.minimum(given["over_ticks"] + 1, loop.over_ticks), 0)
-    open_ticks = np.where(dead, np.minimum(given["open_ticks"] + 1, loop.open_ticks), 0)
+    over_ticks = np.where(too_high, given["over_ticks"] + 1, 0)
+    open_ticks = np.where(dead, given["open_ticks"] + 1, 0)
     faults = given["faults"].copy()
     for bit, stands in (
         (SHORT, given["total"] >= loop.short_sum),

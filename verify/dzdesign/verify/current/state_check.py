@@ -19,11 +19,8 @@ BLOCK = 10_000
 OFFSETS = 200
 SEED = 22
 STATE = np.dtype(
-    [("integral", "<u4"), ("offset_total", "<u4")]
-    + [
-        (name, "<u2")
-        for name in ("offset_ticks", "offset", "compare", "faults", "over_ticks", "open_ticks", "ramped", "_")
-    ]
+    [("integral", "<i4"), ("offset_total", "<u4")]
+    + [(name, "<u4") for name in ("offset_ticks", "offset", "compare", "faults", "over_ticks", "open_ticks", "ramped")]
 )
 #: `struct period` of programs/current_states.h.
 PERIOD = np.dtype(
@@ -68,7 +65,7 @@ def edges_of(loop: CurrentLoop) -> str:
         [
             "#define COUNT(edges) ((uint16_t)(sizeof(edges) / sizeof((edges)[0])))",
             f"#define RATE_EDGE UINT32_C({loop.rate})",
-            f"#define INTEGRAL_MOST UINT32_C({loop.integral_limit << (loop.gain_shift + 1)})",
+            f"#define INTEGRAL_END UINT32_C({loop.integral_limit << loop.gain_shift})",
             *lines,
             "",
         ]
@@ -118,7 +115,6 @@ def given_of(periods: np.ndarray, loop: CurrentLoop) -> dict[str, np.ndarray]:
     """Return state and inputs before each period, as `exact_ticks` takes them."""
     before = periods["before"]
     given = {name: before[name].astype(np.int64) for name in (*COMPARED, "offset")}
-    given["integral"] -= loop.integral_limit << loop.gain_shift
     return given | {name: periods[name].astype(np.int64) for name in ("set_point", "total", "supply_code")}
 
 
@@ -130,7 +126,6 @@ def check_states(loop: CurrentLoop, core: Mapping[str, str], states: int, seed: 
         periods, hashed = host.periods(block + seed, BLOCK)
         hashes.append(hashed)
         expected = exact_ticks(loop, given_of(periods, loop))
-        expected["integral"] += loop.integral_limit << loop.gain_shift
         differs = {name: periods["after"][name] != expected[name] for name in COMPARED}
         places = np.flatnonzero(np.any(list(differs.values()), axis=0))
         wrong += len(places)

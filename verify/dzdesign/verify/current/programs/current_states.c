@@ -39,19 +39,19 @@ static void any_state(struct dz_current *loop)
     dz_current_init(loop);
     switch (random & 3u) {
     case 0u:
-        loop->integral = any() % (INTEGRAL_MOST + 1u);
+        loop->integral = (any() % ((2u * INTEGRAL_END) + 1u)) - INTEGRAL_END;
         break;
     case 1u:
-        loop->integral = any() % 1000u;
+        loop->integral = (any() % 1000u) - INTEGRAL_END;
         break;
     case 2u:
-        loop->integral = INTEGRAL_MOST - (any() % 1000u);
+        loop->integral = INTEGRAL_END - (any() % 1000u);
         break;
     default:
-        loop->integral = (INTEGRAL_MOST / 2u) + (any() % 200000u) - 100000u;
+        loop->integral = (any() % 200000u) - 100000u;
         break;
     }
-    loop->faults = ((random & 0x70u) == 0u) ? (uint16_t)((random >> 8) & 31u) : 0u;
+    loop->faults = ((random & 0x70u) == 0u) ? (random >> 8) & 31u : 0u;
     loop->offset = drawn(offset_edges, COUNT(offset_edges));
     loop->compare = drawn(compare_edges, COUNT(compare_edges));
     loop->over_ticks = drawn(over_tick_edges, COUNT(over_tick_edges));
@@ -67,10 +67,10 @@ static uint32_t folded(uint32_t hash, uint32_t word)
 static uint32_t hash_of(uint32_t hash, const struct dz_current *loop)
 {
     hash = folded(hash, loop->integral);
-    hash = folded(hash, ((uint32_t)loop->compare << 16) | loop->faults);
-    hash = folded(hash, ((uint32_t)loop->over_ticks << 16) | loop->open_ticks);
+    hash = folded(hash, (loop->compare << 16) | loop->faults);
+    hash = folded(folded(hash, loop->over_ticks), loop->open_ticks);
     hash = folded(hash, loop->ramped);
-    return folded(hash, ((uint32_t)loop->offset << 16) | loop->offset_ticks);
+    return folded(hash, (loop->offset << 16) | loop->offset_ticks);
 }
 
 uint32_t current_states(uint32_t seed, uint32_t count, struct period *periods)
