@@ -38,6 +38,7 @@ def certify(
     table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
     refused.
     """
+    margin = _smallest_margin(ceiling, table, u_min0, denominator)
     losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
     holds_to, released_from = _above(curve, ceiling, signals, table, u_min0 / denominator)
     return Certificate(
@@ -48,7 +49,7 @@ def certify(
         dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]),
         holds_to_MPa=holds_to,
         released_from_MPa=released_from,
-        smallest_margin_V=_smallest_margin(ceiling, table, u_min0, denominator) * u_max_V,
+        smallest_margin_V=margin * u_max_V,
         mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
         largest_loss_V=round(max(losses), LOSS_DIGITS),
     )

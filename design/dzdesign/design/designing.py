@@ -160,16 +160,26 @@ def _side_law(
     if min(ceiling.limit[: tested.stop] if goes_on else ceiling.limit) <= 0:
         raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 
-    def table(under: OffsetCeiling) -> tuple[int, ...]:
-        beyond = above if goes_on else None
+    def table(under: OffsetCeiling, beyond: AboveChoice) -> tuple[int, ...]:
         return choose_beta_table(
-            under, u_min0, side.trend, denominator=units.beta, above_one=above_one, above=beyond
+            under,
+            u_min0,
+            side.trend,
+            denominator=units.beta,
+            above_one=above_one,
+            above=beyond if goes_on else None,
         )
 
-    beta = table(ceiling)
+    beta = table(ceiling, above)
     transition_beta = None
     if opening is not None:
-        upper = table(opening_ceiling(opening, certified, tested, signals, u_max, sign))
+        released_from = above.released_from(tested) if goes_on else None
+        upper = table(
+            opening_ceiling(
+                opening, certified, tested, released_from=released_from, signals=signals, u_max=u_max, sign=sign
+            ),
+            AboveChoice(choice="lower", step_codes=STEP_CODES),
+        )
         transition_beta = tuple(map(max, upper, beta))
     return SideLaw(
         drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),

@@ -35,15 +35,23 @@ def opening_offset(side: SideModel, options: DesignOptions) -> OffsetCurve:
 
 
 def opening_ceiling(
-    opening: OffsetCurve, certified: OffsetCurve, tested: range, signals: Signals, u_max: Fraction, sign: int
+    opening: OffsetCurve,
+    certified: OffsetCurve,
+    tested: range,
+    *,
+    released_from: int | None,
+    signals: Signals,
+    u_max: Fraction,
+    sign: int,
 ) -> OffsetCeiling:
     """Return the opening threshold at every pressure code: no bound, so rounding to codes does not count.
 
-    Above the tests it comes down in proportion to the certified offset, so that a transition is never higher than at
-    the last test, and ends with the offset.
+    Above the tests it comes down by as much as the certified offset: a transition, and the hysteresis that a play takes
+    out of it, stay as they are at the last test. Where the offset is let go, only that height is left of it.
     """
     pressures = [signals.dp_MPa(code) for code in range(signals.largest_difference(sign) + 1)]
     limit = [opening.at(dp_MPa) for dp_MPa in pressures]
     for code in range(tested.stop, len(limit)) if certified.above is not None else ():
-        limit[code] *= certified.at(pressures[code]) / certified.offset_V[-1]
+        let_go = released_from is not None and code >= released_from
+        limit[code] -= certified.offset_V[-1] - (0 if let_go else certified.at(pressures[code]))
     return OffsetCeiling(limit=tuple(value / u_max for value in limit), certified=tested)
