@@ -5,7 +5,6 @@ The coil is exact between two edges of the PWM, and the controller is the C.
 
 from time import perf_counter
 
-import numpy as np
 from scoreboard import Row, print_rows, say
 
 from dzdesign.codegen.core.current_files import current_texts
@@ -21,7 +20,9 @@ from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
 from dzdesign.design.current.margins import worst_margins
 from dzdesign.design.current.step_response import step_responses
 from dzdesign.design.target_inputs import Converter
-from dzdesign.verify.current.coil_simulation import CoilSimulation
+from dzdesign.verify.current.coil_simulation import CoilLoop, CoilSimulation
+from dzdesign.verify.current.corner_runs import HELD_S, fault_runs, run_corner
+from dzdesign.verify.current.declared_circuit import declared_corners
 from dzdesign.verify.current.state_check import check_states, hashes_on
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 
@@ -32,8 +33,6 @@ FORMS = {
     "supply unknown": (CurrentSensor(V_per_A=2.0, offset_V=0.15), 10.0),
     "supply measured": (CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.075), 5.0),
 }
-SHARES = (0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
-SECONDS, SETTLE_S = 10, 1
 STATES, QUICK_STATES = 10_000_000, 500_000
 
 
@@ -44,6 +43,7 @@ def print_current_loop(quick: bool = False, seed: int = 0) -> list[Row]:
         say(f"current loop, {name} ...")
         loop = choose_loop(COIL, sensor, CONVERTER, SAMPLING, compare_max=60000)
         core = current_texts(loop)
+        around = CoilLoop(loop=loop, circuit=COIL, sensor=sensor, converter=CONVERTER, sampling=SAMPLING)
         phase, gain = worst_margins(COIL, SAMPLING, gains_of(loop, COIL))
         steps = step_responses(loop, COIL, SAMPLING, sensor_line(sensor, CONVERTER))
         slowest, largest = worst_step(steps)
@@ -56,37 +56,32 @@ def print_current_loop(quick: bool = False, seed: int = 0) -> list[Row]:
                 unit="ms", note=f"{1e3 * slowest.least_s:.1f} ms at full duty; {slowest.corner}"),
             Row(what=f"{name}: overshoot of that step, worst corner", value=100 * largest.overshoot, limit=10, unit="%",
                 note=f"{largest.corner}"),
-            *_settled(name, CoilSimulation(loop, core, COIL, sensor, CONVERTER, SAMPLING), sensor, quick),
+            *_settled(name, around, core, quick),
             *_states(name, loop, core, QUICK_STATES if quick else STATES),
         ]  # fmt: skip
     print_rows("Current loop: coil of 3.5 + 0.5 ohm and 40 mH, R x 0.75-1.35, L x 0.5-1.5, 18-32 V", rows)
     return rows
 
 
-def _settled(name: str, simulation: CoilSimulation, sensor: CurrentSensor, quick: bool) -> list[Row]:
-    """Return the rows of ten seconds at a constant set point, at every corner."""
-    codes_per_A = sensor.V_per_A * CONVERTER.levels / float(CONVERTER.full_V)
-    seconds = SETTLE_S + (1 if quick else SECONDS)
-    settle = SETTLE_S * SAMPLING.tick_Hz
-    worst = np.zeros(4)
-    for corner in COIL.end_corners() if quick else COIL.corners():
-        for share in SHARES:
-            counts = round(share * simulation.loop.full_counts)
-            found = simulation.run(corner, [counts] * (seconds * SAMPLING.tick_Hz))
-            if found.faults:
-                return [Row(what=f"{name}: faults at {corner}", value=found.faults, limit=0)]
-            mean = found.mean_A[settle:] * codes_per_A
-            read = (found.total[settle:].astype(float) - simulation.loop.offset_nominal) / SAMPLING.samples
-            asked = share * codes_per_A
-            now = (np.ptp(mean), np.ptp(read), abs(read.mean() - asked), abs(mean.mean() - asked))
-            worst = np.maximum(worst, now)
+def _settled(name: str, around: CoilLoop, core: dict[str, str], quick: bool) -> list[Row]:
+    """Return the rows of set points held for ten seconds, and of the faults of the circuit, at every corner."""
+    simulation = CoilSimulation(around, core)
+    corners = declared_corners(around.circuit)
+    found = [run_corner(simulation, corner).found for corner in (corners[::13] if quick else corners)]
+    if faults := [each for each in found if each.faults]:
+        return [Row(what=f"{name}: faults at {faults[0]}", value=faults[0].faults, limit=0)]
+    missed = [fault for fault in fault_runs(simulation) if not fault.holds]
     return [
-        Row(what=f"{name}: limit cycle of the mean current in {seconds - SETTLE_S} s", value=worst[0], limit=2,
+        Row(what=f"{name}: limit cycle in {HELD_S:g} s, of mean current and reading, {len(found)} corners",
+            value=max(each.limit_cycle_codes for each in found), limit=2, unit="codes"),
+        Row(what=f"{name}: steady error of the reading", value=max(each.steady_error_codes for each in found), limit=1,
             unit="codes"),
-        Row(what=f"{name}: limit cycle of the codes' mean", value=worst[1], limit=2, unit="codes"),
-        Row(what=f"{name}: steady error of the codes' mean", value=worst[2], limit=1, unit="codes"),
-        Row(what=f"{name}: steady error of the current itself", value=worst[3], unit="codes",
+        Row(what=f"{name}: steady error of the current itself",
+            value=max(each.current_error_codes for each in found), unit="codes",
             note="with rounding of the offset and of codes without noise, and the ripple between two samples"),
+        Row(what=f"{name}: phase margin missing by the eigenvalues of the declared circuit",
+            value=LEAST_PHASE_DEG - min(each.phase_margin_deg for each in found), limit=0, unit="deg"),
+        Row(what=f"{name}: faults of the circuit that the C does not see or latch", value=len(missed), limit=0),
     ]  # fmt: skip
 
 

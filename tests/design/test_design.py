@@ -14,6 +14,7 @@ from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
+from dzdesign.design.machine.allowance import allowance_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.options import IdentifyOptions
@@ -119,7 +120,7 @@ def test_a_valve_file_that_contradicts_itself_is_refused(example_valve, wording)
     greedy = dataclasses.replace(guarded_curve(side, "closing", "hold"), offset_V=(Fraction(6), Fraction(6)))
     greedy = dataclasses.replace(greedy, dp_MPa=(greedy.dp_MPa[0], greedy.dp_MPa[-1]))
     with pytest.raises(RequirementError):
-        offset_ceiling(greedy, DesignOptions().signals, Fraction(10))
+        offset_ceiling(greedy, Fraction(10), allowance_of(DesignOptions().signals))
 
 
 def test_span_must_reach_the_tested_pressures(example_valve, wording):

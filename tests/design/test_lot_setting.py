@@ -12,6 +12,7 @@ from dzdesign.design.beta_table import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
 from dzdesign.design.lot.setting import _limit, lot_setting
+from dzdesign.design.machine.allowance import allowance_of
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, parse_signal
@@ -47,7 +48,7 @@ def highest_over(common, each, label="positive", sign=1):
     """Return by how much the common offset exceeds a valve's own exact ceiling, at worst, over u_max."""
     own = each
     curve = guarded_curve(each.valve.sides[label], own.side(sign).certificate.guard, own.below_dp0)
-    limit = offset_ceiling(curve, own.signals, own.u_max_V, sign=sign).limit
+    limit = offset_ceiling(curve, own.u_max_V, allowance_of(own.signals, sign=sign)).limit
     u_min0 = common.side(sign).u_min0_over_u_max
     return max(common.beta(code, sign) * u_min0 - top for code, top in enumerate(limit))
 

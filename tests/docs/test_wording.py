@@ -24,8 +24,9 @@ FIGURES = {
 
 def scenario(name, **figures):
     return ScenarioResult(
-        name=name, side="positive", dp_MPa=5.0, leak_L_min=0.0, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0,
-        allowed_at_zero_L_min=None, unseen_below_L_min=None, must_shut=True, figures=figures,
+        name=name, side="positive", dp_MPa=5.0, back_MPa=1.0, leak_L_min=0.0, q_zero_L_min=0.0,
+        q_peak_at_zero_L_min=0.0, allowed_at_zero_L_min=None, unseen_below_L_min=None, must_shut=True,
+        not_required="", figures=figures,
     )  # fmt: skip
 
 
@@ -47,7 +48,7 @@ def test_a_flow_that_the_recordings_can_not_show_is_no_zero(capsys):
     hidden = replace(scenario("step", **FIGURES), unseen_below_L_min=0.63, q_peak_at_zero_L_min=0.7)
     print_scenarios([hidden], new_console())
     out = capsys.readouterr().out
-    assert re.search(r"5\.00 +below 0\.63 +0\.70", out) and "without it flow below 0.63 L/min" in out
+    assert re.search(r"5\.00 +1\.00 +below 0\.63 +0\.70", out) and "without it flow below 0.63 L/min" in out
 
 
 def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensator, capsys):

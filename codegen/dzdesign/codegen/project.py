@@ -7,6 +7,7 @@ from functools import cache
 from importlib import import_module
 from importlib.resources import files as files_of
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from dzdesign.codegen.banner import Banner, banner_of, board_lines
@@ -24,12 +25,15 @@ from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
+from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.design.target_inputs import Converter
 
 if TYPE_CHECKING:
     import jinja2
 
 PACKAGE = "dzdesign.codegen"
+#: Width of a paragraph in a README.
+README_COLUMNS = 120
 #: Where neither the compensator nor anybody else says which.
 DEFAULT_TARGET = "f28335"
 
@@ -149,7 +153,8 @@ def target_files(compensator: Compensator, target: Target, banner: Banner) -> di
         **target.context,
         "bipolar": len(signals.signs) == 2,
         "signals": signals,
-        "u_max_V": f"{float(compensator.u_max_V):g}",
+        "units": compensator.valve.recorded_units,
+        "u_max_V": float(compensator.u_max_V),
         "drive": compensator.drive_functions,
         "limited": compensator.drive_functions.compare_limit < signals.compare_max,
         "at_zero": {sign: zero_command(compensator, sign) for sign in signals.signs},
@@ -164,6 +169,7 @@ def target_files(compensator: Compensator, target: Target, banner: Banner) -> di
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,
+        "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }
     return {
         path: _render(

@@ -7,6 +7,7 @@ voltage is that at the converter's pin, behind them.
 from dataclasses import dataclass
 from fractions import Fraction
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import CommandSignal, PressureSignal
 from dzdesign.design.target_inputs import Converter
@@ -54,7 +55,7 @@ class PinReading:
 class CommandPoint:
     """One command to try."""
 
-    #: In volts, as u_max counts it; then its share of full command, or ``zero``, ``full``.
+    #: In the unit that a person sees; then its share of full command, or ``zero``, ``full``.
     u_i: str
     share: str
     pin: PinReading
@@ -68,6 +69,9 @@ class PressureWiring:
     signal: PressureSignal
     zero: PinReading
     full: PinReading
+    #: No pressure and the span, in the unit that a person sees.
+    none: str
+    span: str
     #: That makes this of 4-20 mA; empty without a live zero of that kind.
     shunt_ohm: str
 
@@ -76,7 +80,8 @@ class PressureWiring:
 class Wiring:
     """What a target's templates print of the signals' wiring."""
 
-    #: From full negative command (or zero) to full positive command; then those of them that are zero or full.
+    #: What full commands read; then all to try, from the lowest, and those of them that are zero or full.
+    command_range: str
     commands: tuple[CommandPoint, ...]
     ends: tuple[CommandPoint, ...]
     #: The shunt that makes the command of 4-20 mA, or nothing.
@@ -93,25 +98,30 @@ def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
     points = _commands(compensator, converter)
     zero = PinReading(code=command.zero_code, converter=converter)
     return Wiring(
+        command_range=f"{points[min(points)].u_i} to {points[max(points)].u_i}",
         commands=tuple(points.values()),
         ends=tuple(point for share, point in points.items() if share in (-1, 0, 1)),
         command_shunt_ohm="" if len(signals.signs) == 2 else zero.shunt_ohm(command.full_code),
         no_voltage=_no_voltage(command, signals.signs),
         no_voltage_drives=any(command.from_zero(0, sign) for sign in signals.signs) and command.valid_codes[0] == 0,
-        pressures=(_pressure("A", signals.pressure_a, converter), _pressure("B", signals.pressure_b, converter)),
+        pressures=tuple(
+            _pressure(name, signal, converter, compensator.valve.recorded_units)
+            for name, signal in (("A", signals.pressure_a), ("B", signals.pressure_b))
+        ),
     )
 
 
 def _commands(compensator: Compensator, converter: Converter) -> dict[Fraction, CommandPoint]:
     """Return the commands to try, by their share of full command, from the lowest."""
-    signs, command = compensator.signals.signs, compensator.signals.command
+    signs, command, units = compensator.signals.signs, compensator.signals.command, compensator.valve.recorded_units
+    sided = len(signs) == 2 and units.command.at_zero == 0
     points = {}
     for share in sorted({Fraction(0), *(sign * share for sign in signs for share in TRIED)}):
         sign = -1 if share < 0 else 1
         codes = int(abs(share) * command.span(sign) + Fraction(1, 2))
         volts = float(share * compensator.u_max_V)
         points[share] = CommandPoint(
-            u_i=f"{volts:+g} V" if share and len(signs) == 2 else f"{volts:g} V",
+            u_i=("+" if share > 0 and sided else "") + units.text(volts, "g V"),
             share="zero" if not share else f"full{_side(sign, signs)}" if abs(share) == 1 else _percent(abs(share)),
             pin=PinReading(code=command.zero_code + command.direction(sign) * codes, converter=converter),
         )
@@ -137,6 +147,14 @@ def _percent(share: Fraction) -> str:
     return f"{100 * float(share):.3g} %"
 
 
-def _pressure(name: str, signal: PressureSignal, converter: Converter) -> PressureWiring:
+def _pressure(name: str, signal: PressureSignal, converter: Converter, units: RecordedUnits) -> PressureWiring:
     zero, full = (PinReading(code=code, converter=converter) for code in (signal.zero_code, signal.full_code))
-    return PressureWiring(name=name, signal=signal, zero=zero, full=full, shunt_ohm=zero.shunt_ohm(full.code))
+    return PressureWiring(
+        name=name,
+        signal=signal,
+        zero=zero,
+        full=full,
+        none=units.text(0.0, "g MPa"),
+        span=units.text(float(signal.span_MPa), "g MPa"),
+        shunt_ohm=zero.shunt_ohm(full.code),
+    )

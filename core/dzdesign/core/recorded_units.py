@@ -1,4 +1,6 @@
-"""The units of the recordings, in which a person sees what is computed in V, MPa and L/min; converted here only.
+"""The units in which a person sees what is computed in V, MPa, L/min and A; converted here only.
+
+They are those of the recordings, unless `--units` names others (`dzdesign.core.chosen_units`).
 
 A number in a text is written with a format and the unit in which it is computed, as in ``{knee:.3f V}``.
 `RecordedUnits` turns it into the unit of the recordings, and the decimals into those of the same significance.
@@ -11,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, final, overload
 
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.core.artefact_types import RuleError, quantity
 
@@ -60,15 +62,24 @@ class FlowUnit:
     factor: Annotated[float, quantity("min/L", "How many of it are 1 L/min.", gt=0, le=1e12)] = 1.0
 
 
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentUnit:
+    """Unit of a solenoid's current."""
+
+    unit: Annotated[UnitName, Meta(description="Its name.")] = "A"
+    factor: Annotated[float, quantity("1/A", "How many of it are 1 A.", gt=0, le=1e12)] = 1.0
+
+
 Quantity = Literal["command", "pressure", "flow"]
 Unit = CommandUnit | PressureUnit | FlowUnit
 
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """A unit in which something is computed: powers of command, pressure and flow in it, and how it is named.
+    """A unit in which something is computed: powers of command, pressure, flow and current in it, and how it is named.
 
-    `name` is how it is named where its quantities are in V, MPa and L/min, `label` elsewhere; `scale` brings it to
+    `name` is how it is named where its quantities are in V, MPa, L/min and A, `label` elsewhere; `scale` brings it to
     them.
     """
 
@@ -77,6 +88,7 @@ class _Kind:
     u: int = 0
     dp: int = 0
     q: int = 0
+    i: int = 0
     scale: float = 1.0
     #: A reading, which has a zero, and no difference of two.
     reading: bool = False
@@ -95,17 +107,21 @@ _KINDS = {
     "L/min a volt": _Kind("L/min a volt", "{q} per {u}", u=-1, q=1),
     "mV/MPa²": _Kind("mV/MPa²", "{u}/{dp}²", u=1, dp=-2, scale=1e-3),
     "L/min per MPa": _Kind("L/min per MPa", "{q} per {dp}", dp=-1, q=1),
+    "A": _Kind("A", "{i}", i=1),
 }
 _FORMAT = re.compile(r"(?P<sign>\+?)(?:\.(?P<digits>\d+))?(?P<kind>[fg])")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedUnits:
-    """Units in which a valve was recorded; the numbers of an artefact are in V, MPa and L/min whatever these are."""
+    """Units in which a valve is shown; the numbers of an artefact are in V, MPa, L/min and A whatever these are."""
 
     command: Annotated[CommandUnit, Meta(description="Unit of the command.")] = CommandUnit()
     pressure: Annotated[PressureUnit, Meta(description="Unit of the pressure drop.")] = PressureUnit()
     flow: Annotated[FlowUnit, Meta(description="Unit of the flow.")] = FlowUnit()
+    current: Annotated[
+        CurrentUnit | UnsetType, Meta(description="Unit of a solenoid's current; missing: A.")
+    ] = UNSET
     differ: Annotated[
         tuple[Quantity, ...],
         Meta(description="Quantities that the recordings have in different units: shown in V, MPa or L/min."),
@@ -127,6 +143,10 @@ class RecordedUnits:
         """Whether the reading of the command falls where the valve opens."""
         return self.command.factor < 0
 
+    @property
+    def _current(self) -> CurrentUnit:
+        return self.current or CurrentUnit()
+
     def text(self, value: float, form: str) -> str:
         """Return a number with its unit.
 
@@ -143,7 +163,7 @@ class RecordedUnits:
         spec, _, unit = form.partition(" ")
         kind = _KINDS[unit]
         if self._as_computed(kind):
-            return format(value, spec)
+            return _without_exponent(value, spec)
         found = _FORMAT.fullmatch(spec)
         if found is None:
             raise ValueError(f"{spec!r} is no format of a quantity, expected one such as '.3f'")
@@ -152,15 +172,16 @@ class RecordedUnits:
         if found["kind"] == "f":
             shown = round(shown, decimals := max(0, round(digits - math.log10(abs(gain)))))
             return format(shown + 0.0, f"{found['sign']}.{decimals}f")
-        text = format(shown, spec)
-        return format(shown, f"{found['sign']}.0f") if "e+" in text else text
+        return _without_exponent(shown, spec)
 
     def label(self, unit: str) -> str:
         """Return the name of the unit that stands for one in which something is computed, for a header or an axis."""
         kind = _KINDS[unit]
         if self._as_computed(kind):
             return kind.name
-        return kind.label.format(u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit)
+        return kind.label.format(
+            u=self.command.unit, dp=self.pressure.unit, q=self.flow.unit, i=self._current.unit
+        )
 
     @overload
     def convert(self, value: float, unit: str) -> float: ...
@@ -186,7 +207,7 @@ class RecordedUnits:
         return f"at {first} {unit}" if first == last else f"from {first} to {last} {unit}"
 
     def in_words(self) -> str:
-        """Return what is shown in which unit; nothing where all are V, MPa and L/min."""
+        """Return what is shown in which unit; nothing where all are V, MPa, L/min and A."""
         command, parts = self.command, []
         if not self._as_computed(_KINDS["V"]):
             declared = f" ({command.declared})" if command.declared else ""
@@ -194,10 +215,11 @@ class RecordedUnits:
             parts.append(f"command in {command.unit}{declared}{counted}")
         parts += [f"pressure drop in {self.pressure.unit}"] if self.pressure.factor != 1 else []
         parts += [f"flow in {self.flow.unit}"] if self.flow.factor != 1 else []
+        parts += [f"currents in {self._current.unit}"] if self._current.factor != 1 else []
         differing = f"the recordings differ in the unit of {' and '.join(self.differ)}, shown in " + " and ".join(
             {"command": "V", "pressure": "MPa", "flow": "L/min"}[name] for name in self.differ
         )
-        lines = (", ".join(parts) and f"as recorded, {', '.join(parts)}", self.differ and differing)
+        lines = (", ".join(parts), self.differ and differing)
         return "; ".join(line for line in lines if line)
 
     def _as_computed(self, kind: _Kind) -> bool:
@@ -207,16 +229,37 @@ class RecordedUnits:
             (kind.u and (command.unit, command.at_zero, command.factor) != ("V", 0.0, 1.0))
             or (kind.dp and (self.pressure.unit, self.pressure.factor) != ("MPa", 1.0))
             or (kind.q and (self.flow.unit, self.flow.factor) != ("L/min", 1.0))
+            or (kind.i and (self._current.unit, self._current.factor) != ("A", 1.0))
         )
 
     def _gain(self, kind: _Kind) -> float:
         """Return the factor of a unit; that of a difference is positive: it counts from zero command outwards."""
         factor = self.command.factor if kind.reading else abs(self.command.factor)
-        return kind.scale * factor**kind.u * self.pressure.factor**kind.dp * self.flow.factor**kind.q
+        others = self.pressure.factor**kind.dp * self.flow.factor**kind.q * self._current.factor**kind.i
+        return kind.scale * factor**kind.u * others
+
+
+def _without_exponent(value: float, spec: str) -> str:
+    """Return a number in a format; one such as 1150 as it is, where ``.3g`` makes 1.15e+03 of it."""
+    text = format(value, spec)
+    return format(value, f"{'+' if spec.startswith('+') else ''}.0f") if "e+" in text else text
 
 
 #: V, MPa and L/min.
 AS_COMPUTED = RecordedUnits()
+
+
+#: Spellings of a unit that the name of which is another; of pressures, what they are relative to is no part of a drop.
+_NAMES: dict[str, str] = {
+    **dict.fromkeys(("barg", "bara", "bard", "bar(g)", "bar(a)", "bar(d)"), "bar"),
+    **dict.fromkeys(("psig", "psia", "psid"), "psi"),
+    "m3s": "m3/s", "lph": "L/h", "l/h": "L/h", "pct": "%", "percent": "%",
+}  # fmt: skip
+
+
+def name_of_unit(written: str) -> str:
+    """Return the name of a unit as it is written somewhere; empty if that is no text for people."""
+    return _NAMES.get(written.lower(), plain_unit(written))
 
 
 def plain_unit(name: str) -> str:

@@ -1,11 +1,12 @@
 """Texts with quantities that wait for the units of the recordings: whoever warns or refuses need not know them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from string import Formatter
 from typing import Any, final
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import DzdesignError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 
 
@@ -17,7 +18,7 @@ class _Filler(Formatter):
 
     def convert_field(self, value: Any, conversion: Any) -> Any:
         """Fill a text within the text."""
-        if isinstance(value, Worded | InputError):
+        if isinstance(value, Worded | DzdesignError):
             return in_units(value, self._units)
         return super().convert_field(value, conversion)
 
@@ -36,7 +37,7 @@ class _Filler(Formatter):
 class Worded:
     """A text with quantities that waits for the units of the recordings; `str` of it is in V, MPa and L/min.
 
-    It stands in the place of the text in an `InputError`, so that whoever refuses a recording need not know its units.
+    It stands in the place of the text in an error, so that whoever refuses a recording need not know its units.
     """
 
     template: str
@@ -62,9 +63,19 @@ def all_of(texts: Sequence[Worded], between: str = " and ") -> Worded:
     return worded(between.join(f"{{{place}}}" for place in places), **dict(zip(places, texts, strict=True)))
 
 
-def in_units(text: "Worded | InputError", units: RecordedUnits) -> str:
+def in_units(text: "Worded | DzdesignError", units: RecordedUnits) -> str:
     """Return a text, or that of an error, in units."""
-    if isinstance(text, InputError):
+    if isinstance(text, DzdesignError):
         inner = text.args[0] if text.args else ""
         return in_units(inner, units) if isinstance(inner, Worded) else str(text)
     return _Filler(units).vformat(text.template, (), text.numbers)
+
+
+@contextmanager
+def errors_in(units: RecordedUnits) -> Iterator[None]:
+    """Raise the errors of a block with their quantities in units."""
+    try:
+        yield
+    except DzdesignError as error:
+        error.args = (in_units(error, units),)
+        raise

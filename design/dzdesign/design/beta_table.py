@@ -1,6 +1,8 @@
 """The table of beta in the firmware: the best nodes that lie under the certified offset at every pressure code."""
 
 from bisect import bisect_left
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -10,9 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.worded import worded
+from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.offset.above_tests import AboveChoice, OffsetAbove
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.certified_bound import CertifiedBound
+from dzdesign.identify.valve.certified_bound import CertifiedBound, NEAR_MPa
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -81,6 +85,20 @@ class OffsetCurve:
             return self.above.bound_at(dp_MPa)
         return None if self.certified is None else self.certified.at(dp_MPa)
 
+    def in_doubles(self, dp_MPa: np.ndarray) -> np.ndarray:
+        """Return the offset in double precision, V, and where a bound is certified the lower of both.
+
+        The pressure drops rise.
+        """
+        nodes, offset = (np.array([float(value) for value in values]) for values in (self.dp_MPa, self.offset_V))
+        value: np.ndarray = np.interp(dp_MPa, nodes, offset)
+        if self.above is not None:
+            value = np.where(dp_MPa > nodes[-1], self.above.in_doubles(dp_MPa), value)
+        if self.hold_below_MPa is not None:
+            hold = float(self.hold_below_MPa)
+            value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
+        return value if self.certified is None else np.minimum(value, self.certified.in_doubles(dp_MPa))
+
 
 @lru_cache(maxsize=8)
 def pressures_MPa(signals: Signals, first: int, last: int) -> tuple[Fraction, ...]:
@@ -88,36 +106,62 @@ def pressures_MPa(signals: Signals, first: int, last: int) -> tuple[Fraction, ..
     return tuple(signals.dp_MPa(code) for code in range(first, last + 1))
 
 
-def offset_ceiling(
-    curve: OffsetCurve, signals: Signals, u_max_V: Fraction, *, sign: int = 1, dither_counts: int = 0
-) -> OffsetCeiling:
-    """Return the limit of the offset at every pressure code, rounding to codes and to counts counted.
+def offset_ceiling(curve: OffsetCurve, u_max_V: Fraction, allowance: Allowance) -> OffsetCeiling:
+    """Return the limit of the offset at every pressure code.
 
-    The dither's peak is kept free beside the rounding. A curve that lies above its bound somewhere
+    It is the least certified offset over all pressure drops that the code may stand for, on the machine that moves the
+    threshold furthest, less what rounding and the dither add to the drive. A curve that lies above its bound somewhere
     is refused: valve.json contradicts itself.
     """
+    signals = allowance.signals
     first, last = (signals.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))
-    code_max = signals.largest_difference(sign)
+    code_max = signals.largest_difference(allowance.sign)
     if last > code_max:
         raise InputError(
-            f"the sensor's span of {float(signals.pressure_a.span_MPa):g} MPa ends below the tested pressure drop of "
-            f"{float(curve.dp_MPa[-1]):g} MPa; give the real span with --pressure-span"
-        )
-    low, high = signals.difference_error(sign)
-    pressures = pressures_MPa(signals, low, code_max + high)
-    kept = (Fraction(1, 2) + dither_counts) / signals.compare_max
-    values = []
-    for dp_MPa in pressures:
-        offset, bound = curve.at(dp_MPa), curve.bound(dp_MPa)
-        if bound is not None and offset > bound + DECIMALS:
-            raise RequirementError(
-                f"beta u_min0 is {float(offset):.4f} V at {float(dp_MPa):.3f} MPa, above the threshold's lower bound "
-                f"of {float(bound):.4f} V; make valve.json again with `dzdesign identify`"
+            worded(
+                "the sensor's span of {span:g MPa} ends below the tested pressure drop of {tested:g MPa}; give the "
+                "real span with --pressure-span",
+                span=float(signals.pressure_a.span_MPa),
+                tested=float(curve.dp_MPa[-1]),
             )
-        values.append((offset if bound is None else min(offset, bound)) / u_max_V - kept)
-    span = high - low + 1
-    limit = tuple(min(values[code : code + span]) for code in range(code_max + 1))
+        )
+    low, high = allowance.window
+    factor, kept = allowance.factor / u_max_V, allowance.kept
+    values = [certified_V(curve, dp_MPa) for dp_MPa in pressures_MPa(signals, low, code_max + high)]
+    limit = tuple(value * factor - kept for value in _least_of_windows(values, high - low + 1))
     return OffsetCeiling(limit=limit, certified=range(ceil(first), floor(last) + 1))
+
+
+def certified_V(curve: OffsetCurve, dp_MPa: Fraction) -> Fraction:
+    """Return the offset that is certified at a pressure drop, V; a curve above its bound is refused."""
+    offset, bound = curve.at(dp_MPa), curve.bound(dp_MPa)
+    if bound is None:
+        return offset
+    if offset > bound + DECIMALS:
+        raise RequirementError(
+            worded(
+                "beta u_min0 is {offset:.4f V} at {dp:.3f MPa}, above the threshold's lower bound of {bound:.4f V}; "
+                "make valve.json again with `dzdesign identify`",
+                offset=float(offset),
+                dp=float(dp_MPa),
+                bound=float(bound),
+            )
+        )
+    return min(offset, bound)
+
+
+def _least_of_windows(values: Sequence[Fraction], width: int) -> list[Fraction]:
+    """Return the least of each `width` neighbouring values."""
+    found, rising = [], deque[int]()  # places of values that rise, the first of them the least of the window
+    for place, value in enumerate(values):
+        while rising and values[rising[-1]] >= value:
+            rising.pop()
+        rising.append(place)
+        if rising[0] <= place - width:
+            rising.popleft()
+        if place >= width - 1:
+            found.append(values[rising[0]])
+    return found
 
 
 def _with_release(ceiling: OffsetCeiling, least: Fraction, above: AboveChoice) -> OffsetCeiling:

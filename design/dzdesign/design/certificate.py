@@ -8,8 +8,10 @@ from dataclasses import fields
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.worded import in_units
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.side_law import Certificate
 from dzdesign.design.signals import SIDE_NAMES, Signals
@@ -34,7 +36,7 @@ def certify(
 ) -> Certificate:
     """Prove the certificate of one side, in exact arithmetic, at every pressure code.
 
-    The `curve` is the guarded one; the `ceiling` is what rounding, of pressures too, and dither leave of it. The
+    The `curve` is the guarded one; the `ceiling` is what rounding, dither and the machine leave of it. The
     table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
     refused.
     """
@@ -57,7 +59,7 @@ def certify(
 
 def prove_certificates(compensator: Compensator) -> None:
     """Prove the certificates of a compensator again, from the valve in it; refuse the first statement that differs."""
-    signals, dither = compensator.signals, compensator.dither_reserve_counts
+    signals = compensator.signals
     for sign in signals.signs:
         name = SIDE_NAMES[sign]
         law, model = compensator.side(sign), compensator.valve.sides.get(name)
@@ -66,7 +68,8 @@ def prove_certificates(compensator: Compensator) -> None:
         stated = law.certificate
         above = AboveChoice(choice=compensator.above, step_codes=STEP_CODES)
         curve = guarded_curve(model, stated.guard, compensator.below_dp0, above)
-        ceiling = offset_ceiling(curve, signals, compensator.u_max_V, sign=sign, dither_counts=dither)
+        allowance = compensator.allowance(sign)
+        ceiling = offset_ceiling(curve, compensator.u_max_V, allowance)
         try:
             proved = certify(
                 model,
@@ -80,7 +83,8 @@ def prove_certificates(compensator: Compensator) -> None:
                 denominator=compensator.beta_denominator,
             )
         except RequirementError as error:
-            raise InputError(f"the {name} side's certificate does not hold: {error}; design it again") from error
+            reason = in_units(error, compensator.valve.recorded_units)
+            raise InputError(f"the {name} side's certificate does not hold: {reason}; design it again") from error
         for field in fields(Certificate):
             claim, found = getattr(stated, field.name), getattr(proved, field.name)
             if claim != found:
@@ -88,6 +92,10 @@ def prove_certificates(compensator: Compensator) -> None:
                     f"the {name} side's certificate says {field.name} = {_words(claim)}, but {_words(found)} follows "
                     "from its valve; design it again"
                 )
+        if law.budget != budget_of(model, curve, compensator.u_max_V, allowance, stated.guard, compensator.machine):
+            raise InputError(
+                f"the {name} side's budget is not the one that follows from its valve and its machine; design it again"
+            )
 
 
 def _words(value: object) -> str:

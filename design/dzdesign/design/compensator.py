@@ -18,6 +18,7 @@ from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
@@ -119,6 +120,8 @@ class Compensator(ShownInNotebooks, Artefact):
         if self.u_max_V != Fraction(repr(self.valve.u_max_V)):
             raise RuleError(f"'u_max_V' is {float(self.u_max_V):g}, not that of its valve, {self.valve.u_max_V:g} V")
         self._check_codes()
+        if self.machine is not None and (self.machine.drive == "current") != (self.current_drive is not None):
+            raise RuleError(f"the machine's drive is '{self.machine.drive}', not the one of the compensator")
         if len(self.lot) == 1:
             raise RuleError("the lot has 1 valve, expected none, or two and more")
         if len({valve.name for valve in self.lot}) < len(self.lot):
@@ -211,7 +214,11 @@ class Compensator(ShownInNotebooks, Artefact):
     @property
     def dither_reserve_counts(self) -> int:
         """Counts by which the offset stays lower for the dither; next to none where the ramps were recorded with it."""
-        return self.drive_functions.dither(self.signals).reserve(self.valve.dither)
+        return dither_reserve(self.drive_functions.dither(self.signals), self.valve.dither, self.machine)
+
+    def allowance(self, sign: int) -> Allowance:
+        """Return what the offset of a side leaves free under the certified curve."""
+        return allowance_of(self.signals, self.machine, sign=sign, dither_counts=self.dither_reserve_counts)
 
     @property
     def transition_end(self) -> int:

@@ -6,6 +6,7 @@ from dzdesign.design.broken_sensor import ACCEPTED, hidden_failure
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.machine.costs import machine_costs
 from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
@@ -20,6 +21,7 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
     for sign in compensator.signals.signs:
         side, label = valve.sides[SIDE_NAMES[sign]], _side_label(compensator, sign)
         lines += lines_of_tests(compensator, sign)
+        lines += [label + line for line in machine_costs(compensator, sign)]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     units = valve.recorded_units
     lines.append(
@@ -142,7 +144,8 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     if not compensator.transition_codes:
         return [
             f"no transition, so no zero band: a zero command that reads {error.zero_band_codes} codes too high "
-            f"({declared}) lifts the drive by {_lift_V(compensator):.3f} V, which the certificate does not count"
+            f"({declared}) lifts the drive by {compensator.valve.recorded_units.text(_lift_V(compensator), '.3f dV')}, "
+            "which the certificate does not count"
         ]
     leave = compensator.drive_functions.leave_zero_codes
     return [

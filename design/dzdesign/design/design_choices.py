@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, Option, Text, arguments_of
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.design.current.choices import CurrentChoices
+from dzdesign.design.machine.choices import MachineChoices
 
 if TYPE_CHECKING:
     from dzdesign.design.target_inputs import TargetInputs
@@ -25,7 +26,7 @@ HYSTERESIS = ("keep", "play")
 
 
 @dataclass(frozen=True, kw_only=True)
-class DesignChoices(CurrentChoices):
+class DesignChoices(MachineChoices, CurrentChoices):
     """Options of `design`, as written; None takes the default, so that `codegen` can tell what was given."""
 
     law: Annotated[Text, Option("LAW", LAW, "paper", choices=LAW_NAMES)] = None

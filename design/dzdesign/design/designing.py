@@ -6,6 +6,7 @@ from fractions import Fraction
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import errors_in, worded
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
@@ -14,14 +15,17 @@ from dzdesign.design.broken_sensor import ACCEPTED, refuse_hidden_failures
 from dzdesign.design.certificate import certify, guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
+from dzdesign.design.machine.accounting import budget_of
+from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
+from dzdesign.design.machine.bench_current import check_bench_current
 from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.offset.opening import opening_ceiling, opening_offset
+from dzdesign.design.offset.refusals import refuse_crossed_branches, refuse_two_signs
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
 from dzdesign.design.quantise import Units, finest_units, fits
 from dzdesign.design.side_law import SideLaw, Sides
-from dzdesign.design.signals import SIDE_NAMES
-from dzdesign.identify.valve.guard_curve import GUARDS
+from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.reading_flow import default_reading_flow
 from dzdesign.identify.valve.side_model import SideModel
@@ -49,20 +53,29 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
     RequirementError
         If a proof fails.
     """
-    signals = (options := options or DesignOptions()).signals
+    with errors_in(valve.recorded_units):
+        return _designed(valve, options or DesignOptions(), valve_bytes)
+
+
+def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | None) -> Compensator:
+    signals = options.signals
     law(options.law)
     u_max = _full_command(valve, options)
+    if options.current is not None and (machine := options.machine) is not None:
+        rated_A = options.current.circuit.rated_A
+        check_bench_current(valve, rated_A, machine.bench_full_A, machine.bench_current_error or 0.0)
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
-        _refuse_two_signs(valve, options.guard)
+        refuse_two_signs(valve, options.guard)
     functions = options.drive_functions(transition_codes)
     dither = functions.dither(signals)
     dither.check(valve.dither)
-    reserve, laws = dither.reserve(valve.dither), {}
+    reserve, laws = dither_reserve(dither, valve.dither, options.machine), {}
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
-        laws[sign] = _side_law(side, options, u_max, sign, units, transition_codes, reserve)
+        allowance = allowance_of(signals, options.machine, sign=sign, dither_counts=reserve)
+        laws[sign] = _side_law(side, options, u_max, units, transition_codes, allowance)
     digest, request = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes), options.request
     compensator = Compensator(
         tool=THIS_TOOL,
@@ -84,6 +97,7 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         command_error=options.error,
         drive_functions=functions,
         current_drive=options.current_drive(),
+        machine=options.machine,
         costs=(),
         valve=valve,
     )
@@ -133,32 +147,37 @@ def _side_law(
     side: SideModel,
     options: DesignOptions,
     u_max: Fraction,
-    sign: int,
     units: Units,
     transition_codes: int,
-    dither_counts: int,
+    allowance: Allowance,
 ) -> SideLaw:
-    """Choose the coefficients and tables of one side, and prove its certificate.
-
-    So many counts of the dither are kept free under the bound.
-    """
+    """Choose the coefficients and tables of one side, and prove its certificate."""
     signals = options.signals
     if "branch-order" not in options.accept:
-        _refuse_crossed_branches(side)
+        refuse_crossed_branches(side)
     above = AboveChoice(choice=options.above, step_codes=STEP_CODES)
     certified = guarded_curve(side, options.guard, options.below_dp0, above)
     opening = opening_offset(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))
+    ceiling = offset_ceiling(certified, u_max, allowance)
+    tested, goes_on = ceiling.certified, certified.above is not None
+    if min(ceiling.limit[: tested.stop] if goes_on else ceiling.limit) <= 0:
+        raise InputError(
+            "dither and declared machine leave no offset under the certified one; make the dither smaller, declare "
+            "narrower ranges, or control the current"
+            if options.machine
+            else "the dither's peak leaves no offset under the certified one; make it smaller"
+        )
     top = (opening or certified).at(reference)
+    if opening is None and options.machine:
+        top = left_by_machine(top, ceiling, signals, reference, u_max)
     # Half a count less, because the compare value of the offset may be rounded up.
     u_min0 = over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
     if u_min0 <= 0:
-        raise InputError(f"u_min0 is {float(top):.4f} V, less than one count of the PWM: no dead zone")
+        raise InputError(
+            worded("u_min0 is {top:.4f V}, less than one count of the PWM: no dead zone", top=float(top))
+        )
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
-    ceiling = offset_ceiling(certified, signals, u_max, sign=sign, dither_counts=dither_counts)
-    tested, goes_on = ceiling.certified, certified.above is not None
-    if min(ceiling.limit[: tested.stop] if goes_on else ceiling.limit) <= 0:
-        raise InputError("the dither's peak leaves no offset under the certified one; make it smaller")
 
     def table(under: OffsetCeiling, beyond: AboveChoice) -> tuple[int, ...]:
         return choose_beta_table(
@@ -176,7 +195,8 @@ def _side_law(
         released_from = above.released_from(tested) if goes_on else None
         upper = table(
             opening_ceiling(
-                opening, certified, tested, released_from=released_from, signals=signals, u_max=u_max, sign=sign
+                opening, certified, tested, released_from=released_from, signals=signals, u_max=u_max,
+                sign=allowance.sign,
             ),
             AboveChoice(choice="lower", step_codes=STEP_CODES),
         )
@@ -197,38 +217,7 @@ def _side_law(
             table=beta,
             denominator=units.beta,
         ),
-    )
-
-
-def _refuse_crossed_branches(side: SideModel) -> None:
-    """Refuse knees in an order that no valve has: the guarded one is not where the valve closes."""
-    for test in side.tests:
-        if test.closes_above_opening:
-            raise InputError(
-                f"'{test.source}': the valve closes ({test.u_knee_falling_V:.3f} V) above where it opens "
-                f"({test.u_knee_rising_V:.3f} V), as no valve does, so flow at zero command is possible; run "
-                "`identify` again with the meter's true --meter-lag or a right column of time, or take it as it is by "
-                "--accept branch-order"
-            )
-
-
-def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
-    """Refuse a command of both signs where a side was not tested, or does not bound the guarded threshold."""
-    if "negative" not in valve.sides:
-        raise InputError(
-            "the command has both signs, but the valve's negative side was not tested; record its ramps, or give a "
-            "command of one sign"
-        )
-    guards = {name: valve.sides[name].certified for name in ("positive", "negative")}
-    lacking = [name for name, found in guards.items() if guard not in found]
-    if not lacking:
-        return
-    common = [name for name in GUARDS if all(name in found for found in guards.values())]
-    raise InputError(
-        f"the {' and the '.join(lacking)} side's ramp tests do not bound the {guard} threshold, which is to be "
-        "guarded; "
-        + (f"take --guard {common[0]}, or " if common else "no guard serves both sides: ")
-        + "record both branches of both sides"
+        budget=budget_of(side, certified, u_max, allowance, options.guard, options.machine),
     )
 
 
@@ -243,6 +232,14 @@ def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
     below_knee = max(Fraction(repr(knee)) - offset_V, Fraction(0))
     travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
     return min(travel, 1 - offset_V / u_max)  # beyond full drive there is nothing
+
+
+def left_by_machine(
+    top_V: Fraction, ceiling: OffsetCeiling, signals: Signals, dp0_MPa: Fraction, u_max_V: Fraction
+) -> Fraction:
+    """Return the offset at dP0 that a declared machine leaves, V: a beta of 1 without a transition."""
+    limit = ceiling.limit[round(signals.dp_code(dp0_MPa))]
+    return min(top_V, (limit + Fraction(1, 2 * signals.compare_max)) * u_max_V)
 
 
 def over(value: Fraction, rounding: str, unit: int) -> Fraction:

@@ -18,6 +18,7 @@ from dzdesign.design.design_choices import (
     BelowDp0,
     DesignRequest,
 )
+from dzdesign.design.machine.texts import machine_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import (
     command_signal,
@@ -57,17 +58,19 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     signal = parse_signal(text["command_signal"], "--command-signal")
     command = command_signal(signal, converter, inverted=text["polarity"] == "inverted")
     dither_Hz, dither_peak = _dither(text["dither"])
+    signals = Signals(
+        code_max=converter.code_max,
+        compare_max=target.compare_max,
+        sample_Hz=target.sample_Hz,
+        tick_Hz=target.tick_Hz,
+        command=command,
+        swapped=text["negative_dp"] == "swapped",
+        **sensors,
+    )
+    current = current_request(text, target)
     return DesignOptions(
         law=text["law"],
-        signals=Signals(
-            code_max=converter.code_max,
-            compare_max=target.compare_max,
-            sample_Hz=target.sample_Hz,
-            tick_Hz=target.tick_Hz,
-            command=command,
-            swapped=text["negative_dp"] == "swapped",
-            **sensors,
-        ),
+        signals=signals,
         guard=cast(Guard, text["guard"]),
         below_dp0=cast(BelowDp0, text["below_dp0"]),
         above=cast(Above, text["above"]),
@@ -82,7 +85,8 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         reading_flow_L_min=_flow_L_min(text["reading_flow"], "--reading-flow") if text["reading_flow"] else None,
         full_command_V=full_command_V(signal),
         accept=tuple(text["accept"].replace(",", " ").split()),
-        current=current_request(text, target),
+        current=current,
+        machine=machine_of(text, target, signals, current),
         request=DesignRequest(target=target, options=text),
     )
 

@@ -9,6 +9,7 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.current.drive import CurrentDrive, CurrentRequest, design_current_drive
 from dzdesign.design.design_choices import ABOVE, BELOW_DP0, Above, BelowDp0, DesignRequest
 from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
+from dzdesign.design.machine.machine import Machine
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter
 from dzdesign.design.zero_band import LEAST_TRANSITION, LEAST_TRANSITION_NOISE, CommandError, command_error_of
@@ -66,6 +67,8 @@ class DesignOptions:
         Codes of `ACCEPTABLE` for which the design is not refused.
     current : CurrentRequest or None
         Coil, supply and sensor of a drive that controls the current; None: the law's output is the PWM's duty.
+    machine : Machine or None
+        By how much the machine may differ from the bench; None: the certificate is of the recording.
     request : DesignRequest or None
         The target and the texts that these were read from, to be kept in compensator.json.
     """
@@ -87,6 +90,7 @@ class DesignOptions:
     full_command_V: Fraction | None = None
     accept: tuple[str, ...] = ()
     current: CurrentRequest | None = None
+    machine: Machine | None = None
     request: DesignRequest | None = None
 
     def __post_init__(self) -> None:

@@ -1,19 +1,20 @@
 """What the codes of a compensator stand for, and which failures of a wire they do not show, in a person's words."""
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.signals import PressureSignal, Signals
 
 
-def signals_in_words(signals: Signals, u_max_V: float) -> list[str]:
+def signals_in_words(signals: Signals, u_max_V: float, units: RecordedUnits) -> list[str]:
     """Return one line for the command and one for each sensor."""
     command = signals.command
-    text = f"command: code {command.zero_code} is zero, {command.full_code} is {u_max_V:g} V"
+    text = f"command: code {command.zero_code} is zero, {command.full_code} is {units.text(u_max_V, 'g V')}"
     if command.negative_full_code is not None:
-        text += f", {command.negative_full_code} is -{u_max_V:g} V"
+        text += f", {command.negative_full_code} is {units.text(-u_max_V, 'g V')}"
     lines = [f"{text}; {_valid(command.valid_codes)}"]
     for name, sensor in _sensors(signals).items():
         lines.append(
-            f"pressure {name}: code {sensor.zero_code} is none, {sensor.full_code} is {float(sensor.span_MPa):g} MPa; "
-            + _valid(sensor.valid_codes)
+            f"pressure {name}: code {sensor.zero_code} is none, {sensor.full_code} is "
+            f"{units.text(float(sensor.span_MPa), 'g MPa')}; {_valid(sensor.valid_codes)}"
         )
     if signals.swapped:
         lines.append("the pressure drop of negative commands is B less A")

@@ -216,10 +216,11 @@ class Signals:
         reversed_ = sign < 0 and self.swapped
         return max(self.difference(a[0], b[1], sign) if reversed_ else self.difference(a[1], b[0], sign), 1)
 
-    def difference_error(self, sign: int) -> tuple[int, int]:
+    def difference_error(self, sign: int, half_width_MPa: Fraction = Fraction(0)) -> tuple[int, int]:
         """Return how many codes a difference may read too high (as a negative number) and too low, rounded outwards.
 
-        That is rounding to codes alone: errors of the sensors and of their converters are not in it.
+        That is rounding to codes, and a half-width of the pressure drop beside it: what the sensors and their
+        converters, and those of the bench, may be off.
         """
         a, b = self.pressure_a, self.pressure_b
         low, high = a.error_MPa[0] - b.error_MPa[1], a.error_MPa[1] - b.error_MPa[0]
@@ -228,6 +229,7 @@ class Signals:
         if sign < 0 and self.swapped:
             low, high = -high, -low
         shift = 0 if self.like_sensors else a.per_code_MPa
+        unlike += half_width_MPa
         return floor((low - unlike) / a.per_code_MPa), ceil((high + unlike + shift) / a.per_code_MPa)
 
     def dp_MPa(self, dp_code: int) -> Fraction:

@@ -7,6 +7,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, common_units
+from dzdesign.core.worded import in_units
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.compensator_sides import SIGNS
 from dzdesign.report.lot.spread import quantiles, spreads_of
@@ -35,7 +36,7 @@ def lot_setting_of(designed: "Mapping[str, Compensator]") -> "tuple[LotSetting |
     try:
         return lot_setting(designed), None
     except (InputError, RequirementError) as error:
-        return None, str(error)
+        return None, in_units(error, units_of_lot(designed))
 
 
 def setting_files(setting: "LotSetting") -> dict[str, bytes]:

@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.chosen_units import read_units
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import number, percent, quantity, quantity_range, whole_number, with_tolerance
-from dzdesign.core.options import EXPECTED, FIT, METER, RECORDINGS, AnyPath, Option, Text, flag_of, read_options
+from dzdesign.core.options import EXPECTED, FIT, METER, RECORDINGS, AnyPath, Option, Text, Texts, flag_of, read_options
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
+from dzdesign.core.worded import errors_in
 from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
@@ -73,6 +75,8 @@ class PlanArguments:
     at least 0.05 s)."""
     meter_zero: Annotated[Text, Option("Q", METER, "0 L/min", "0.1 L/min", quantity("flow"))] = None
     """Bound of the flow meter's zero error."""
+    units: Annotated[Texts | None, Option("U", RECORDINGS, read=read_units)] = None
+    """Units of what is printed, such as "bar, %" (default: those of the pilot series)."""
     confidence: Annotated[float | str, Option("C", FIT, read=number("a number such as 0.99", (0.5, 1.0)))] = "0.99"
     """Joint confidence level of all lower bounds."""
 
@@ -90,10 +94,13 @@ def plan(arguments: PlanArguments) -> "SeriesPlan":
 
     read = read_options(arguments, [each.name for each in fields(PlanArguments) if each.name != "pilot"])
     pilot = _read_pilot(arguments)
-    valve, bench, request = _premises(arguments, read, pilot)
-    with stage_progress("comparing series"):
-        found = plan_series(valve, bench, request)
     units = AS_COMPUTED if pilot is None else pilot.recorded_units
+    if read["units"] is not None:
+        units = read["units"].over(units, read["u_max"] if pilot is None else pilot.u_max)
+    with errors_in(units):
+        valve, bench, request = _premises(arguments, read, pilot)
+        with stage_progress("comparing series"):
+            found = plan_series(valve, bench, request)
     return series_plan(found, valve, bench, request, _stated(arguments, valve, bench, pilot, units), units)
 
 
@@ -214,7 +221,8 @@ def _stated(
         return units.text(value / L_MIN, ".3g L/min")
 
     # A share of a signal that is not zero at zero command is no share of its reading.
-    full = "full command" if units.command.at_zero else units.text(bench.u_max, "g V")
+    unnamed = units.command.at_zero or units.command.unit == "%"
+    full = "full command" if unnamed else units.text(bench.u_max, "g V")
 
     whole = {origin(name) for name in ("dead_zone", "threshold_change")}
     return [

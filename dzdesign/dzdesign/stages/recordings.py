@@ -15,6 +15,7 @@ from dzdesign.core.artefact_files import (
     write_file,
     write_files,
 )
+from dzdesign.core.chosen_units import read_units
 from dzdesign.core.errors import InputError, nearest, neighbour
 from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
 from dzdesign.core.options import (
@@ -26,6 +27,7 @@ from dzdesign.core.options import (
     Paths,
     Table,
     Text,
+    Texts,
     paths_of,
     read_options,
 )
@@ -77,6 +79,10 @@ class RampArguments(ColumnArguments):
     meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=with_tolerance("time"))] = None
     """Lag of the flow meter, with its tolerance: "0.1 s +- 0.02 s" (default: found from ramps of two rates; without a
     tolerance 20 %, and at least 0.05 s)."""
+    units: Annotated[Texts | None, Option("U", RECORDINGS, read=read_units)] = None
+    """Units of what is printed and drawn, such as "bar, %, mA": of pressure, flow, command ("%" of full command, or a
+    voltage) and current (default: those of the recordings). Repeatable; in the options file also a list. Files stay in
+    V, MPa and L/min."""
     knee_window: Annotated[str, Option("A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
     """Flow range of the straight-line fit, in percent of maximum flow."""
 

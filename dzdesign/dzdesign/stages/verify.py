@@ -8,7 +8,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, read_bytes, sha256_of, write_folder
-from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, paths_of
+from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Texts, paths_of, texts_of
+from dzdesign.core.units import parse_quantity
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
     from dzdesign.verify.evidence import MutationScore
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
+
+#: No port behind a valve's edge has more.
+LARGEST_BACK_MPA = 100.0
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,9 @@ class VerifyArguments:
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
     """File with the plant of the closed loop, like examples/paper_valve/plant.toml (default: made of the identified
     thresholds)."""
+    back_pressure: Annotated[Texts, Option("P", example="1 MPa")] = ()
+    """Pressure behind the metering edge in the closed loop; repeatable. Ramps run at the highest, failing sensors at
+    each (default: 0 and 1 MPa, or what the sensors span beside the tested pressure drops)."""
     tolerances: Annotated[AnyPath | None, Option("TOL.toml", CHECKS)] = None
     """File with a series of plants to run too, like examples/paper_valve/tolerances.toml; needs a plant."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
@@ -68,12 +76,13 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
         digest = sha256_of(read_bytes(Path(arguments.plant), "plant file"))
         plant_source = plant_source or Path(arguments.plant).name  # how the evidence calls the plant
     tolerances = read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None
+    backs_MPa = _back_pressures_MPa(texts_of(arguments.back_pressure))
     with _firmware_folder(arguments.firmware) as folder:
         ware = arguments.c2000ware
         added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
         with stage_progress() as stage:
             verification = verify_folder(
-                folder, plant, plant_source, digest, tolerances=tolerances,
+                folder, plant, plant_source, digest, tolerances=tolerances, backs_MPa=backs_MPa,
                 include=[Path(place) for place in paths_of(arguments.include)], say=stage, watch=stage.each,
             )  # fmt: skip
         more, mutants = _further_checks(arguments, folder, verification)
@@ -86,6 +95,19 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
             files = with_report(evidence_files(verification), folder, output, verification.derived)
             write_folder(output, files, manifest)
     return verification
+
+
+def _back_pressures_MPa(texts: list[str]) -> list[float] | None:
+    """Return the pressures behind the edge; None where none were given."""
+    if not texts:
+        return None
+    values = [parse_quantity(text, "pressure", "--back-pressure") / 1e6 for text in texts]
+    for text, value in zip(texts, values, strict=True):
+        if not 0 <= value <= LARGEST_BACK_MPA:
+            raise InputError(f"--back-pressure is {quoted(text)}, expected 0 to {LARGEST_BACK_MPA:g} MPa")
+    if len(set(values)) < len(values):
+        raise InputError(f"--back-pressure repeats a pressure ({', '.join(texts)}); give each of them once")
+    return values
 
 
 @contextmanager

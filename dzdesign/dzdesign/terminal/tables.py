@@ -184,7 +184,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     chosen, units = law(compensator.law), compensator.valve.recorded_units
     lines = [
         f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
-        *signals_in_words(compensator.signals, float(compensator.u_max_V)),
+        *signals_in_words(compensator.signals, float(compensator.u_max_V), units),
     ]
     for sign in compensator.signals.signs:
         side = compensator.side(sign)
@@ -196,8 +196,9 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"below the valve's knee, to full flow), offset at dP0 u_min0/u_max = {_rational(side.u_min0_over_u_max)}, "
             f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
-            f"{label}certificate: the offset stays below the {100 * certificate.confidence:.6g}% lower bound of the "
-            f"{certificate.guard} threshold {units.span(low, high, '.3f MPa')}, at every pressure code; "
+            f"{label}certificate of {compensator.certified_of}: the offset stays below the "
+            f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
+            f"{units.span(low, high, '.3f MPa')}, at every pressure code; "
             + (
                 f"flow below {units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of "
                 "the largest flow) counts as none"
@@ -213,7 +214,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"threshold over those from there to {end:.2%}"
         )
     if compensator.current_drive is not None:
-        lines += compensator.current_drive.in_words()
+        lines += compensator.current_drive.in_words(units)
     hidden = hidden_failures(compensator)
     elsewhere = {*hidden, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
     console = console or new_console()

@@ -61,6 +61,8 @@ def _put_closed_loop(console: "Console", verification: "Verification", units: "R
     onset = "onset of flow" + (" (the first flow seen, continued to none)" if hidden else "")
     title = f"Closed loop (plant: {plant}); dead zones in per cent of full command, at the {onset}"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
+    backs = ", ".join(units.text(each, ".2f MPa") for each in verification.evidence.closed_loop.back_MPa)
+    put_line(console, f"Pressure behind the edge: {backs}; ramps at the highest, failing sensors at each.")
     _put_readings(console, verification, {f"dP ({pressure})": columns[f"dP ({pressure})"]}, units)
 
 
@@ -87,25 +89,33 @@ def _put_readings(
 def print_scenarios(
     scenarios: "Sequence[ScenarioResult]", console: "Console", units: "RecordedUnits" = AS_COMPUTED
 ) -> None:
-    """Print every scenario once: its worst over the pressure drops, and below the table what else was read there."""
+    """Print every scenario once: its worst over the pressures, and below the table what else was read there.
+
+    One that is required at some pressures only stands twice.
+    """
 
     def severity(each: "ScenarioResult") -> tuple[float, float, float]:
         return each.q_zero_L_min, each.q_peak_at_zero_L_min, each.dp_MPa
 
-    names = dict.fromkeys(each.name for each in scenarios)
-    shown = [max((each for each in scenarios if each.name == name), key=severity) for name in names]
+    def name_of(each: "ScenarioResult") -> str:
+        return each.name + (f" (not required: {each.not_required})" if each.not_required else "")
+
+    names = dict.fromkeys(map(name_of, scenarios))
+    shown = [max((each for each in scenarios if name_of(each) == name), key=severity) for name in names]
     flow = units.label("L/min")
     columns: dict[str, Callable[[ScenarioResult], str]] = {
-        "scenario": lambda each: each.name + ("" if each.must_shut else " (no core can know)"),
+        "scenario": name_of,
         f"dP ({units.label('MPa')})": lambda each: units.number(each.dp_MPa, ".2f MPa"),
+        "behind": lambda each: units.number(each.back_MPa, ".2f MPa"),
         f"Q at zero, at the end ({flow})": lambda each: each.in_words(each.q_zero_L_min, units),
         f"on the way, at most ({flow})": lambda each: each.in_words(each.q_peak_at_zero_L_min, units),
     }
     if shown:
-        put_rows(console, "Scenarios with the compensator, worst of all pressure drops", shown, columns)
+        title = "Scenarios with the compensator, worst of all pressure drops and pressures behind the edge"
+        put_rows(console, title, shown, columns)
     for each in shown:  # words of many lines in a narrow column are no table
         if each.figures:
-            put_line(console, f"{each.name}: {_figures(each, units)}")
+            put_line(console, f"{name_of(each)}: {_figures(each, units)}")
 
 
 #: How a figure's name begins -> of which valve it is; and how it ends -> its unit.

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from dzdesign.core.chosen_units import ChosenUnits
 from dzdesign.core.dither import DeclaredDither
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.identify.constants import MPA, PREMISES, Premise
@@ -54,6 +55,8 @@ class IdentifyOptions:
         M of `smooth`: the largest second divided difference of the threshold, V/Pa²; None estimates it from the tests.
     dithered : DeclaredDither or None
         Dither that the drive superimposed on the command of every recording; None: none that `design` is to make.
+    units : ChosenUnits or None
+        Units in which results are shown; None: those of the recordings.
     """
 
     u_max: float = 10.0
@@ -72,6 +75,7 @@ class IdentifyOptions:
     curve: Premise | None = None
     curvature: float | None = None
     dithered: DeclaredDither | None = None
+    units: ChosenUnits | None = None
 
     def __post_init__(self) -> None:
         if not self.u_max > 0:

@@ -93,8 +93,8 @@ class Page:
 
     `template` has the heading of every section, and what no report proves; `sections` by anchor what this one found;
     `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
-    Of a lot setting `lot` stands before all other figures, and `carrier` is the one valve that `record` and `figures`
-    are of.
+    `not_counted` is what of a machine no certificate here counts. Of a lot setting `lot` stands before all other
+    figures, and `carrier` is the one valve that `record` and `figures` are of.
     """
 
     title: str
@@ -107,6 +107,7 @@ class Page:
     record: Sequence[tuple[str, str]] = ()
     lot: Sequence[Figure] = ()
     carrier: str = ""
+    not_counted: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

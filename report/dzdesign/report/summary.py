@@ -7,6 +7,7 @@ from dataclasses import replace
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
@@ -31,6 +32,8 @@ def _cautions(chain: Chain) -> Iterator[str]:
     for cost in dict.fromkeys(compensator.costs if compensator else ()):
         if cost.startswith("accepted, "):
             yield f"ACCEPTED warning, {cost.removeprefix('accepted, ')}."
+    if compensator:
+        yield reach_of_certificate(compensator)
     if valve and valve.simulated:
         yield "SIMULATED recordings: this is an example, not of a measured valve."
     if valve and compensator:
@@ -49,11 +52,11 @@ def _verdict(chain: Chain) -> Headline:
         reasons = tuple(f"{check.name}: {check.text}" for check in others)
         text = "THE EVIDENCE CONTRADICTS ITSELF: what it says to hold does not follow from its figures"
         return Headline(kind="bad", text=text, reasons=reasons)
-    return _judged([*evidence.all_checks, *_limits(chain)])
+    return _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
 
 
-def _judged(checks: Sequence[Check]) -> Headline:
-    """Return the verdict on requirements."""
+def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headline:
+    """Return the verdict on requirements, and what the certificate among them is of."""
     missed = [check for check in checks if check.holds is False]
     unknown = [check for check in checks if check.holds is None]
     reasons = tuple(
@@ -67,7 +70,8 @@ def _judged(checks: Sequence[Check]) -> Headline:
     if unknown:
         text = f"{NOT_CHECKED} in full: {len(unknown)} of {len(checks)} requirements are open"
         return Headline(kind="open", text=text, reasons=reasons)
-    return Headline(kind="good", text=f"Every requirement holds, all {len(checks)} that were tried")
+    of = f"; the certificate is of {compensator.certified_of}" if compensator else ""
+    return Headline(kind="good", text=f"Every requirement holds, all {len(checks)} that were tried{of}")
 
 
 def _limits(chain: Chain) -> list[Check]:
@@ -148,7 +152,8 @@ def _threshold(valve: ValveModel) -> Figure:
     name, side = next(iter(valve.sides.items()))
     units = valve.recorded_units
     # A share of a signal that is not zero at zero command is no share of its reading.
-    of = "of full command" if units.command.at_zero else f"of {units.text(valve.u_max_V, 'g V')}"
+    unnamed = units.command.at_zero or units.command.unit == "%"
+    of = "of full command" if unnamed else f"of {units.text(valve.u_max_V, 'g V')}"
     opens = [100 * (test.u_knee_rising_V or test.u_guard_V) / valve.u_max_V for test in side.tests]
     span = f"; {min(opens):.1f} to {max(opens):.1f} % over {len(opens)} pressure drops"
     return Figure(
@@ -173,7 +178,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
             kind="bad",
         )
     return Figure(
-        label="Certificate",
+        label=f"Certificate of {compensator.certified_of}",
         value=f"{100 * worst.confidence:g} %",
         note=f"confidence that the drive at zero command stays below the {worst.guard} threshold "
         f"{units.span(low, high, '.2f MPa')}; smallest margin "

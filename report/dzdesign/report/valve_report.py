@@ -7,6 +7,7 @@ from pathlib import Path
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import schema_of
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.machine.words import not_counted
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
@@ -14,6 +15,7 @@ from dzdesign.report.chain import Chain
 from dzdesign.report.figures.figure import figure_style
 from dzdesign.report.page import Page, Report, Section, report_of
 from dzdesign.report.sections.acceptance import acceptance_section
+from dzdesign.report.sections.budget import budget_section
 from dzdesign.report.sections.compensator import integers_section, law_section
 from dzdesign.report.sections.evidence import checks_section, inputs_section, loop_section
 from dzdesign.report.sections.law import account_of
@@ -24,7 +26,7 @@ from dzdesign.report.summary import headline, key_figures
 
 REPORT_NAME = "report.html"
 #: Of a lot setting, these are of the one valve that its file holds.
-OF_A_VALVE = ("data", "thresholds", "beta", "loop")
+OF_A_VALVE = ("data", "thresholds", "beta", "budget", "loop")
 
 
 def report_of_folder(folder: Path) -> Report:
@@ -80,6 +82,7 @@ def make_report(chain: Chain) -> Report:
         template="valve.html.jinja",
         sections=sections,
         missing=chain.missing,
+        not_counted=not_counted(compensator),
         law=account_of(compensator.law) if compensator else None,
     )
     return report_of(page, chain.faults)
@@ -90,6 +93,7 @@ def _sections(chain: Chain) -> dict[str, Section]:
     compensator = chain.compensator
     sections = {
         **valve_sections(chain.valve, compensator),
+        "budget": budget_section(compensator),
         "law": law_section(compensator),
         "integers": integers_section(chain.firmware, compensator),
         "inputs": inputs_section(chain),

@@ -94,7 +94,7 @@ def test_noise_on_a_standing_command_does_not_chatter(example_valve, with_play, 
             codes = np.concatenate([np.linspace(4095 * before, code, 2000).round(), code + rng.integers(-4, 5, 6000)])
             rms = {}
             for name, scene in scenes.items():
-                command = scene.loop.command_of_codes(codes)
+                command = scene.loop.channels.command_of_codes(codes)
                 run = scene.loop.run(command, scene.dp_MPa, "compensated", periods_per_record=2)
                 rms[name] = run.compare[4000:].std()
             assert 0 < rms["play"] <= 2 * rms["kept"], (code, before, rms)

@@ -16,7 +16,8 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop_checks import shut_after_scenarios
-from dzdesign.verify.closed_loop.scenarios import EXCESS, run_scenarios
+from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
+from dzdesign.verify.closed_loop.sensor_failures import sensor_failures
 from dzdesign.verify.requirements import ZERO_FLOW
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
@@ -46,17 +47,25 @@ def test_a_failure_is_required_to_be_harmless_where_the_core_can_know_of_it(valv
     )
     made = generate(compensator, "host")
     write_folder(tmp_path / "fw", made.files, made.manifest)
-    scene = scenes_of(tmp_path / "fw", compensator, None)[0]
-    results = [result for result in run_scenarios(scene) if result.name.startswith("sensor ")]
-    (excess,) = [result for result in results if result.name == EXCESS]
     rising = valve.positive.trend == "increasing"
-    assert excess.must_shut == (signal == BOTH or not rising)
+    everything = []
+    for scene in scenes_of(tmp_path / "fw", compensator, None):
+        results = list(sensor_failures(scene))
+        everything += results
+        for result in results:
+            assert result.q_zero_L_min == 0 or not result.must_shut, result
+        unknown = {each.name.partition(":")[0] for each in results if not each.must_shut}
+        assert all(each.not_required == NO_CORE_CAN_KNOW for each in results if not each.must_shut)
+        # Each sensor by itself. With the port open to the tank B breaks and reads what it reads.
+        opens = {"sensor B breaks"} if rising and signal == NO_LIVE_ZERO else set()
+        opens |= {"sensor A is shorted"} if rising and signal == NO_ROOM else set()
+        opens |= {"sensor A breaks"} if not rising and signal == NO_LIVE_ZERO else set()
+        assert {name for name in unknown if "stuck" not in name} == opens
     # A reading at the converter's end is one of 20 MPa, where the signal has no room above.
-    assert (excess.q_zero_L_min > 0.5) == (rising and signal == NO_ROOM)
-    assert all(result.must_shut for result in results if result is not excess)
+    most = max(each.q_zero_L_min for each in everything if "A is shorted" in each.name)
+    assert (most > 0.5) == (rising and signal == NO_ROOM)
     check = shut_after_scenarios(results, ZERO_FLOW.check(holds=True, text=""), AS_COMPUTED, plant_given=False)
     assert check.holds is True, check.text
     told = [line.partition(",")[0] for line in hidden_failures(compensator) if "pressure signal" in line or "," in line]
     hides = signal != BOTH if rising else signal == NO_LIVE_ZERO
-    assert ("accepted" in told) == hides
-    assert ("live zero" in check.text) == (rising and hides)
+    assert hides == bool(opens) == ("accepted" in told) == ("live zero" in check.text)

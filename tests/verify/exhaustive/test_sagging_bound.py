@@ -78,7 +78,7 @@ def test_design_refuses_an_offset_that_lies_on_the_chords(drawn):
         offset_V=tuple(Fraction(repr(value)) for value in side.curve.u_lower_V),
     )
     if side.curve.premise == "line":  # of a straight threshold the chords are the bound
-        assert min(offset_ceiling(chords, compensator.signals, compensator.u_max_V).limit) > 0
+        assert min(offset_ceiling(chords, compensator.u_max_V, compensator.allowance(1)).limit) > 0
         return
     with pytest.raises(RequirementError):
-        offset_ceiling(chords, compensator.signals, compensator.u_max_V)
+        offset_ceiling(chords, compensator.u_max_V, compensator.allowance(1))

@@ -12,8 +12,9 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import Artefact, Sha256, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.design_choices import Above
+from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.loop_results import ClosedLoopResult, Count, MonteCarlo, ScenarioResult, Side, about
-from dzdesign.verify.requirements import ALWAYS, Check
+from dzdesign.verify.requirements import ALWAYS, OF_CURRENT, Check
 
 Sign = Literal[1, -1]
 Names = tuple[str, ...]
@@ -174,6 +175,9 @@ class Evidence(Artefact):
     closed_loop: Annotated[ClosedLoopResult, about("Ramps in closed loop with the generated C.")]
     scenarios: Annotated[tuple[ScenarioResult, ...], about("What happens beside ramps.")]
     monte_carlo: Annotated[MonteCarlo | None, about("The series of plants, where --tolerances was given.")]
+    current_loop: Annotated[
+        CurrentLoopResult | None, about("Of a drive by current its loop; null of one by duty, or if it did not run.")
+    ]
     mutants: Annotated[MutationScore | None, about("Wrong versions of the C, where --mutate was given.")]
 
     def __post_init__(self) -> None:
@@ -186,7 +190,8 @@ class Evidence(Artefact):
             return self.checks
         tried = {check.id for check in self.checks}
         text = "the evidence has no check of it; make it again with `dzdesign verify`"
-        return (*self.checks, *(each.check(holds=None, text=text) for each in ALWAYS if each.id not in tried))
+        required = ALWAYS if self.current_loop is None else ALWAYS + OF_CURRENT
+        return (*self.checks, *(each.check(holds=None, text=text) for each in required if each.id not in tried))
 
     @property
     def verdict(self) -> str:

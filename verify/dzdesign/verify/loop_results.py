@@ -109,6 +109,10 @@ class ClosedLoopResult:
             "where a plant was given."
         ),
     ]
+    back_MPa: Annotated[
+        tuple[float, ...],
+        quantity("MPa", "Pressures behind the edge: ramps at the highest of them, failing sensors at each."),
+    ]
     pressures: Annotated[
         tuple[PressureResult, ...], about("One entry a side and tested pressure drop; none if it did not run.")
     ]
@@ -121,12 +125,19 @@ class ScenarioResult:
     name: Annotated[str, about("What happens.")]
     side: Side
     dp_MPa: PressureDrop
+    back_MPa: Annotated[float, quantity("MPa", "Pressure behind the edge, at the end.", ge=0, le=1000)]
     leak_L_min: Annotated[Flow, about("Flow without any drive at the end, which no compensator can stop.")]
     allowed_at_zero_L_min: Annotated[
         Flow | None,
         about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
     ]
-    q_zero_L_min: Annotated[Flow, about("Flow at zero command at the end; a leak is in it.")]
+    q_zero_L_min: Annotated[
+        Flow,
+        about(
+            "Flow at zero command at the end, or the largest where a disturbance lasts and the scenario is judged "
+            "throughout; a leak is in it."
+        ),
+    ]
     q_peak_at_zero_L_min: Annotated[
         Flow, about("Largest flow while the command was zero and the valve had closed before.")
     ]
@@ -134,9 +145,8 @@ class ScenarioResult:
         Flow | None,
         about("Flow below which the recordings show none, so that the plant's is not known; null of a given plant."),
     ]
-    must_shut: Annotated[
-        bool, about("Whether flow at the end is a failure: not where no compensator could know better.")
-    ]
+    must_shut: Annotated[bool, about("Whether that flow is a failure.")]
+    not_required: Annotated[str, about("Why it is not: no core can know, or nothing was declared; else empty.")]
     figures: Annotated[Mapping[str, float], about("What else was measured; the unit is the end of the name.")]
 
     @property

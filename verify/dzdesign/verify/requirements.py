@@ -80,6 +80,13 @@ LOAD_STEPS = Requirement(
     id="load-steps", title="load steps and frozen sensors in the closed loop", how="`verify --plant`"
 )
 SERIES = Requirement(id="series", title="a series of plants, with tolerances", how="`verify --tolerances`")
+CURRENT_STATES = Requirement(id="current-controller", title="the current controller equals its exact model")
+CURRENT_MARGINS = Requirement(id="current-margins", title="the current loop is stable at every corner")
+CURRENT_SETTLES = Requirement(id="current-settles", title="the current settles at every corner")
+CURRENT_STEP = Requirement(id="current-step", title="the current follows a step as fast as stated")
+CURRENT_FAULTS = Requirement(
+    id="current-faults", title="an open, a shorted and an over-driven coil switch the output off"
+)
 #: What follows from the figures that stand beside the checks: of every input, and of the closed loop.
 FROM_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK)
 FROM_LOOP = (PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS)
@@ -88,5 +95,7 @@ ALWAYS = (
     FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK, DRIVE,
     PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CERTIFICATE, LAW, VALVE, REGENERATED,
 )  # fmt: skip
+#: What every `verify` checks beside it where the drive is by current.
+OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS)
 #: What is checked if it is asked for.
 OPTIONAL = (MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)

@@ -17,6 +17,7 @@ from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.tolerances import Tolerances
+from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
@@ -53,8 +54,11 @@ class Verification(ShownInNotebooks):
 
     @property
     def verdict(self) -> str:
-        """In words: what does not hold goes before what could not be checked."""
-        return self.evidence.verdict
+        """In words: what does not hold goes before what could not be checked, and what the certificate is of last."""
+        words = self.evidence.verdict
+        if not self.holds or self.derived is None:
+            return words
+        return f"{words.removesuffix('.')}; the certificate is of {self.derived.certified_of}."
 
     def with_checks(self, *checks: Check) -> "Verification":
         """Return the verification with further requirements."""
@@ -68,6 +72,7 @@ def verify(
     plant_sha256: str | None = None,
     sequence: RampSequence | None = None,
     tolerances: Tolerances | None = None,
+    backs_MPa: Sequence[float] | None = None,
     include: Sequence[Path] = (),
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
@@ -76,7 +81,8 @@ def verify(
 
     Without a `plant` the recorded characteristic stands in for the valve in the closed loop; `plant_source` and
     `plant_sha256` are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about
-    it. `sequence` is the command over time, by default 0-10 V in 100 s and back. In `include` lie headers of the user's
+    it. `sequence` is the command over time, by default 0-10 V in 100 s and back; `backs_MPa` are the pressures behind
+    the edge. In `include` lie headers of the user's
     board files.
     `say` is told each stage before it begins; `watch` is handed the pieces of a long one and their number, and gives
     them back one by one, as they are done.
@@ -90,15 +96,18 @@ def verify(
     compensator = read_compensator(folder)
     host_compiler()
     say("compiling the core with every warning an error")
-    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant)  # a compiler's time, not ours
-    core, loop = _try_core(folder, manifest, compensator, say), FirmwareLoop()
+    # A compiler's time, not ours.
+    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
+    core, loop, current = _try_core(folder, manifest, compensator, say), FirmwareLoop(), CurrentChecks()
     if core.inputs:
+        current = current_checks(folder, compensator, say)
         loop = close_the_loop(building.result(), compensator, plant, sequence or RampSequence(), tolerances, say, watch)
     board, law = board_compiles(folder, manifest, include), law_follows(compensator)
     checks = (
         files_unchanged(folder, manifest),
         manifest_follows(folder, manifest, compensator),
         *core.checks,
+        *current.checks,
         *loop.checks,
         certificate_follows(compensator),
         law,
@@ -117,6 +126,7 @@ def verify(
         closed_loop=loop.result(plant, plant_source, plant_sha256),
         scenarios=loop.scenarios,
         monte_carlo=loop.monte_carlo,
+        current_loop=current.result,
         mutants=None,
     )
     derived = compensator if law.holds else None

@@ -4,9 +4,8 @@ from textwrap import wrap
 
 from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
-from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.core.units import span_MPa
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.machine.words import taken_off
 from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.design.signals import SIDE_NAMES
 
@@ -21,22 +20,24 @@ def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
 
 def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     """Return comment lines that say what the offset of one sign of command is certified for."""
-    certificate = compensator.side(sign).certificate
+    certificate, units = compensator.side(sign).certificate, compensator.valve.recorded_units
     low, high = certificate.dp_MPa
-    where = span_MPa(float(low), float(high)) + (", between the tests too" if low < high else "")
+    where = units.span(float(low), float(high), ".2f MPa") + (", between the tests too" if low < high else "")
     text = (
-        f"Certificate: {where}, that lies below the "
+        f"Certificate of {compensator.certified_of}: {where}, that lies below the "
         f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold, by "
-        f"{1e3 * float(certificate.smallest_margin_V):.3g} mV at the least beyond {_counted(compensator)}"
+        f"{units.text(1e3 * float(certificate.smallest_margin_V), '.3g mV')} at the least beyond "
+        f"{_counted(compensator)}"
     )
     if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:
-        text += f", so that {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(AS_COMPUTED)}."
+        text += f", so that {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)}."
     elif certificate.guard == "closing":
-        text += f", so that less than {certificate.level_L_min:.2f} L/min flows: what the recordings can't show."
+        flow = units.text(certificate.level_L_min, ".2f L/min")
+        text += f", so that less than {flow} flows: what the recordings can't show."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
     text += f" {_beyond(compensator, sign)}"
-    text += " Errors of the pressure sensors and of their converters beyond rounding are not in it."
+    text += f" {_machine(compensator, sign)}"
     lot = lot_in_words(compensator)
     return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
 
@@ -44,8 +45,21 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
 def _beyond(compensator: Compensator, sign: int) -> str:
     """Return what is certified above the tests, and what there is below them."""
     certificate, side = compensator.side(sign).certificate, compensator.valve.sides[SIDE_NAMES[sign]]
-    above = above_in_words(compensator.above, certificate, side, AS_COMPUTED)
-    return f"{above[0].upper()}{above[1:]}; {below_in_words(certificate, side, AS_COMPUTED)}."
+    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    above = above_in_words(compensator.above, certificate, side, units)
+    return f"{above[0].upper()}{above[1:]}; {below_in_words(certificate, side, units)}."
+
+
+def _machine(compensator: Compensator, sign: int) -> str:
+    """Return what of a machine is counted."""
+    budget = compensator.side(sign).budget
+    if compensator.machine is None or budget is None:
+        return (
+            "No machine was declared: its coil temperature, supply, pressure sensors and converters beyond rounding, "
+            "oil and ageing are not in it."
+        )
+    words = taken_off(budget, compensator.valve.recorded_units.of_side(SIDE_NAMES[sign]))
+    return f"{words[0].upper()}{words[1:]}; compensator.json lists all of it."
 
 
 def _counted(compensator: Compensator) -> str:
@@ -53,11 +67,12 @@ def _counted(compensator: Compensator) -> str:
     rounding = "the rounding of readings to codes and of the drive to counts"
     if not compensator.drive_functions.dither_counts:
         return rounding
-    counted = compensator.dither_reserve_counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    volts = compensator.dither_reserve_counts / compensator.signals.compare_max * float(compensator.u_max_V)
+    counted = compensator.valve.recorded_units.text(1e3 * volts, ".4g mV")
     recorded = compensator.valve.dither
     if recorded is not None:
         return (
-            f"{rounding} and {1e3 * counted:.4g} mV by which dz_drive's dither may differ from that of the recordings, "
+            f"{rounding} and {counted} by which dz_drive's dither may differ from that of the recordings, "
             f"{recorded.in_words()}, which the bound has in it"
         )
-    return f"{rounding} and the dither's peak of {1e3 * counted:.4g} mV, which dz_drive adds to it"
+    return f"{rounding} and the dither's peak of {counted}, which dz_drive adds to it"

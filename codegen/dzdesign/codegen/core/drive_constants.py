@@ -1,5 +1,6 @@
 """The numbers of the interface and of the drive functions: `#define`s of dz_comp.h, dz_drive.h and dz_drive.c."""
 
+from dzdesign.codegen.core.command_shares import in_unit, share_of_command
 from dzdesign.codegen.core.constants import Define, Table
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
@@ -22,13 +23,14 @@ STATUS_BITS = {
 def interface_constants(compensator: Compensator) -> list[Define]:
     """Return the ends of inputs and output."""
     signals, limit = compensator.signals, compensator.drive_functions.compare_limit
-    u_max_V = float(compensator.u_max_V)
+    units, u_max_V = compensator.valve.recorded_units, float(compensator.u_max_V)
     share = limit / signals.compare_max
     return [
         Define(symbol="DZ_COMPARE_MAX", value=signals.compare_max, equation="Eq. (32), PWM compare value of u_max",
-                 engineering=f"{u_max_V:g} V, 100 % duty", data=("signals.compare_max", "u_max_V"), generator=SIGNALS),
+                 engineering=f"{units.text(u_max_V, 'g V')}, 100 % duty", data=("signals.compare_max", "u_max_V"),
+                 generator=SIGNALS),
         Define(symbol="DZ_COMPARE_LIMIT", value=limit, equation="largest compare value that is put out",
-                 engineering=f"{share * u_max_V:.4g} V, {share:.1%} duty", rounding="rounded down",
+                 engineering=f"{units.text(share * u_max_V, '.4g V')}, {share:.1%} duty", rounding="rounded down",
                  data=("drive_functions.compare_limit", "signals.compare_max", "u_max_V"), generator=OPTIONS),
         Define(symbol="DZ_ADC_CODE_MAX", value=signals.code_max, equation="largest code of the converter",
                  engineering="the top of its range, right-justified", data=("signals.code_max",), generator=SIGNALS),
@@ -62,7 +64,8 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     if bipolar or functions.has_ramp or compensator.zero_band_codes:
         found.append(
             Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
-                     equation="Eq. (29), code of zero command", engineering="0 V",
+                     equation="Eq. (29), code of zero command",
+                     engineering=compensator.valve.recorded_units.text(0.0, "g V"),
                      rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
                      generator=SIGNALS)
         )  # fmt: skip
@@ -79,18 +82,13 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     return found
 
 
-def _share(compensator: Compensator, codes: int) -> str:
-    share = codes / compensator.signals.command.span(1)
-    return f"{share:.2%} of command, {share * float(compensator.u_max_V):.4g} V"
-
-
 def _zero_band(compensator: Compensator) -> Define:
     return Define(
         symbol="ZERO_BAND",
         value=compensator.zero_band_codes,
         literal="int32",
         equation="codes of command up to which the drive comes to rest, the law's zero band",
-        engineering=_share(compensator, compensator.zero_band_codes),
+        engineering=share_of_command(compensator, compensator.zero_band_codes),
         data=("zero_band_codes", "signals.command", "u_max_V"),
         generator=ZERO_BAND,
     )
@@ -105,7 +103,7 @@ def _leave_zero(compensator: Compensator) -> Define:
         value=codes,
         literal="int32",
         equation=f"codes by which the command must pass zero before the drive {' or '.join(what)}",
-        engineering=f"{_share(compensator, codes)}; a zero command with twice its noise stays within",
+        engineering=f"{share_of_command(compensator, codes)}; a zero command with twice its noise stays within",
         data=("drive_functions.leave_zero_codes", "signals.command", "u_max_V"),
         generator=ZERO_BAND,
     )
@@ -114,17 +112,19 @@ def _leave_zero(compensator: Compensator) -> Define:
 def _play(compensator: Compensator) -> list[Define]:
     signals, functions = compensator.signals, compensator.drive_functions
     codes, band, u_max_V = functions.play_codes, compensator.transition_codes, float(compensator.u_max_V)
+    units = compensator.valve.recorded_units
     found = [
         Define(symbol="TRANSITION_CODES", value=band, literal="int32",
                equation="codes of command behind the zero band over which the play comes in, the law's transition",
-               engineering=_share(compensator, band), data=("transition_codes", "signals.command", "u_max_V"),
+               engineering=share_of_command(compensator, band), data=("transition_codes", "signals.command", "u_max_V"),
                rounding="a power of two", generator=OPTIONS),
         Define(symbol="PLAY_NOISE", value=functions.play_noise_codes, literal="int32",
                equation="codes that the command strays to either side without turning",
-               engineering=_share(compensator, functions.play_noise_codes),
+               engineering=share_of_command(compensator, functions.play_noise_codes),
                data=("drive_functions.play_noise_codes", "signals.command", "u_max_V"), generator=PLAY),
         Define(symbol="PLAY_CODES", value=codes, literal="int32",
-               equation="codes of travel from the one branch to the other", engineering=_share(compensator, codes),
+               equation="codes of travel from the one branch to the other",
+               engineering=share_of_command(compensator, codes),
                data=("drive_functions.play_codes", "signals.command", "u_max_V"), rounding="a power of two",
                generator=PLAY),
         Define(symbol="PLAY_SHIFT", value=(codes * band).bit_length() - 1,
@@ -135,14 +135,14 @@ def _play(compensator: Compensator) -> list[Define]:
     step = functions.play_step_codes
     found += [
         Define(symbol="PLAY_STEP", value=step, equation="codes of command between two nodes of the play's width",
-               engineering=_share(compensator, step), rounding="a power of two", generator=PLAY,
+               engineering=share_of_command(compensator, step), rounding="a power of two", generator=PLAY,
                data=("drive_functions.play_step_codes", "signals.command", "u_max_V")),
         Define(symbol="PLAY_STEP_SHIFT", value=step.bit_length() - 1, equation="the power of two in PLAY_STEP",
                engineering=f"1/{step}", data=("drive_functions.play_step_codes",),
                rounding="the width is rounded down to a count", generator=HERE),
         *(
             Define(symbol=f"SPAN_{SIDE_NAMES[sign].upper()}", value=signals.command.span(sign), literal="int32",
-                   equation="Eq. (29), codes from zero to full command", engineering=f"{sign * u_max_V:g} V",
+                   equation="Eq. (29), codes from zero to full command", engineering=units.text(sign * u_max_V, "g V"),
                    data=("signals.command", "u_max_V"), generator=SIGNALS)
             for sign in signals.signs
         ),
@@ -152,7 +152,7 @@ def _play(compensator: Compensator) -> list[Define]:
 
 def play_tables(compensator: Compensator) -> list[Table]:
     """Return the play's width over the command, a table for each sign; none without a play."""
-    functions, signals = compensator.drive_functions, compensator.signals
+    functions, signals, units = compensator.drive_functions, compensator.signals, compensator.valve.recorded_units
     if not functions.has_play:
         return []
     found = []
@@ -162,7 +162,8 @@ def play_tables(compensator: Compensator) -> list[Table]:
         found.append(
             Table(symbol=f"play_{SIDE_NAMES[sign]}", value=tuple((count, 0) for count in nodes),
                   equation="counts by which a falling command is driven lower than a rising one, every PLAY_STEP codes",
-                  engineering=f"the recorded hysteresis, {volts[0]:.4g} to {volts[1]:.4g} V",
+                  engineering=f"the recorded hysteresis, {units.number(volts[0], '.4g dV')} to "
+                  f"{units.text(volts[1], '.4g dV')}",
                   rounding="rounded to nearest", generator=PLAY,
                   data=("drive_functions.play_counts", "signals.compare_max", "u_max_V"))
         )  # fmt: skip
@@ -201,7 +202,7 @@ def _dither(compensator: Compensator) -> list[Define]:
     share = counts / signals.compare_max
     return [
         Define(symbol="DITHER_COUNTS", value=counts, equation="half the height of the dither's square wave",
-                 engineering=f"{share:.3%} of full drive, {share * float(compensator.u_max_V):.4g} V",
+                 engineering=f"{share:.3%} of full drive{in_unit(compensator, share)}",
                  rounding="rounded to nearest", generator=OPTIONS,
                  data=("drive_functions.dither_counts", "signals.compare_max", "u_max_V")),
         Define(symbol="DITHER_TICKS", value=ticks, equation="half the dither's period, PWM periods",

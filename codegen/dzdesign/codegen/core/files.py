@@ -87,7 +87,7 @@ def _law_source(compensator: Compensator, sign: int, arithmetic: str) -> CoreFil
         "transition_share": f"{transition / compensator.signals.command.span(sign):.2%}",
         "segment_count": len(tables[0].value) - 1,
         "step_codes": step,
-        "step_MPa": f"{float(compensator.signals.dp_MPa(step)):.4f}",
+        "step_text": compensator.valve.recorded_units.text(float(compensator.signals.dp_MPa(step)), ".4f MPa"),
         "signal_defines": defines(signals),
         "step_defines": defines(steps),
         "law_defines": defines(integers),
@@ -98,13 +98,17 @@ def _law_source(compensator: Compensator, sign: int, arithmetic: str) -> CoreFil
 
 def _law_header(compensator: Compensator) -> CoreFile:
     """Return dz_comp.h, the interface of the law."""
-    ends, bits = interface_constants(compensator), status_constants()
+    ends, bits, units = interface_constants(compensator), status_constants(), compensator.valve.recorded_units
     values = {
         **_law_words(compensator),
         "misra_lines": misra_lines("dz_comp.h"),
         "interface_defines": defines(ends),
         "status_defines": defines(bits),
-        "reverse_text": f"{-float(compensator.signals.dp_MPa(compensator.reverse_codes)):.3f} MPa",
+        "reverse_text": units.text(-float(compensator.signals.dp_MPa(compensator.reverse_codes)), ".3f MPa"),
+        "spans": [
+            units.text(float(sensor.span_MPa), "g MPa")
+            for sensor in (compensator.signals.pressure_a, compensator.signals.pressure_b)
+        ],
         "at_zero": {sign: zero_command(compensator, sign) for sign in compensator.signals.signs},
         "certificates": {sign: certificate_lines(compensator, sign) for sign in compensator.signals.signs},
     }
@@ -140,7 +144,7 @@ def _law_words(compensator: Compensator) -> Values:
     chosen = law(compensator.law)
     return {
         "signals": compensator.signals,
-        "u_max_V": f"{float(compensator.u_max_V):g}",
+        "u_max": compensator.valve.recorded_units.text(float(compensator.u_max_V), "g V"),
         "bipolar": compensator.negative is not None,
         "law_text": str(chosen.output).replace("**", "^"),
         "law_equation": equation_of(chosen),
@@ -223,8 +227,8 @@ def _table(table: Table, form: TableForm, of_law: LawConstants, suffix: str) -> 
         start, change = table.value[at]
         codes = (at - 1) * step
         beta = (start + turn * change * codes) % 2**32 / of_law.unit
-        from_MPa = float(compensator.signals.dp_MPa(codes))
-        lines.append(f"{' '.join(printed[at : at + TABLE_COLUMNS])} /* from {from_MPa:.3f} MPa: beta {beta:.6f} */")
+        begins = compensator.valve.recorded_units.text(float(compensator.signals.dp_MPa(codes)), ".3f MPa")
+        lines.append(f"{' '.join(printed[at : at + TABLE_COLUMNS])} /* from {begins}: beta {beta:.6f} */")
     return {
         "symbol": name,
         "function": "zero_beta" if name == "zero_segment" else "law_beta",

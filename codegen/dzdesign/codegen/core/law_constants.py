@@ -10,6 +10,7 @@ from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.derivation.symbols import k
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.signals import SIDE_NAMES
 
 HERE = "codegen/dzdesign/codegen/core/integer_form.py"
 #: Of the numerators over a power of two, by design/dzdesign/design/designing.py.
@@ -90,10 +91,11 @@ class LawConstants:
         codes = signals.command.span(self.sign) * (self.compensator.transition_codes or 1)
         return count * codes / (form.divisor << form.shift) / signals.compare_max
 
-    def _volts(self, count: int) -> float:
-        """Return u_O in V of a term of the sum."""
-        form, c = self.form, self.compensator
-        return count / (form.divisor << form.shift) / c.signals.compare_max * float(c.u_max_V)
+    def _drive(self, count: int, form: str) -> str:
+        """Return u_O of a term of the sum, in the unit that a person sees."""
+        of_sum, c = self.form, self.compensator
+        volts = count / (of_sum.divisor << of_sum.shift) / c.signals.compare_max * float(c.u_max_V)
+        return c.valve.recorded_units.of_side(SIDE_NAMES[self.sign]).text(volts, form)
 
     def _factor(self) -> list[Define]:
         """Return what beta multiplies, by command and alone, and what the transition takes away."""
@@ -124,7 +126,7 @@ class LawConstants:
                 "FACTOR_OFFSET",
                 form.offset % 2**32 if self.narrow else form.offset,
                 f"{equation}, coefficient of beta in u_O",
-                f"u_min0 = {self._volts(form.offset * self.unit):.6f} V",
+                f"u_min0 = {self._drive(form.offset * self.unit, '.6f V')}",
                 (u_min0_key, "u_max_V", *SCALED),
                 rounding=f"exact from {u_min0_text}",
                 literal="uint32" if self.narrow else "int32",
@@ -136,7 +138,7 @@ class LawConstants:
                     "TRANSITION_FACTOR",
                     form.transition,
                     "transition, coefficient of (beta - beta_zero) in u_O, for each code of command missing to its end",
-                    f"u_min0/{c.transition_codes} = {self._volts(form.transition * self.unit):.6g} V",
+                    f"u_min0/{c.transition_codes} = {self._drive(form.transition * self.unit, '.6g dV')}",
                     (u_min0_key, "transition_codes", "u_max_V", *SCALED),
                     rounding=f"exact from {u_min0_text}",
                     literal="uint32" if self.narrow else "int32",
@@ -178,7 +180,7 @@ class LawConstants:
         form = self.form
         data = SCALED
         equation = "Eq. (32), half a count, so that shift and division round to the nearest, a half up"
-        engineering = f"{self._volts(form.half):.3g} V"
+        engineering = self._drive(form.half, ".3g dV")
         high, low = divmod(form.half, 1 << 32)
         shift = form.shift - (32 if self.narrow else 0)
         shifting = self._constant(
@@ -206,7 +208,9 @@ class LawConstants:
             "QUOTIENT_LIMIT",
             form.largest,
             f"largest quotient whose compare value is DZ_COMPARE_LIMIT, ({limit} + 1) * {form.divisor} - 1",
-            f"{limit / c.signals.compare_max * float(c.u_max_V):.4g} V",
+            c.valve.recorded_units.of_side(SIDE_NAMES[self.sign]).text(
+                limit / c.signals.compare_max * float(c.u_max_V), ".4g V"
+            ),
             ("drive_functions.compare_limit", "signals.compare_max", "u_max_V"),
         )
 

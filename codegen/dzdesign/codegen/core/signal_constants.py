@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import floor
 
+from dzdesign.codegen.core.command_shares import share_of_command
 from dzdesign.codegen.core.constants import EXACT, Define
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import WEIGHT_SHIFT, PressureSignal
@@ -32,19 +33,21 @@ class SignalConstants:
         signals, command = c.signals, c.signals.command
         span, direction = command.span(self.sign), command.direction(self.sign)
         full_key = "full_code" if self.sign > 0 else "negative_full_code"
-        u_max_V = float(c.u_max_V) * self.sign
+        u_max_V, units = float(c.u_max_V) * self.sign, c.valve.recorded_units
 
-        def volts(code: int) -> str:
-            return f"{direction * (code - command.zero_code) / span * u_max_V + 0.0:.4g} V"
+        def reading(code: int) -> str:
+            return units.text(direction * (code - command.zero_code) / span * u_max_V + 0.0, ".4g V")
 
-        low, high = command.valid_codes
+        zero, (low, high) = command.zero_code, command.valid_codes
         keys = ("signals.command.zero_code", f"signals.command.{full_key}", "u_max_V")
         valid = ("signals.command.valid_codes", *keys)
-        full = self._signal("COMMAND_SPAN", span, "Eq. (29), codes from zero to full command", f"{u_max_V:g} V", keys)
+        full = self._signal("COMMAND_SPAN", span, "Eq. (29), codes from zero to full command",
+                            units.text(u_max_V, "g V"), keys)  # fmt: skip
         return [
-            self._signal("COMMAND_ZERO", command.zero_code, "Eq. (29), code of zero command", "0 V", keys[:1], DOWN),
-            self._signal("COMMAND_LOW", low, "Eq. (29), least valid code of the command", volts(low), valid, DOWN),
-            self._signal("COMMAND_HIGH", high, "Eq. (29), largest valid code of the command", volts(high), valid, DOWN),
+            self._signal("COMMAND_ZERO", zero, "Eq. (29), code of zero command", reading(zero), keys[:1], DOWN),
+            self._signal("COMMAND_LOW", low, "Eq. (29), least valid code of the command", reading(low), valid, DOWN),
+            self._signal("COMMAND_HIGH", high, "Eq. (29), largest valid code of the command", reading(high), valid,
+                         DOWN),
             *([full] if self.passes_full else []),
             *self._sensor("A", signals.pressure_a),
             *self._sensor("B", signals.pressure_b),
@@ -58,7 +61,7 @@ class SignalConstants:
                 engineering=f"bit {self.word_bits - 1} of {self.word_bits}",
                 generator=HERE,
             ),
-        ]
+        ]  # fmt: skip
 
     def _signal(
         self, symbol: str, value: int, equation: str, engineering: str, data: tuple[str, ...], rounding: str = EXACT
@@ -69,24 +72,26 @@ class SignalConstants:
         )  # fmt: skip
 
     def _sensor(self, name: str, sensor: PressureSignal) -> list[Define]:
-        key = f"signals.pressure_{name.lower()}"
+        key, units = f"signals.pressure_{name.lower()}", self.compensator.valve.recorded_units
         codes = (f"{key}.zero_code", f"{key}.full_code", f"{key}.span_MPa")
 
         def pressure(code: int) -> str:
-            return f"{float((code - sensor.zero_code) * sensor.per_code_MPa):.4g} MPa"
+            return units.text(float((code - sensor.zero_code) * sensor.per_code_MPa), ".4g MPa")
 
         low, high = sensor.valid_codes
         valid = (f"{key}.valid_codes", *codes)
-        what = f"text below Eq. (29), {{}} of sensor {name}, {float(sensor.per_code_MPa):.6g} MPa a code"
+        a_code = units.text(float(sensor.per_code_MPa), ".6g MPa")
+        what = f"text below Eq. (29), {{}} of sensor {name}, {a_code} a code"
         return [
-            self._signal(f"PRESSURE_{name}_ZERO", sensor.zero_code, what.format("code of no pressure"), "0 MPa",
+            self._signal(f"PRESSURE_{name}_ZERO", sensor.zero_code, what.format("code of no pressure"),
+                         pressure(sensor.zero_code),
                          codes[:1], DOWN),
             self._signal(f"PRESSURE_{name}_LOW", low, what.format("least valid code"), pressure(low), valid, DOWN),
             self._signal(f"PRESSURE_{name}_HIGH", high, what.format("largest valid code"), pressure(high), valid, DOWN),
         ]  # fmt: skip
 
     def _weights(self) -> list[Define]:
-        signals = self.compensator.signals
+        signals, units = self.compensator.signals, self.compensator.valve.recorded_units
         a, b = (float(each.per_code_MPa) for each in (signals.pressure_a, signals.pressure_b))
         keys = tuple(
             f"signals.pressure_{name}.{key}" for name in "ab" for key in ("span_MPa", "zero_code", "full_code")
@@ -96,7 +101,7 @@ class SignalConstants:
             self._signal("PRESSURE_A_WEIGHT", weight, "weight of a code of sensor A, in codes of sensor A",
                          f"one code, times {weight}", ()),
             self._signal("PRESSURE_B_WEIGHT", signals.weight_b, "weight of a code of sensor B, in codes of A",
-                         f"{b:.6g} MPa / {a:.6g} MPa = {b / a:.6g}, times {weight}", keys,
+                         f"{units.text(b, '.6g MPa')} / {units.text(a, '.6g MPa')} = {b / a:.6g}, times {weight}", keys,
                          "rounded to nearest"),
             self._signal("WEIGHT_SHIFT", WEIGHT_SHIFT, "from weighted codes to codes of sensor A",
                          f"1/2^{WEIGHT_SHIFT}", (), "the difference is rounded down"),
@@ -109,7 +114,7 @@ class SignalConstants:
             "REVERSE",
             c.reverse_codes << WEIGHT_SHIFT if weighted else c.reverse_codes,
             "a pressure drop less than minus this means that a sensor has failed",
-            f"{float(c.signals.dp_MPa(c.reverse_codes)):.3f} MPa in codes of sensor A"
+            f"{c.valve.recorded_units.text(float(c.signals.dp_MPa(c.reverse_codes)), '.3f MPa')} in codes of sensor A"
             + (f", times {2**WEIGHT_SHIFT}" if weighted else ""),
             ("reverse_codes", "signals.pressure_a.span_MPa"),
             "a hundredth of the span, rounded down to a code",
@@ -133,7 +138,7 @@ class SignalConstants:
         """Return what finds a segment of the tables, and the transition's length."""
         c = self.compensator
         step, transition = c.beta_step_codes, c.transition_codes
-        width = f"{float(c.signals.dp_MPa(step)):.4f} MPa"
+        width = c.valve.recorded_units.text(float(c.signals.dp_MPa(step)), ".4f MPa")
         data = ("beta_step_codes",)
         found = [
             Define(symbol="STEP_CODES", value=step, equation="width of a segment of beta, codes of sensor A",
@@ -148,19 +153,15 @@ class SignalConstants:
 
     def _zero_band(self) -> list[Define]:
         c, where = self.compensator, "design/dzdesign/design/options.py"
-        span, error = c.signals.command.span(self.sign), c.command_error
-
-        def share(codes: int) -> str:
-            return f"{codes / span:.2%} of command, {codes / span * float(c.u_max_V):.4g} V"
-
+        error = c.command_error
         return [
             Define(symbol="ZERO_BAND", value=c.zero_band_codes, equation="codes of command that count as zero, u_z",
-                   engineering=f"{share(c.zero_band_codes)}; error of a zero command, {error.offset_codes} + "
-                   f"{error.noise_codes} codes", data=("zero_band_codes", "command_error"),
+                   engineering=f"{share_of_command(c, c.zero_band_codes, self.sign)}; error of a zero command, "
+                   f"{error.offset_codes} + {error.noise_codes} codes", data=("zero_band_codes", "command_error"),
                    generator="design/dzdesign/design/zero_band.py"),
             Define(symbol="TRANSITION_CODES", value=c.transition_codes,
                    equation="codes of command that the transition takes, u_t - u_z",
-                   engineering=share(c.transition_codes), data=("transition_codes",),
+                   engineering=share_of_command(c, c.transition_codes, self.sign), data=("transition_codes",),
                    rounding="a power of two", generator=where),
             Define(symbol="TRANSITION_SHIFT", value=c.transition_codes.bit_length() - 1,
                    equation="from codes to the unit of the law's command", engineering=f"1/{c.transition_codes} code",

@@ -20,8 +20,6 @@ class CurrentChoices:
     with that of switch and shunt (default: 0.5 ohm), inductance, and their ranges (default: these)."""
     rated_current: Annotated[Text, Option("I", DRIVE, example="1 A")] = None
     """Current of full drive, for --drive current."""
-    supply: Annotated[Text, Option("V", DRIVE, example="18..32 V")] = None
-    """Lowest and highest supply voltage of the coil, for --drive current."""
     current_signal: Annotated[Text, Option("S", DRIVE, example="0..1.2 A on 2 ohm + 0.15 V")] = None
     """Current sensor at the converter, such as "0..1.2 A on 2 ohm + 0.15 V", a shunt times its amplifier's gain and
     the voltage without current, for --drive current."""
@@ -31,5 +29,5 @@ class CurrentChoices:
 
 
 #: Options that only current control has a use for, and those that it needs.
-OF_CURRENT = ("coil", "rated_current", "supply", "current_signal", "supply_signal")
-NEEDED = OF_CURRENT[:4]
+OF_CURRENT = ("coil", "rated_current", "current_signal", "supply_signal")
+NEEDED = ("coil", "rated_current", "supply", "current_signal")

@@ -6,6 +6,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
     CurrentSensor,
@@ -42,13 +43,14 @@ class CurrentDrive:
                 f"the current loop's phase margin is {self.phase_margin_deg:.1f} degrees, expected {LEAST_PHASE_DEG:g}"
             )
 
-    def in_words(self) -> tuple[str, ...]:
+    def in_words(self, units: RecordedUnits) -> tuple[str, ...]:
         """Return lines for a person."""
         circuit, loop = self.circuit, self.loop
         low, high = circuit.supply_V
         measured = "measured" if loop.supply else "not measured"
         return (
-            f"drive: current control, full drive is {circuit.rated_A:g} A; coil {circuit.resistance_ohm:g} + "
+            f"drive: current control, full drive is {units.text(circuit.rated_A, 'g A')}; coil "
+            f"{circuit.resistance_ohm:g} + "
             f"{circuit.series_ohm:g} ohm (x {_ends(circuit.resistance_factors)}), {1e3 * circuit.inductance_H:g} mH (x "
             f"{_ends(circuit.inductance_factors)}), supply {low:g}..{high:g} V, {measured}",
             f"current loop: phase margin {self.phase_margin_deg:.0f} degrees, gain margin {self.gain_margin:.1f} at "

@@ -9,6 +9,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 
@@ -35,14 +36,14 @@ class LotMargin:
 def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
     """Return each valve's margin, exactly, at every code of its own tested interval, worst side, worst code.
 
-    A code stands for all pressures that may have made it; rounding and dither count as drive.
+    A code stands for all pressures that may have made it; rounding, dither and the machine count as in a ceiling.
     """
     signals = compensator.signals
-    kept = (Fraction(1, 2) + compensator.dither_reserve_counts) / signals.compare_max
     margins: dict[str, LotMargin] = {}
     for sign in signals.signs:
         law = compensator.side(sign)
-        low, high = signals.difference_error(sign)
+        allowance = compensator.allowance(sign)
+        low, high = window = allowance.window
         numerators = _numerators(law.beta, compensator.beta_step_codes, signals.largest_difference(sign))
         scale = compensator.beta_denominator * compensator.beta_step_codes
         unit_V = law.u_min0_over_u_max * compensator.u_max_V / scale
@@ -59,13 +60,16 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
                 if first > last:
                     continue
                 drive_V = numerators[first : last + 1] * float(unit_V)
-                nearest = first + _nearest(piece, signals, first, drive_V, (low, high))
+                nearest = first + _nearest(piece, allowance, first, drive_V)
                 over, code = max(
-                    (int(numerators[code]) * unit_V - _least(piece, signals, int(code), (low, high)), -int(code))
+                    (
+                        int(numerators[code]) * unit_V - allowance.factor * _least(piece, signals, int(code), window),
+                        -int(code),
+                    )
                     for code in nearest
                 )
                 code = -code
-                margin = -over - kept * compensator.u_max_V
+                margin = -over - allowance.kept * compensator.u_max_V
                 if valve.name not in margins or margin < margins[valve.name].margin_V:
                     margins[valve.name] = LotMargin(
                         name=valve.name, sign=sign, dp_MPa=signals.dp_MPa(code), margin_V=margin
@@ -79,19 +83,20 @@ def _least(piece: BoundPiece, signals: Signals, code: int, error: tuple[int, int
     return piece.least(max(min(low, piece.to_MPa), piece.from_MPa), min(max(high, piece.from_MPa), piece.to_MPa))
 
 
-def _nearest(
-    piece: BoundPiece, signals: Signals, first: int, drive_V: np.ndarray, error: tuple[int, int]
-) -> np.ndarray:
+def _nearest(piece: BoundPiece, allowance: Allowance, first: int, drive_V: np.ndarray) -> np.ndarray:
     """Return which drives, from the code `first` on, may come nearest to a piece: by doubles, to `CLOSE_V`."""
+    signals = allowance.signals
     codes = first + np.arange(drive_V.size)
     zero, step = float(signals.dp_MPa(0)), float(signals.dp_MPa(1) - signals.dp_MPa(0))
-    low, high = (np.clip(zero + step * (codes + each), float(piece.from_MPa), float(piece.to_MPa)) for each in error)
+    from_MPa, to_MPa = float(piece.from_MPa), float(piece.to_MPa)
+    low, high = (np.clip(zero + step * (codes + each), from_MPa, to_MPa) for each in allowance.window)
     places = [low, high]
     if piece.curvature > 0:
         slope = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa)
         places.append(np.clip(float((piece.from_MPa + piece.to_MPa) / 2 - slope / piece.curvature), low, high))
     bound = CertifiedBound(pieces=(piece,))
-    left_V = np.min([bound.in_doubles(place) for place in places], axis=0) - drive_V
+    least = np.min([bound.in_doubles(place) for place in places], axis=0)
+    left_V = float(allowance.factor) * least - drive_V
     near: np.ndarray = np.flatnonzero(left_V <= left_V.min() + CLOSE_V)
     if piece.curvature == 0 and piece.low_V == piece.high_V:  # a step: the largest drive comes nearest, the first of it
         return np.array([int(drive_V.argmax())])
@@ -111,10 +116,10 @@ def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:
     margins = lot_margins(compensator)
     above = sorted((each for each in margins if each.margin_V < 0), key=lambda each: each.margin_V)
     if above:
-        worst = above[0]
+        worst, units = above[0], compensator.valve.recorded_units
         raise RequirementError(
             f"the lot setting over-compensates {len(above)} of {len(margins)} valves of its lot: "
-            f"{and_more([each.name for each in above], NAMED)}; {worst.name} by {-1e3 * float(worst.margin_V):.3f} mV "
-            f"at {float(worst.dp_MPa):.2f} MPa"
+            f"{and_more([each.name for each in above], NAMED)}; {worst.name} by "
+            f"{units.text(-1e3 * float(worst.margin_V), '.3f mV')} at {units.text(float(worst.dp_MPa), '.2f MPa')}"
         )
     return margins

@@ -17,6 +17,7 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.worded import worded
 from dzdesign.design.beta_table import (
     STEP_CODES,
     OffsetCeiling,
@@ -28,15 +29,16 @@ from dzdesign.design.beta_table import (
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
-from dzdesign.design.designing import design, over, prove_monotone, travel
+from dzdesign.design.designing import design, left_by_machine, over, prove_monotone, travel
 from dzdesign.design.lot.margins import LotMargin, prove_lot
 from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.machine.accounting import budget_of
+from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
-from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.identify.valve.certified_bound import NEAR_MPa
+from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
@@ -45,6 +47,7 @@ CLEAR = 1e-6
 SHARED = (
     "law", "below_dp0", "above", "signals", "u_max_V",
     "beta_denominator", "transition_codes", "command_error", "drive_functions",
+    "current_drive", "machine",
 )  # fmt: skip
 
 
@@ -181,8 +184,14 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
     _, high, lowest = min(ends, key=lambda one: one[1])
     if low > high:
         raise InputError(
-            f"the valves have no tested pressure drop in common ({highest} begins at {float(low):g} MPa, {lowest} ends "
-            f"at {float(high):g} MPa), so no setting is certified for all"
+            worded(
+                "the valves have no tested pressure drop in common ({highest} begins at {low:g MPa}, {lowest} ends at "
+                "{high:g MPa}), so no setting is certified for all",
+                highest=highest,
+                low=float(low),
+                lowest=lowest,
+                high=float(high),
+            )
         )
     return float(low), float(high)
 
@@ -190,15 +199,15 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
 def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
     """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
     signals, u_max = first.signals, first.u_max_V
-    dither = first.dither_reserve_counts
+    allowance = first.allowance(sign)
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     above = AboveChoice(choice=first.above, step_codes=STEP_CODES)
     curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
     low, high = _common_interval([curves])
-    least, near = _near_the_least(curves, signals, float(u_max), sign)
+    least, near = _near_the_least(curves, allowance, float(u_max))
     exact = {
-        name: offset_ceiling(curves[name], signals, u_max, sign=sign, dither_counts=dither)
+        name: offset_ceiling(curves[name], u_max, allowance)
         for name, distance in near.items()
         if distance < CLEAR
     }
@@ -211,31 +220,20 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
 
 
 def _near_the_least(
-    curves: Mapping[str, OffsetCurve], signals: Signals, u_max_V: float, sign: int
+    curves: Mapping[str, OffsetCurve], allowance: Allowance, u_max_V: float
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return how far each valve's ceiling lies above the least of all, over u_max: on average, and where it is least.
 
-    The rounding and the dither lower all ceilings alike, so they are left out.
+    Factors, rounding and dither lower all ceilings alike, so they are left out.
     """
-    low, high = signals.difference_error(sign)
-    dp_MPa = np.array([float(dp) for dp in pressures_MPa(signals, low, signals.largest_difference(sign) + high)])
-    limits = np.array([_limit(curve, dp_MPa) / u_max_V for curve in curves.values()])
+    (low, high), signals = allowance.window, allowance.signals
+    code_max = signals.largest_difference(allowance.sign)
+    dp_MPa = np.array([float(dp) for dp in pressures_MPa(signals, low, code_max + high)])
+    limits = np.array([curve.in_doubles(dp_MPa) / u_max_V for curve in curves.values()])
     limits = np.lib.stride_tricks.sliding_window_view(limits, high - low + 1, axis=1).min(axis=2)
     above = limits - limits.min(axis=0)
     mean = dict(zip(curves, map(float, above.mean(axis=1)), strict=True))
     return mean, dict(zip(curves, map(float, above.min(axis=1)), strict=True))
-
-
-def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
-    """Return in doubles what `offset_ceiling` limits the offset to, V: the curve and, where tested, its bound."""
-    nodes, offset = (np.array([float(value) for value in values]) for values in (curve.dp_MPa, curve.offset_V))
-    value: np.ndarray = np.interp(dp_MPa, nodes, offset)
-    if curve.above is not None:
-        value = np.where(dp_MPa > nodes[-1], curve.above.in_doubles(dp_MPa), value)
-    if curve.hold_below_MPa is not None:
-        hold = float(curve.hold_below_MPa)
-        value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
-    return value if curve.certified is None else np.minimum(value, curve.certified.in_doubles(dp_MPa))
 
 
 def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[str]:
@@ -253,6 +251,8 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     model, u_max = side.models[carrier], first.u_max_V
     reference = Fraction(repr(model.reference.dp_MPa))
     top = min(curve.at(reference) for curve in side.curves.values())
+    if first.machine:
+        top = left_by_machine(top, side.least, first.signals, reference, u_max)
     scale = finest_units(first.signals, transition_codes=0).coefficient
     u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
     if u_min0 <= 0:
@@ -274,16 +274,15 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
         beta=table,
         certificate=first.side(side.sign).certificate,
     )
-    return replace(law, certificate=_certified(side, carrier, law, first))
+    guard, allowance = law.certificate.guard, first.allowance(side.sign)
+    budget = budget_of(model, side.curves[carrier], u_max, allowance, guard, first.machine)
+    return replace(law, certificate=_certified(side, carrier, law, first), budget=budget)
 
 
 def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
     """Prove the common law for one valve, on the whole interval that it was tested over."""
-    dither = first.dither_reserve_counts
     curve = side.curves[name]
-    ceiling = side.exact.get(name) or offset_ceiling(
-        curve, first.signals, first.u_max_V, sign=side.sign, dither_counts=dither
-    )
+    ceiling = side.exact.get(name) or offset_ceiling(curve, first.u_max_V, first.allowance(side.sign))
     return certify(
         side.models[name],
         curve,

@@ -7,12 +7,13 @@ resistance, the supply and the sensors; oil and ageing move the threshold itself
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
+from math import prod
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.design.machine.budget import Component
 
 #: Temperature coefficient of copper about 20 degC, 1/K (IEC 60028): R = R20 (1 + alpha (T - 20)).
 COPPER_PER_K = Fraction("0.00393")
@@ -34,6 +35,7 @@ NEEDED_BY: Mapping[str, tuple[DriveKind, ...]] = {
     "current_rest_error": ("current",),
     "bench_current_error": ("current",),
 }
+OF_ANY_DRIVE = ("coil_temperature_C", "supply_V")
 Share = Annotated[float, Meta(ge=0, le=LARGEST_SHARE)]
 Pressure = Annotated[float, Meta(ge=0, le=LARGEST_MPa)]
 Error = Annotated[int, Meta(ge=0, le=4095)]
@@ -64,7 +66,7 @@ class Machine:
         quantity("V", "Lowest and highest supply; null where an amplifier was declared and it was not."),
     ] | None = None
     bench_supply_V: Annotated[
-        Supply, quantity("V", "Supply while the ramps were recorded; null with its range.")
+        Supply, quantity("V", "Supply while the ramps were recorded; else null.")
     ] | None = None
     amplifier_error: Annotated[
         Share,
@@ -73,18 +75,19 @@ class Machine:
     current_error: Annotated[
         Share,
         quantity(
-            "1", "Error of the controlled current, of its value: shunt, amplifier, converter's gain; null by duty."
+            "1", "Error of the controlled current, of its value: shunt, amplifier, converter's gain; else null."
         ),
     ] | None = None
     current_rest_error: Annotated[
         Share,
-        quantity(
-            "1", "What rounding and the calibrated offset leave of it, of the rated current; null by duty."
-        ),
+        quantity("1", "What rounding and the calibrated offset leave of it, of the rated current; else null."),
     ] | None = None
     bench_current_error: Annotated[
         Share,
-        quantity("1", "Error of the bench's current at a recorded command, of its value; null by duty."),
+        quantity("1", "Error of the bench's current at a recorded command, of its value; else null."),
+    ] | None = None
+    bench_full_A: Annotated[
+        float, quantity("A", "Coil's current at full command on the bench, as declared; else null.", gt=0, le=1000)
     ] | None = None
     pressure_error_a_MPa: Annotated[
         Pressure, quantity("MPa", "Error of the sensor ahead of the metering edge, offset and gain together.")
@@ -103,13 +106,19 @@ class Machine:
     ]
 
     def __post_init__(self) -> None:
-        _check_ends("the coil's temperature", "degC", self.coil_temperature_C, self.bench_coil_C)
-        _check_ends("the supply", "V", self.supply_V, self.bench_supply_V)
+        for what, unit, ends, bench in (
+            ("the coil's temperature", "degC", self.coil_temperature_C, self.bench_coil_C),
+            ("the supply", "V", self.supply_V, self.bench_supply_V),
+        ):
+            if (bench is not None and ends is None) or (bench is None and self.drive == "duty"):
+                raise RuleError(f"{what} needs both, its range on the machine and its value on the bench")
+            if ends is not None and ends[0] > ends[1]:
+                raise RuleError(f"{what} runs from {ends[0]:g} to {ends[1]:g} {unit}, expected the lower end first")
         for name, drives in NEEDED_BY.items():
             missing = getattr(self, name) is None
             if missing and self.drive in drives:
                 raise RuleError(f"{name} is missing in a machine whose drive is '{self.drive}'")
-            if not missing and self.drive not in drives and not name.endswith(("_C", "_V")):
+            if not missing and self.drive not in drives and name not in OF_ANY_DRIVE:
                 raise RuleError(f"{name} stands in a machine whose drive is '{self.drive}'")
         if unknown := set(self.defaults) - set(self.__slots__):
             raise RuleError(f"'defaults' names {sorted(unknown)[0]!r}, expected a key of the machine")
@@ -132,26 +141,34 @@ class Machine:
         return _resistance(_exact(temperature_C)) / _resistance(bench_C) * bench_V / _exact(supply_V)
 
     @property
-    def drive_factors(self) -> tuple[Fraction, Fraction]:
-        """The least and the largest of `drive_factor` over all that is declared."""
-        if self.drive == "duty":
-            corners = product(self.coil_temperature_C or (), self.supply_V or ())
-            factors = [self.drive_factor(temperature_C, supply_V) for temperature_C, supply_V in corners]
-        else:
-            error = _exact((self.amplifier_error if self.drive == "amplifier" else self.current_error) or 0.0)
-            bench = _exact(self.bench_current_error or 0.0)
-            factors = [(1 - bench) / (1 + error), (1 + bench) / (1 - error)]
-        return min(factors), max(factors)
+    def least_factors(self) -> dict[Component, Fraction]:
+        """The least threshold over that on the bench, component by component; the bench itself is a machine too."""
+        oil, ageing = 1 - _exact(self.oil_error), 1 - _exact(self.ageing_error)
+        return {**self._drive_factors(-1), "oil": oil, "ageing": ageing}
 
     @property
     def least_factor(self) -> Fraction:
         """The least threshold over that on the bench: drive, oil and ageing all at their worst."""
-        return self.drive_factors[0] * (1 - _exact(self.oil_error)) * (1 - _exact(self.ageing_error))
+        return prod(self.least_factors.values(), start=Fraction(1))
 
     @property
     def largest_factor(self) -> Fraction:
-        """The largest threshold over that on the bench."""
-        return self.drive_factors[1] * (1 + _exact(self.oil_error)) * (1 + _exact(self.ageing_error))
+        """The largest threshold over that on the bench: all at their other ends."""
+        moved = (1 + _exact(self.oil_error)) * (1 + _exact(self.ageing_error))
+        return prod(self._drive_factors(1).values(), start=moved)
+
+    def _drive_factors(self, way: int) -> dict[Component, Fraction]:
+        """Return the factors of the drive's components at the end that raises (1) or lowers (-1) the threshold."""
+        worst = max if way > 0 else min
+        if self.drive == "duty":
+            bench_C, bench_V = self.bench_coil_C or 0.0, self.bench_supply_V or 0.0
+            coils, supplies = (*(self.coil_temperature_C or ()), bench_C), (*(self.supply_V or ()), bench_V)
+            coil = worst(_resistance(_exact(each)) for each in coils) / _resistance(_exact(bench_C))
+            return {"coil temperature": coil, "supply": worst(_exact(bench_V) / _exact(each) for each in supplies)}
+        if self.drive == "amplifier":
+            return {"amplifier": 1 / (1 - way * _exact(self.amplifier_error or 0.0))}
+        current = 1 / (1 - way * _exact(self.current_error or 0.0))
+        return {"current": current, "bench current": 1 + way * _exact(self.bench_current_error or 0.0)}
 
 
 def _exact(value: float) -> Fraction:
@@ -162,10 +179,3 @@ def _exact(value: float) -> Fraction:
 def _resistance(temperature_C: Fraction) -> Fraction:
     """Return a copper coil's resistance over that at 20 degC."""
     return 1 + COPPER_PER_K * (temperature_C - REFERENCE_C)
-
-
-def _check_ends(what: str, unit: str, ends: tuple[float, float] | None, bench: float | None) -> None:
-    if (ends is None) != (bench is None):
-        raise RuleError(f"{what} needs both, its range on the machine and its value on the bench")
-    if ends is not None and ends[0] > ends[1]:
-        raise RuleError(f"{what} runs from {ends[0]:g} to {ends[1]:g} {unit}, expected the lower end first")

@@ -30,7 +30,7 @@ from dzdesign.identify.ramps.pooling import PooledTest, name_of_ramp, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.series_order import with_clock_of_series
-from dzdesign.identify.reading.units_of_columns import units_of
+from dzdesign.identify.reading.units_of_columns import shown_units
 
 logger = logging.getLogger(__name__)
 
@@ -54,7 +54,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
     pooled = _in_order_of_pressure(pooled)
     for left_out in dict.fromkeys(part for item in pooled for part in item.left_out):
-        logger.info("%s", left_out.in_words(units_of(tests)))
+        logger.info("%s", left_out.in_words(shown_units(tests, options)))
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
     described = _described(pooled, floor, lag, options)

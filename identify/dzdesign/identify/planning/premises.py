@@ -7,6 +7,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.worded import worded
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.knees.linear_region import ABOVE_LEVEL, NOISE_LEVEL, USEFUL_FLOW, WIDER
 from dzdesign.identify.knees.meter_lag import MeterLag
@@ -146,7 +147,9 @@ def straight_valve(
             "full command, expected above 0 and below 100 %; correct --dead-zone or --threshold-change"
         )
     if not 0 < max_flow < math.inf:
-        raise InputError(f"the largest flow is {max_flow / L_MIN:g} L/min, expected above zero; correct --max-flow")
+        raise InputError(
+            worded("the largest flow is {flow:g L/min}, expected above zero; correct --max-flow", flow=max_flow / L_MIN)
+        )
     slope = max_flow / (u_max - thresholds[0]) * np.sqrt(nodes / nodes[0])
     return ExpectedValve(
         dp=nodes,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import worded
 from dzdesign.identify.constants import LARGEST_DP, MPA, SMALLEST_DP
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES
 from dzdesign.identify.planning.prediction import Prediction, predict
@@ -40,13 +41,24 @@ class Request:
         low, high = self.dp_range
         if not SMALLEST_DP <= low <= high <= LARGEST_DP:
             raise InputError(
-                f"the pressure drops run from {low / MPA:g} to {high / MPA:g} MPa, expected a rising range within "
-                f"{SMALLEST_DP / MPA:g} to {LARGEST_DP / MPA:g} MPa"
+                worded(
+                    "the pressure drops run from {low:g #MPa} to {high:g MPa}, expected a rising range within "
+                    "{least:g #MPa} to {most:g MPa}",
+                    low=low / MPA,
+                    high=high / MPA,
+                    least=SMALLEST_DP / MPA,
+                    most=LARGEST_DP / MPA,
+                )
             )
         if low < high < low / (1 - LEAST_STEP):
             raise InputError(
-                f"{low / MPA:g} and {high / MPA:g} MPa are too near to one another to be told apart, expected a range "
-                f"of {LEAST_STEP:.0%} or more; give one pressure drop, or a wider range"
+                worded(
+                    "{low:g #MPa} and {high:g MPa} are too near to one another to be told apart, expected a range of "
+                    "{step:.0%} or more; give one pressure drop, or a wider range",
+                    low=low / MPA,
+                    high=high / MPA,
+                    step=LEAST_STEP,
+                )
             )
         if not 0 < self.ramp_times[0] <= self.ramp_times[1]:
             raise InputError(
@@ -54,7 +66,7 @@ class Request:
                 "above zero"
             )
         if self.wanted is not None and not self.wanted > 0:
-            raise InputError(f"the loss wanted is {1e3 * self.wanted:g} mV, expected above zero")
+            raise InputError(worded("the loss wanted is {loss:g mV}, expected above zero", loss=1e3 * self.wanted))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from dzdesign.core.chosen_units import LARGEST_FACTOR, SMALLEST_FACTOR
 from dzdesign.core.recorded_units import (
     CommandUnit,
     FlowUnit,
@@ -11,25 +12,17 @@ from dzdesign.core.recorded_units import (
     RecordedUnits,
     Unit,
     common_units,
-    plain_unit,
+    name_of_unit,
     significant,
 )
 from dzdesign.core.signal_ranges import read_signal_range
 from dzdesign.core.units import measures, si_factor
 from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.column_labels import PRESSURES, Column
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
 
-#: Spellings of a unit that the name of which is another; of pressures, what they are relative to is no part of a drop.
-NAMES: dict[str, str] = {
-    **dict.fromkeys(("barg", "bara", "bard", "bar(g)", "bar(a)", "bar(d)"), "bar"),
-    **dict.fromkeys(("psig", "psia", "psid"), "psi"),
-    "m3s": "m3/s", "lph": "L/h", "l/h": "L/h", "pct": "%", "percent": "%",
-}  # fmt: skip
-
-#: Of a unit in V, MPa or L/min, between which numbers in it can be read: 1 MPa is 1e7 Ba.
-SMALLEST_FACTOR, LARGEST_FACTOR = 1e-9, 1e9
 #: What stands in front of one.
 NOT_OF_A_UNIT = " +-0123456789.,"
 
@@ -54,13 +47,19 @@ def units_of(tests: Sequence[RampTest]) -> RecordedUnits:
     return common_units(every)
 
 
+def shown_units(tests: Sequence[RampTest], options: IdentifyOptions) -> RecordedUnits:
+    """Return the units in which what is found in recordings is shown: theirs, or those that the options choose."""
+    recorded = units_of(tests)
+    return recorded if options.units is None else options.units.over(recorded, options.u_max)
+
+
 def pressure_unit(text: str) -> PressureUnit | None:
     """Return a unit of pressure, or that of what a transmitter's range means; None if there is none."""
     unit = _meant(text)
     if not measures(unit, "pressure"):
         return None
     factor = significant(MPA / si_factor(unit, "pressure"))
-    return PressureUnit() if factor == 1 or _extreme(factor) else PressureUnit(unit=_name(unit), factor=factor)
+    return PressureUnit() if factor == 1 or _extreme(factor) else PressureUnit(unit=name_of_unit(unit), factor=factor)
 
 
 def unit_of_pressure(text: str) -> dict[Quantity, tuple[Unit, ...]]:
@@ -80,7 +79,7 @@ def _flow_unit(text: str) -> FlowUnit | None:
     if not measures(unit, "flow"):
         return None
     factor = significant(L_MIN / si_factor(unit, "flow"))
-    return FlowUnit() if factor == 1 or _extreme(factor) else FlowUnit(unit=_name(unit), factor=factor)
+    return FlowUnit() if factor == 1 or _extreme(factor) else FlowUnit(unit=name_of_unit(unit), factor=factor)
 
 
 def _meant(unit: str) -> str:
@@ -91,10 +90,6 @@ def _meant(unit: str) -> str:
 def _extreme(factor: float) -> bool:
     """Whether a unit is none that a person reads a valve's quantity in."""
     return not SMALLEST_FACTOR <= abs(factor) <= LARGEST_FACTOR
-
-
-def _name(unit: str) -> str:
-    return NAMES.get(unit.lower(), plain_unit(unit))
 
 
 def _command_unit(path: Path, column: Column, u_max: float) -> CommandUnit:
@@ -117,7 +112,7 @@ def _command_unit(path: Path, column: Column, u_max: float) -> CommandUnit:
             scaling, unit, declared = Scaling(gain=factor), means.unit, ""
         else:
             scaling, unit = Scaling(gain=gain, offset=bottom - gain * low), name
-    unit = _name(unit)
+    unit = name_of_unit(unit)
     factor, at_zero = significant(1 / scaling.gain), significant(-scaling.offset / scaling.gain)
     if not unit or _extreme(factor) or (measures(unit, "voltage") and (factor, at_zero) == (1.0, 0.0)):
         return CommandUnit()

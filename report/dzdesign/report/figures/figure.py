@@ -184,14 +184,30 @@ def legend_below(figure: "Figure", columns: int) -> None:
 
 
 def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names at lines' ends (x, y, text, hue; in the axes' units), where none covers another."""
+    """Write names at lines' ends (x, y, text, hue; in the axes' units), moved apart where one would cover another."""
+    labels = sorted(labels, key=lambda label: label[1])
     room = 0.055 * max((label[1] for label in labels), default=1.0)
-    below = -room
-    for x, y, text, hue in sorted(labels, key=lambda label: label[1]):
-        if y - below >= room:
-            axes.annotate(text, (x, y), xytext=(5, 0), textcoords="offset points", va="center", fontsize=8,
-                          color=hue, annotation_clip=False)  # fmt: skip
-            below = y
+    places = apart([label[1] for label in labels], room)
+    for (x, _, text, hue), place in zip(labels, places, strict=True):
+        axes.annotate(text, (x, place), xytext=(5, 0), textcoords="offset points", va="center", fontsize=8,
+                      color=hue, annotation_clip=False)  # fmt: skip
+
+
+def apart(places: Sequence[float], room: float) -> list[float]:
+    """Return rising places moved as little as it takes for each to have its room.
+
+    Examples
+    --------
+    >>> apart([0.0, 1.0, 5.0], 2.0)
+    [-0.5, 1.5, 5.0]
+    """
+    groups: list[list[float]] = []  # of places that touch, each less the room of those below it
+    for index, place in enumerate(places):
+        groups.append([place - room * index])
+        while len(groups) > 1 and sum(groups[-2]) / len(groups[-2]) > sum(groups[-1]) / len(groups[-1]):
+            groups[-2:] = [groups[-2] + groups[-1]]
+    kept = [sum(group) / len(group) for group in groups for _ in group]
+    return [base + room * index for index, base in enumerate(kept)]
 
 
 def to_report_figure(figure: "Figure", name: str, caption: str, description: str, csv: str) -> ReportFigure:

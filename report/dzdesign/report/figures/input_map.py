@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import LIGHT, Curves, ReportFigure, new_figure, to_report_figure
@@ -26,22 +27,23 @@ def map_figure(
 
     From input_map_<side>.csv and, for where the valve is over-compensated, zero_command_<side>.csv.
     """
-    side, grid = inputs.side, _grid_of(curves, compensator, inputs.sign)
-    low, high = map(float, laws_of(compensator)[side].certificate.dp_MPa)
+    side, units = inputs.side, compensator.valve.recorded_units.of_side(inputs.side)
+    grid = _grid_of(curves, compensator, inputs)
+    low, high = (units.convert(float(end), "MPa") for end in laws_of(compensator)[side].certificate.dp_MPa)
     room = max(0.14 * (high - low), 0.01 * float(np.ptp(grid.dp)))  # of one tested pressure drop, too, a strip is shown
     figure = new_figure(4.3, right=0.1, top=0.3)
     left, tested = figure.subplots(1, 2, width_ratios=(1, 2.7), gridspec_kw={"wspace": 0.16})
     _draw_map(left, grid, (low, high), (grid.dp.min(), grid.dp.max()))
     mesh = _draw_map(tested, grid, (low, high), (low - room, high + room))
-    levels, mean = _levels(grid.volts), grid.volts.mean()
-    lines = tested.contour(grid.u, grid.dp, grid.volts, levels=levels, linewidths=0.8,
+    levels, mean = _levels(grid.output), grid.output.mean()
+    lines = tested.contour(grid.u, grid.dp, grid.output, levels=levels, linewidths=0.8,
                            colors=["#f2f2f2" if level < mean else "#101418" for level in levels])  # fmt: skip
-    over = _draw_zero_strip(tested, zero)
+    over = _draw_zero_strip(tested, zero, units)
     first, last = grid.u.min(), grid.u.max()
-    left.set(xlim=(first, last), ylabel="pressure drop dP (MPa)", title="every difference of codes")
+    left.set(xlim=(first, last), ylabel=f"pressure drop dP ({units.label('MPa')})", title="every difference of codes")
     tested.set(xlim=(max(first, -OTHER_SIGN), last), title="the tested interval, dashed, and around it")
     bar = figure.colorbar(mesh, ax=tested, pad=0.02)
-    bar.set_label("output u_O of the C (V)")
+    bar.set_label(f"output u_O of the C ({units.label('V')})")
     bar.outline.set_visible(False)
     bar.add_lines(lines)
     wrong, fallen = int(grid.wrong.sum()), int(grid.fallen.sum())
@@ -54,7 +56,7 @@ def map_figure(
         f"the exactly rounded law; on this grid {wrong}, of all pairs {whole(inputs.wrong)}. Strip at zero "
         f"command: green where the drive is below the threshold's bound, red and hatched where not ({over} codes).",
         f"Map of the output over command and pressure drop. {whole(inputs.inputs)} pairs checked, "
-        f"{whole(inputs.wrong)} wrong. On the drawn grid {wrong} of {grid.volts.size} points are wrong, "
+        f"{whole(inputs.wrong)} wrong. On the drawn grid {wrong} of {grid.output.size} points are wrong, "
         f"{fallen} fall back to the safe value; {over} codes are over-compensated at zero command.",
         curves.text,
     )
@@ -62,18 +64,19 @@ def map_figure(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Grid:
-    """What the core gives on a grid: command in per cent, pressure drop in MPa, output in V, and where it is wrong or
-    falls back, each (pressures, commands)."""
+    """What the core gives on a grid: command in per cent, pressure drop and output in the units that are shown, and
+    where it is wrong or falls back, each (pressures, commands)."""
 
     u: np.ndarray
     dp: np.ndarray
-    volts: np.ndarray
+    output: np.ndarray
     wrong: np.ndarray
     fallen: np.ndarray
 
 
-def _grid_of(curves: Curves, compensator: Compensator, sign: int) -> _Grid:
+def _grid_of(curves: Curves, compensator: Compensator, inputs: InputCheck) -> _Grid:
     """Return the rows of input_map_<side>.csv as a grid, codes as what they stand for."""
+    sign, units = inputs.sign, compensator.valve.recorded_units.of_side(inputs.side)
     command, volt = compensator.signals.command, float(compensator.u_max_V) / compensator.signals.compare_max
     towards_full = command.direction(sign) * command.span(sign)
     codes, dp_codes = np.unique(curves.columns["command_code"]), np.unique(curves.columns["dp_code"])
@@ -83,47 +86,49 @@ def _grid_of(curves: Curves, compensator: Compensator, sign: int) -> _Grid:
     )
     return _Grid(
         u=100 * (codes - command.zero_code) / towards_full,
-        dp=dp_codes * float(compensator.signals.pressure_a.per_code_MPa),
-        volts=volt * output,
+        dp=units.convert(dp_codes * float(compensator.signals.pressure_a.per_code_MPa), "MPa"),
+        output=units.convert(volt * output, "V"),
         wrong=error != 0,
         fallen=status != 0,
     )
 
 
 def _draw_map(
-    axes: "Axes", grid: _Grid, certified_MPa: tuple[float, float], limits_MPa: tuple[float, float]
+    axes: "Axes", grid: _Grid, certified: tuple[float, float], limits: tuple[float, float]
 ) -> "QuadMesh":
     """Draw the output as colours, the fallback hatched, what is wrong as crosses, the certified interval dashed."""
     from matplotlib.colors import ListedColormap
 
-    mesh = axes.pcolormesh(grid.u, grid.dp, grid.volts, cmap="cividis", shading="nearest", rasterized=True)
+    mesh = axes.pcolormesh(grid.u, grid.dp, grid.output, cmap="cividis", shading="nearest", rasterized=True)
     fallen = np.ma.masked_equal(grid.fallen.astype(float), 0)
     if fallen.count():
         axes.pcolormesh(grid.u, grid.dp, fallen, cmap=ListedColormap(["#ffffff"]), alpha=0.35, shading="nearest",
                         rasterized=True)  # fmt: skip
         axes.contourf(grid.u, grid.dp, grid.fallen.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
-    for end in certified_MPa:
+    for end in certified:
         axes.axhline(end, color="#ffffff", lw=1.6, ls="--")
     rows, columns = np.nonzero(grid.wrong)
     axes.plot(grid.u[columns], grid.dp[rows], "x", color="#ff2d2d", ms=4.5, mew=1.6, zorder=5)
-    axes.set(ylim=limits_MPa, xlabel="command u_i (% of full)")
+    axes.set(ylim=limits, xlabel="command u_i (% of full)")
     axes.grid(False)
     return mesh
 
 
-def _levels(volts: np.ndarray) -> np.ndarray:
-    """Return whole or half volts between the least and the largest, at most some ten."""
-    low, high = float(volts.min()), float(volts.max())
-    step = next((step for step in (0.1, 0.25, 0.5, 1.0, 2.5) if (high - low) / step <= 12), 10.0)
-    return step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
+def _levels(output: np.ndarray) -> np.ndarray:
+    """Return round outputs between the least and the largest, at most some twelve."""
+    low, high = float(output.min()), float(output.max())
+    power = 10.0 ** np.floor(np.log10(max(high - low, 1e-12) / 12))
+    step = next(step * power for step in (1.0, 2.5, 5.0, 10.0) if (high - low) / (step * power) <= 12)
+    levels: np.ndarray = step * np.arange(np.floor(low / step) + 1, np.ceil(high / step))
+    return levels
 
 
-def _draw_zero_strip(axes: "Axes", zero: Curves | None) -> int:
+def _draw_zero_strip(axes: "Axes", zero: Curves | None, units: RecordedUnits) -> int:
     """Draw along zero command where the drive is certified and where not; return at how many codes it is not."""
     if zero is None:
         return 0
     dp, above = zero.columns["dp_MPa"], zero.columns["drive_V"] > zero.columns["bound_V"]
-    ends = (0.0, 2.0)  # per cent of command: wide enough to be seen
+    dp, ends = units.convert(dp, "MPa"), (0.0, 2.0)  # per cent of command: wide enough to be seen
     axes.fill_betweenx(dp, *ends, where=~above, color=LIGHT["green"], lw=0, zorder=4)
     axes.fill_betweenx(dp, *ends, where=above, facecolor="#ff2d2d", edgecolor="#ffffff", hatch="xxxx", lw=0, zorder=4)
     return int(above.sum())

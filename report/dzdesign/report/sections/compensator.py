@@ -10,7 +10,7 @@ from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.figures.law import law_figure
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import Cell, Table, number, table_of
+from dzdesign.report.sections.cells import Cell, Table, recorded, table_of
 
 #: Rows of a constant's table that stand in the page; all of them stand in the CSV.
 MOST_ROWS = 3
@@ -98,8 +98,8 @@ def _origin(constant: FirmwareConstant) -> str:
 
 def rounding_table(compensator: Compensator) -> Table:
     """Return what turning the law into integers costs."""
-    u_max = compensator.u_max_V
-    rows = []
+    u_max, units = compensator.u_max_V, compensator.valve.recorded_units
+    rows: list[tuple[str, str, str, float]] = []
     for name, side in laws_of(compensator).items():
         certificate = side.certificate
         offset = side.u_min0_over_u_max * u_max
@@ -107,13 +107,13 @@ def rounding_table(compensator: Compensator) -> Table:
         of = f" ({name})" if len(laws_of(compensator)) > 1 else ""
         if not compensator.transition_codes:  # which counts from the opening threshold, the valve's curve does not
             wanted = Fraction(repr(compensator.valve.sides[name].certified[certificate.guard].u_min0_V))
-            volts = (f"{float(offset):.6f} V", f"{float(wanted):.6f} V")
-            rows.append(("u_min0" + of, *volts, 1e3 * float(offset - wanted)))
+            in_c, exact = (units.of_side(name).text(float(value), ".6f V") for value in (offset, wanted))
+            rows.append(("u_min0" + of, in_c, exact, 1e3 * float(offset - wanted)))
         rows += [
             ("one step of a node of β" + of, f"1/{compensator.beta_denominator}", "rounded down", -1e3 * float(node)),
             (
                 "offset under the certified curve, mean" + of, "few nodes, rounding to codes and to counts",
-                f"largest {1e3 * certificate.largest_loss_V:.2f} mV", -1e3 * certificate.mean_loss_V,
+                f"largest {units.text(1e3 * certificate.largest_loss_V, '.2f mV')}", -1e3 * certificate.mean_loss_V,
             ),
         ]  # fmt: skip
     half_count = u_max / compensator.signals.compare_max / 2
@@ -124,5 +124,5 @@ def rounding_table(compensator: Compensator) -> Table:
         ("number", lambda row: row[0]),
         ("in the C", lambda row: row[1]),
         ("exact, or what is done", lambda row: row[2]),
-        ("difference, at most (mV)", lambda row: number(row[3], 3, "+")),
+        (f"difference, at most ({units.label('mV')})", lambda row: recorded(row[3], "+.3f mV", units)),
     )

@@ -53,7 +53,7 @@ def inputs_section(chain: Chain) -> Section:
     lines, missing = [], ""
     for each in chain.evidence.inputs:
         side = each.side
-        lines += _input_lines(each)
+        lines += _input_lines(each, chain.recorded_units)
         law = laws_of(chain.compensator).get(side)
         map_curves, zero_curves = (_curves(chain, name(side)) for name in (input_map_name, zero_command_name))
         if map_curves and law and chain.compensator:
@@ -68,12 +68,12 @@ def inputs_section(chain: Chain) -> Section:
     return Section(figures=figures, lines=tuple(lines), missing=missing)
 
 
-def _input_lines(found: InputCheck) -> list[str]:
+def _input_lines(found: InputCheck, units: RecordedUnits) -> list[str]:
     line = (
         f"{found.side.capitalize()} commands: {whole(found.inputs)} pairs of command and pressure-difference code "
         f"compared with the exactly rounded law, {whole(found.wrong)} wrong, largest error {found.largest_error} "
         f"counts; {found.over_compensated} pressure codes over-compensated, smallest margin of the C's compare values "
-        f"{1e3 * found.smallest_margin_V:.3f} mV."
+        f"{units.text(1e3 * found.smallest_margin_V, '.3f mV')}."
     )
     return [line, f"First wrong: {found.first_wrong}."] if found.first_wrong else [line]
 
@@ -179,20 +179,21 @@ def loops_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Ta
 
 def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> Table | None:
     """Return each scenario at the pressure drop where it is worst; None if there are none."""
-    worst: dict[str, ScenarioResult] = {}
+    worst: dict[tuple[str, str], ScenarioResult] = {}
     for each in sorted(scenarios, key=lambda one: (one.q_zero_L_min, one.q_peak_at_zero_L_min, one.dp_MPa)):
-        worst[each.name] = each
+        worst[each.name, each.not_required] = each
     if not worst:
         return None
     flow = units.label("L/min")
     return table_of(
-        "Beside ramps: each scenario at the pressure drop where it is worst",
-        [worst[name] for name in dict.fromkeys(each.name for each in scenarios)],
+        "Beside ramps: each scenario at the pressures where it is worst",
+        [worst[key] for key in dict.fromkeys((each.name, each.not_required) for each in scenarios)],
         ("scenario", lambda one: one.name),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
+        (f"behind the edge ({units.label('MPa')})", lambda one: recorded(one.back_MPa, ".2f MPa", units)),
         (f"at zero, at the end ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
         (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
-        ("required", lambda one: _required(one, units) if one.must_shut else "no core can know: not required"),
+        ("required", lambda one: _required(one, units) if one.must_shut else f"{one.not_required}: not required"),
     )
 
 

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot.valves import LotSide
@@ -14,7 +15,7 @@ from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.page import Figure, Section
-from dzdesign.report.sections.cells import from_to, in_number_font, number, table_of
+from dzdesign.report.sections.cells import Cell, in_number_font, number, recorded, table_of
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
@@ -86,10 +87,11 @@ def lot_figures(chain: Chain) -> tuple[Figure, ...]:
         value=f"of {len(compensator.lot)} valves",
         note=f"one law for all; the file holds one of them, {carrier_of(compensator)}, its carrier",
     )
-    return (first, _worst(chain.evidence), _cost(lot_costs(compensator)))
+    units = chain.recorded_units
+    return (first, _worst(chain.evidence, units), _cost(lot_costs(compensator), units))
 
 
-def _worst(evidence: Evidence | None) -> Figure:
+def _worst(evidence: Evidence | None, units: RecordedUnits) -> Figure:
     found = [each.lot for each in evidence.inputs if each.lot] if evidence else []
     if not found:
         return Figure(
@@ -100,14 +102,15 @@ def _worst(evidence: Evidence | None) -> Figure:
     over = {name for each in found for name in each.over_compensated}
     return Figure(
         label=f"Worst valve of the lot: {worst.worst}",
-        value=f"{1e3 * worst.smallest_margin_V:.3f} mV",
+        value=units.text(1e3 * worst.smallest_margin_V, ".3f mV"),
         note="margin of the C's compare values at zero command under its own lower bound, at "
-        f"{worst.worst_dp_MPa:.2f} MPa; {len(over)} of {min(each.valves for each in found)} valves over-compensated",
+        f"{units.text(worst.worst_dp_MPa, '.2f MPa')}; {len(over)} of {min(each.valves for each in found)} valves "
+        "over-compensated",
         kind="bad" if over else "text",
     )
 
 
-def _cost(costs: tuple[LotCost, ...]) -> Figure:
+def _cost(costs: tuple[LotCost, ...], units: RecordedUnits) -> Figure:
     label = "What it costs over the lot"
     if not costs:
         return Figure(label=label, value="not known", note="the file holds no valve but its carrier", kind="open")
@@ -116,7 +119,8 @@ def _cost(costs: tuple[LotCost, ...]) -> Figure:
         label=label,
         value=f"{least.least_percent:.1f} to {most.most_percent:.1f} %",
         note=f"of command passes before the drive reaches a valve's own lower bound: least {least.valve} at "
-        f"{least.least_dp_MPa:.2f} MPa, most {most.valve} at {most.most_dp_MPa:.2f} MPa; each stands under The lot",
+        f"{units.text(least.least_dp_MPa, '.2f MPa')}, most {most.valve} at {units.text(most.most_dp_MPa, '.2f MPa')}; "
+        "each stands under The lot",
     )
 
 
@@ -126,18 +130,27 @@ def lot_section(compensator: Compensator) -> Section:
     if not costs:
         return Section(missing=f"The file is of {count} valves and names none but one; run `dzdesign batch` again.")
     more = f": the first {ROWS} of {len(costs)}" if len(costs) > ROWS else ""
+    units = compensator.valve.recorded_units
+    pressure, command = units.label("MPa"), units.label("V")
+
+    def least_bound(one: LotCost) -> Cell:
+        return recorded(min(one.bounds.u_lower_V), ".3f V", units.of_side(one.side))
+
+    def tested(one: LotCost) -> Cell:
+        ends = (units.number(end(one.bounds.dp_MPa), ".2f MPa") for end in (min, max))
+        return in_number_font(" to ".join(dict.fromkeys(ends)))
 
     table = table_of(
         f"What the lot setting costs each valve, the dearest first{more}",
         costs[:ROWS],
         ("valve", lambda one: one.valve),
         ("commands", lambda one: one.side),
-        ("tested (MPa)", lambda one: in_number_font(from_to(one.bounds.dp_MPa, ".2f"))),
-        ("least bound (V)", lambda one: number(min(one.bounds.u_lower_V), 3)),
+        (f"tested ({pressure})", tested),
+        (f"least bound ({command})", least_bound),
         ("confidence (%)", lambda one: in_number_font(f"{100 * one.bounds.confidence:.6g}")),
         ("cost, least (%)", lambda one: number(one.least_percent, 2)),
         ("cost, most (%)", lambda one: number(one.most_percent, 2)),
-        ("most at (MPa)", lambda one: number(one.most_dp_MPa, 2)),
+        (f"most at ({pressure})", lambda one: recorded(one.most_dp_MPa, ".2f MPa", units)),
         csv=csv_text(
             ("valve", "side", *NUMBERS),
             ((cost.valve, cost.side, *(round(getattr(cost, name), 4) for name in NUMBERS)) for cost in costs),

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.verify.current.current_checks import controller_on_machine
 from dzdesign.verify.evidence import InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import SAMPLED_STRIDE, PreparedInputs
@@ -46,9 +47,15 @@ def check_on_machine(folder: Path, machine: Machine, host: InputCheck) -> Machin
 
 
 def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Check]:
-    """Return one requirement a machine: its machine code is right at every input, or at a sample of them."""
+    """Return one requirement a machine: its machine code is right at every input, or at a sample of them.
+
+    Of a drive by current also one of its controller.
+    """
+    compensator = read_compensator(folder)
     checks = []
     for machine in MACHINES:
+        if compensator.current_drive is not None:
+            checks.append(controller_on_machine(folder, compensator, machine))
         name = f"machine code of the {machine.name}"
         missing = "the core was not checked on the host" if not inputs else machine.missing()
         if missing:

@@ -1,18 +1,20 @@
 """A firmware in closed loop: ramps, scenarios and a series of plants at every tested pressure drop, and the checks."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.recorded_curve import RecordedCurve
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison, compare_at_pressure
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.closed_loop.scenarios import Scene, run_scenarios
+from dzdesign.verify.closed_loop.scenarios import run_scenarios
+from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
 from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, ScenarioResult, Side
@@ -25,6 +27,8 @@ WORKERS = 2
 #: How the evidence calls the plant where none was given.
 STAND_IN = "the recorded flow over command, moved by the default plant's coil and spool"
 SIGNS: dict[Side, int] = {"positive": 1, "negative": -1}
+#: Pressures behind the edge where none were given, MPa: a port open to the tank, and a pipe's back pressure.
+BACKS_MPA = (0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +37,7 @@ class FirmwareLoop:
 
     checks: tuple[Check, ...] = ()
     dynamics: Plant | None = None
+    backs_MPa: tuple[float, ...] = ()
     loops: tuple[LoopComparison, ...] = ()
     scenarios: tuple[ScenarioResult, ...] = ()
     monte_carlo: MonteCarlo | None = None
@@ -44,14 +49,18 @@ class FirmwareLoop:
             plant_source=source or STAND_IN,
             plant_sha256=sha256,
             dynamics=None if plant else self.dynamics,
+            back_MPa=self.backs_MPa,
             pressures=tuple(loop.result for loop in self.loops),
         )
 
 
-def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tuple[Scene, ...]:
+def scenes_of(
+    folder: Path, compensator: Compensator, plant: Plant | None, backs_MPa: Sequence[float] | None = None
+) -> tuple[Scene, ...]:
     """Return the compensated loop of each side at every tested pressure drop.
 
-    Without a plant the recorded characteristic stands in for the valve.
+    Without a plant the recorded characteristic stands in for the valve. Pressures behind the edge that were given must
+    be within the sensors' spans; usual ones are lowered until they are.
     """
     valve = compensator.valve
     scenes: list[Scene] = []
@@ -62,6 +71,13 @@ def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tu
         one = plant or stand_in_of(side, valve.u_max_V)
         pressures = side.beta.dp_MPa or tuple(test.dp_MPa for test in side.tests if test.dp_MPa is not None)
         loop = ClosedLoop(one, folder, compensator, sign)
+        for back_MPa in backs_MPa or ():
+            if loop.back_within_span(back_MPa, max(pressures)) < back_MPa:
+                first, second = (valve.recorded_units.text(each, ".3g MPa") for each in (back_MPa, max(pressures)))
+                raise InputError(
+                    f"a back pressure of {first} and the tested {second} together exceed the sensors' span; give a "
+                    "lower --back-pressure, or design with larger sensors"
+                )
         for dp_MPa in pressures:
             reference = dp_MPa if side.reference.dp_MPa is None else side.reference.dp_MPa
             # A recording at one pressure drop says nothing of another.
@@ -70,14 +86,12 @@ def scenes_of(folder: Path, compensator: Compensator, plant: Plant | None) -> tu
                 Scene(
                     loop=loop,
                     plant=one,
+                    compensator=compensator,
                     side=name,
                     dp_MPa=dp_MPa,
                     reference_MPa=reference,
                     tested_MPa=tested,
-                    command_error=compensator.command_error,
-                    has_zero_band=compensator.zero_band_codes > 0,
-                    hides_excess=side.trend == "increasing" and bool(compensator.signals.hidden_excess(sign)),
-                    units=valve.recorded_units,
+                    backs_MPa=tuple(sorted(BACKS_MPA if backs_MPa is None else backs_MPa)),
                 )
             )
     return tuple(scenes)
@@ -105,6 +119,7 @@ def close_the_loop(
             lambda scene: compare_at_pressure(
                 scene.loop, scene.dp_MPa, scene.reference_MPa, sequence, scene.side,
                 reading_flow_L_min=compensator.reading_flow_L_min, recorded=recorded_at(compensator, scene),
+                back_MPa=scene.back_MPa,
             ),
             scenes,
         )
@@ -120,6 +135,7 @@ def close_the_loop(
     return FirmwareLoop(
         checks=loop_checks([loop.result for loop in loops], scenarios, compensator, plant_given=plant is not None),
         dynamics=scenes[0].plant.parameters if scenes else None,
+        backs_MPa=scenes[0].backs_MPa if scenes else (),
         loops=loops,
         scenarios=scenarios,
         monte_carlo=series,

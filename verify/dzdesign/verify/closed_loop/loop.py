@@ -12,8 +12,10 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.verify.closed_loop.coil_in_loop import HOLDING_H, coil_sources, nominal_coil
 from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
 from dzdesign.verify.toolchain.host_compiler import load_library
 
@@ -22,8 +24,8 @@ PERIODS_PER_RECORD = 25
 RECORD_S = PERIODS_PER_RECORD * PWM_PERIOD_S
 #: Numbers in a record, as loop.c has them.
 RECORDED = ("compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m")
-#: Pressure behind the edge: what both sensors see beside the drop.
-BACK_PRESSURE_MPA = 1.0
+#: Pressure behind the edge where none is given, as on a bench: what both sensors see beside the drop.
+BENCH_BACK_MPA = 1.0
 #: Flow at zero command below this is none: the edge is shut, only the last bits of a number remain.
 NO_FLOW_L_MIN = 1e-9
 #: The command's ramps are longer than the drive's own by this factor.
@@ -103,9 +105,9 @@ class ClosedLoop:
         sign: int = 1,
         dither: tuple[int, int] | None = None,
     ) -> None:
-        driver = files("dzdesign.verify.closed_loop")
+        driver = files(__package__) / "programs"
         sources = {"plant_motion.h": motion_header()}
-        for name in ("loop.c", "plant_period.h", "plant_curve.h", "plant_stops.h"):
+        for name in ("loop.c", "plant_coil.h", "plant_period.h", "plant_curve.h", "plant_stops.h"):
             sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
             sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
@@ -114,28 +116,30 @@ class ClosedLoop:
         else:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")
+        #: Of a drive by current the coil, at a supply.
+        self._coil = nominal_coil(compensator) if firmware and compensator else None
+        sources |= coil_sources(self._coil)
         self._library = load_library(sources, "the closed loop", FLOATING)
         #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
         self._dither = dither or _recorded_dither(compensator)
         #: Without a compensator no code is read, and any scaling serves.
         self._signals = compensator.signals if compensator else Signals()
         self._negative = sign < 0
-        command, sensors = self._signals.command, (self._signals.pressure_a, self._signals.pressure_b)
-        full = command.zero_code + command.direction(sign) * command.span(sign)
-        #: Codes of command and pressures at zero and at their spans, and these (1, MPa, MPa).
-        self._scalings = (
-            np.array([command.zero_code, *(sensor.zero_code for sensor in sensors)], dtype=np.int32),
-            np.array([full, *(sensor.full_code for sensor in sensors)], dtype=np.int32),
-            np.array([1.0, *(float(sensor.span_MPa) for sensor in sensors)]),
-        )
+        #: Command, sensor A, sensor B.
+        self.channels = Channels(self._signals, sign)
         #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
         self._has_core = firmware is not None
         self._side = compensator.valve.sides.get(SIDE_NAMES[sign]) if compensator else None
+        #: Added to the plant's drive, V of command.
+        self._added_V = 0.0
         self._take(plant)
 
     def _take(self, plant: Plant | StandIn) -> None:
-        self._plant = numbers_of(plant.parameters, self._signals.compare_max)
+        parameters, counts = plant.parameters, self._signals.compare_max
+        self._plant = numbers_of(parameters, counts)
+        #: The same, moved by a given current.
+        self._of_current = numbers_of(replace(parameters, L_c_H=HOLDING_H), counts) if self._coil else self._plant
         #: Of a stand-in its recorded characteristic.
         self._curve = plant.table if isinstance(plant, StandIn) else None
         #: Full command, V.
@@ -151,6 +155,11 @@ class ClosedLoop:
         if self._dither is None:
             return 0, 1, False
         return (0, 1, True) if self._stand_in else (*self._dither, False)
+
+    @property
+    def is_stand_in(self) -> bool:
+        """Whether a recorded characteristic stands in for the plant."""
+        return self._stand_in is not None
 
     @property
     def has_dither(self) -> bool:
@@ -169,21 +178,43 @@ class ClosedLoop:
         """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""
         return None if self._stand_in is None else self._stand_in.unseen_below_L_min(dp_MPa)
 
-    def command_of_codes(self, codes: np.ndarray) -> np.ndarray:
-        """Return the commands, shares of full, that the converter reads as so many codes from zero, (N,) whole numbers.
+    def with_added_drive(self, added_V: float) -> "ClosedLoop":
+        """Return the same loop with so much added to the plant's drive, V of command."""
+        other = copy.copy(self)
+        other._added_V = added_V
+        return other
 
-        They may lie below zero: then the command is one of the other sign, or none that the signal has.
-        """
-        zero, full = int(self._scalings[0][0]), int(self._scalings[1][0])
-        span, way = abs(full - zero), 1 if full > zero else -1
-        middle: np.ndarray = (codes + 0.5 * way) / (span + 1)  # of the code: it is rounded down, whichever way it runs
-        return middle
+    def back_within_span(self, back_MPa: float, dp_MPa: float) -> float:
+        """Return a pressure behind the edge, or the largest that leaves a pressure drop within the sensors' spans."""
+        span = float(self.channels.spans[1:].min())
+        if dp_MPa > span:
+            raise InputError(f"a pressure drop of {dp_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
+        return min(back_MPa, span - dp_MPa)
 
     def with_plant(self, plant: Plant | StandIn) -> "ClosedLoop":
         """Return the same loop with another plant; nothing is compiled again."""
         other = copy.copy(self)
         other._take(plant)
         return other
+
+    def with_coil(
+        self, *, resistance: float = 1.0, inductance: float = 1.0, supply_V: float | None = None
+    ) -> "ClosedLoop":
+        """Return the same loop with another coil or supply; nothing is compiled again.
+
+        Resistance and inductance are factors of the declared coil's; without a supply it is the nominal one. For a
+        drive by current only.
+        """
+        if self._coil is None:
+            raise InputError("this loop's drive is by duty; a coil and its supply belong to one by current")
+        other = copy.copy(self)
+        other._coil = self._coil.at(resistance=resistance, inductance=inductance, supply_V=supply_V)
+        return other
+
+    @property
+    def controls_current(self) -> bool:
+        """Whether the law's output is the set point of a current, in a coil that `with_coil` may change."""
+        return self._coil is not None
 
     def run(
         self,
@@ -192,41 +223,50 @@ class ClosedLoop:
         mode: str = "direct",
         dp_frozen_MPa: float = 0.0,
         *,
-        seen_MPa: np.ndarray | None = None,
+        back_MPa: float | np.ndarray | None = None,
+        added_V: float | np.ndarray | None = None,
+        shown: np.ndarray | None = None,
+        errors: ReadingErrors = NO_ERRORS,
         periods_per_record: int = PERIODS_PER_RECORD,
     ) -> LoopRun:
         """Run the loop from rest, in one of `MODES`.
 
         `command` (N,) is a share of u_max, one value a record of `periods_per_record` periods of the PWM; `supply_MPa`
-        is the pressure drop at no flow, (N,) where it changes. Of sensors that fail `seen_MPa` (N,) is what they show;
-        not a number: the plant's own. Mode "without beta" shows `dp_frozen_MPa` to the core.
+        is the pressure drop at no flow and `back_MPa` the pressure behind the edge, (N,) where they change; without one
+        that of a bench, as far as the sensors span it. `added_V` is added to the plant's drive, V of command. Of
+        sensors that fail `shown` (N, 2) are the codes of A and B; below zero: the plant's own. Pressures above a
+        sensor's span read as the converter's largest code. Mode "without beta" shows `dp_frozen_MPa` to the core.
         """
         if mode not in MODES:
             raise ValueError(f"mode is '{mode}', expected one of {', '.join(MODES)}")
         if mode != "direct" and not self._has_core:
             raise InputError("this loop was built without a compensator; give the firmware folder")
         command = np.ascontiguousarray(command, dtype=float)
-        supply = np.ascontiguousarray(np.broadcast_to(supply_MPa, command.shape), dtype=float)
+        if back_MPa is None:
+            back_MPa = self.back_within_span(BENCH_BACK_MPA, float(np.max(supply_MPa)))
+        supply, back, bias = (
+            np.ascontiguousarray(np.broadcast_to(each, command.shape), dtype=float)
+            for each in (supply_MPa, back_MPa, self._added_V if added_V is None else added_V)
+        )
         if mode == "without beta":
-            seen_MPa = np.full(command.shape, dp_frozen_MPa)
-        seen = np.full(command.shape, np.nan) if seen_MPa is None else np.ascontiguousarray(seen_MPa, dtype=float)
+            shown = self.channels.pressure_codes(dp_frozen_MPa, back)
+        codes = np.full((command.size, 2), -1) if shown is None else shown
         record = np.empty((command.size, len(RECORDED)))
-        signals, plant, negative = self._signals, self._plant, self._negative
-        span, highest = float(self._scalings[2][1:].min()), float(supply.max())
-        back_MPa = min(BACK_PRESSURE_MPA, span - highest)
-        if back_MPa < 0:
-            raise InputError(f"a pressure drop of {highest:g} MPa exceeds the sensors' span of {span:g} MPa")
+        channels, coil = self.channels, self._coil if mode != "direct" else None
+        signals, plant, negative = self._signals, self._of_current if coil else self._plant, self._negative
         choices = (
-            command.size, periods_per_record, mode != "direct", negative, negative and signals.swapped,
-            *self._wave(), signals.code_max, signals.compare_max,
+            command.size, periods_per_record, mode != "direct", negative, channels.swapped, *self._wave(),
+            signals.code_max, signals.compare_max, errors.seed,
         )  # fmt: skip
-        series = (np.array(choices, dtype=np.int32), command, supply, seen)
-        given = (*self._scalings, plant.flat, plant.coarse, plant.fine, self._curve, record)
-        pointers = [
-            [None if array is None else array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
-            for arrays in (series, given)
-        ]
-        self._library.dz_loop(*pointers[0], ctypes.c_double(back_MPa), *pointers[1])
+        series = (
+            np.array(choices, dtype=np.int32), command, supply, back, bias, np.ascontiguousarray(codes, dtype=np.int32),
+            channels.zeros, channels.fulls, channels.spans, errors.table,
+            plant.flat, plant.coarse, plant.fine, self._curve,
+        )  # fmt: skip
+        *given, recording = (
+            None if each is None else each.ctypes.data_as(ctypes.c_void_p) for each in (*series, record)
+        )
+        self._library.dz_loop(*given, *(coil.pointers() if coil else (None, None)), recording)
         recorded = dict(zip(RECORDED, record.T, strict=True))
         time = np.arange(command.size) * periods_per_record * PWM_PERIOD_S
         return LoopRun(time=time, command=command, position_mm=1e3 * recorded.pop("position_m"), **recorded)

@@ -10,7 +10,7 @@ from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.recorded_agreement import check_recorded
-from dzdesign.verify.closed_loop.scenarios import EXCESS
+from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
 from dzdesign.verify.loop_results import PressureResult, ScenarioResult
 from dzdesign.verify.requirements import (
     PLANT_IS_THE_VALVE,
@@ -21,6 +21,8 @@ from dzdesign.verify.requirements import (
     Requirement,
 )
 
+#: How the names of a sensor's failures begin that signals with a live zero would show.
+OPEN_CIRCUITS = tuple(f"sensor {name} {fails}" for name in "AB" for fails in ("breaks", "is shorted"))
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03
 #: Share of a test's largest flow by which a stand-in's mean flow in a bin of command may differ from the recorded one.
@@ -189,11 +191,12 @@ def shut_after_scenarios(
     worst = max(required, key=_zero_flow)
     text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: "
     text += f"{_flow(worst, worst.q_zero_L_min, units)} ({worst.name}, at {_at(worst, units)}){_allowed(worst, units)}"
-    if hidden := [each for each in scenarios if not each.must_shut]:
-        worst_of = {each.name: each for each in sorted(hidden, key=lambda each: each.q_zero_L_min)}
-        found = [f"{name}, {_flow(each, each.q_zero_L_min, units)}" for name, each in worst_of.items()]
-        text += f"; not required, as no core can know of it or it has no zero band: {', and '.join(found[::-1])}"
-        if EXCESS in worst_of:
+    for reason in dict.fromkeys(each.not_required for each in scenarios if not each.must_shut):
+        others = [each for each in scenarios if each.not_required == reason]
+        most = max(others, key=_zero_flow)
+        text += f"; not required ({reason}): {_flow(most, most.q_zero_L_min, units)} ({most.name}, at "
+        text += f"{_at(most, units)}, the most of {len({each.name for each in others})})"
+        if reason == NO_CORE_CAN_KNOW and any(each.name.startswith(OPEN_CIRCUITS) for each in others):
             text += "; signals with a live zero and room above the span would show the failed sensor"
     if not plant_given and not any(each.is_load_step for each in scenarios):
         text += "; load steps and frozen sensors were not tried: that needs ramps at two pressure drops, or --plant"

@@ -1,23 +1,21 @@
-"""What a machine does to a valve beside ramps: steps, load steps, failing sensors, noise, cold and hot oil."""
+"""What a machine does to a valve beside ramps: steps, load steps, noise, wrong readings, a reset, cold and hot oil.
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from types import MappingProxyType
+Failing sensors stand in sensor_failures.py, coil and supply in drive_corners.py.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
-from dzdesign.design.zero_band import CommandError
-from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
-from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
-from dzdesign.verify.closed_loop.stand_in import StandIn
-from dzdesign.verify.loop_results import ScenarioResult, Side
+from dzdesign.design.target_inputs import Converter
+from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, coil_and_supply
+from dzdesign.verify.closed_loop.loop import LoopRun
+from dzdesign.verify.closed_loop.readings import ReadingErrors
+from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW, SETTLE_S, STEP_S, Ends, Scene, ramp
+from dzdesign.verify.closed_loop.sensor_failures import sensor_failures
+from dzdesign.verify.loop_results import ScenarioResult
 
-#: Two periods a record: as often as the core samples, 1.25 kHz.
-PERIODS = 2
-STEP_S = PERIODS * PWM_PERIOD_S
-#: Time in which a spool has come to rest; and of a command's ramp, quick but far slower than the spool.
-SETTLE_S, RAMP_S = 0.4, 2.0
 #: Of the final flow: where a rise begins and ends, and how near it is settled.
 RISE, SETTLED = (0.1, 0.9), 0.05
 #: Standard deviation of the noise on the command, share of full.
@@ -25,90 +23,8 @@ NOISE = 0.002
 SEED = 1
 #: Viscosity (damping goes with it) and density of a mineral oil of class VG 46 against 40 °C: about 0 °C and 80 °C.
 OILS = {"cold oil, 8 times the viscosity": (8.0, 1.03), "hot oil, a quarter of the viscosity": (0.25, 0.97)}
-
-
-#: Lowest and highest tested pressure drop, MPa.
-Ends = tuple[float, float]
-#: A failure that reads as a large pressure drop.
-EXCESS = "sensor ahead shows full, or the one behind breaks"
-NO_FIGURES: Mapping[str, float] = MappingProxyType({})
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
-    """The loop of one side at one pressure drop."""
-
-    #: With the compensator, and the plant of this pressure drop.
-    loop: ClosedLoop
-    plant: Plant | StandIn
-    side: Side
-    #: At no flow.
-    dp_MPa: float
-    #: The law's dP0.
-    reference_MPa: float
-    #: Of the tests; None where the plant holds at `dp_MPa` only.
-    tested_MPa: Ends | None
-    #: Of a zero command's code; and whether the law has a zero band against it.
-    command_error: CommandError
-    has_zero_band: bool
-    #: Whether a sensor may fail so that the core must take a pressure drop for larger than it is, and that opens the
-    #: valve: the threshold grows with the pressure drop, and the failed sensor's code is a valid one.
-    hides_excess: bool = False
-    #: In which a scenario's name has its pressures.
-    units: RecordedUnits = AS_COMPUTED
-
-    @property
-    def settle_s(self) -> float:
-        """Time in which the valve has come to rest, the firmware's own ramps included."""
-        return SETTLE_S + self.loop.slowest_ramp_s
-
-    def held(self, level: float, times: float = 1) -> np.ndarray:
-        """Return a command held for so many times the time to come to rest."""
-        return np.full(round(times * self.settle_s / STEP_S), level)
-
-    def opened_and_closed(self) -> np.ndarray:
-        """Return the command that leaves the spool as its hysteresis leaves it after use."""
-        return np.concatenate([_ramp(0, 1), self.held(1), _ramp(1, 0), self.held(0, 2)])
-
-    def run(
-        self,
-        command: np.ndarray,
-        *,
-        supply_MPa: float | np.ndarray | None = None,
-        mode: str = "compensated",
-        seen_MPa: np.ndarray | None = None,
-    ) -> LoopRun:
-        """Run the compensated loop at this pressure drop unless told otherwise."""
-        supply = self.dp_MPa if supply_MPa is None else supply_MPa
-        return self.loop.run(command, supply, mode, seen_MPa=seen_MPa, periods_per_record=PERIODS)
-
-    def result(
-        self,
-        name: str,
-        run: LoopRun,
-        *,
-        must_shut: bool = True,
-        figures: Mapping[str, float] = NO_FIGURES,
-        end_MPa: float | None = None,
-    ) -> ScenarioResult:
-        """Return the result; zero command counts once the valve has had the time to come to rest.
-
-        It ended at this pressure drop unless told otherwise.
-        """
-        ended_MPa = self.dp_MPa if end_MPa is None else end_MPa
-        shut = np.flatnonzero(_held_for(run.command <= 0, round(self.settle_s / STEP_S)))
-        return ScenarioResult(
-            name=name,
-            side=self.side,
-            dp_MPa=self.dp_MPa,
-            leak_L_min=self.loop.leak_L_min(ended_MPa),
-            allowed_at_zero_L_min=self.loop.allowed_at_zero_L_min(ended_MPa),
-            q_zero_L_min=float(run.q_largest_L_min[-1]),
-            q_peak_at_zero_L_min=float(run.q_largest_L_min[shut].max(initial=0.0)),
-            unseen_below_L_min=self.loop.unseen_below_L_min(self.dp_MPa),
-            must_shut=must_shut,
-            figures={key: float(value) for key, value in figures.items()},
-        )
+#: Pressure drops above the tested ones, over the highest of these.
+ABOVE = (1.25, 1.6, 2.0)
 
 
 def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
@@ -118,20 +34,14 @@ def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
         yield _load_step_at_zero(scene, scene.tested_MPa)
         yield _load_step_in_motion(scene, scene.tested_MPa)
         yield _frozen_sensors(scene, scene.tested_MPa)
-    yield from _failing_sensors(scene)
+        yield _above_the_tests(scene, scene.tested_MPa)
+    yield from sensor_failures(scene)
     yield _noise_at_zero(scene)
-    yield _converter_off_at_zero(scene)
+    yield from _converter_off_at_zero(scene)
+    yield from readings_off(scene)
+    yield _restart(scene)
+    yield from coil_and_supply(scene)
     yield from _oils(scene)
-
-
-def _ramp(start: float, end: float) -> np.ndarray:
-    return np.linspace(start, end, round(RAMP_S / STEP_S))
-
-
-def _held_for(condition: np.ndarray, count: int) -> np.ndarray:
-    """Return where a condition has held for so many records, this one included."""
-    since = np.arange(condition.size) - np.maximum.accumulate(np.where(condition, -1, np.arange(condition.size)))
-    return condition & (since > count)
 
 
 def _steps(scene: Scene) -> ScenarioResult:
@@ -182,53 +92,62 @@ def _load_step_at_zero(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
 def _load_step_in_motion(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """The pressure drop jumps in the middle of a ramp of the command."""
     then_MPa = tested_MPa[1] if scene.dp_MPa < sum(tested_MPa) / 2 else tested_MPa[0]
-    run, jump = _changed_in_mid_ramp(scene, np.nan, then_MPa)
+    run, jump = _changed_in_mid_ramp(scene, None, then_MPa)
     change = run.q_L_min[jump + round(SETTLE_S / STEP_S)] - run.q_L_min[jump - 1]
     figures = {"pressure_drop_then_MPa": then_MPa, "flow_change_L_min": change}
     return scene.result("load step in the middle of a ramp", run, figures=figures, end_MPa=then_MPa)
 
 
-def _failing_sensors(scene: Scene) -> Iterator[ScenarioResult]:
-    """A sensor fails in mid-ramp: its wire breaks, or it shows full pressure."""
-    beyond = 1e3  # MPa: the converter's end
-    for name, signal_MPa, must_shut in (
-        ("sensor ahead breaks, or the one behind shows full", -beyond, True),
-        (EXCESS, beyond, not scene.hides_excess),
-    ):
-        run, _ = _changed_in_mid_ramp(scene, signal_MPa, scene.dp_MPa)
-        yield scene.result(name, run, must_shut=must_shut)
-
-
 def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
-    """The sensors freeze, then the pressure drop rises. The codes are sound: what it costs is stated, not required."""
+    """Both sensors freeze, then the pressure drop rises. The codes are sound: what it costs is shown, not required."""
     low, high = tested_MPa
     first, then = (scene.units.text(dp_MPa, ".2f MPa") for dp_MPa in tested_MPa)
     name = f"sensors frozen at {first}, then {then}"
-    return scene.result(name, _changed_in_mid_ramp(scene, low, high)[0], must_shut=False, end_MPa=high)
+    run, _ = _changed_in_mid_ramp(scene, scene.loop.channels.pressure_codes(low, scene.back_MPa), high)
+    return scene.result(name, run, not_required=NO_CORE_CAN_KNOW, end_MPa=high)
 
 
-def _changed_in_mid_ramp(scene: Scene, seen_MPa: float, supply_MPa: float) -> tuple[LoopRun, int]:
+def _changed_in_mid_ramp(scene: Scene, codes: np.ndarray | None, supply_MPa: float) -> tuple[LoopRun, int]:
     """Run a ramp up and down, and tell at which record, in mid-ramp, what the sensors show and the supply change.
 
-    Sensors that show not a number show the plant's own pressure drop.
+    Without codes the sensors show the plant's own pressures.
     """
     before = scene.opened_and_closed()
-    command = np.concatenate([before, _ramp(0, 0.6), _ramp(0.6, 0), scene.held(0, 2)])
-    change = before.size + _ramp(0, 1).size // 2
-    seen, supply = np.full(command.size, np.nan), np.full(command.size, scene.dp_MPa)
-    seen[change:], supply[change:] = seen_MPa, supply_MPa
-    return scene.run(command, supply_MPa=supply, seen_MPa=seen), change
+    command = np.concatenate([before, ramp(0, 0.6), ramp(0.6, 0), scene.held(0, 2)])
+    change = before.size + ramp(0, 1).size // 2
+    shown, supply = np.full((command.size, 2), -1), np.full(command.size, scene.dp_MPa)
+    supply[change:] = supply_MPa
+    if codes is not None:
+        shown[change:] = codes
+    return scene.run(command, supply_MPa=supply, shown=shown), change
+
+
+def _above_the_tests(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
+    """The pressure drop rises to twice the highest that was tested, while the command is zero; judged throughout."""
+    before, highest = scene.opened_and_closed(), tested_MPa[1]
+    each = scene.held(0, 2)
+    steps = np.repeat([factor * highest for factor in ABOVE], each.size)
+    # In between the valve opens and closes there, as hysteresis may hold what a step alone does not move.
+    ends = scene.opened_and_closed()
+    command = np.concatenate([before, np.zeros(steps.size), ends])
+    supply = np.concatenate([np.full(before.size, scene.dp_MPa), steps, np.full(ends.size, ABOVE[-1] * highest)])
+    run = scene.run(command, supply_MPa=supply)
+    last, first = (scene.units.text(factor * highest, ".2f MPa") for factor in (ABOVE[-1], 1))
+    reason = f"certified up to {first}"
+    return scene.result(f"dP above the tests, up to {last}", run, not_required=reason, end_MPa=ABOVE[-1] * highest)
 
 
 def _noise_at_zero(scene: Scene) -> ScenarioResult:
-    """White noise on a zero command, as long as the spool needs to feel its mean."""
+    """White noise across zero, as long as the spool needs to feel its mean; then none.
+
+    Judged after it, as it is beyond what was declared; what passes meanwhile is shown.
+    """
     before = scene.opened_and_closed()
     noise = NOISE * np.random.default_rng(SEED).standard_normal(round(2.0 / STEP_S))
-    command = np.concatenate([before, np.maximum(noise, 0.0), scene.held(0)])
-    run = scene.run(command)
+    run = scene.run(np.concatenate([before, noise, scene.held(0)]))
     noisy = slice(before.size, before.size + noise.size)
     return scene.result(
-        f"noise of {100 * NOISE:g} % on a zero command",
+        f"noise of {100 * NOISE:g} % across zero command",
         run,
         figures={
             "mean_flow_L_min": run.q_mean_L_min[noisy].mean(),
@@ -237,29 +156,70 @@ def _noise_at_zero(scene: Scene) -> ScenarioResult:
     )
 
 
-def _converter_off_at_zero(scene: Scene) -> ScenarioResult:
-    """A zero command that the converter reads with its declared error: too high for long, and noisy on top.
+def _converter_off_at_zero(scene: Scene) -> Iterator[ScenarioResult]:
+    """A zero command that the converter reads with its declared error: off for long, either way, and noisy on top.
 
     Judged while it lasts, once the spool has had the time to follow. Without a zero band flow is to be expected.
     """
-    error, count = scene.command_error, scene.held(0, 2).size
+    error, count = scene.compensator.command_error, scene.held(0, 2).size
     noise = np.random.default_rng(SEED).integers(-error.noise_codes, error.noise_codes, count, endpoint=True)
-    wrong = scene.loop.command_of_codes(error.offset_codes + noise)
-    # The valve closes onto the wrong zero: from a true one the spool would have to open first.
-    before = np.concatenate([_ramp(0, 1), scene.held(1), _ramp(1, float(np.mean(wrong)))])
-    run = scene.run(np.concatenate([before, wrong]))
-    flow = run.q_largest_L_min[before.size + round(scene.settle_s / STEP_S) :]
-    return ScenarioResult(
-        name=f"zero command read {error.offset_codes} codes too high, with ±{error.noise_codes} codes of noise",
-        side=scene.side,
-        dp_MPa=scene.dp_MPa,
-        leak_L_min=scene.loop.leak_L_min(scene.dp_MPa),
-        allowed_at_zero_L_min=scene.loop.allowed_at_zero_L_min(scene.dp_MPa),
-        q_zero_L_min=float(flow.max()),
-        q_peak_at_zero_L_min=float(flow.max()),
-        unseen_below_L_min=scene.loop.unseen_below_L_min(scene.dp_MPa),
-        must_shut=scene.has_zero_band,
-        figures={"mean_flow_L_min": float(run.q_mean_L_min[before.size :].mean())},
+    reason = "" if scene.compensator.zero_band_codes else "without a transition there is no zero band"
+    off = f"{error.offset_codes} codes too"
+    for name, offset in (
+        (f"zero command read {off} high", error.offset_codes),
+        (f"zero command read {off} low", -error.offset_codes),
+        ("noise across zero command", 0),
+    ):
+        wrong = scene.loop.channels.command_of_codes(offset + noise)
+        # The valve closes onto the wrong zero: from a true one the spool would have to open first.
+        before = np.concatenate([ramp(0, 1), scene.held(1), ramp(1, float(np.mean(wrong)))])
+        run = scene.run(np.concatenate([before, wrong]))
+        yield scene.result(
+            f"{name}, with ±{error.noise_codes} codes of noise",
+            run,
+            judged=slice(before.size + round(scene.settle_s / STEP_S), None),
+            figures={"mean_flow_L_min": run.q_mean_L_min[before.size :].mean()},
+            not_required=reason,
+        )
+
+
+def readings_off(scene: Scene) -> Iterator[ScenarioResult]:
+    """Pressures that sensors and converter read wrong, so that dP reads too low or too high; noisy on top.
+
+    Errors as declared; of a machine that was not, of the target's converter alone. Judged while it lasts.
+    """
+    machine, target = scene.compensator.machine, scene.compensator.target
+    converter = target.converter if target else Converter()
+    offset, gain, noise = (
+        (machine.pressure_offset_codes, machine.pressure_gain_codes, machine.pressure_noise_codes)
+        if machine
+        else (converter.offset_codes, converter.gain_codes, converter.noise_codes)
+    )
+    own_MPa = (machine.pressure_error_a_MPa, machine.pressure_error_b_MPa) if machine else (0.0, 0.0)
+    own = [error * codes for error, codes in zip(own_MPa, scene.loop.channels.codes_per_MPa, strict=True)]
+    command = scene.opened_and_closed()
+    for name, way in (("low", -1), ("high", 1)):
+        a, b = (-way, way) if scene.loop.channels.swapped else (way, -way)
+        errors = ReadingErrors(
+            offset_codes=(0.0, a * (offset + own[0]), b * (offset + own[1])),
+            gain_codes=(0.0, a * gain, b * gain),
+            noise_codes=(0, noise, noise),
+            seed=SEED,
+        )
+        yield scene.result(
+            f"dP read too {name}: {'sensors and ' if machine else ''}converter off, ±{noise} codes of noise",
+            scene.run(command, errors=errors),
+            judged=slice(command.size - scene.held(0).size, None),
+            not_required="" if machine else NOT_DECLARED,
+        )
+
+
+def _restart(scene: Scene) -> ScenarioResult:
+    """The processor is reset while full command is there; judged until the command has been at zero."""
+    full = scene.held(1, 2)
+    run = scene.run(np.concatenate([full, scene.held(0), scene.opened_and_closed()]))
+    return scene.result(
+        "restart with full command present", run, judged=slice(full.size), not_required="there is no interlock"
     )
 
 

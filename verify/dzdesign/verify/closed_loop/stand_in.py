@@ -4,8 +4,9 @@ The rules. A test's flow over command is what was recorded (`recorded` in valve.
 the branches the spool stands still, so that a command that turns finds the same flow until it meets the other branch.
 Between two tests the command of the first flow seen runs straight over the pressure drop; the command counts from
 there, as a share of what is left up to full command (or down to zero); the share of the largest flow at it is straight
-between the tests' own, and the largest flow straight in logarithms. Beyond the tests the nearest one's shares hold, and
-the largest flow goes with the root of the pressure drop. The pressure drop sags over the flow as on the bench.
+between the tests' own, and the largest flow straight in logarithms. Beyond the tests that command goes straight on, as
+steep as the line that fits best where the flow of all tests begins. The nearest test's shares hold there, and the
+largest flow goes with the root of the pressure drop. The pressure drop sags over the flow as on the bench.
 
 Below the noise level a recording shows no flow, and the plant none that is known: `unseen_below_L_min`.
 """
@@ -34,17 +35,19 @@ class StandIn:
     dynamics: Plant
     #: Flow over that of the tests, for oil of another density.
     flow_scale: float = 1.0
+    #: Drive over that of the tests, for another coil or supply.
+    drive_ratio: float = 1.0
 
     @property
     def parameters(self) -> Plant:
         """The plant that moves the spool."""
-        return self.dynamics
+        return replace(self.dynamics, u_max_V=self.drive_ratio * self.dynamics.u_max_V)
 
     @property
     def table(self) -> np.ndarray:
         """What plant_curve.h reads."""
         volts_per_metre = self.dynamics.K_et_N_m / self.dynamics.force_per_volt
-        head = [len(self.side.tests), self.dynamics.u_max_V, volts_per_metre, self.flow_scale, SAG_STEPS]
+        head = [len(self.side.tests), self.dynamics.u_max_V, volts_per_metre, self.flow_scale, SAG_STEPS, *self._slopes]
         tests, starts, begin = [], [], len(head) + len(self.side.tests)
         for test in self.side.tests:
             curve = test.recorded
@@ -63,6 +66,18 @@ class StandIn:
             begin += tests[-1].size
         return np.concatenate([head, starts, *tests])
 
+    @property
+    def _slopes(self) -> list[float]:
+        """How the command where the flow begins runs over the pressure drop, opening and closing, V/MPa."""
+        dp = np.array([test.dp_MPa for test in self.side.tests])
+        if dp.size < 2:
+            return [0.0, 0.0]
+        curves = [test.recorded for test in self.side.tests]
+        return [
+            float(np.polyfit(dp, [_begin(branch) for branch in branches], 1)[0])
+            for branches in ([curve.opening for curve in curves], [curve.closing for curve in curves])
+        ]
+
     def unseen_below_L_min(self, dp_MPa: float) -> float:
         """Return the flow below which nothing is known at a pressure drop: the noise level of the tests about it."""
         dp = np.array([test.dp_MPa for test in self.side.tests])
@@ -75,10 +90,19 @@ class StandIn:
         scale = self.flow_scale / density**0.5
         return replace(self, dynamics=self.dynamics.with_oil(viscosity, density), flow_scale=scale)
 
+    def with_coil(self, resistance_ratio: float, voltage_ratio: float) -> "StandIn":
+        """Return it with so many times the coil's resistance and voltage: its current goes with one over the other."""
+        return replace(self, drive_ratio=self.drive_ratio * voltage_ratio / resistance_ratio)
+
 
 def _first_seen(branch: RecordedBranch, u_max_V: float) -> float:
     """Return the command of the first flow seen, off both ends: commands are counted from it, as shares."""
     return float(np.clip(branch.u_seen_V, 1e-3 * u_max_V, 0.99 * u_max_V))
+
+
+def _begin(branch: RecordedBranch) -> float:
+    """Return the command where the flow begins: of the second point, unless that is where it is first seen."""
+    return min(branch.u_V[1], branch.u_seen_V) if len(branch.u_V) > 1 else branch.u_V[0]
 
 
 def stand_in_of(side: SideModel, u_max_V: float) -> StandIn:

@@ -147,7 +147,7 @@ static inline void plant_period(struct plant *plant, int32_t compare, int linear
         respond(plant, compare);
     }
     plant->play = (plant->play < low) ? low : ((plant->play > high) ? high : plant->play);
-    plant->push = (plant->play - plant->mean) * p[PLANT_PUSH];
+    plant->push = (plant->play - plant->mean + plant->bias) * p[PLANT_PUSH];
     if (at_stop(plant)) {
         const double after = p[PLANT_I_I] * plant->i + plant->response[0];
 

@@ -5,11 +5,15 @@
 #include "plant_stops.h"
 
 /* The table, as stand_in.py writes it: a head, then where each test begins. */
-enum { CURVE_TESTS, CURVE_U_MAX_V, CURVE_V_PER_M, CURVE_SCALE, CURVE_SAG_STEPS, CURVE_STARTS };
+enum { CURVE_TESTS, CURVE_U_MAX_V, CURVE_V_PER_M, CURVE_SCALE, CURVE_SAG_STEPS, CURVE_SLOPES, CURVE_STARTS = CURVE_SLOPES + 2 };
 /* A test: pressure drop at no flow; largest flow; of rising and falling: the command of the first flow seen, where in
  * the test its commands stand, where its flows, how many; then what is left of the pressure drop over the flow. */
 enum { TEST_DP_MPA, TEST_Q_MAX, TEST_BRANCHES, TEST_BRANCH_SIZE = 4, TEST_SAG = TEST_BRANCHES + 2 * TEST_BRANCH_SIZE };
 enum { BRANCH_SEEN_V, BRANCH_COMMANDS, BRANCH_FLOWS, BRANCH_POINTS };
+
+/* The first flow seen is off both ends of the command, as shares of full. */
+#define LEAST_SEEN 1e-3
+#define MOST_SEEN 0.99
 
 static inline const double *curve_test(const double *table, int index)
 {
@@ -55,6 +59,7 @@ static inline void curve_supply(struct plant *plant)
     plant->below = curve_test(table, index);
     plant->above = curve_test(table, (index < last) ? index + 1 : index);
     plant->share_above = 0.0;
+    plant->beyond_MPa = dp - fmin(fmax(dp, plant->below[TEST_DP_MPA]), plant->above[TEST_DP_MPA]);
     if (plant->above != plant->below) {
         const double low = plant->below[TEST_DP_MPA];
         const double high = plant->above[TEST_DP_MPA];
@@ -70,14 +75,17 @@ static inline void curve_supply(struct plant *plant)
 }
 
 /* The share of the largest flow that a branch (0 rising, 1 falling) of the tests passes at a command: the command counts
- * from the first flow seen, whose command runs straight over the pressure drop, as a share of what is left on its side. */
+ * from the first flow seen, whose command runs straight over the pressure drop, and straight on beyond the tests, as a
+ * share of what is left on its side. */
 static inline double curve_share(const struct plant *plant, int branch, double u)
 {
     const double u_max = plant->curve[CURVE_U_MAX_V];
     const double *below = &plant->below[TEST_BRANCHES + TEST_BRANCH_SIZE * branch];
     const double *above = &plant->above[TEST_BRANCHES + TEST_BRANCH_SIZE * branch];
     const double w = plant->share_above;
-    const double seen = below[BRANCH_SEEN_V] + w * (above[BRANCH_SEEN_V] - below[BRANCH_SEEN_V]);
+    const double straight = below[BRANCH_SEEN_V] + w * (above[BRANCH_SEEN_V] - below[BRANCH_SEEN_V]) +
+                            plant->beyond_MPa * plant->curve[CURVE_SLOPES + branch];
+    const double seen = fmin(fmax(straight, LEAST_SEEN * u_max), MOST_SEEN * u_max);
     const double beyond = (u > seen) ? (u - seen) / (u_max - seen) : (u - seen) / seen;
     double share = 0.0;
 

@@ -35,7 +35,8 @@ struct plant
     double v;    /* m/s */
     double play; /* play of the magnetic force, V of command */
     double mean; /* mean current of the last period, V of command */
-    double push; /* acceleration by the play, m/s^2 */
+    double bias; /* drive that is added to the plant's, V of command */
+    double push; /* acceleration by the play and by that drive, m/s^2 */
     double acts; /* acceleration at x by what is neither current, spring, damping nor play, m/s^2 */
     double dp_MPa;
     double flow; /* L/min */
@@ -49,6 +50,7 @@ struct plant
     const double *below; /* its tests on both sides of the pressure drop, */
     const double *above;
     double share_above; /* how far towards the upper one, */
+    double beyond_MPa;  /* and how far beyond both, */
     double q_max;       /* the largest flow there, L/min, */
     double share;       /* and the share of it that flows */
 };

@@ -1,0 +1,217 @@
+"""`verify` of a firmware whose drive is by current: what it requires, and faults that it must see."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.design.current.choosing import CurrentSensor, choose_loop, gains_of
+from dzdesign.design.current.circuit import CoilCircuit
+from dzdesign.design.current.margins import margins
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.verify.analysis import machine_code
+from dzdesign.verify.current.coil_simulation import CoilLoop
+from dzdesign.verify.current.current_checks import current_checks
+from dzdesign.verify.current.declared_circuit import declared_corners, least_rise_s
+from dzdesign.verify.current.stability import CURRENTS, stability_margins
+from dzdesign.verify.requirements import OF_CURRENT
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
+from dzdesign.verify.verification import verify
+from tests.codegen.test_current_control import MEASURED, TEXTS
+from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
+from tests.support.synthetic import needs_compiler
+
+pytestmark = needs_compiler
+#: Fewer than `verify` compares, where a fault is a common one.
+STATES = 200_000
+
+
+def silent(_: str) -> None:
+    """Say nothing."""
+
+
+@pytest.fixture(scope="module")
+def controlled(example_valve):
+    """The example's compensator with current control, the supply not measured."""
+    return design(example_valve, options_of(TEXTS, target_named("cortex-m4").inputs()))
+
+
+@pytest.fixture(scope="module", params=SENSORS)
+def either(request, controlled, example_valve):
+    """The same, without and with the supply measured."""
+    if request.param == "supply unknown":
+        return controlled
+    return design(example_valve, options_of(MEASURED, target_named("cortex-m4").inputs()))
+
+
+def firmware_of(compensator, folder, edit=lambda text: text):
+    firmware = generate(compensator, "cortex-m4", to_json_bytes(compensator))
+    write_folder(folder, firmware.files, firmware.manifest)
+    source = folder / "core" / "dz_current.c"
+    source.write_text(edit(source.read_text()))
+    return folder
+
+
+def failing(checks) -> set[str]:
+    return {check.id for check in checks if check.holds is False}
+
+
+def test_a_firmware_with_current_control_holds(either, tmp_path):
+    """All that `verify` requires, with every input, in one run; 27 corners and each kind of fault stand in evidence."""
+    evidence = verify(firmware_of(either, tmp_path / "firmware")).evidence
+    assert failing(evidence.checks) == set()
+    assert {each.id for each in OF_CURRENT} <= {check.id for check in evidence.checks}
+    found = evidence.current_loop
+    assert found.states.states > 10_000_000 and found.states.wrong == 0
+    assert len({(each.resistance_ohm, each.inductance_H, each.supply_V) for each in found.corners}) == 27
+    assert {fault.expected for fault in found.faults} == {"OPEN", "SHORT", "OVER", "SENSOR"}
+    assert all(fault.holds for fault in found.faults)
+    # Evidence that lacks a check of it is not that of a firmware that holds.
+    lacking = replace(evidence, checks=tuple(check for check in evidence.checks if check.id != "current-settles"))
+    assert "current-settles" in {check.id for check in lacking.all_checks if check.holds is None}
+
+
+def test_a_drive_by_duty_has_no_such_requirement(example_compensator, tmp_path):
+    assert current_checks(tmp_path, example_compensator, silent).checks == ()
+
+
+#: What is edited in dz_current.c, and the requirements that must see it (the files as generated always do).
+EDITS = {
+    "a gain a thousandth too large": (
+        ("(error * PROPORTIONAL)", "(error * (PROPORTIONAL + 6u))"),
+        {"current-controller"},
+    ),
+    "twice the gain": (
+        ("(error * PROPORTIONAL)", "(error * (2u * PROPORTIONAL))"),
+        {"current-controller", "current-step"},
+    ),
+    "feed-forward and integral swapped": (
+        ("#define FEED_FORWARD", "#define FEED_FORWARD INTEGRAL\n#define UNUSED"),
+        {"current-controller"},
+    ),
+    "no anti-windup": ((" & ~past_end", ""), {"current-controller"}),
+    "an offset that is not rounded": (("+ OFFSET_HALF", ""), {"current-controller"}),
+    "an offset that is not calibrated": (
+        ("loop->offset = offset;", "loop->offset = OFFSET_NOMINAL;"),
+        {"current-controller", "current-settles"},
+    ),
+    "an open load that is not seen": (("* DZ_CURRENT_OPEN)", "* 0u)"), {"current-controller", "current-faults"}),
+    "a short that is not seen": (("* DZ_CURRENT_SHORT)", "* 0u)"), {"current-controller", "current-faults"}),
+    "an over-current that is not seen": (("* DZ_CURRENT_OVER)", "* 0u)"), {"current-controller", "current-faults"}),
+    "faults that are not latched": (
+        ("faults = loop->faults |", "faults = (loop->faults & DZ_CURRENT_NO_OFFSET) |"),
+        {"current-controller", "current-faults"},
+    ),
+    "a zero too far off that is no fault": (
+        ("? DZ_CURRENT_SENSOR : 0u", "? 0u : 0u"),
+        {"current-controller", "current-faults"},
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", EDITS)
+def test_an_edited_controller_is_seen(fault, controlled, tmp_path):
+    (right, wrong), expected = EDITS[fault]
+
+    def edit(text: str) -> str:
+        assert text.count(right) == 1
+        return text.replace(right, wrong)
+
+    found = current_checks(firmware_of(controlled, tmp_path / "firmware", edit), controlled, silent, STATES)
+    assert expected <= failing(found.checks)
+
+
+def test_one_code_too_many_in_one_of_a_million_states_is_seen(controlled, tmp_path):
+    """With the states that every verification compares."""
+    right = "smaller(counts, COMPARE_LIMIT) & on"
+    mixed = "(asked * 0x9E3779B1u) ^ (((uint32_t)sum + loop->offset) * 0x85EBCA6Bu) ^ (aim * 0xC2B2AE35u)"
+    wrong = f"({right}) + ((((({mixed}) * 0x27D4EB2Fu) >> 8) % 1000000u) == 0u)"
+
+    def edit(text: str) -> str:
+        assert text.count(right) == 1
+        return text.replace(right, wrong)
+
+    found = current_checks(firmware_of(controlled, tmp_path / "firmware", edit), controlled, silent)
+    assert 1 <= found.result.states.wrong <= 60
+    assert failing(found.checks) == {"current-controller"}
+
+
+TAMPERED = {"gain": {"proportional": 2}, "feed-forward": {"feed_forward": 3}, "rate": {"rate": 6}}
+
+
+@pytest.mark.parametrize("number", TAMPERED)
+def test_another_loop_in_compensator_json_is_seen(number, controlled, tmp_path):
+    """C and compensator.json agree: what is stated of the loop, and the loop itself, must tell."""
+    drive = controlled.current_drive
+    changed = {name: min(getattr(drive.loop, name) * by, 8191) for name, by in TAMPERED[number].items()}
+    changed = changed if number != "rate" else {"rate": 60000}
+    tampered = replace(controlled, current_drive=replace(drive, loop=replace(drive.loop, **changed)))
+    found = current_checks(firmware_of(tampered, tmp_path / "firmware"), tampered, silent, STATES)
+    assert "current-controller" not in failing(found.checks)
+    assert failing(found.checks) & {"current-margins", "current-step", "current-settles"}
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_the_margins_are_those_of_design_by_another_way(name):
+    """Eigenvalues of a turned loop against the crossovers of a transfer function: 0.02 degrees, 1 %."""
+    around = CoilLoop(
+        loop=example_loop(name), circuit=COIL, sensor=SENSORS[name], converter=CONVERTER, sampling=SAMPLING
+    )
+    assert set(declared_corners(COIL)) == set(COIL.corners())
+    for corner in declared_corners(COIL)[::5]:
+        ours = stability_margins(around, corner)
+        theirs = [
+            margins(COIL, corner, SAMPLING, gains_of(around.loop, COIL), share)
+            for share in CURRENTS
+            if COIL.duty(corner, share) < 1
+        ]
+        assert ours.phase_deg == pytest.approx(min(each.phase_deg for each in theirs), abs=0.02)
+        assert ours.gain == pytest.approx(min(each.gain for each in theirs), rel=0.01)
+
+
+def test_the_least_rise_is_that_of_an_exponential():
+    corner = COIL.nominal
+    assert least_rise_s(corner, 0.1, 0.82) == pytest.approx(COIL.fastest_rise_s(corner, 0.1, 0.82))
+    assert least_rise_s(corner._replace(resistance_ohm=40.0), 0.1, 0.82) == float("inf")
+
+
+@pytest.mark.parametrize(
+    ("machine", "why"), [pytest.param(each, each.missing(), id=each.name) for each in (CORTEX_M4, AVR)]
+)
+def test_other_machines_are_checked_and_a_wrong_one_is_seen(machine, why, controlled, tmp_path, monkeypatch):
+    from dzdesign.verify.current import current_checks as checks
+
+    if why:
+        pytest.skip(why)
+    monkeypatch.setattr(checks, "STATES", 50_000)
+    right = checks.controller_on_machine(firmware_of(controlled, tmp_path / "right"), controlled, machine, 50_000)
+    assert right.holds, right.text
+    # What another compiler alone sees.
+    mark = "__arm__" if machine is CORTEX_M4 else "__AVR__"
+    edit = f"#ifdef {mark}\n#undef GAIN_HALF\n#define GAIN_HALF UINT32_C(7)\n#endif\n\nstatic uint32_t smaller("
+    folder = firmware_of(
+        controlled, tmp_path / "wrong", lambda text: text.replace("static uint32_t smaller(", edit, 1)
+    )
+    assert checks.controller_on_machine(folder, controlled, machine, 50_000).holds is False
+
+
+def test_machine_code_has_a_row_for_the_controller(controlled, tmp_path, monkeypatch):
+    monkeypatch.setattr(machine_code, "MACHINES", (replace(CORTEX_M4, needs={"no-such-compiler": "its-package"}),))
+    names = [check.name for check in machine_code.machine_code_checks(firmware_of(controlled, tmp_path / "f"), ())]
+    assert names == ["current controller's machine code of the Cortex-M4", "machine code of the Cortex-M4"]
+
+
+def test_a_set_point_that_the_supply_cannot_carry_is_said(controlled, tmp_path):
+    weak = CoilCircuit(resistance_ohm=16.0, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))
+    loop = choose_loop(weak, CurrentSensor(V_per_A=2.0, offset_V=0.15), CONVERTER, SAMPLING, compare_max=60000)
+    assert loop.compare_limit == 60000 and Fraction(loop.full_counts, 60000) == 1
+    drive = replace(controlled.current_drive, circuit=weak, loop=loop)
+    other = replace(controlled, current_drive=drive)
+    found = current_checks(firmware_of(other, tmp_path / "firmware"), other, silent, STATES)
+    assert found.result.not_carried > 0
+    settles = next(check for check in found.checks if check.id == "current-settles")
+    assert str(found.result.not_carried) in settles.text

@@ -1,0 +1,172 @@
+"""The drive at the ends of coil temperature and supply, by formulas of this room's own: R = R20 (1 + alpha (T - 20)).
+
+Where the duty is the coil's voltage, the current is duty V / R, and a threshold of the valve, which is one of current,
+comes at a duty of R / V times that on the bench. An amplifier, or the firmware's current control, holds the current to
+its declared error instead.
+
+What is done to a plant: a stand-in's drive is multiplied, and only by what changes the current; a plant of equations
+has the coil's resistance itself, and its PWM's voltage goes with the supply where the duty is the coil's voltage. Under
+the firmware's current control the coil is the declared one, in the loop with the C, and the plant's own is left alone.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.current.circuit import CoilCircuit
+from dzdesign.design.machine.machine import Machine
+from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
+from dzdesign.verify.closed_loop.scene import Scene
+from dzdesign.verify.loop_results import ScenarioResult
+
+#: Of copper, per kelvin of its resistance at 20 °C.
+COPPER_PER_K, COPPER_AT_C = 0.00393, 20.0
+#: Of a machine that was not declared: a coil so much colder and hotter than on the bench, which was at 20 °C; and a
+#: supply so much lower and higher.
+COLDER_K, HOTTER_K, SUPPLY_SHARE = 40.0, 60.0, 0.2
+NOT_DECLARED = "the machine is not declared"
+#: Ramp up on which the dead zone is read, s: the spool's lag is some thousandths of a command of the quick ones.
+READING_RAMP_S = 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveCorner:
+    """One end of coil and supply, or of a current that is held, beside the bench."""
+
+    name: str
+    #: Of the coil's resistance, and of the voltage that full duty puts on it; 1 on the bench.
+    resistance_ratio: float = 1.0
+    voltage_ratio: float = 1.0
+    #: Of a coil in the loop with the C: its supply, V.
+    supply_V: float | None = None
+    #: Of the current that an amplifier, or the firmware's control, holds; 1 on the bench.
+    current_ratio: float = 1.0
+    #: What is added to that current, share of full drive.
+    current_rest: float = 0.0
+    #: Why no flow is not required there; empty: it is.
+    not_required: str = ""
+
+
+def resistance_ratio(coil_C: float, bench_coil_C: float) -> float:
+    """Return a copper coil's resistance at a temperature over that on the bench.
+
+    Examples
+    --------
+    >>> round(resistance_ratio(-20.0, 20.0), 4), round(resistance_ratio(20.0, 60.0), 4)
+    (0.8428, 0.8641)
+    """
+
+    def over_20(temperature_C: float) -> float:
+        return 1 + COPPER_PER_K * (temperature_C - COPPER_AT_C)
+
+    return over_20(coil_C) / over_20(bench_coil_C)
+
+
+def holds_current(compensator: Compensator) -> bool:
+    """Return whether an amplifier, or the firmware, holds the current; else the duty is the coil's voltage."""
+    machine = compensator.machine
+    return compensator.current_drive is not None or (machine is not None and machine.drive != "duty")
+
+
+def drive_corners(compensator: Compensator) -> Iterator[DriveCorner]:
+    """Give the corners of a declared machine, and usual ones of what was not declared."""
+    machine = compensator.machine
+    here = _End(name="", ratio=1.0)
+    drive = compensator.current_drive
+    (cold, hot), (low, high) = (_coils(machine), _supplies(machine)) if drive is None else _circuit_ends(drive.circuit)
+    for coil, supply in ((cold, here), (hot, here), (here, low), (here, high), (cold, high), (hot, low)):
+        yield DriveCorner(
+            name=", ".join(filter(None, (coil.name, supply.name))),
+            resistance_ratio=coil.ratio,
+            voltage_ratio=supply.ratio,
+            supply_V=supply.supply_V,
+            not_required=coil.not_required or supply.not_required,
+        )
+    yield from _current_corners(machine)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _End:
+    """One end of the coil's temperature or of the supply, over the bench."""
+
+    name: str
+    ratio: float
+    not_required: str = ""
+    supply_V: float | None = None
+
+
+def _coils(machine: Machine | None) -> tuple[_End, _End]:
+    """Return the coil's resistance cold and hot."""
+    if machine is not None and machine.coil_temperature_C is not None:
+        bench_C = COPPER_AT_C if machine.bench_coil_C is None else machine.bench_coil_C
+        cold, hot = (
+            _End(name=f"coil at {end:g} °C", ratio=resistance_ratio(end, bench_C)) for end in machine.coil_temperature_C
+        )
+        return cold, hot
+    cold, hot = (
+        _End(name=name, ratio=resistance_ratio(COPPER_AT_C + added_K, COPPER_AT_C), not_required=NOT_DECLARED)
+        for name, added_K in ((f"coil {COLDER_K:g} K colder", -COLDER_K), (f"coil {HOTTER_K:g} K hotter", HOTTER_K))
+    )
+    return cold, hot
+
+
+def _supplies(machine: Machine | None) -> tuple[_End, _End]:
+    """Return the supply low and high."""
+    if machine is not None and machine.supply_V is not None and machine.bench_supply_V is not None:
+        low, high = (_End(name=f"supply at {end:g} V", ratio=end / machine.bench_supply_V) for end in machine.supply_V)
+        return low, high
+    low, high = (
+        _End(name=f"supply {SUPPLY_SHARE:.0%} {word}", ratio=1 + way * SUPPLY_SHARE, not_required=NOT_DECLARED)
+        for word, way in (("lower", -1), ("higher", 1))
+    )
+    return low, high
+
+
+def _circuit_ends(circuit: CoilCircuit) -> tuple[tuple[_End, _End], tuple[_End, _End]]:
+    """Return the declared ends of the coil and the supply that the current loop was designed for."""
+    cold, hot = (
+        _End(name=f"coil of {factor:g} times the resistance", ratio=factor) for factor in circuit.resistance_factors
+    )
+    low, high = (_End(name=f"supply at {end:g} V", ratio=1.0, supply_V=end) for end in circuit.supply_V)
+    return (cold, hot), (low, high)
+
+
+def _current_corners(machine: Machine | None) -> Iterator[DriveCorner]:
+    """Give the ends of a current that is held: its error on the machine, and that of the bench."""
+    if machine is None or machine.drive == "duty":
+        return
+    error = machine.amplifier_error or machine.current_error or 0.0
+    bench, rest = machine.bench_current_error or 0.0, machine.current_rest_error or 0.0
+    for name, ratio, added in (
+        ("low", (1 - error) / (1 + bench), -rest),
+        ("high", (1 + error) / (1 - bench), rest),
+    ):
+        yield DriveCorner(name=f"current at its {name} end", current_ratio=ratio, current_rest=added)
+
+
+def at_corner(scene: Scene, corner: DriveCorner) -> Scene | None:
+    """Return the scene with its plant at a corner; None where the corner changes nothing of it."""
+    if scene.loop.controls_current and corner.current_ratio == 1.0:
+        coil = scene.loop.with_coil(resistance=corner.resistance_ratio, supply_V=corner.supply_V)
+        return replace(scene, loop=coil)
+    held = holds_current(scene.compensator)
+    # Of a stand-in the current alone counts, and a held one does not know of resistance and supply.
+    resistance = 1.0 if held and scene.loop.is_stand_in else corner.resistance_ratio
+    voltage = corner.current_ratio * (1.0 if held else corner.voltage_ratio)
+    if resistance == 1.0 == voltage and corner.current_rest == 0.0:
+        return None
+    plant = scene.plant.with_coil(resistance, voltage)
+    loop = scene.loop.with_plant(plant).with_added_drive(corner.current_rest * scene.loop.u_max_V)
+    return replace(scene, loop=loop, plant=plant)
+
+
+def coil_and_supply(scene: Scene) -> Iterator[ScenarioResult]:
+    """Open and close at every corner; what the corner does to the dead zone on opening is measured."""
+    for corner in drive_corners(scene.compensator):
+        there = at_corner(scene, corner)
+        if there is None:
+            continue
+        run = there.run(there.opened_and_closed(READING_RAMP_S))
+        level = there.loop.leak_L_min(there.dp_MPa) + FLOW_SHARE * float(run.q_mean_L_min.max())
+        opening = {"dead_zone_on_opening_percent": 100 * dead_zone(run, level, rising=True)}
+        yield there.result(corner.name, run, figures=opening, not_required=corner.not_required)

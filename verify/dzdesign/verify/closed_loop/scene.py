@@ -1,0 +1,143 @@
+"""The loop of one side at one pressure drop, and how a scenario is run and judged there."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.design.compensator import Compensator
+from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.closed_loop.readings import NO_ERRORS, ReadingErrors
+from dzdesign.verify.closed_loop.stand_in import StandIn
+from dzdesign.verify.loop_results import ScenarioResult, Side
+
+#: Two periods a record: as often as the core samples, 1.25 kHz.
+PERIODS = 2
+STEP_S = PERIODS * PWM_PERIOD_S
+#: Time in which a spool has come to rest; and of a command's ramp, quick but far slower than the spool.
+SETTLE_S, RAMP_S = 0.4, 2.0
+#: Lowest and highest tested pressure drop, MPa.
+Ends = tuple[float, float]
+NO_FIGURES: Mapping[str, float] = MappingProxyType({})
+#: Why a scenario is not required, in words of the report.
+NO_CORE_CAN_KNOW = "no core can know"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """The loop of one side at one pressure drop."""
+
+    #: With the compensator, and the plant of this pressure drop.
+    loop: ClosedLoop
+    plant: Plant | StandIn
+    compensator: Compensator
+    side: Side
+    #: At no flow.
+    dp_MPa: float
+    #: The law's dP0.
+    reference_MPa: float
+    #: Of the tests; None where the plant holds at `dp_MPa` only.
+    tested_MPa: Ends | None
+    #: Pressures behind the edge, rising; what has nothing to do with them runs at the highest.
+    backs_MPa: tuple[float, ...]
+
+    @property
+    def sign(self) -> int:
+        """Sign of the commands that drive the side."""
+        return 1 if self.side == "positive" else -1
+
+    @property
+    def units(self) -> RecordedUnits:
+        """Units in which a scenario's name has its pressures."""
+        return self.compensator.valve.recorded_units
+
+    @property
+    def back_MPa(self) -> float:
+        """The highest pressure behind the edge that is within the sensors' spans at this pressure drop."""
+        return self.back_within_span(self.backs_MPa[-1])
+
+    def back_within_span(self, back_MPa: float) -> float:
+        """Return a pressure behind the edge, or the highest that the sensors span at every tested pressure drop."""
+        return self.loop.back_within_span(back_MPa, self.dp_MPa if self.tested_MPa is None else self.tested_MPa[1])
+
+    @property
+    def settle_s(self) -> float:
+        """Time in which the valve has come to rest, the firmware's own ramps included."""
+        return SETTLE_S + self.loop.slowest_ramp_s
+
+    def held(self, level: float, times: float = 1) -> np.ndarray:
+        """Return a command held for so many times the time to come to rest."""
+        return np.full(round(times * self.settle_s / STEP_S), level)
+
+    def opened_and_closed(self, ramp_s: float = RAMP_S) -> np.ndarray:
+        """Return the command that leaves the spool as its hysteresis leaves it after use."""
+        return np.concatenate([ramp(0, 1, ramp_s), self.held(1), ramp(1, 0), self.held(0, 2)])
+
+    def run(
+        self,
+        command: np.ndarray,
+        *,
+        supply_MPa: float | np.ndarray | None = None,
+        back_MPa: float | np.ndarray | None = None,
+        mode: str = "compensated",
+        shown: np.ndarray | None = None,
+        errors: ReadingErrors = NO_ERRORS,
+    ) -> LoopRun:
+        """Run the compensated loop at this pressure drop unless told otherwise."""
+        return self.loop.run(
+            command,
+            self.dp_MPa if supply_MPa is None else supply_MPa,
+            mode,
+            back_MPa=self.back_MPa if back_MPa is None else back_MPa,
+            shown=shown,
+            errors=errors,
+            periods_per_record=PERIODS,
+        )
+
+    def result(
+        self,
+        name: str,
+        run: LoopRun,
+        *,
+        not_required: str = "",
+        figures: Mapping[str, float] = NO_FIGURES,
+        end_MPa: float | None = None,
+        back_MPa: float | None = None,
+        judged: slice | None = None,
+    ) -> ScenarioResult:
+        """Return the result, judged at its end, or by its largest flow where it is judged throughout.
+
+        Zero command counts once the valve has had the time to come to rest. It ended at this pressure drop and at this
+        pressure behind the edge unless told otherwise. `not_required` is the reason, if no flow is not required.
+        """
+        ended_MPa = self.dp_MPa if end_MPa is None else end_MPa
+        shut = judged or np.flatnonzero(held_for(run.command <= 0, round(self.settle_s / STEP_S)))
+        q_peak = float(run.q_largest_L_min[shut].max(initial=0.0))
+        return ScenarioResult(
+            name=name,
+            side=self.side,
+            dp_MPa=self.dp_MPa,
+            back_MPa=self.back_MPa if back_MPa is None else back_MPa,
+            leak_L_min=self.loop.leak_L_min(ended_MPa),
+            allowed_at_zero_L_min=self.loop.allowed_at_zero_L_min(ended_MPa),
+            q_zero_L_min=q_peak if judged else float(run.q_largest_L_min[-1]),
+            q_peak_at_zero_L_min=q_peak,
+            unseen_below_L_min=self.loop.unseen_below_L_min(self.dp_MPa),
+            must_shut=not not_required,
+            not_required=not_required,
+            figures={key: float(value) for key, value in figures.items()},
+        )
+
+
+def ramp(start: float, end: float, seconds: float = RAMP_S) -> np.ndarray:
+    """Return a ramp of the command."""
+    return np.linspace(start, end, round(seconds / STEP_S))
+
+
+def held_for(condition: np.ndarray, count: int) -> np.ndarray:
+    """Return where a condition has held for so many records, this one included."""
+    since = np.arange(condition.size) - np.maximum.accumulate(np.where(condition, -1, np.arange(condition.size)))
+    return condition & (since > count)

@@ -1,0 +1,207 @@
+"""The requirements on a firmware's current loop: the C against its exact model, and with the coil at every corner."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import log
+from pathlib import Path
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.current.drive import CurrentDrive
+from dzdesign.verify.current.coil_simulation import CoilLoop, CoilSimulation, coil_loop_of
+from dzdesign.verify.current.corner_runs import HELD_S, SHARES, fault_runs, held_current, offset_errors, run_corner
+from dzdesign.verify.current.declared_circuit import declared_corners, nominal_corner
+from dzdesign.verify.current.results import ControllerStates, CurrentCorner, CurrentLoopResult, FaultRun
+from dzdesign.verify.current.state_check import BLOCK, SEED, StateFindings, check_states, hashes_on
+from dzdesign.verify.requirements import (
+    CURRENT_FAULTS,
+    CURRENT_MARGINS,
+    CURRENT_SETTLES,
+    CURRENT_STATES,
+    CURRENT_STEP,
+    MACHINE_CODE,
+    Check,
+)
+from dzdesign.verify.toolchain.machines import Machine
+
+#: States that every verification compares: a second's work.
+STATES = 10_000_000
+#: On a small machine.
+FEW_STATES = BLOCK
+#: Least phase margin; largest limit cycle and steady error, codes of the converter; largest overshoot.
+LEAST_PHASE_DEG, MOST_SWING_CODES, MOST_ERROR_CODES, MOST_OVERSHOOT = 45.0, 2.0, 1.0, 0.10
+#: How far what is found may lie from what compensator.json says of the same.
+SAME_DEG, SAME_GAIN, SAME_OVERSHOOT = 0.1, 0.02, 0.002
+#: Chance of which a wrong state among those that are drawn would be missed.
+MISSED = 1e-3
+CORE = ("dz_current.c", "dz_current.h")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentChecks:
+    """What was found of the current loop; nothing of a drive by duty."""
+
+    checks: tuple[Check, ...] = ()
+    result: CurrentLoopResult | None = None
+
+
+def read_controller(folder: Path) -> dict[str, str]:
+    """Return the C of a firmware's current controller, by file; one that is not there is a `RequirementError`."""
+    try:
+        return {name: (folder / "core" / name).read_text(encoding="utf-8") for name in CORE}
+    except (OSError, UnicodeDecodeError) as error:
+        raise RequirementError(f"the current controller's C can't be read: {error}; run codegen again") from error
+
+
+def current_checks(
+    folder: Path, compensator: Compensator, say: Callable[[str], None], states: int = STATES
+) -> CurrentChecks:
+    """Check the current loop of a firmware; one whose drive is by duty has none."""
+    drive, around = compensator.current_drive, coil_loop_of(compensator)
+    if drive is None:
+        return CurrentChecks()
+    if around is None:
+        text = "compensator.json names no target, so the converter of the current is not known; design it again"
+        return CurrentChecks(checks=(CURRENT_STATES.check(holds=None, text=text),))
+    say("comparing the current controller with its exact model, state by state")
+    try:
+        core = read_controller(folder)
+        found = check_states(drive.loop, core, states)
+        say("running the current controller with the coil at every corner")
+        result = _result(CoilSimulation(around, core), found)
+    except RequirementError as error:
+        return CurrentChecks(checks=(CURRENT_STATES.check(holds=False, text=str(error)),))
+    checks = (
+        _states_check(result.states),
+        _margins_check(result, drive),
+        _settles_check(result),
+        _step_check(result, drive, around),
+        _faults_check(result.faults),
+    )
+    return CurrentChecks(checks=checks, result=result)
+
+
+def controller_on_machine(folder: Path, compensator: Compensator, machine: Machine, states: int = STATES) -> Check:
+    """Compare a machine's controller with the host's over the states that there are those of the exact model."""
+    name = f"current controller's machine code of the {machine.name}"
+    drive = compensator.current_drive
+    if drive is None:
+        raise ValueError("the drive is by duty")
+    if missing := machine.missing():
+        return MACHINE_CODE.check(name=name, holds=None, text=f"not run: {missing}")
+    count = FEW_STATES if machine.small else states
+    try:
+        core = read_controller(folder)
+        host, found = check_states(drive.loop, core, count), hashes_on(machine, drive.loop, core, count)
+    except RequirementError as error:
+        return MACHINE_CODE.check(name=name, holds=False, text=str(error))
+    wrong = sum(one != other for one, other in zip(found, host.hashes, strict=True))
+    text = (
+        f"{host.states} states and calibrations (seed {SEED}) in {len(found)} hashes: {wrong} other than the host's, "
+        f"whose states are those of the exact model but for {host.wrong}; {machine.runner[0]}, {machine.compiler} "
+        f"{' '.join(machine.core_flags)}"
+    )
+    return MACHINE_CODE.check(name=name, holds=wrong + host.wrong == 0, text=text)
+
+
+def _result(simulation: CoilSimulation, found: StateFindings) -> CurrentLoopResult:
+    around = simulation.around
+    corners = [run_corner(simulation, corner) for corner in declared_corners(around.circuit)]
+    offsets = offset_errors(around)
+    shifted = partial(held_current, simulation, nominal_corner(around.circuit), 0.5)
+    return CurrentLoopResult(
+        states=ControllerStates(states=found.states, seed=SEED, wrong=found.wrong, first_wrong=found.first or None),
+        seconds=HELD_S,
+        shares=SHARES,
+        not_carried=sum(corner.not_carried for corner in corners),
+        corners=tuple(corner.found for corner in corners),
+        offset_codes=offsets,
+        offset_error_codes=max((shifted(offset).reading_error for offset in offsets), default=0.0),
+        faults=tuple(fault_runs(simulation)),
+    )
+
+
+def _states_check(states: ControllerStates) -> Check:
+    # A share p of wrong states among those drawn is missed with (1 - p)^N.
+    one_of = states.states / -log(MISSED)
+    text = (
+        f"{states.states} states and calibrations, random and at the ends that matter (seed {states.seed}): "
+        f"{states.wrong} differ; a controller that is wrong in one of {one_of:.2g} of them would be missed once in "
+        f"{1 / MISSED:g}"
+    )
+    first = f"; first: {states.first_wrong}" if states.first_wrong else ""
+    return CURRENT_STATES.check(holds=states.wrong == 0, text=text + first)
+
+
+def _at(corner: CurrentCorner) -> str:
+    return f"{corner.resistance_ohm:.3g} ohm, {1e3 * corner.inductance_H:.3g} mH, {corner.supply_V:.3g} V"
+
+
+def _margins_check(result: CurrentLoopResult, drive: CurrentDrive) -> Check:
+    phase = min(result.corners, key=lambda corner: corner.phase_margin_deg)
+    gain = min(result.corners, key=lambda corner: corner.gain_margin)
+    same = (
+        abs(phase.phase_margin_deg - drive.phase_margin_deg) <= SAME_DEG
+        and abs(gain.gain_margin / drive.gain_margin - 1) <= SAME_GAIN
+    )
+    text = (
+        f"{len(result.corners)} corners of resistance, inductance and supply, every delay counted: phase margin at "
+        f"least {phase.phase_margin_deg:.1f} degrees (at {_at(phase)}; required: {LEAST_PHASE_DEG:g}), gain margin "
+        f"{gain.gain_margin:.2f} (at {_at(gain)}); compensator.json says {drive.phase_margin_deg:.1f} degrees and "
+        f"{drive.gain_margin:.2f}"
+    )
+    return CURRENT_MARGINS.check(holds=same and phase.phase_margin_deg >= LEAST_PHASE_DEG, text=text)
+
+
+def _settles_check(result: CurrentLoopResult) -> Check:
+    swing = max(result.corners, key=lambda corner: corner.limit_cycle_codes)
+    error = max(result.corners, key=lambda corner: corner.steady_error_codes)
+    current = max(corner.current_error_codes for corner in result.corners)
+    tried = len(result.corners) * len(result.shares) - result.not_carried
+    text = (
+        f"{tried} set points of {result.seconds:g} s each, without dither: limit cycle up to "
+        f"{swing.limit_cycle_codes:.2f} codes (at {_at(swing)}; allowed: {MOST_SWING_CODES:g}), steady error up to "
+        f"{error.steady_error_codes:.2f} codes (at {_at(error)}; allowed: {MOST_ERROR_CODES:g}), of the current itself "
+        f"{current:.2f}"
+    )
+    if result.not_carried:
+        text += f"; {result.not_carried} set points lie beyond what the supply can drive, and were not tried"
+    if result.offset_codes:
+        shifts = ", ".join(f"{offset:+.0f}" for offset in result.offset_codes)
+        text += f"; with a sensor's zero off by {shifts} codes {result.offset_error_codes:.2f} codes, once calibrated"
+    faults = [corner for corner in result.corners if corner.faults]
+    if faults:
+        text += f"; faults {faults[0].faults:#x} of a sound circuit at {_at(faults[0])}"
+    settles = not faults and max(error.steady_error_codes, result.offset_error_codes) <= MOST_ERROR_CODES
+    return CURRENT_SETTLES.check(holds=settles and swing.limit_cycle_codes <= MOST_SWING_CODES and tried > 0, text=text)
+
+
+def _step_check(result: CurrentLoopResult, drive: CurrentDrive, around: CoilLoop) -> Check:
+    stepped = [corner for corner in result.corners if corner.overshoot is not None]
+    late = [corner for corner in stepped if corner.rise_s is None]
+    if not stepped or late:
+        text = f"at {_at(late[0])} the step does not arrive" if late else "no corner can carry the rated current"
+        return CURRENT_STEP.check(holds=False, text=text)
+    slowest = max(stepped, key=lambda corner: corner.rise_s or 0.0)
+    largest = max(stepped, key=lambda corner: corner.overshoot or 0.0)
+    rise_s, least_s, overshoot = slowest.rise_s or 0.0, slowest.least_rise_s or 0.0, largest.overshoot or 0.0
+    as_printed = rise_s <= drive.rise_s + around.sampling.period_s and overshoot <= drive.overshoot + SAME_OVERSHOOT
+    text = (
+        f"10 to 90 % of the rated current in {1e3 * rise_s:.1f} ms at the slowest corner ({_at(slowest)}; "
+        f"{rise_s / least_s:.1f} times what the switch on all the time would take), overshoot up to {overshoot:.1%} "
+        f"(at {_at(largest)}; allowed: {MOST_OVERSHOOT:.0%}); compensator.json says {1e3 * drive.rise_s:.1f} ms and "
+        f"{drive.overshoot:.1%}"
+    )
+    if len(stepped) < len(result.corners):
+        text += f"; {len(result.corners) - len(stepped)} corners can't carry the rated current"
+    return CURRENT_STEP.check(holds=as_printed and overshoot <= MOST_OVERSHOOT, text=text)
+
+
+def _faults_check(faults: tuple[FaultRun, ...]) -> Check:
+    parts = []
+    for fault in faults:
+        seen = "not seen" if fault.seen_after_s is None else f"seen after {1e3 * fault.seen_after_s:.1f} ms"
+        stays = "the output stays off" if fault.latched else "the output does not stay off"
+        parts.append(f"{fault.name}: {seen} (at most {1e3 * fault.limit_s:.0f}), {stays}")
+    return CURRENT_FAULTS.check(holds=all(fault.holds for fault in faults), text="; ".join(parts))

@@ -1,0 +1,97 @@
+"""Evidence of a current loop, as ``verification.json`` holds it."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import quantity
+
+Number = Annotated[int, Meta(ge=0, le=2**60)]
+Share = Annotated[float, quantity("1", "Of the rated current.", ge=0, le=1)]
+Codes = Annotated[float, quantity("codes", "Of the converter.", ge=-65536, le=65536)]
+#: Names of the bits of dz_current.h.
+FaultName = Literal["NO_OFFSET", "SENSOR", "OPEN", "SHORT", "OVER"]
+
+
+def about(description: str) -> Meta:
+    """Return what an annotation says of a field."""
+    return Meta(description=description)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerStates:
+    """The C of the controller against its exact model."""
+
+    states: Annotated[Number, about("States and calibrations that were compared.")]
+    seed: Annotated[Number, about("Of the first block of states; each block has the next one.")]
+    wrong: Annotated[Number, about("Those of which any number differs.")]
+    first_wrong: Annotated[str | None, about("The first of them, in words.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentCorner:
+    """One coil at one supply: margins of its equations, and what the C does with it."""
+
+    resistance_ohm: Annotated[float, quantity("ohm", "Of the whole circuit.", ge=0, le=1e6)]
+    inductance_H: Annotated[float, quantity("H", "Inductance.", ge=0, le=1e6)]
+    supply_V: Annotated[float, quantity("V", "Supply.", ge=0, le=1e6)]
+    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin of all currents.", ge=0, le=180)]
+    gain_margin: Annotated[float, quantity("1", "Least gain margin of all currents.", ge=0, le=1e6)]
+    limit_cycle_codes: Annotated[
+        float, quantity("codes", "Largest swing of the settled mean current, or of its reading.", ge=0, le=1e6)
+    ]
+    steady_error_codes: Annotated[
+        float, quantity("codes", "Largest departure of the mean reading from the set point.", ge=0, le=1e6)
+    ]
+    current_error_codes: Annotated[
+        float,
+        quantity(
+            "codes",
+            "The same of the current itself: with the rounding of codes without noise, and the ripple between samples.",
+            ge=0, le=1e6,
+        ),
+    ]  # fmt: skip
+    rise_s: Annotated[
+        float | None,
+        quantity("s", "10 to 90 % of the rated current; null where the supply can't carry that, or it is not reached."),
+    ]
+    least_rise_s: Annotated[float | None, quantity("s", "The same with the switch on all the time.")]
+    overshoot: Annotated[float | None, quantity("1", "Of that step, of its height.")]
+    faults: Annotated[Number, about("Bits of the faults that the C saw, of DZ_CURRENT_...: must be 0.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultRun:
+    """One fault of the circuit in motion, taken away again."""
+
+    name: Annotated[str, about("What happens.")]
+    expected: Annotated[FaultName, about("Bit of the faults that it must set.")]
+    seen_after_s: Annotated[
+        float | None, quantity("s", "From the fault to that bit; null: it was not set.")
+    ]
+    limit_s: Annotated[float, quantity("s", "How long that may take.", ge=0, le=1e6)]
+    latched: Annotated[bool, about("Whether the output stays off, and the bit set, once the fault is gone.")]
+
+    @property
+    def holds(self) -> bool:
+        """True if it was seen in time, and the output stayed off."""
+        return self.seen_after_s is not None and self.seen_after_s <= self.limit_s and self.latched
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentLoopResult:
+    """What was found of the current loop: the C by itself, and with the coil at every corner of the declared ranges."""
+
+    states: Annotated[ControllerStates, about("State by state.")]
+    seconds: Annotated[float, quantity("s", "For which each set point was held, once settled.", ge=0, le=1e6)]
+    shares: Annotated[tuple[Share, ...], about("Those set points, of the rated current.")]
+    not_carried: Annotated[Number, about("Pairs of corner and set point that the supply can't carry: not tried.")]
+    corners: Annotated[tuple[CurrentCorner, ...], about("One entry a corner.")]
+    offset_codes: Annotated[
+        tuple[Codes, ...], about("Errors of the sensor's zero that were calibrated away at the nominal corner.")
+    ]
+    offset_error_codes: Annotated[
+        float, quantity("codes", "Largest departure of the mean reading from the set point with them.", ge=0, le=1e6)
+    ]
+    faults: Annotated[tuple[FaultRun, ...], about("One entry a fault.")]
