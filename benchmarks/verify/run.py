@@ -11,6 +11,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
     os.environ.setdefault(_threads, "1")  # before NumPy is imported: ratios of one core
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
 
+from above_tests import print_above  # noqa: E402
 from all_inputs import print_inputs  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
@@ -28,6 +29,7 @@ PARTS = {
     "mutants": (print_mutants, 202),
     "proof": (print_proof, 0),
     "current": (print_current_loop, 0),
+    "above": (print_above, 0),
 }
 
 
