@@ -71,6 +71,11 @@ UNDEFINED_BEHAVIOUR = Requirement(
 )
 MUTATION = Requirement(id="mutation", title="wrong C is caught", how="`verify --mutate`")
 C2000WARE = Requirement(id="c2000ware", title="compiles against C2000Ware", how="`verify --c2000ware`")
+POPULATION = Requirement(
+    id="population",
+    title="no flow at zero command of any machine drawn from the budget",
+    how="`verify --tolerances` with machines = 10000, of a declared machine",
+)
 OWN_PLANT = Requirement(
     id="own-plant", title="closed loop with a plant of the machine's own", how="`verify --plant`"
 )
