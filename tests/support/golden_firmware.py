@@ -42,7 +42,7 @@ def full_options(**changes) -> DesignOptions:
 
     signals = Signals(
         command=command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "--command-signal"), adc),
-        pressure_a=sensor("4..20 mA on 149 ohm = 25 MPa"),
+        pressure_a=sensor("4..20 mA on 139 ohm = 25 MPa"),
         pressure_b=sensor("4..20 mA on 140 ohm = 16 MPa"),
         swapped=True,
     )
@@ -54,6 +54,8 @@ def full_options(**changes) -> DesignOptions:
         "dither_Hz": 150.0,
         "dither_peak": Fraction(1, 100),
         "output_max": Fraction(95, 100),
+        "fault_samples": 3,
+        "fault_latch": True,
     }
     return DesignOptions(**(chosen | changes))
 

@@ -20,6 +20,7 @@ BelowDp0 = Literal["hold", "extend"]
 BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
 POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")
 HYSTERESIS = ("keep", "play")
+ON_OFF = ("on", "off")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +70,14 @@ class DesignChoices(MachineChoices, CurrentChoices):
     """What to do about the valve's hysteresis: keep it, or play, which drives a falling command lower by its width."""
     dither: Annotated[Text, Option("D", DRIVE, "off", example="150 Hz 1 %")] = None
     """Square wave on the output, such as "150 Hz 1 %", plus and minus 1 % of full drive."""
+    fault_debounce: Annotated[Text, Option("N", DRIVE, "5 samples", example="5 samples")] = None
+    """Sound samples in a row after which a fault is over, such as "5 samples" or "4 ms". It acts at once: an invalid
+    command lets the valve go, a failed pressure gives the smallest beta."""
+    fault_latch: Annotated[Text, Option("L", DRIVE, "off", choices=ON_OFF)] = None
+    """Latch faults: on keeps one that has lasted for the debounce until a reset; off."""
+    interlock: Annotated[Text, Option("I", DRIVE, "on", choices=ON_OFF)] = None
+    """Interlock: on lets the drive follow, after a reset or an invalid command, only once zero command has been seen
+    for the debounce; off."""
 
 
 #: Text of each option where it is not given. Of signals none: they span the target's whole converter.

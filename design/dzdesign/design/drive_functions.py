@@ -15,6 +15,9 @@ RAMP_UNIT = 1 << 16
 #: Codes of command from zero on that a ramp counts in 32 bits.
 RAMPED_CODES = (1 << 31) // RAMP_UNIT - 1
 
+#: Samples that the firmware counts up to.
+MOST_FAULT_SAMPLES = 10_000
+
 Step = Annotated[int, Meta(ge=0, le=2**30)]
 Counts = Annotated[int, Meta(ge=0, le=65535)]
 
@@ -73,6 +76,35 @@ class DriveFunctions:
         int, Meta(description="Codes that a command may stray to either side without turning.", ge=0, le=4095)
     ] = 0
     compare_limit: Annotated[int, Meta(description="Largest compare value.", ge=0, le=65535)] = 60000
+    fault_samples: Annotated[
+        int,
+        Meta(
+            description="Sound samples in a row after which a fault is over. Until then, from the first faulty sample "
+            "on, the valve is let go where the command is invalid, and has the smallest beta where a pressure is.",
+            ge=1,
+            le=MOST_FAULT_SAMPLES,
+        ),
+    ] = 1
+    fault_latch: Annotated[
+        bool,
+        Meta(
+            description="Whether a fault of `fault_samples` faulty samples, with fewer sound ones in a row between "
+            "them, stays until the drive is initialised again."
+        ),
+    ] = False
+    interlock_codes: (
+        Annotated[
+            int,
+            Meta(
+                description="Codes of command up to which it counts as zero command, which the drive must see for "
+                "`fault_samples` samples in a row after a reset or an invalid command before it follows; null: it "
+                "follows any valid one.",
+                ge=0,
+                le=32767,
+            ),
+        ]
+        | None
+    ) = None
 
     def __post_init__(self) -> None:
         for name, value, limit in (
@@ -80,12 +112,15 @@ class DriveFunctions:
             ("dither_counts", self.dither_counts, 65535),
             ("compare_limit", self.compare_limit, 65535),
             ("play_noise_codes", self.play_noise_codes, 4095),
+            ("interlock_codes", self.interlock_codes or 0, 32767),
             *(("play_counts", value, 65535) for nodes in self.play_counts for value in nodes),
             *(("ramp_up", value, 2**30) for value in self.ramp_up),
             *(("ramp_down", value, 2**30) for value in self.ramp_down),
         ):
             if not 0 <= value <= limit:
                 raise RuleError(f"{name} is {value}, expected 0 to {limit}")
+        if not 1 <= self.fault_samples <= MOST_FAULT_SAMPLES:
+            raise RuleError(f"fault_samples is {self.fault_samples}, expected 1 to {MOST_FAULT_SAMPLES}")
         if not 1 <= self.dither_ticks <= 32767:
             raise RuleError(
                 f"dither_ticks is {self.dither_ticks}, expected 1 to 32767 PWM periods: a wave is twice that"

@@ -1,7 +1,9 @@
 """The engineer's options as text, turned into `DesignOptions`."""
 
+import re
 from collections.abc import Mapping
 from fractions import Fraction
+from math import ceil
 from typing import cast
 
 from dzdesign.core.dither import parted
@@ -9,7 +11,15 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.texts import current_request
-from dzdesign.design.design_choices import DEFAULTS, HYSTERESIS, NEGATIVE_DP, POLARITIES, BelowDp0, DesignRequest
+from dzdesign.design.design_choices import (
+    DEFAULTS,
+    HYSTERESIS,
+    NEGATIVE_DP,
+    ON_OFF,
+    POLARITIES,
+    BelowDp0,
+    DesignRequest,
+)
 from dzdesign.design.machine.texts import machine_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import (
@@ -30,7 +40,13 @@ from dzdesign.identify.valve.model import DECIMALS
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     """Return the engineer's choices, each from its text; the default stands for one that is missing or empty."""
     text = {name: texts.get(name) or default for name, default in DEFAULTS.items()}
-    for name, known in (("negative_dp", NEGATIVE_DP), ("polarity", POLARITIES), ("hysteresis", HYSTERESIS)):
+    for name, known in (
+        ("negative_dp", NEGATIVE_DP),
+        ("polarity", POLARITIES),
+        ("hysteresis", HYSTERESIS),
+        ("fault_latch", ON_OFF),
+        ("interlock", ON_OFF),
+    ):
         if text[name] not in known:
             raise InputError(
                 f"{flag_of(name)} is '{text[name]}'{nearest(text[name], known)}, expected {' or '.join(known)}"
@@ -73,6 +89,9 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         dither_peak=dither_peak,
         play=text["hysteresis"] == "play",
         output_max=_share(text["output_max"], "--output-max"),
+        fault_samples=_samples(text["fault_debounce"], target.sample_Hz),
+        fault_latch=text["fault_latch"] == "on",
+        interlock=text["interlock"] == "on",
         reading_flow_L_min=_flow_L_min(text["reading_flow"], "--reading-flow") if text["reading_flow"] else None,
         full_command_V=full_command_V(signal),
         accept=tuple(text["accept"].replace(",", " ").split()),
@@ -104,6 +123,17 @@ def _seconds(text: str, option: str) -> tuple[float, float]:
     if len(parts) > 2:
         raise InputError(f"{option} is '{text}', expected a time, or two such as '0.5 s / 0.8 s'")
     return parts[0], parts[-1]
+
+
+def _samples(text: str, sample_Hz: int) -> int:
+    """Read a number of samples, or a time as the samples that it needs."""
+    if match := re.fullmatch(r"(\d{1,9}) ?samples?", text.strip()):
+        return int(match[1])
+    try:
+        seconds = parse_quantity(text, "time", "--fault-debounce")
+    except InputError as error:
+        raise InputError(f"--fault-debounce is '{text}', expected '5 samples' or a time such as '4 ms'") from error
+    return ceil(Fraction(repr(seconds)) * sample_Hz)
 
 
 def _dither(text: str) -> tuple[float, Fraction]:

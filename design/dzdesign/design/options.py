@@ -8,7 +8,7 @@ from dzdesign.core.dither import HIGHEST_HZ, LARGEST_PEAK, LOWEST_HZ
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.current.drive import CurrentDrive, CurrentRequest, design_current_drive
 from dzdesign.design.design_choices import BELOW_DP0, BelowDp0, DesignRequest
-from dzdesign.design.drive_functions import RAMP_UNIT, DriveFunctions
+from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES, RAMP_UNIT, DriveFunctions
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter
@@ -22,6 +22,8 @@ LARGEST_DITHER = Fraction(repr(LARGEST_PEAK))
 #: Frequencies that a proportional valve's dither has, Hz.
 DITHER_HZ = (LOWEST_HZ, HIGHEST_HZ)
 LONGEST_RAMP_S = 600.0
+#: Samples that a fault must be over for, where nothing is said: 4 ms at 1.25 kHz.
+FAULT_SAMPLES = 5
 #: Beyond any flow that a valve of a control passes.
 MOST_L_MIN = 1e6
 #: What a design is refused for unless it is accepted: a warning of `identify`, and what its signals hide.
@@ -56,6 +58,12 @@ class DesignOptions:
         Drive a falling command lower than a rising one, by the valve's hysteresis.
     output_max : Fraction
         Largest drive over full drive.
+    fault_samples : int
+        Sound samples in a row after which a fault is over.
+    fault_latch : bool
+        Whether a fault of that many samples stays until a reset.
+    interlock : bool
+        Whether the drive, after a reset or an invalid command, waits for zero command.
     reading_flow_L_min : float or None
         Flow at which dead zones are read beside the onset; None takes the meter's floor, or the noise level of a meter
         without one.
@@ -83,6 +91,9 @@ class DesignOptions:
     dither_peak: Fraction = Fraction(0)
     play: bool = False
     output_max: Fraction = Fraction(1)
+    fault_samples: int = FAULT_SAMPLES
+    fault_latch: bool = False
+    interlock: bool = True
     reading_flow_L_min: float | None = None
     full_command_V: Fraction | None = None
     accept: tuple[str, ...] = ()
@@ -113,6 +124,11 @@ class DesignOptions:
                 raise InputError(f"the {what} is {float(share):.3%}, expected 0 to {float(limit):.0%}")
         if not 0 < self.output_max <= 1:
             raise InputError(f"the largest output is {float(self.output_max):.3%}, expected more than 0, up to 100 %")
+        if not 1 <= self.fault_samples <= MOST_FAULT_SAMPLES:
+            raise InputError(
+                f"--fault-debounce is {self.fault_samples} samples, expected 1 to {MOST_FAULT_SAMPLES}, "
+                f"{1e3 / self.signals.sample_Hz:g} ms to {MOST_FAULT_SAMPLES / self.signals.sample_Hz:g} s"
+            )
         if self.reading_flow_L_min is not None and not 0 < self.reading_flow_L_min <= MOST_L_MIN:
             expected = "more than zero" if self.reading_flow_L_min <= 0 else f"at most {MOST_L_MIN:g} L/min"
             raise InputError(
@@ -192,6 +208,9 @@ class DesignOptions:
             dither_counts=self._dither_counts(),
             dither_ticks=self._dither_ticks(),
             compare_limit=int(self.output_max * signals.compare_max),
+            fault_samples=self.fault_samples,
+            fault_latch=self.fault_latch,
+            interlock_codes=self.error.zero_band_codes if self.interlock else None,
         )
 
     def _dither_counts(self) -> int:

@@ -41,6 +41,7 @@ class Drive(ctypes.Structure):
         ("rising", ctypes.c_uint16),
         ("played", ctypes.c_int16),
         ("ramped", ctypes.c_int32),
+        *((f"{kind}_{of}", ctypes.c_uint16) for kind in ("sound", "faulty") for of in ("commands", "pressures")),
     ]
 
 
@@ -70,13 +71,20 @@ def turned(text: str):
     return command_signal(parse_signal(text, "--command-signal"), Converter(), inverted=True)
 
 
+#: Where a fault is over with the next sample, and no zero command is waited for.
+FOLLOWS_AT_ONCE = {"fault_samples": 1, "fault_latch": False, "interlock": False}
+
+
 def options_named(name: str) -> DesignOptions:
     """Sets of options, each with something that the others lack."""
-    full = full_options()
-    plain = DesignOptions(signals=replace(full.signals, command=DesignOptions().signals.command, swapped=False))
+    watched = full_options()
+    full = replace(watched, **FOLLOWS_AT_ONCE)
+    plain = DesignOptions(
+        signals=replace(full.signals, command=DesignOptions().signals.command, swapped=False), **FOLLOWS_AT_ONCE
+    )
     return {
         "everything": full,
-        "two solenoids alone": DesignOptions(signals=full.signals),
+        "two solenoids alone": DesignOptions(signals=full.signals, **FOLLOWS_AT_ONCE),
         "turned, same pressures": replace(
             full, signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), swapped=False)
         ),
@@ -90,11 +98,18 @@ def options_named(name: str) -> DesignOptions:
             dither_peak=Fraction(3, 100),
             output_max=Fraction(3, 4),
         ),
-        "quick ramps, small error": full_options(
-            command_error=CommandError(offset_codes=0, noise_codes=1), ramp_up_s=(0.001, 0.02), ramp_down_s=(0.0, 0.003)
+        "quick ramps, small error": replace(
+            full,
+            command_error=CommandError(offset_codes=0, noise_codes=1),
+            ramp_up_s=(0.001, 0.02),
+            ramp_down_s=(0.0, 0.003),
         ),
-        "two solenoids, play": DesignOptions(signals=full.signals, play=True),
-        "two solenoids, no transition": DesignOptions(signals=full.signals, transition=Fraction(0)),
+        "two solenoids, play": DesignOptions(signals=full.signals, play=True, **FOLLOWS_AT_ONCE),
+        "two solenoids, no transition": DesignOptions(signals=full.signals, transition=Fraction(0), **FOLLOWS_AT_ONCE),
+        "two solenoids, interlock and latch": DesignOptions(signals=full.signals, fault_samples=3, fault_latch=True),
+        "one solenoid, interlock": replace(plain, fault_samples=5, interlock=True),
+        "one solenoid, no transition, latch": replace(plain, transition=Fraction(0), fault_samples=4, fault_latch=True),
+        "everything, watched": watched,
     }[name]
 
 
@@ -102,7 +117,8 @@ SETS = (
     "everything", "two solenoids alone", "turned, same pressures", "one solenoid alone", "one solenoid, ramps",
     "one solenoid, turned, live zero, dither", "quick ramps, small error",
     "two solenoids, play",
-    "two solenoids, no transition",
+    "two solenoids, no transition", "two solenoids, interlock and latch", "one solenoid, interlock",
+    "one solenoid, no transition, latch", "everything, watched",
 )  # fmt: skip
 
 
@@ -300,7 +316,7 @@ def test_an_unsound_command_lets_go_at_once_and_starts_from_rest():
     assert firmware.outputs[0] == compensator.drive_functions.compare_limit
     firmware.sample(65535, *PRESSURES)
     firmware.tick()
-    assert firmware.outputs == (0, 0, 1) and firmware.state.ramped == firmware.state.side == 0
+    assert firmware.outputs == (0, 0, 1 + 32) and firmware.state.ramped == firmware.state.side == 0
 
 
 def test_beta_for_the_telemetry_is_that_of_the_side():

@@ -7,6 +7,12 @@ from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import SIDE_NAMES
 
 HERE = "codegen/dzdesign/codegen/core/drive_constants.py"
+#: Bits that the drive adds to those of the core, each with its place.
+DRIVE_BITS = {
+    "WAITING": (5, "the drive waits: for valid commands, and with the interlock for zero command"),
+    "HELD": (6, "the smallest beta is used until the pressures have been sound for long enough"),
+    "LATCHED": (7, "a fault that stays until dz_drive_init()"),
+}
 OPTIONS, SIGNALS = "design/dzdesign/design/options.py", "design/dzdesign/design/signals.py"
 PLAY, ZERO_BAND = "design/dzdesign/design/play.py", "design/dzdesign/design/zero_band.py"
 INT32_MAX = 2**31 - 1
@@ -52,15 +58,28 @@ def drive_interface_constants(compensator: Compensator) -> list[Define]:
         Define(symbol="DZ_DRIVE_TICKS_PER_SAMPLE", value=signals.tick_Hz // signals.sample_Hz,
                  equation="PWM periods from one sample to the next",
                  engineering=f"{signals.tick_Hz} periods and {signals.sample_Hz} samples a second",
-                 data=("signals.tick_Hz", "signals.sample_Hz"), generator=HERE)
+                 data=("signals.tick_Hz", "signals.sample_Hz"), generator=HERE),
+        Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=signals.command.zero_code,
+                 equation="Eq. (29), code of zero command",
+                 engineering=compensator.valve.recorded_units.text(0.0, "g V"),
+                 rounding="the converter's code, rounded down",
+                 data=("signals.command.zero_code",), generator=SIGNALS),
+        *(
+            Define(symbol=f"DZ_STATUS_{name}", value=1 << place, equation=f"bit {place} of the drive's status word",
+                     engineering=text, rounding="a convention", generator=HERE)
+            for name, (place, text) in DRIVE_BITS.items()
+        ),
     ]  # fmt: skip
 
 
 def drive_constants(compensator: Compensator) -> list[Define]:
-    """Return what the drive functions need; nothing where all are off."""
+    """Return what the drive functions need."""
     functions, bipolar = compensator.drive_functions, compensator.negative is not None
-    found = []
-    if bipolar or functions.has_ramp or compensator.zero_band_codes:
+    found = [_fault_samples(compensator)]
+    interlock = functions.interlock_codes is not None
+    if interlock:
+        found.append(_interlock(compensator))
+    if bipolar or functions.has_ramp or compensator.zero_band_codes or interlock:
         found.append(
             Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
                      equation="Eq. (29), code of zero command",
@@ -79,6 +98,31 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     if functions.dither_counts:
         found += _dither(compensator)
     return found
+
+
+def _fault_samples(compensator: Compensator) -> Define:
+    signals, samples = compensator.signals, compensator.drive_functions.fault_samples
+    return Define(
+        symbol="FAULT_SAMPLES",
+        value=samples,
+        equation="sound samples in a row after which a fault is over",
+        engineering=f"{1e3 * samples / signals.sample_Hz:.4g} ms",
+        data=("drive_functions.fault_samples", "signals.sample_Hz"),
+        generator=OPTIONS,
+    )
+
+
+def _interlock(compensator: Compensator) -> Define:
+    codes = compensator.drive_functions.interlock_codes or 0
+    return Define(
+        symbol="INTERLOCK",
+        value=codes,
+        literal="int32",
+        equation="codes of command up to which it counts as the zero command that the interlock waits for",
+        engineering=share_of_command(compensator, codes),
+        data=("drive_functions.interlock_codes", "signals.command", "u_max_V"),
+        generator=ZERO_BAND,
+    )
 
 
 def _zero_band(compensator: Compensator) -> Define:

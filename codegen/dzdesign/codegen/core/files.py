@@ -165,6 +165,9 @@ def _drive_words(compensator: Compensator) -> Values:
         "dither": functions.dither_counts > 0,
         "rises": signals.command.direction(1) > 0,
         "sample_Hz": signals.sample_Hz,
+        "functions": functions,
+        "interlock": functions.interlock_codes is not None,
+        "latch": functions.fault_latch,
     }
 
 

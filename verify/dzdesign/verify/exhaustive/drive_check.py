@@ -11,6 +11,7 @@ import numpy as np
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
+from dzdesign.verify.exhaustive.fault_model import Memory, every_memory
 from dzdesign.verify.requirements import DRIVE, Check
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, stored
 
@@ -23,7 +24,10 @@ STAYS, PUT_SHARE = -(2**31), 0.04
 INVALID = 65535
 #: The dragged point of a play is put as a number from this on; beyond the transition so far apart are the commands.
 PLAYED_SHIFTED, PLAYED_STRIDE = 8192, 61
-FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "rising", "played", "ramped")
+FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "rising", "played", "ramped",
+          "sound_commands", "sound_pressures", "faulty_commands", "faulty_pressures")  # fmt: skip
+#: Most samples at zero command in a row among the random ones, for an interlock that waits for them.
+MOST_AT_ZERO = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +48,9 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes
     corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
     corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
     sound_pressures = (signals.pressure_a.valid_codes, signals.pressure_b.valid_codes)
-    made: list[Codes] = []
+    p_a, p_b = (sum(codes) // 2 for codes in sound_pressures)
+    at_zero = [(zero, p_a, p_b)] * min(compensator.drive_functions.fault_samples, MOST_AT_ZERO)
+    made: list[Codes] = list(at_zero)
     while len(made) < count:
         kind = int(rng.integers(7))
         length = int(rng.integers(1, 900 if kind == 5 else 60))
@@ -60,6 +66,8 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes
             if not sound:
                 p_a, p_b = map(int, rng.choice([0, 700, 4014, 4095, 4096, 65535], 2))
             made.append((command, p_a, p_b))
+        if rng.random() < 0.7:
+            made += at_zero
     return made[:count]
 
 
@@ -158,30 +166,48 @@ class PreparedDrive:
     def __init__(self, compensator: Compensator, seed: int = SEED, count: int = SAMPLES) -> None:
         signals = compensator.signals
         first, put = zip(*window_samples(compensator), strict=True)
-        states_put = every_state(compensator)
+        states_put, memories_put = every_state(compensator), list(every_memory(compensator))
         drawn = drive_samples(compensator, seed, count)
-        self.samples = [*first, *drawn, *(codes for codes, _, _ in states_put)]
-        #: How many of the samples are taken from a state that was put: every command, from each.
-        self.put = len(states_put)
+        self.samples = [*first, *drawn, *(codes for codes, _, _ in states_put), *(codes for codes, _ in memories_put)]
+        #: How many of the samples are taken from a state that was put: every command, from each; and of how many the
+        #: memory of faults is.
+        self.put, self.memories = len(states_put), len(memories_put)
         self.ticks_per_sample = signals.tick_Hz // signals.sample_Hz
         model = DriveModel(compensator)
         states = [model.state]
         places = [*put, *ramp_places(compensator, seed, count), *(place for _, place, _ in states_put)]
+        places += [STAYS] * len(memories_put)
         words = [STAYS] * (len(first) + count) + [word for _, _, word in states_put]
+        words += [state_word(signals.signs[-1], 0)] * len(memories_put)
+        needed = compensator.drive_functions.fault_samples
+        used = (needed, 0, needed, 0)
+        memories: list[Memory | None] = [used] * len(first) + [None] * count
+        memories += [None if word == STAYS else used for _, _, word in states_put]
+        memories += [memory for _, memory in memories_put]
         for index, codes in enumerate((None, *self.samples)):  # some PWM periods go by before the first sample
             if codes:
                 if places[index - 1] != STAYS:
                     model.position = Fraction(places[index - 1], STEP_UNIT)
                 if words[index - 1] != STAYS:
                     model.rising, model.side, model.at_rest, model.played = state_of(words[index - 1])
+                if memory := memories[index - 1]:
+                    model.commands.sound, model.commands.faulty = memory[:2]
+                    model.pressures.sound, model.pressures.faulty = memory[2:]
                 model.sample(*codes)
             for _ in range(self.ticks_per_sample):
                 model.tick()
                 states.append(model.state)
         head = np.array([len(self.samples), self.ticks_per_sample], dtype="<i4")
         codes = np.array(self.samples, dtype="<u2").tobytes()
-        numbers = b"".join(np.array(each, dtype="<i4").tobytes() for each in (places, words, states))
+        columns = (places, words, *_in_words(memories), states)
+        numbers = b"".join(np.array(each, dtype="<i4").tobytes() for each in columns)
         self.content = head.tobytes() + codes + bytes(-len(codes) % 4) + numbers
+
+
+def _in_words(memories: list[Memory | None]) -> tuple[list[int], list[int]]:
+    """Return the sound samples, then the faulty ones, of command and pressures in one number each."""
+    sound = [STAYS if each is None else each[0] | each[2] << 15 for each in memories]
+    return sound, [STAYS if each is None else each[1] | each[3] << 15 for each in memories]
 
 
 class CompiledDrive:
@@ -233,6 +259,7 @@ def drive_follows(folder: Path, compensator: Compensator) -> Check:
     text = f"outputs and state after each of {found.ticks} PWM periods, {len(prepared.samples)} samples of corners, "
     text += f"steps, noise and random codes (seed {SEED})"
     text += f", {prepared.put} of them every valid command from every state of rest and side" if prepared.put else ""
+    text += f", {prepared.memories} the borders of the inputs from every memory of faults"
     text += f": {found.faults} wrong"
     text += f" ({found.first_wrong})" if found.faults else ""
     return DRIVE.check(holds=found.faults == 0, text=text)

@@ -10,6 +10,7 @@ from fractions import Fraction
 from math import floor
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.verify.exhaustive.fault_model import HELD, LATCHED, WAITING, FaultMemory, command_counts_as_zero
 
 #: Seconds and steps of a ramp are held as codes over this.
 STEP_UNIT = 65536
@@ -41,19 +42,26 @@ class DriveModel:
         self.both = len(self.compensator.signals.signs) == 2
         self.has_rest = self.compensator.zero_band_codes > 0
         self.side, self.at_rest = 0 if self.both else 1, self.has_rest
+        functions = self.compensator.drive_functions
+        needed, latches = functions.fault_samples, functions.fault_latch
+        #: What is remembered of the faults of the command and of the pressures: with an interlock a reset is one.
+        self.commands = FaultMemory(needed, latches, needed if functions.interlock_codes is None else 0)
+        self.pressures = FaultMemory(needed, latches, needed)
         self._turn_at_zero()
 
     def sample(self, command: int, p_a: int, p_b: int) -> None:
         """Take new codes."""
         signals, functions = self.compensator.signals, self.compensator.drive_functions
         low, high = signals.command.valid_codes
-        if not low <= command <= high:
-            self.status = self._status(command, p_a, p_b, 1)
+        away = signals.command.direction(1) * (command - signals.command.zero_code)
+        early = not self.commands.usable and not command_counts_as_zero(self.compensator, away)
+        self.commands.take(fault=not low <= command <= high, unwanted=early)
+        if not self.commands.usable:
+            self._watch(command, p_a, p_b, 1)
             self.law, self.side, self.position = 0, 0 if self.both else 1, Fraction(0)
             self.at_rest = self.has_rest
             self._turn_at_zero()
             return
-        away = signals.command.direction(1) * (command - signals.command.zero_code)
         if any(functions.ramp_up + functions.ramp_down):
             self._ramp(away)
             away = int(self.position)  # towards zero: never more command than the ramp has reached
@@ -65,7 +73,7 @@ class DriveModel:
         if self.at_rest or self.side != driven:
             self._turn_at_zero()
         code = signals.command.zero_code + signals.command.direction(1) * away
-        self.status = self._status(command, p_a, p_b, self.side or 1)
+        self._watch(command, p_a, p_b, self.side or 1)
         self.law = self._law(code, p_a, p_b) if self.side else 0
         if functions.has_play and self.side and not self.at_rest:
             self.law = max(self.law - floor(self._lowered_by_play(away * self.side)), 0)
@@ -123,6 +131,14 @@ class DriveModel:
             way = step if way > 0 else -step
         self.position += way
 
+    def _watch(self, command: int, p_a: int, p_b: int, sign: int) -> None:
+        """Take the pressures' part of a sample, and say what is wrong with all of it."""
+        found = self._status(command, p_a, p_b, sign)
+        self.pressures.take(fault=found // 2 % 8 > 0)
+        latched = self.commands.is_latched or self.pressures.is_latched
+        waits, held = not self.commands.usable, not self.pressures.usable
+        self.status = found + WAITING * waits + HELD * held + LATCHED * latched
+
     def _sound(self, p_a: int, p_b: int) -> tuple[bool, bool]:
         signals = self.compensator.signals
         (a_low, a_high), (b_low, b_high) = signals.pressure_a.valid_codes, signals.pressure_b.valid_codes
@@ -138,7 +154,8 @@ class DriveModel:
     def _law(self, code: int, p_a: int, p_b: int) -> int:
         failed = -self.compensator.reverse_codes - 1
         difference = self.compensator.signals.difference(p_a, p_b, self.side)
-        return self.compensator.compare(code, difference if all(self._sound(p_a, p_b)) else failed, self.side)
+        usable = self.pressures.usable and all(self._sound(p_a, p_b))
+        return self.compensator.compare(code, difference if usable else failed, self.side)
 
     def tick(self) -> None:
         """Go one PWM period on."""
@@ -162,4 +179,5 @@ class DriveModel:
         """Everything that `struct dz_drive` holds, in its order."""
         ramped = self.position * STEP_UNIT
         play = (self.rising, self.played)
-        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(self.at_rest), *play, int(ramped))
+        faults = (self.commands.sound, self.pressures.sound, self.commands.faulty, self.pressures.faulty)
+        return (*self.outputs, self.law, self.side, self.tick_of_wave, int(self.at_rest), *play, int(ramped), *faults)

@@ -6,13 +6,15 @@
 
 #include "dz_drive.h"
 
-#define FIELDS 10
+#define FIELDS 14
 
 static long wrong_field(const struct dz_drive *drive, const int32_t *expected)
 {
     const int32_t found[FIELDS] = {drive->compare_a, drive->compare_b, drive->status, drive->law,
                                    drive->side,      drive->ticks,     drive->at_rest,
-                                   drive->rising,    drive->played,    drive->ramped};
+                                   drive->rising,    drive->played,    drive->ramped,
+                                   drive->sound_commands,  drive->sound_pressures,
+                                   drive->faulty_commands, drive->faulty_pressures};
 
     for (long field = 0; field < FIELDS; field++) {
         if (found[field] != expected[field]) {
@@ -49,18 +51,21 @@ static int run(FILE *file)
     struct comparison found = {0, 0, 0, 0};
     int whole = 1;
     uint16_t *codes;
-    int32_t *places, *words; /* where the ramp is put before each sample, and side and rest */
+    /* Where the ramp is put before each sample, side and rest, and what is remembered of faults, two in a word. */
+    int32_t *places, *words, *sound, *faulty;
     struct dz_drive drive;
 
     if (fread(head, sizeof head, 1, file) != 1 || head[0] < 1) {
         return 2;
     }
     codes = malloc((size_t)head[0] * 6u + 2u);
-    places = malloc(2u * (size_t)head[0] * sizeof *places);
+    places = malloc(4u * (size_t)head[0] * sizeof *places);
     words = places + head[0];
+    sound = words + head[0];
+    faulty = sound + head[0];
     /* The codes fill whole words. */
     if (codes == NULL || places == NULL || fread(codes, ((size_t)head[0] * 6u + 3u) & ~(size_t)3u, 1, file) != 1 ||
-        fread(places, 2u * (size_t)head[0] * sizeof *places, 1, file) != 1) {
+        fread(places, 4u * (size_t)head[0] * sizeof *places, 1, file) != 1) {
         free(codes);
         free(places);
         return 2;
@@ -79,6 +84,12 @@ static int run(FILE *file)
                 drive.side = (int16_t)(((words[sample] >> 1) & 3) - 1);
                 drive.rising = (uint16_t)((words[sample] >> 3) & 63);
                 drive.played = (int16_t)((words[sample] >> 9) - 8192);
+            }
+            if (sound[sample] != INT32_MIN) {
+                drive.sound_commands = (uint16_t)(sound[sample] & 0x7FFF);
+                drive.sound_pressures = (uint16_t)(sound[sample] >> 15);
+                drive.faulty_commands = (uint16_t)(faulty[sample] & 0x7FFF);
+                drive.faulty_pressures = (uint16_t)(faulty[sample] >> 15);
             }
             dz_drive_sample(&drive, codes[3 * sample], codes[3 * sample + 1], codes[3 * sample + 2]);
         }

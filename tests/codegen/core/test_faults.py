@@ -1,0 +1,277 @@
+"""Debounce, latch and interlock of the drive: what an engineer asks, and seeded faults that verify must find."""
+
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
+
+import pytest
+
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.errors import InputError
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import DesignOptions
+from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
+from dzdesign.verify.exhaustive.exact_drive import DriveModel
+from dzdesign.verify.exhaustive.fault_model import memories, tried_commands, tried_pressures
+from tests.codegen.core.test_drive import Firmware, compensator_named
+from tests.support.golden_firmware import GOLDENS, golden_compensator
+from tests.support.synthetic import needs_compiler
+
+pytestmark = needs_compiler
+#: Bits of the status word.
+COMMAND, PRESSURE_A, PRESSURE_B, DIFFERENCE, WAITING, HELD, LATCHED = 1, 2, 4, 8, 32, 64, 128
+SOUND, BROKEN_A, REVERSED = (1500, 1000), (0, 1000), (1000, 1500)
+FULL, INVALID = 4095, 65535
+
+
+@cache
+def compensator_of(samples: int = 5, latch: bool = False, interlock: bool = True):
+    valve = golden_compensator("f28335", GOLDENS).valve
+    return design(valve, DesignOptions(fault_samples=samples, fault_latch=latch, interlock=interlock))
+
+
+@cache
+def firmware_of(*options):
+    return Firmware(compensator_of(*options))
+
+
+def started(*options) -> Firmware:
+    """The drive after zero command has been seen."""
+    firmware = Firmware(compensator_of(*options))
+    give(firmware, 0, SOUND, compensator_of(*options).drive_functions.fault_samples)
+    assert firmware.state.status == 0
+    return firmware
+
+
+def give(firmware: Firmware, command: int, pressures: tuple[int, int], count: int = 1) -> list[tuple[int, int]]:
+    """Give so many samples; the compare value and the status after each."""
+    found = []
+    for _ in range(count):
+        firmware.sample(command, *pressures)
+        firmware.tick()
+        found.append((firmware.state.compare_a, firmware.state.status))
+    return found
+
+
+@pytest.mark.parametrize("samples", [1, 5, 40])
+def test_after_a_reset_full_command_does_nothing_until_zero_command_was_seen(samples):
+    compensator = compensator_of(samples)
+    band, firmware = compensator.drive_functions.interlock_codes, Firmware(compensator)
+    assert band == compensator.zero_band_codes == 19
+    assert set(give(firmware, FULL, SOUND, 3000)) == {(0, WAITING)}
+    assert set(give(firmware, band + 1, SOUND, 3000)) == {(0, WAITING)}
+    *waits, last = give(firmware, band, SOUND, samples)
+    assert set(waits) <= {(0, WAITING)} and last == (compensator.compare(0, 500), 0)
+    assert give(firmware, FULL, SOUND)[0] == (compensator.compare(FULL, 500), 0)
+
+
+@pytest.mark.parametrize("samples", [2, 5])
+def test_zero_command_must_be_seen_in_a_row(samples):
+    firmware = Firmware(compensator_of(samples))
+    for _ in range(50):
+        assert set(give(firmware, 0, SOUND, samples - 1) + give(firmware, FULL, SOUND)) == {(0, WAITING)}
+
+
+@pytest.mark.parametrize("interlock", [True, False])
+def test_one_invalid_command_lets_go_at_once_and_full_command_alone_does_not_come_back_by_itself(interlock):
+    compensator = compensator_of(5, False, interlock)
+    firmware = started(5, False, interlock)
+    full = compensator.compare(FULL, 500)
+    assert give(firmware, FULL, SOUND, 9)[-1] == (full, 0)
+    assert give(firmware, INVALID, SOUND) == [(0, COMMAND | WAITING)]
+    if interlock:
+        assert set(give(firmware, FULL, SOUND, 2000)) == {(0, WAITING)}
+        assert give(firmware, 0, SOUND, 5)[-1] == (compensator.compare(0, 500), 0)
+        assert give(firmware, FULL, SOUND) == [(full, 0)]
+    else:
+        assert give(firmware, FULL, SOUND, 5) == [(0, WAITING)] * 4 + [(full, 0)]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_interlock_of_two_solenoids_waits_for_zero_from_either_side(sign):
+    compensator = compensator_named("two solenoids, interlock and latch")
+    zero, band = compensator.signals.command.zero_code, compensator.drive_functions.interlock_codes
+    firmware = Firmware(compensator)
+    pressures = (2400, 1500)
+    for away, follows in ((band + 1, False), (-band - 1, False), (band, True)):
+        for _ in range(10):
+            firmware.sample(zero + sign * away, *pressures)
+        assert (firmware.state.status & WAITING == 0) == follows
+    firmware.sample(zero + sign * 500, *pressures)
+    firmware.tick()
+    assert firmware.outputs[0 if sign > 0 else 1] > 0
+
+
+@pytest.mark.parametrize("fault", [BROKEN_A, (1500, 4095), REVERSED], ids=["A broken", "B above", "reversed"])
+def test_a_failed_pressure_has_the_smallest_beta_at_once_and_until_it_was_sound_for_the_debounce(fault):
+    compensator = compensator_of()
+    smallest, normal = compensator.compare(700, -compensator.reverse_codes - 1), compensator.compare(700, 500)
+    assert smallest < normal
+    firmware = started()
+    assert give(firmware, 700, SOUND, 3)[-1] == (normal, 0)
+    first, *rest = give(firmware, 700, fault, 20)
+    assert first[0] == smallest and {value for value, _ in rest} == {smallest} and first[1] & HELD
+    assert give(firmware, 700, SOUND, 6) == [(smallest, HELD)] * 4 + [(normal, 0)] * 2
+
+
+def test_at_the_limit_of_plausible_pressures_the_offset_no_longer_chatters():
+    """Every sample another side of the limit: without a debounce each change is hundreds of millivolts."""
+    on_edge = (1000, 1000 + compensator_of().reverse_codes)
+    beyond = (1000, 1001 + compensator_of().reverse_codes)
+
+    def steps(*options) -> tuple[int, int]:
+        firmware = started(*options)
+        give(firmware, 700, beyond)
+        values = [give(firmware, 700, on_edge if sample % 2 else beyond)[0][0] for sample in range(500)]
+        return sum(left != right for left, right in pairwise(values)), max(values) - min(values)
+
+    debounced, alone = steps(), steps(1)
+    assert debounced == (0, 0)
+    assert alone[0] == 499 and alone[1] > 60000 // 100, "more than 100 mV of 10 V"
+
+
+def test_a_latched_fault_stays_whatever_comes_until_the_drive_is_initialised():
+    compensator = compensator_of(3, True)
+    smallest = compensator.compare(700, -compensator.reverse_codes - 1)
+    firmware = started(3, True)
+    assert give(firmware, 700, BROKEN_A, 2)[-1] == (smallest, PRESSURE_A | HELD)
+    assert give(firmware, 700, SOUND, 3)[-1] == (compensator.compare(700, 500), 0), "two samples do not latch"
+    # Three do, though sound ones come between, as long as there are fewer in a row than are needed.
+    assert give(firmware, 700, BROKEN_A, 1) + give(firmware, 700, SOUND, 2) + give(firmware, 700, BROKEN_A, 1)
+    assert give(firmware, 700, SOUND, 2)[-1] == (smallest, HELD)
+    assert give(firmware, 700, BROKEN_A, 1) == [(smallest, PRESSURE_A | HELD | LATCHED)]
+    assert set(give(firmware, 700, SOUND, 5000)) == {(smallest, HELD | LATCHED)}
+    assert set(give(firmware, INVALID, SOUND, 3)[-1:]) == {(0, COMMAND | WAITING | HELD | LATCHED)}
+    assert set(give(firmware, 0, SOUND, 5000)) == {(0, WAITING | HELD | LATCHED)}
+
+
+#: What is put for what in dz_drive.c, and the options that show it.
+SEEDED = {
+    "the interlock is forgotten after an invalid command": (
+        "unsound(drive->sound_commands) &", "unsound(drive->sound_commands) & all_ones((drive->status & 1u) ^ 1u) &"),
+    "no interlock after a reset": (
+        "drive->sound_commands = 0u;", "drive->sound_commands = FAULT_SAMPLES;"),
+    "an invalid command does not wait": (
+        " = sound_samples(drive->sound_commands, invalid |", " = sound_samples(drive->sound_commands,"),
+    "zero one code too wide": (
+        "(INTERLOCK - asked)", "(INTERLOCK + 1 - asked)"),
+    "zero one code too narrow": (
+        "(INTERLOCK - asked)", "(INTERLOCK - 1 - asked)"),
+    "back one sample early": (
+        "return 0u - ((sound - FAULT_SAMPLES) >> 31);", "return 0u - ((sound + 1u - FAULT_SAMPLES) >> 31);"),
+    "back one sample late": (
+        "(sound + ((sound - FAULT_SAMPLES) >> 31))", "(sound + ((sound - FAULT_SAMPLES - 1u) >> 31))"),
+    "sound samples need not be in a row": (
+        " >> 31)) & ~fault;", " >> 31)) & (~fault | sound);"),
+    "latched one sample early": (
+        "((FAULT_SAMPLES - 1u) - faulty)", "((FAULT_SAMPLES - 2u) - faulty)"),
+    "a single sound command clears the latch": (
+        "(uint16_t)(faulty & gone)", "(uint16_t)(faulty & invalid)"),
+    "a single sound pressure clears the latch": (
+        "(uint16_t)(faulty & held)", "(uint16_t)(faulty & fault)"),
+    "the latch of the command is not asked": (
+        " | latched(faulty));\n    /* All", ");\n    /* All"),
+    "pressure B's bit is no fault": (
+        "DZ_STATUS_PRESSURE_B | ", ""),
+    "an implausible difference is no fault": (
+        " | DZ_STATUS_DIFFERENCE)", ")"),
+    "the law takes the pressures again": (
+        "p_a = (uint16_t)(p_a_adc | (held >> 16));", "p_a = p_a_adc;"),
+    "the status is silent": (
+        "(gone & DZ_STATUS_WAITING) | ", ""),
+}  # fmt: skip
+
+
+@cache
+def prepared_and_folder(samples: int, folder) -> tuple[PreparedDrive, CompiledDrive]:
+    compensator = compensator_of(samples, True)
+    made = generate(compensator, "host")
+    write_folder(folder, made.files, made.manifest)
+    return PreparedDrive(compensator, count=300), CompiledDrive(folder)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("faults") / "fw"
+
+
+def test_without_a_seeded_fault_nothing_is_found(folder):
+    prepared, drive = prepared_and_folder(3, folder)
+    found = drive.check(prepared)
+    assert found.faults == 0 and prepared.memories > 1500
+
+
+@pytest.mark.parametrize("name", SEEDED)
+def test_a_seeded_fault_is_found(name, folder):
+    prepared, drive = prepared_and_folder(3, folder)
+    old, new = SEEDED[name]
+    text = drive.sources["dz_drive.c"].decode()
+    assert text.count(old) == 1, old
+    assert drive.edited("dz_drive.c", text.replace(old, new).encode()).check(prepared).faults > 0
+
+
+@pytest.mark.parametrize(("samples", "latch"), [(1, False), (5, True), (7, True)])
+def test_every_reachable_memory_is_tried(samples, latch):
+    """The states that a walk over all the inputs' kinds reaches are those that are put, no more."""
+    compensator = compensator_of(samples, latch)
+    commands, pressures = tried_commands(compensator), tried_pressures(compensator)
+    kinds = {0, FULL, INVALID} & set(commands)
+    pairs = [pair for pair in pressures if pair in ((0, 0), pressures[len(pressures) // 2])]
+    model, seen, todo = DriveModel(compensator), set(), []
+
+    def state() -> tuple[tuple[int, int], tuple[int, int]]:
+        return tuple((each.sound, each.faulty) for each in (model.commands, model.pressures))
+
+    todo.append(state())
+    while todo:
+        at = todo.pop()
+        if at in seen:
+            continue
+        seen.add(at)
+        for code in kinds:
+            for pair in pairs:
+                (model.commands.sound, model.commands.faulty), (model.pressures.sound, model.pressures.faulty) = at
+                model.sample(code, *pair)
+                todo.append(state())
+    known = set(memories(compensator))
+    assert {command for command, _ in seen} <= known and {pressure for _, pressure in seen} <= known
+    assert {command[0] for command, _ in seen} == set(range(samples + 1))
+
+
+@pytest.mark.parametrize(
+    ("texts", "expected"),
+    [
+        ({}, (5, False, True)), ({"fault_debounce": "1 sample"}, (1, False, True)),
+        ({"fault_debounce": "4 ms", "fault_latch": "on"}, (5, True, True)),
+        ({"fault_debounce": "4.1 ms", "interlock": "off"}, (6, False, False)),
+        ({"fault_debounce": "8 s"}, (10_000, False, True)),
+    ],
+)  # fmt: skip
+def test_the_options_are_read(texts, expected):
+    options = options_of(texts, target_named("f28335").inputs())
+    assert (options.fault_samples, options.fault_latch, options.interlock) == expected
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [
+        {"fault_debounce": "0 samples"}, {"fault_debounce": "5"}, {"fault_debounce": "9 s"},
+        {"fault_debounce": "-4 ms"}, {"fault_debounce": "2.5 samples"}, {"fault_latch": "yes"}, {"interlock": "1"},
+    ],
+    ids=lambda texts: " ".join(texts.values()),
+)  # fmt: skip
+def test_what_is_no_debounce_latch_or_interlock_is_refused(texts, wording):
+    with wording.refusal(InputError):
+        options_of(texts, target_named("f28335").inputs())
+
+
+def test_without_a_transition_the_declared_error_of_the_command_counts_as_zero():
+    valve = golden_compensator("f28335", GOLDENS).valve
+    compensator = design(valve, DesignOptions(transition=Fraction(0)))
+    functions = compensator.drive_functions
+    assert compensator.zero_band_codes == 0
+    assert functions.interlock_codes == compensator.command_error.zero_band_codes == 19
+    assert replace(functions, interlock_codes=None).interlock_codes is None
