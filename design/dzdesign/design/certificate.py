@@ -152,17 +152,19 @@ def _remedy(side: SideModel, guard: str) -> str:
 
 
 def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int) -> Fraction:
-    """Return the least distance over u_max between ceiling and offset on the certified codes; never negative."""
+    """Return the least distance over u_max between ceiling and offset on the certified codes.
+
+    On no code it is negative: those outside the tests may be read at a tested pressure drop.
+    """
     scale = denominator * STEP_CODES
     margins = []
-    for code in ceiling.certified or range(len(ceiling.limit)):
+    for code, limit in enumerate(ceiling.limit):
         index, share = divmod(code, STEP_CODES)
         beta = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, scale)
-        margins.append(ceiling.limit[code] - beta * u_min0)
-    smallest = min(margins)
-    if smallest < 0:
-        raise RequirementError(f"the offset exceeds the certified one by {float(-smallest):.2e} of u_max")
-    return smallest
+        margins.append(limit - beta * u_min0)
+    if min(margins) < 0:
+        raise RequirementError(f"the offset exceeds the certified one by {float(-min(margins)):.2e} of u_max")
+    return min(margins[code] for code in ceiling.certified or range(len(margins)))
 
 
 def _above(
