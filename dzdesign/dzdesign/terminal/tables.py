@@ -207,13 +207,6 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
                 else compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)
             ),
         ]
-    if compensator.transition_codes:
-        span, guard = compensator.signals.command.span(1), compensator.positive.certificate.guard
-        band, end = compensator.zero_band_codes / span, compensator.transition_end / span
-        lines.append(
-            f"zero band: commands up to {band:.2%} count as zero; transition: from the {guard} to the opening "
-            f"threshold over those from there to {end:.2%}"
-        )
     if compensator.current_drive is not None:
         lines += compensator.current_drive.in_words(units)
     hidden = hidden_failures(compensator)

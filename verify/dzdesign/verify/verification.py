@@ -130,7 +130,7 @@ def verify(
         scenarios=loop.scenarios,
         population=loop.population,
         monte_carlo=loop.monte_carlo,
-        current_loop=current.result,
+        current_loop=current.result and replace(current.result, valve=loop.valve_at_corners),
         mutants=None,
     )
     derived = compensator if law.holds else None

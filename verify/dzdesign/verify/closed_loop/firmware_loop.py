@@ -18,6 +18,8 @@ from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
+from dzdesign.verify.closed_loop.valve_at_corners import valve_at_corners, valve_at_corners_check
+from dzdesign.verify.current.results import ValveAtCorners
 from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, Population, ScenarioResult, Side
 from dzdesign.verify.requirements import Check
 
@@ -43,6 +45,8 @@ class FirmwareLoop:
     scenarios: tuple[ScenarioResult, ...] = ()
     population: Population | None = None
     monte_carlo: MonteCarlo | None = None
+    #: Of a drive by current.
+    valve_at_corners: tuple[ValveAtCorners, ...] = ()
 
     def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
         """Return what the evidence has of the ramps and of the plant, given from a file or made of the recordings."""
@@ -129,6 +133,7 @@ def close_the_loop(
         say("running the scenarios")
         done = pool.map(lambda scene: tuple(run_scenarios(scene)), scenes)
         scenarios = tuple(result for results in watch(done, len(scenes)) for result in results)
+        valve = _at_every_coil(scenes, compensator, pool, watch, say)
     series = None
     population = None
     if tolerances and tolerances.machines:
@@ -139,8 +144,12 @@ def close_the_loop(
         pieces = watch(scenes, len(scenes))
         series = monte_carlo(tolerances, [scatter(s.loop, plant, tolerances, s.dp_MPa, s.side) for s in pieces])
     results = [loop.result for loop in loops]
+    checks = loop_checks(results, scenarios, compensator, population, plant_given=plant is not None)
+    if valve:
+        checks += (valve_at_corners_check(valve, compensator.valve.recorded_units),)
     return FirmwareLoop(
-        checks=loop_checks(results, scenarios, compensator, population, plant_given=plant is not None),
+        checks=checks,
+        valve_at_corners=valve,
         dynamics=scenes[0].plant.parameters if scenes else None,
         backs_MPa=scenes[0].backs_MPa if scenes else (),
         loops=loops,
@@ -148,3 +157,18 @@ def close_the_loop(
         population=population,
         monte_carlo=series,
     )
+
+
+def _at_every_coil(
+    scenes: tuple[Scene, ...],
+    compensator: Compensator,
+    pool: ThreadPoolExecutor,
+    watch: Watch,
+    say: Callable[[str], None],
+) -> tuple[ValveAtCorners, ...]:
+    """Run the valve with every coil and supply; nothing of a drive by duty."""
+    drive = compensator.current_drive
+    if drive is None:
+        return ()
+    say("running the closed loop with every coil and supply")
+    return tuple(watch(pool.map(lambda scene: valve_at_corners(scene, drive.circuit), scenes), len(scenes)))
