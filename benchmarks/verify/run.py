@@ -18,6 +18,7 @@ from current_valve import print_current_valve  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from plant import print_plant  # noqa: E402
+from population import print_population  # noqa: E402
 from proof_of_c import print_proof  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 from stand_in_flow import print_stand_in  # noqa: E402
@@ -25,6 +26,7 @@ from stand_in_flow import print_stand_in  # noqa: E402
 PARTS = {
     "inputs": (print_inputs, 101),
     "plant": (print_plant, 303),
+    "population": (print_population, 1),
     "stand-in": (print_stand_in, 0),
     "hysteresis": (print_hysteresis, 404),
     "mutants": (print_mutants, 202),
