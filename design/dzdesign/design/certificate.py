@@ -178,7 +178,7 @@ def _above(
     """Return up to which pressure drop the certificate holds, and from which on the offset is let go, MPa.
 
     Above the tests it holds as far as the continued bound does, code by code, and where the drive is zero whatever the
-    threshold. An offset that is let go is one `unit` of beta over u_max; another one above the ceiling is refused.
+    threshold. An offset that is let go is one `unit` of beta over u_max.
     """
     tests_end = curve.dp_MPa[-1]
     if curve.above is None:
@@ -188,11 +188,6 @@ def _above(
         index, share = divmod(code, STEP_CODES)
         offset = unit * Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
         limit, here = ceiling.limit[code], max(signals.dp_MPa(code), tests_end)
-        if offset > max(limit, unit):
-            raise RequirementError(
-                f"the offset at {float(here):.3f} MPa, above the tests, exceeds the continued bound by "
-                f"{float(offset - limit):.2e} of u_max"
-            )
         holds = holds and (offset <= limit or offset * signals.compare_max < Fraction(1, 2))
         holds_to = here if holds else holds_to
         if offset > unit:
