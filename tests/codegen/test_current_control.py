@@ -2,6 +2,7 @@
 
 import subprocess
 from dataclasses import replace
+from math import ceil, log
 
 import pytest
 
@@ -141,7 +142,39 @@ def test_a_table_of_plain_numbers_is_compared_with_the_manifest(example_valve, t
     assert "play_positive" in manifest_follows(tmp_path / "fw", firmware.manifest, play).text
 
 
-@pytest.mark.parametrize("target", ["f28335", "f280049c", "avr"])
-def test_a_target_without_current_control_is_refused(controlled, target):
-    with pytest.raises(InputError):
-        generate(replace(controlled, target=None, options=None), target)
+def test_a_target_without_current_control_is_refused(controlled):
+    with pytest.raises(InputError, match="--drive"):
+        options(TEXTS, "avr")
+    with pytest.raises(InputError, match="--drive"):
+        generate(replace(controlled, target=None, options=None), "avr")
+
+
+def test_a_target_that_samples_at_other_times_is_refused(controlled):
+    """The loop's delays and the sum of the codes are those of the target that it was designed for."""
+    with pytest.raises(InputError, match="16 samples"):
+        generate(replace(controlled, target=None, options=None), "f28335")
+
+
+@pytest.mark.parametrize("target", ["f28335", "f280049c"])
+@pytest.mark.parametrize("texts", [TEXTS, MEASURED], ids=SENSORS)
+def test_the_c2000_targets_control_the_current_with_their_own_sampling(example_valve, target, texts):
+    designed = design(example_valve, options(texts, target))
+    drive, ours = designed.current_drive, target_named(target).current_sampling
+    assert (drive.sampling, drive.loop.samples) == (ours, ours.samples) and (ours.samples, ours.before) == (8, 7)
+    assert drive.phase_margin_deg >= 45 and drive.overshoot <= 0.1
+    assert read_artefact(to_json_bytes(designed), Compensator, "compensator.json") == designed
+    files = generate(designed, target).files
+    assert f"DZ_CURRENT_SAMPLES {ours.samples}u" in files["core/dz_current.h"]
+    assert f"DZ_CURRENT_REST_TICKS {drive.rest_ticks}u" in files[f"{target}/dz_hardware.h"]
+    for name in (f"{target}/dzdesign.projectspec", f"{target}/Makefile"):
+        assert "dz_current.c" in files[name] and "dz_current.h" in files[name]
+    # A library on a PC takes the loop of any target.
+    assert f"DZ_CURRENT_SAMPLES {ours.samples}u" in generate(designed, "host").files["core/dz_current.h"]
+
+
+def test_the_current_has_died_away_when_its_offset_is_taken(controlled):
+    """From the current of a short to nothing, at the largest L/R: the diode's voltage ends it in finite time."""
+    drive = controlled.current_drive
+    ohm, henry, current, diode = 3.5 * 0.75 + 0.5, 0.04 * 1.5, 1.45 * 1.0, 0.7
+    seconds = henry / ohm * log(1 + current * ohm / diode)
+    assert drive.rest_ticks == ceil(seconds * 2500) == 97

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.design.designing import design as design_valve
+from dzdesign.design.option_texts import options_of
 from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.notebook import html_of
 from dzdesign.terminal.page import new_console
@@ -51,11 +54,13 @@ def test_a_flow_that_the_recordings_can_not_show_is_no_zero(capsys):
     assert re.search(r"5\.00 +1\.00 +below 0\.63 +0\.70", out) and "without it flow below 0.63 L/min" in out
 
 
-def test_numbers_of_the_law_are_put_into_words(example_valve, example_compensator, capsys):
+def test_numbers_of_the_law_are_put_into_words(example_valve, capsys):
     print_valve(example_valve)
     valve = capsys.readouterr().out
     number = r"0\.\d{4} ± 0\.\d{4}"
     assert re.search(rf"drive range of the valve k x_max/u_max = {number}: command from the knee to full stroke", valve)
+    hiding = {"pressure_a": "0..3 V", "accept": "broken-sensor"}
+    example_compensator = design_valve(example_valve, options_of(hiding, target_named("f28335").inputs()))
     print_compensator(example_compensator)
     design = capsys.readouterr().out
     # What the signals hide is no cost among others: it comes first.

@@ -1,9 +1,13 @@
 """The example's coil (examples/paper_valve/plant.toml) and the loop that is chosen for it; once for all tests."""
 
+from dataclasses import replace
 from functools import cache
 
+from dzdesign.codegen.target import Target
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.choosing import CurrentSensor, choose_loop
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.drive import CurrentRequest, design_current_drive
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.target_inputs import Converter
 
@@ -20,3 +24,12 @@ SENSORS = {
 def example_loop(name: str) -> CurrentLoop:
     """Return the loop that `design` chooses."""
     return choose_loop(COIL, SENSORS[name], CONVERTER, SAMPLING, compare_max=60000)
+
+
+def with_current(compensator: Compensator, target: Target, sensor: CurrentSensor) -> Compensator:
+    """Return a compensator that controls the current of this coil on a target."""
+    request = CurrentRequest(circuit=COIL, sensor=sensor, sampling=target.current_sampling)
+    return replace(compensator, current_drive=_drive(request, target.converter, compensator.signals.compare_max))
+
+
+_drive = cache(design_current_drive)

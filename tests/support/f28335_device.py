@@ -8,8 +8,11 @@ from xml.etree import ElementTree
 import pytest
 
 from dzdesign.codegen.banner import Banner
+from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
+from dzdesign.design.current.choosing import CurrentSensor
+from tests.support.example_coil import with_current
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 
 HERE = Path(__file__).parent / "f28335"
@@ -17,11 +20,18 @@ COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.whic
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc, gcc or clang) on the path")
 
 
-def render_firmware(folder: Path, *signs: int) -> dict[str, Path]:
-    """Write the target's files below `folder`, by the real renderer; output path to file. One sign by default."""
+def render_firmware(folder: Path, *signs: int, sensor: CurrentSensor | None = None) -> dict[str, Path]:
+    """Write the target's files below `folder`, by the real renderer; output path to file. One sign by default.
+
+    With a sensor of the current they control it, and its controller is the generated one.
+    """
     compensator = golden_compensator("f28335", FULL if -1 in signs else GOLDENS)
+    core = {}
+    if sensor:
+        compensator = with_current(compensator, TARGET, sensor)
+        core = {f"f28335/{name}": text for name, text in current_texts(compensator.current_drive.loop).items()}
     written = {}
-    for path, text in target_files(compensator, TARGET, Banner(digest="1234567890abcdef")).items():
+    for path, text in (target_files(compensator, TARGET, Banner(digest="1234567890abcdef")) | core).items():
         written[path] = folder / path
         written[path].parent.mkdir(parents=True, exist_ok=True)
         written[path].write_text(text, encoding="utf-8", newline="\n")
@@ -33,9 +43,9 @@ def build(firmware: dict[str, Path], *options: str) -> Path:
     folder = firmware["f28335/main.c"].parent
     program = folder / "driver"
     sources = [folder / name for name in ("dz_hardware.c", "dz_isr.c", "dz_telemetry.c", "dz_frame.c")]
-    sources += [HERE / "device.c", HERE / "driver.c"]
+    sources += [HERE / "device.c", HERE / "current.c", HERE / "driver.c", *folder.glob("dz_current.c")]
     command = [COMPILER, "-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", *options]
-    command += [f"-I{folder}", f"-I{HERE}", *map(str, sources), "-o", str(program)]
+    command += [f"-I{folder}", f"-I{HERE}", *map(str, sources), "-lm", "-o", str(program)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return program
@@ -46,8 +56,8 @@ def run(program: Path, *words: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def registers(program: Path) -> dict[str, int]:
-    lines = (line.split() for line in run(program, "registers"))
+def registers(program: Path, *left_behind: str) -> dict[str, int]:
+    lines = (line.split() for line in run(program, "registers", *left_behind))
     return {words[0]: int(words[1], 16) for words in lines if len(words) == 2}
 
 

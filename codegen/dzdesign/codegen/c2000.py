@@ -6,6 +6,7 @@ from fractions import Fraction
 from dzdesign.codegen.target import Target
 from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError
+from dzdesign.design.current.circuit import CurrentSampling
 from dzdesign.design.target_inputs import Converter
 
 PWM_HZ = 2_500  # section 3 of the paper
@@ -14,6 +15,11 @@ ISR_DELAY_S = Fraction(20, 10**6)  # from the start of conversion to the interru
 SAMPLE_TIMEOUT_S = Fraction(32, 10**4)  # four sample periods
 WATCHDOG_COUNTS = 512 * 256  # clock / 512 into eight bits, no further divider
 ADC_BITS, CHANNELS = 12, 3
+#: With current control: as many codes in a period as there are results beside those of the sample. The interrupt comes
+#: so late that all but one of them are of this period, and its value acts from the next one on.
+CURRENT = CurrentSampling(tick_Hz=PWM_HZ, samples=8, before=7)
+CURRENT_ISR_S = Fraction(330, 10**6)  # from CTR = 0 to the interrupt
+CURRENT_READ_S = Fraction(10, 10**6)  # that the interrupt may take to read the codes, latency included
 #: What the projects of both build with.
 TOOLS = {
     "cgt_version": "22.6.3.LTS",
@@ -42,6 +48,7 @@ def c2000_target(
         converter=converter,
         sample_Hz=SAMPLE_HZ,
         tick_Hz=PWM_HZ,
+        current_sampling=CURRENT,
         templates={f"{name}/{file}": f"{file}.jinja" for file in (*SOURCES, *sources, *PROJECT_FILES)},
         board=frozenset({f"{name}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
         context={**context, **TOOLS},
@@ -105,4 +112,30 @@ def pwm_timing(clock_hz: Fraction | int, watchdog_hz: int, prescale_max: int) ->
         "sample_timeout_ticks": str(timeout),
         "sample_timeout_ms": printed(SAMPLE_TIMEOUT_S * 1000),
         "watchdog_ms": printed(watchdog_s * 1000),
+    }
+
+
+def current_timing(clock_hz: Fraction | int, held_s: Fraction, result_s: Fraction) -> dict[str, str]:
+    """Return the figures of the counter that starts the conversions of the current, printed.
+
+    It counts `clock_hz`, in step with the PWM; a code is held `held_s` after its start, and read from `result_s` on.
+    """
+    apart_s = Fraction(1, PWM_HZ * CURRENT.samples)
+    counts = exact(Fraction(clock_hz) * apart_s, "counts between two conversions of the current", 0xFFFF)
+    # The code is held in the middle of its part of the period, so the start comes before.
+    start_s = apart_s / 2 - held_s
+    start = exact(Fraction(round(clock_hz * start_s)), "counts to the first conversion of the current", counts - 1)
+    read = exact(clock_hz * CURRENT_ISR_S, "counts to the interrupt with current control", 0xFFFF)
+    last_s = start_s + (CURRENT.before - 1) * apart_s + result_s
+    within(CURRENT_ISR_S, last_s, start_s + CURRENT.before * apart_s - CURRENT_READ_S, "the interrupt's time in s")
+    rest_s = Fraction(1, PWM_HZ) - CURRENT_ISR_S
+    return {
+        "current_apart_us": printed(apart_s * 10**6),
+        "current_tbprd": str(counts - 1),
+        "current_start": str(start),
+        "current_start_us": f"{float(start_s * 10**6):.2f}",
+        "current_cmpb": str(read),
+        "current_isr_us": printed(CURRENT_ISR_S * 10**6),
+        "current_rest_us": printed(rest_s * 10**6),
+        "current_rest_cycles": printed(rest_s * clock_hz),
     }

@@ -117,7 +117,7 @@ def generate(
     digest = sha256_of(document)
     core = {f"core/{name}": file for name, file in core_files(compensator, target.arithmetic).items()}
     if (drive := compensator.current_drive) is not None:
-        target.check_current_control()
+        target.check_current_control(drive.sampling)
         core |= {f"core/{name}": file for name, file in current_files(drive.loop).items()}
     banner = banner_of(compensator, digest)
     files = {

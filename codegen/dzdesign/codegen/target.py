@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError, InputError
+from dzdesign.design.current.circuit import CurrentSampling
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter, TargetInputs
 
@@ -51,8 +52,8 @@ class Target:
     takes_any_signals: bool = False
     #: Whether it takes samples and ticks by a timer of its own, at `sample_Hz` and `tick_Hz` and no other rate.
     has_timer: bool = True
-    #: Whether its files sample and control the current of a solenoid.
-    controls_current: bool = False
+    #: When its files sample the current of a solenoid that they control; None where they do not.
+    current_sampling: CurrentSampling | None = None
     #: Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     board: frozenset[str] = frozenset()
     #: The serial line of its telemetry, if it sends any.
@@ -97,14 +98,22 @@ class Target:
             compare_max=self.compare_max,
             sample_Hz=self.sample_Hz,
             tick_Hz=self.tick_Hz,
+            current_sampling=self.current_sampling,
         )
 
-    def check_current_control(self) -> None:
-        """Refuse a compensator with current control where the target's files have none."""
-        if not self.controls_current:
+    def check_current_control(self, sampling: CurrentSampling) -> None:
+        """Refuse a compensator with current control where the target's files have none, or sample at other times."""
+        if self.current_sampling is None:
             raise InputError(
                 f"the compensator controls the current, but the files of target {self.name} do not; "
-                "design it again with --drive duty, or generate it for host or cortex-m4"
+                "design it again with --drive duty, or for another target"
+            )
+        if sampling != self.current_sampling and not self.takes_any_signals:
+            ours = self.current_sampling
+            raise InputError(
+                f"the compensator's current loop is for {sampling.samples} samples a PWM period, {sampling.before} of "
+                f"them before the interrupt, but target {self.name} takes {ours.samples} and {ours.before}; "
+                f"design it again with `dzdesign design --target {self.name}`"
             )
 
     def check_signals(self, signals: Signals) -> None:

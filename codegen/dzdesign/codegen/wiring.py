@@ -77,6 +77,16 @@ class PressureWiring:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentWiring:
+    """The sensor of a solenoid's current, without current and at the rated one, at the converter's pin."""
+
+    zero_V: float
+    rated_V: float
+    zero_code: int
+    rated_code: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Wiring:
     """What a target's templates print of the signals' wiring."""
 
@@ -90,6 +100,8 @@ class Wiring:
     no_voltage: str
     no_voltage_drives: bool
     pressures: tuple[PressureWiring, ...]
+    #: With current control alone.
+    current: CurrentWiring | None
 
 
 def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
@@ -108,6 +120,7 @@ def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
             _pressure(name, signal, converter, compensator.valve.recorded_units)
             for name, signal in (("A", signals.pressure_a), ("B", signals.pressure_b))
         ),
+        current=_current(compensator, converter),
     )
 
 
@@ -157,4 +170,17 @@ def _pressure(name: str, signal: PressureSignal, converter: Converter, units: Re
         none=units.text(0.0, "g MPa"),
         span=units.text(float(signal.span_MPa), "g MPa"),
         shunt_ohm=zero.shunt_ohm(full.code),
+    )
+
+
+def _current(compensator: Compensator, converter: Converter) -> CurrentWiring | None:
+    if (drive := compensator.current_drive) is None:
+        return None
+    sensor = drive.sensor
+    rated_V = sensor.offset_V + sensor.V_per_A * drive.circuit.rated_A
+    return CurrentWiring(
+        zero_V=sensor.offset_V,
+        rated_V=rated_V,
+        zero_code=converter.code(Fraction(sensor.offset_V)),
+        rated_code=converter.code(Fraction(rated_V)),
     )

@@ -8,6 +8,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.design.current.circuit import CurrentSampling
 
 Count = Annotated[int, Meta(ge=1, le=65535)]
 Error = Annotated[int, Meta(ge=0, le=4095)]
@@ -78,3 +79,13 @@ class TargetInputs:
     compare_max: Annotated[Count, Meta(description="Counts of full drive.")]
     sample_Hz: Annotated[Count, quantity("Hz", "Samples a second.")]
     tick_Hz: Annotated[Count, quantity("Hz", "PWM periods a second.")]
+    current_sampling: Annotated[
+        CurrentSampling | None, Meta(description="When a solenoid's current is sampled, if it is.")
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.current_sampling and self.current_sampling.tick_Hz != self.tick_Hz:
+            raise RuleError(
+                f"the current is sampled in {self.current_sampling.tick_Hz} PWM periods a second, expected "
+                f"{self.tick_Hz}"
+            )

@@ -148,13 +148,13 @@ def test_a_datum_is_the_constants_value():
 
 
 def test_the_engineering_values_are_those_of_the_constants():
-    """By numbers typed here: 10 V over 60000 counts and 4095 codes, 20 MPa over 4095 codes."""
+    """By numbers typed here: 10 V over 60000 counts and 4095 codes, 20 MPa over 3058 codes (4 to 20 mA)."""
     manifest = firmware("no transition", "wide").manifest
     said = {(entry.file, entry.symbol): entry.engineering for entry in manifest.constants}
     side = variant("no transition", "wide").positive
     core = "core/dz_comp.c"
-    assert said[core, "REVERSE"].startswith(f"{40 * 20 / 4095:.3f} MPa")
-    assert said[core, "STEP_CODES"] == f"{64 * 20 / 4095:.4f} MPa"
+    assert said[core, "REVERSE"].startswith(f"{30 * 20 / 3058:.3f} MPa")
+    assert said[core, "STEP_CODES"] == f"{64 * 20 / 3058:.4f} MPa"
     assert said[core, "HALF"] == f"{10 / 60000 / 2:.3g} V"
     assert said[core, "FACTOR_OFFSET"] == f"u_min0 = {10 * float(side.u_min0_over_u_max):.6f} V"
     assert said[core, "FACTOR_SLOPE"] == f"k x_max/u_max - 1 = {float(side.drive_range_over_u_max) - 1:.6f}"

@@ -15,11 +15,14 @@ import pytest
 
 from dzdesign.codegen import c2000
 from dzdesign.codegen.banner import Banner
+from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.codegen.f280049c import target as f280049c
 from dzdesign.codegen.f280049c.target import TARGET
 from dzdesign.codegen.project import target_files
 from dzdesign.core.errors import DzdesignError
+from dzdesign.design.current.choosing import CurrentSensor
 from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
+from tests.support.example_coil import with_current
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 from tests.support.paths import DEVICES
 from tests.support.synthetic import needs_compiler
@@ -38,10 +41,14 @@ def bipolar(tmp_path) -> Path:
     return render(tmp_path, 1, -1)
 
 
-def render(tmp_path: Path, *signs: int) -> Path:
-    """Write the target's folder, by the real renderer."""
+def render(tmp_path: Path, *signs: int, sensor: CurrentSensor | None = None) -> Path:
+    """Write the target's folder, by the real renderer; with a sensor of the current its controller is there too."""
     compensator = golden_compensator("f280049c", FULL if -1 in signs else GOLDENS)
-    for path, text in target_files(compensator, TARGET, Banner(digest="0" * 64)).items():
+    core = {}
+    if sensor:
+        compensator = with_current(compensator, TARGET, sensor)
+        core = {f"f280049c/{name}": text for name, text in current_texts(compensator.current_drive.loop).items()}
+    for path, text in (target_files(compensator, TARGET, Banner(digest="0" * 64)) | core).items():
         (tmp_path / path).parent.mkdir(exist_ok=True)
         (tmp_path / path).write_text(text, encoding="utf-8", newline="\n")
     return tmp_path / "f280049c"
@@ -51,8 +58,11 @@ def build(firmware: Path) -> Path:
     """Compile the generated C with the model; a call that does not fit the stand-in's types is an error."""
     sources = [firmware / "dz_hardware.c", firmware / "dz_isr.c"]
     sources += [HERE / name for name in ("device.c", "driver.c", "dz_comp.c")]
+    sources += firmware.glob("dz_current.c")
     command = [host_compiler(), *STRICT, "-Wenum-conversion", f"-I{firmware}", f"-I{HERE}", *map(str, sources)]
-    done = subprocess.run([*command, "-o", str(firmware / "driver")], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*command, "-lm", "-o", str(firmware / "driver")], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     return firmware / "driver"
 

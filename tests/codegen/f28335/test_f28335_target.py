@@ -31,6 +31,14 @@ START_VALUES = {
     "PIEIER3": 1, "IER": 0x0004, "OST": 1, "CMPA": 0, "VECTOR_SET": 1,
 }  # fmt: skip
 
+#: Registers that nothing here uses, and that would change what the pin does.
+LEFT_AT_ZERO = dict.fromkeys(
+    ("CMPAHR", "TBPHS", "AQCTLB", "AQSFRC", "DBCTL", "PCCTL", "TZEINT", "HRCNFG"), 0
+) | {"AQCSFRC": 1}  # fmt: skip
+SECOND_AT_ZERO = (
+    "SECOND_DBCTL", "SECOND_PCCTL", "SECOND_AQCTLB", "SECOND_TZEINT", "SECOND_HRCNFG", "SECOND_CMPB", "SECOND_ETPS",
+)  # fmt: skip
+
 #: Of the second output, which only a command of both signs has.
 SECOND_VALUES = {
     "SECOND_TBCTL": 0x0004, "SECOND_TBPRD": 0xEA5F, "SECOND_CMPCTL": 0, "SECOND_AQCTLA": 0x0012, "SECOND_ETSEL": 0,
@@ -45,7 +53,7 @@ def firmware(tmp_path):
 
 @pytest.fixture
 def bipolar(tmp_path):
-    return render_firmware(tmp_path, 1, -1)
+    return render_firmware(tmp_path / "bipolar", 1, -1)
 
 
 def compare_of_sample(n: int) -> int:
@@ -72,6 +80,33 @@ def check_registers(program: Path) -> None:
     found = registers(program)
     assert {name: found[name] for name in START_VALUES} == START_VALUES
     assert {found[name] for name in SECOND_VALUES} == {0, 0x0083}, "the second output is left as a reset leaves it"
+
+
+def check_left_behind(program: Path, *second: dict[str, int]) -> None:
+    """After a load by the debugger registers hold what the last program left: only their own reset clears them."""
+    expected = START_VALUES | LEFT_AT_ZERO
+    for values in second:
+        expected |= values
+    for left_behind in ("0000", "FFFF", "A5A5"):
+        found = registers(program, left_behind)
+        assert {name: found[name] for name in expected} == expected
+
+
+def check_second_left_behind(program: Path) -> None:
+    check_left_behind(program, SECOND_VALUES, dict.fromkeys(SECOND_AT_ZERO, 0), {"TBCTL": 0x0010})
+
+
+@needs_compiler
+def test_registers_that_another_program_has_set_are_written(firmware, bipolar):
+    check_left_behind(build(firmware))
+    check_second_left_behind(build(bipolar))
+
+
+def check_emulation_stop(program: Path) -> None:
+    """Released outputs stop with the pin low; while the trip zone holds them the register is as it was set up."""
+    ticks = periods(program, "." * 6)
+    assert column(ticks, "free_soft") == column(ticks, "released")
+    assert column(ticks, "free_soft")[-1] == 1
 
 
 def check_trip_on_missing_samples(program: Path) -> None:
@@ -124,6 +159,7 @@ def test_numbers_follow_from_the_engineering_quantities():
     context = TARGET.context
     assert int(context["tbprd"]) == 150_000_000 // 2_500 - 1 == 59_999
     assert int(context["cmpb"]) == 150 * 20 == 3_000
+    assert (context["wdflag_ms"], context["wdrst_us"]) == ("1.11", "17"), "(4 x 8192 + 512) and 512 periods of 30 MHz"
     assert TARGET.compare_max == 60_000 and TARGET.converter.code_max == 4_095
     assert (context["adcclk_mhz"], context["sequence_us"]) == ("12.5", "4.52")
     assert context["held_us"] == "1.48", "2.5 + 16 periods of 80 ns"
@@ -256,7 +292,10 @@ def test_makefile_says_what_is_missing(firmware):
         assert done.returncode != 0 and said in done.stderr
 
 
-CHECKS = [check_registers, check_normal_running, check_trip_on_missing_samples, check_zero_command, check_delays]
+CHECKS = [
+    check_registers, check_normal_running, check_trip_on_missing_samples, check_zero_command, check_delays,
+    check_emulation_stop, check_left_behind,
+]  # fmt: skip
 
 
 @pytest.mark.slow
@@ -269,7 +308,7 @@ def test_firmware_on_the_device_model(firmware, check):
 def check_second_registers(program: Path) -> None:
     """ePWM1 differs from that of one solenoid by the pulse that keeps ePWM2 in step."""
     found = registers(program)
-    assert found == START_VALUES | SECOND_VALUES | {"TBCTL": 0x0010}
+    assert found == START_VALUES | SECOND_VALUES | LEFT_AT_ZERO | dict.fromkeys(SECOND_AT_ZERO, 0) | {"TBCTL": 0x0010}
 
 
 def check_drive_calls(program: Path) -> None:
@@ -312,13 +351,13 @@ def check_delayed_start(program: Path) -> None:
 
 BIPOLAR_CHECKS = [
     check_second_registers, check_drive_calls, check_both_outputs, check_second_trip_on_missing_samples,
-    check_delayed_start,
+    check_delayed_start, check_second_left_behind,
 ]  # fmt: skip
 
 
 @pytest.mark.slow
 @needs_compiler
-@pytest.mark.parametrize("check", [*CHECKS[1:], *BIPOLAR_CHECKS])
+@pytest.mark.parametrize("check", [*CHECKS[1:-1], *BIPOLAR_CHECKS])
 def test_firmware_of_two_solenoids_on_the_device_model(bipolar, check):
     check(build(bipolar))
 
@@ -415,6 +454,10 @@ def test_start_up_order_and_watchdog(firmware):
         ("dz_telemetry.c", "    EALLOW;\n    SysCtrlRegs", "    SysCtrlRegs", check_registers),
         ("dz_telemetry.c", "GPAMUX2.bit.GPIO29 = 1u", "GPAMUX2.bit.GPIO29 = 2u", check_registers),
         ("dz_isr.c", "(compare == 0u) ? DZ_FORCE_LOW : DZ_FORCE_NONE", "DZ_FORCE_NONE", check_zero_command),
+        ("dz_isr.c", "EPwm1Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;", "", check_emulation_stop),
+        ("dz_hardware.c", "    clear_leftovers();\n", "    (void)clear_leftovers;\n", check_left_behind),
+        ("dz_hardware.c", "EPwm1Regs.DBCTL.all = 0u;", "", check_left_behind),
+        ("dz_hardware.c", "    EALLOW;\n    EPwm1Regs.HRCNFG", "    EPwm1Regs.HRCNFG", check_left_behind),
     ],
 )
 def test_a_seeded_fault_is_caught(firmware, file, old, new, check):

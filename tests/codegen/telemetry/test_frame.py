@@ -227,13 +227,13 @@ def test_beta_of_the_frame_is_the_compensators_at_every_difference(example_compe
     core.dz_beta.restype, core.dz_beta.argtypes = ctypes.c_uint16, [ctypes.c_uint16] * 2
     wrong = [
         difference
-        for difference in range(-4095, 4096)
-        if core.dz_beta(max(difference, 0), max(-difference, 0))
+        for difference in range(-3326, 3327)
+        if core.dz_beta(688 + max(difference, 0), 688 + max(-difference, 0))
         != int(example_compensator.law_beta(difference) * 2**15)
     ]
     assert wrong == []
-    fallback = int(example_compensator.law_beta(-4095) * 2**15)
-    assert core.dz_beta(4096, 0) == core.dz_beta(0, 0xFFFF) == fallback
+    fallback = int(example_compensator.law_beta(-3326) * 2**15)
+    assert core.dz_beta(4015, 764) == core.dz_beta(764, 0xFFFF) == core.dz_beta(687, 688) == fallback
 
 
 def test_the_factor_of_beta_is_exact_where_it_counts_and_refused_where_none_is(wording):
@@ -276,7 +276,7 @@ def test_a_pass_costs_what_is_stated_and_packs_the_same_where_int_has_16_bits(fi
     (frame,), reader = read(bytes.fromhex(facts["line"]))
     assert reader.skipped == 0
     assert frame.ticks == (2**32 - 2**16 + 65530 + LINK.frame_ticks) % TICKS_MODULUS
-    assert (frame.u_adc, frame.p_a_adc, frame.p_b_adc, frame.compare_a) == (4095, 1234, 321, 59999)
+    assert (frame.u_adc, frame.p_a_adc, frame.p_b_adc, frame.compare_a) == (4095, 1234, 900, 59999)
     assert frame.status == 0x000F | STATUS_RELEASED
     octets = octets_of(frames_program(firmware), [f"frame {numbers(frame)}"])
     assert octets.hex().upper() == facts["line"]

@@ -5,8 +5,14 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+#include "../solenoid.h"
 #include "driverlib.h"
 #include "model.h"
+
+#define SYSCLK_HZ 100e6
+#define FULL_V 3.3
+#define WINDOW 50u /* counts from a start to the hold, then to the result */
+#define CONVERSION 24u
 
 int device_verbose;
 void (*device_on_eint)(void);
@@ -53,6 +59,13 @@ static void record(const char *function, int count, ...)
 /* ePWM1 or ePWM2. */
 static unsigned at(uint32_t base) { return (base == EPWM2_BASE) ? 1u : 0u; }
 
+/* Whether a pin that is low trips ePWM1 or ePWM2. */
+static bool trips(unsigned index)
+{
+    return (model.trip_pin_low[0] && ((model.trip_signals[index] & 1u) != 0u) && (model.xbar[0] == 12u)) ||
+           (model.trip_pin_low[1] && ((model.trip_signals[index] & 2u) != 0u) && (model.xbar[1] == 13u));
+}
+
 #define U(value) ((uint32_t)(value))
 #define RECORD0() record(__func__, 0)
 #define RECORD1(a) record(__func__, 1, U(a))
@@ -61,7 +74,7 @@ static unsigned at(uint32_t base) { return (base == EPWM2_BASE) ? 1u : 0u; }
 
 void EPWM_setClockPrescaler(uint32_t base, EPWM_ClockDivider a, EPWM_HSClockDivider b) { RECORD3(base, a, b); }
 void EPWM_setPeriodLoadMode(uint32_t base, EPWM_PeriodLoadMode mode) { RECORD2(base, mode); }
-void EPWM_setTimeBasePeriod(uint32_t base, uint16_t count) { RECORD2(base, count); model.period = count; }
+void EPWM_setTimeBasePeriod(uint32_t base, uint16_t count) { RECORD2(base, count); *((at(base) == 0u) ? &model.period : &model.trigger_period) = count; }
 void EPWM_setTimeBaseCounter(uint32_t base, uint16_t count) { RECORD2(base, count); }
 void EPWM_disablePhaseShiftLoad(uint32_t base) { RECORD1(base); }
 void EPWM_setTimeBaseCounterMode(uint32_t base, EPWM_TimeBaseCountMode mode) { RECORD2(base, mode); model.mode = mode; }
@@ -104,13 +117,17 @@ void EPWM_setActionQualifierContSWForceAction(uint32_t base, EPWM_ActionQualifie
 void EPWM_setADCTriggerSource(uint32_t base, EPWM_ADCStartOfConversionType a, EPWM_ADCStartOfConversionSource b)
 {
     RECORD3(base, a, b);
+    if (at(base) == 1u)
+    {
+        model.trigger_source = b;
+    }
 }
 void EPWM_setADCTriggerEventPrescale(uint32_t base, EPWM_ADCStartOfConversionType type, uint16_t count)
 {
     RECORD3(base, type, count);
-    model.soca_prescale = count;
+    *((at(base) == 0u) ? &model.soca_prescale : &model.trigger_prescale) = count;
 }
-void EPWM_enableADCTrigger(uint32_t base, EPWM_ADCStartOfConversionType type) { RECORD2(base, type); model.soca = true; }
+void EPWM_enableADCTrigger(uint32_t base, EPWM_ADCStartOfConversionType type) { RECORD2(base, type); *((at(base) == 0u) ? &model.soca : &model.trigger_soca) = true; }
 void EPWM_setInterruptSource(uint32_t base, uint16_t source) { RECORD2(base, source); model.interrupt_source = source; }
 void EPWM_setInterruptEventCount(uint32_t base, uint16_t count) { RECORD2(base, count); }
 void EPWM_enableInterrupt(uint32_t base) { RECORD1(base); model.interrupt = true; }
@@ -120,18 +137,35 @@ void EPWM_setTripZoneAction(uint32_t base, EPWM_TripZoneEvent event, EPWM_TripZo
     RECORD3(base, event, action);
     model.trip_action[at(base)] = action;
 }
-void EPWM_enableTripZoneSignals(uint32_t base, uint16_t signals) { RECORD2(base, signals); model.trip_signals[at(base)] = signals; }
+void EPWM_enableTripZoneSignals(uint32_t base, uint16_t signals) { RECORD2(base, signals); model.trip_signals[at(base)] |= (signals == EPWM_TZ_SIGNAL_OSHT1) ? 1u : 2u; }
 void EPWM_forceTripZoneEvent(uint32_t base, uint16_t event) { RECORD2(base, event); model.tripped[at(base)] = true; }
 void EPWM_clearTripZoneFlag(uint32_t base, uint16_t flags)
 {
     RECORD2(base, flags);
-    model.tripped[at(base)] = model.trip_pin_low; /* a level that is still there trips again */
+    model.tripped[at(base)] = trips(at(base)); /* a level that is still there trips again */
 }
 uint16_t EPWM_getTripZoneFlagStatus(uint32_t base)
 {
     return model.tripped[at(base)] ? (uint16_t)EPWM_TZ_FLAG_OST : (uint16_t)0;
 }
 
+void EPWM_setSyncOutPulseMode(uint32_t base, EPWM_SyncOutPulseMode mode) { RECORD2(base, mode); model.sync_out = mode; }
+void EPWM_setPhaseShift(uint32_t base, uint16_t count) { RECORD2(base, count); }
+void EPWM_enablePhaseShiftLoad(uint32_t base) { RECORD1(base); model.in_phase = true; }
+void EPWM_disableCounterCompareShadowLoadMode(uint32_t base, EPWM_CounterCompareModule module)
+{
+    RECORD2(base, module);
+    model.at_once = true;
+}
+
+void ADC_setSOCPriority(uint32_t base, ADC_PriorityMode mode) { RECORD2(base, mode); model.priority = true; }
+void ADC_setBurstModeConfig(uint32_t base, ADC_Trigger trigger, uint16_t size)
+{
+    RECORD3(base, trigger, size);
+    model.burst_trigger = trigger;
+    model.burst_size = size;
+}
+void ADC_enableBurstMode(uint32_t base) { RECORD1(base); model.burst = true; }
 void ADC_setVREF(uint32_t base, ADC_ReferenceMode a, ADC_ReferenceVoltage b) { RECORD3(base, a, b); }
 void ADC_setPrescaler(uint32_t base, ADC_ClkPrescale prescale) { RECORD2(base, prescale); }
 void ADC_setInterruptPulseMode(uint32_t base, ADC_PulseMode mode) { RECORD2(base, mode); }
@@ -140,16 +174,17 @@ void ADC_setupSOC(uint32_t base, ADC_SOCNumber number, ADC_Trigger trigger, ADC_
 {
     record(__func__, 5, U(base), U(number), U(trigger), U(channel), window);
     model.channel[number] = channel;
+    model.trigger[number] = trigger;
 }
 void ADC_setInterruptSource(uint32_t base, ADC_IntNumber number, uint16_t trigger)
 {
     RECORD3(base, number, trigger);
-    model.last_conversion = trigger;
+    model.last_conversion[number == ADC_INT_NUMBER2] = trigger;
 }
 void ADC_disableContinuousMode(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); }
 void ADC_enableInterrupt(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); }
-void ADC_clearInterruptStatus(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); model.adc_flag = false; }
-bool ADC_getInterruptStatus(uint32_t base, ADC_IntNumber number) { (void)base; (void)number; return model.adc_flag; }
+void ADC_clearInterruptStatus(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); model.adc_flag[number == ADC_INT_NUMBER2] = false; }
+bool ADC_getInterruptStatus(uint32_t base, ADC_IntNumber number) { (void)base; return model.adc_flag[number == ADC_INT_NUMBER2]; }
 bool ADC_getInterruptOverflowStatus(uint32_t base, ADC_IntNumber number) { (void)base; (void)number; return model.adc_overflow; }
 void ADC_clearInterruptOverflowStatus(uint32_t base, ADC_IntNumber number) { RECORD2(base, number); model.adc_overflow = false; }
 bool ADC_isBusy(uint32_t base) { (void)base; return model.adc_busy; }
@@ -159,8 +194,8 @@ void GPIO_setDirectionMode(uint32_t pin, GPIO_Direction direction) { RECORD2(pin
 void GPIO_setPadConfig(uint32_t pin, uint32_t type) { RECORD2(pin, type); }
 void GPIO_setQualificationMode(uint32_t pin, GPIO_QualificationMode mode) { RECORD2(pin, mode); }
 void GPIO_setPinConfig(uint32_t config) { RECORD1(config); }
-uint32_t GPIO_readPin(uint32_t pin) { return ((pin == 12u) && model.trip_pin_low) ? 0u : 1u; }
-void XBAR_setInputPin(XBAR_InputNum input, uint16_t pin) { RECORD2(input, pin); }
+uint32_t GPIO_readPin(uint32_t pin) { return (((pin == 12u) && model.trip_pin_low[0]) || ((pin == 13u) && model.trip_pin_low[1])) ? 0u : 1u; }
+void XBAR_setInputPin(XBAR_InputNum input, uint16_t pin) { RECORD2(input, pin); model.xbar[input == XBAR_INPUT2] = pin; }
 
 void Interrupt_initModule(void) { RECORD0(); }
 void Interrupt_initVectorTable(void) { RECORD0(); }
@@ -198,27 +233,39 @@ void device_eint(void)
     }
 }
 
-/* The n-th sample has the codes 100 n, 1, 2 at the channels 0, 1, 2; events are those of driver.c. */
+/* The n-th sample has the codes 100 n (n modulo 41), 1, 2 at the channels 0, 1, 2, and that of the supply at 4; events are
+ * those of driver.c and of solenoid.h. */
 static void convert(char event)
 {
-    const uint16_t inputs[3] = {
-        (uint16_t)((event == 'h') ? 5000u : (model.zero ? 0u : 100u * ++model.samples)), 1u, 2u};
-    unsigned number;
+    const uint16_t inputs[5] = {
+        (uint16_t)((event == 'h') ? 5000u : (model.half ? 1000u : model.zero ? 0u : 100u * (++model.samples % 41u))),
+        model.half ? (uint16_t)900u : (uint16_t)1u, model.half ? (uint16_t)100u : (uint16_t)2u, 4000u,
+        code_at(SOLENOID_SUPPLY_V * 0.075, FULL_V)};
+    unsigned number, last = 0u;
 
-    for (number = 0u; number < 3u; number++)
+    for (number = 0u; number < 8u; number++)
     {
-        model.result[number] = inputs[model.channel[number] - ADC_CH_ADCIN0];
+        if (model.trigger[number] == ADC_TRIGGER_EPWM1_SOCA)
+        {
+            model.result[number] = inputs[model.channel[number] - ADC_CH_ADCIN0];
+            last = number;
+        }
     }
-    model.adc_flag = (model.last_conversion == 2u); /* else the flag came before the results */
+    model.adc_flag[0] = (model.last_conversion[0] == last); /* else the flag came before the results */
 }
 
 /* Pin A of ePWM1 or ePWM2 in this period. */
 static const char *pin(unsigned index, uint32_t *duty)
 {
     *duty = 0u;
+    if (model.tripped[index] && (model.trip_action[index] == EPWM_TZ_ACTION_HIGH))
+    {
+        *duty = model.period + 1u;
+        return "high";
+    }
     if (model.tripped[index])
     {
-        return (model.trip_action[index] == EPWM_TZ_ACTION_HIGH) ? "high" : "low";
+        return "low";
     }
     if ((model.force[index] == EPWM_AQ_SW_OUTPUT_LOW) || (model.at_zero[index] != EPWM_AQ_OUTPUT_HIGH) ||
         (model.at_cmpa[index] != EPWM_AQ_OUTPUT_LOW))
@@ -230,28 +277,64 @@ static const char *pin(unsigned index, uint32_t *duty)
     return (model.cmpa[index] == 0u) ? "full" : "pwm";
 }
 
+static struct solenoid solenoid = SOLENOID_AT_FIRST;
+static uint32_t phase = 777u;
+static unsigned place; /* of SOC 8 to 15 */
+
+/* The conversions that ePWM2 starts and that are over by so many counts after the period began. */
+static void convert_current(struct tick *tick, uint32_t until)
+{
+    const uint32_t event = (model.trigger_source == EPWM_SOC_TBCTR_U_CMPA) ? model.cmpa[1] : 0u;
+    const bool runs = model.trigger_soca && model.burst && model.priority && (model.burst_size == 1u) && model.at_once &&
+                      (model.burst_trigger == ADC_TRIGGER_EPWM2_SOCA) && (model.trigger_prescale > 0u) && !solenoid.stopped;
+
+    while (runs && (phase + event + WINDOW + CONVERSION <= until) && (phase + event <= model.period))
+    {
+        const unsigned held = phase + event + WINDOW;
+
+        solenoid_go_to(&solenoid, held, SYSCLK_HZ);
+        model.result[8u + place] =
+            (model.channel[8u + place] == ADC_CH_ADCIN3) ? code_at(solenoid_volts(&solenoid), FULL_V) : (uint16_t)4000u;
+        model.adc_flag[1] = model.adc_flag[1] || (model.last_conversion[1] == 8u + place);
+        place = (place + 1u) % 8u;
+        tick->first = (tick->converted == 0u) ? held : tick->first;
+        tick->apart = (tick->converted == 1u) ? held - tick->first : tick->apart;
+        tick->converted++;
+        phase += (model.trigger_period + 1u) * model.trigger_prescale;
+    }
+}
+
 struct tick device_period(char event)
 {
-    struct tick tick = {"low", 0u, 0u, 0u};
+    struct tick tick = {"low", 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u};
     unsigned index;
 
     model.zero = (event == 'z') || (model.zero && (event != 'n'));
-    model.trip_pin_low = (event == 'T') || (model.trip_pin_low && (event != 't'));
+    model.half = (event == 'm') || (model.half && (event != 'n'));
+    model.trip_pin_low[0] = (event == 'T') || (model.trip_pin_low[0] && (event != 't'));
+    model.trip_pin_low[1] = (event == 'K') || (model.trip_pin_low[1] && (event != 'k'));
+    solenoid_event(&solenoid, event);
     device_side = (event == 'B') ? -1 : (event == 'A') ? 1 : device_side;
     for (index = 0u; index < 2u; index++)
     {
-        model.tripped[index] =
-            model.tripped[index] || (model.trip_pin_low && (model.trip_signals[index] == EPWM_TZ_SIGNAL_OSHT1));
+        model.tripped[index] = model.tripped[index] || trips(index);
     }
     /* CTR = 0: the shadows are loaded, and every so many periods the converter is started. */
     tick.output = pin(0u, &tick.duty);
     (void)pin(1u, &tick.duty_b);
+    solenoid_begin(&solenoid, tick.duty);
+    if (model.in_phase && (model.sync_out == EPWM_SYNC_OUT_PULSE_ON_COUNTER_ZERO))
+    {
+        phase = 0u;
+    }
     if (model.soca && model.converter && (model.powered_us >= 1000u) && (++model.periods % model.soca_prescale == 0u) &&
         (event != 'x'))
     {
         convert(event);
     }
     model.adc_busy = (event == 'b');
+    convert_current(&tick, model.cmpb);
+    tick.before = tick.converted;
     /* CTR = CMPB: the interrupt, if the last one was acknowledged in both places. */
     if (model.interrupt && model.pie && !model.interrupt_flag && !model.pie_blocked &&
         (model.interrupt_source == EPWM_INT_TBCTR_U_CMPB) && (model.cmpb <= model.period))
@@ -261,5 +344,9 @@ struct tick device_period(char event)
         tick.served = 1u;
         model.isr();
     }
+    convert_current(&tick, 2u * model.period);
+    solenoid_go_to(&solenoid, model.period + 1u, SYSCLK_HZ);
+    phase -= (phase > model.period) ? model.period + 1u : 0u;
+    tick.current_mA = (unsigned)(1000.0 * solenoid.charge * SYSCLK_HZ / (model.period + 1u) + 0.5);
     return tick;
 }

@@ -14,7 +14,8 @@
     X(INTERRUPT_ACK_GROUP3, 30005) X(EPWM_TZ_SIGNAL_OSHT1, 30006) X(EPWM_TZ_FORCE_EVENT_OST, 30007)                    \
     X(EPWM_TZ_FLAG_OST, 30008) X(EPWM_INT_TBCTR_U_CMPB, 30009) X(EPWM_INT_TBCTR_ZERO, 30010)                           \
     X(GPIO_PIN_TYPE_STD, 30011) X(GPIO_PIN_TYPE_PULLUP, 30012) X(GPIO_0_EPWM1_A, 30013) X(GPIO_12_GPIO12, 30014)       \
-    X(SYSCTL_CAUSE_WDRS, 30015) X(EPWM2_BASE, 30016) X(GPIO_2_EPWM2_A, 30017)
+    X(SYSCTL_CAUSE_WDRS, 30015) X(EPWM2_BASE, 30016) X(GPIO_2_EPWM2_A, 30017)                             \
+    X(EPWM_TZ_SIGNAL_OSHT2, 30018) X(GPIO_13_GPIO13, 30019)
 #define TYPED_WORDS                                                                                                    \
     T(EPWM_ClockDivider, X(EPWM_CLOCK_DIVIDER_1, 30101))                                                               \
     T(EPWM_HSClockDivider, X(EPWM_HSCLOCK_DIVIDER_1, 30111))                                                           \
@@ -29,18 +30,22 @@
     T(EPWM_ActionQualifierSWOutput, X(EPWM_AQ_SW_DISABLED, 30191) X(EPWM_AQ_SW_OUTPUT_LOW, 30192))                     \
     T(EPWM_ActionQualifierContForce, X(EPWM_AQ_SW_SH_LOAD_ON_CNTR_ZERO, 30201))                                        \
     T(EPWM_ADCStartOfConversionType, X(EPWM_SOC_A, 30211))                                                             \
-    T(EPWM_ADCStartOfConversionSource, X(EPWM_SOC_TBCTR_ZERO, 30221))                                                  \
+    T(EPWM_ADCStartOfConversionSource, X(EPWM_SOC_TBCTR_ZERO, 30221) X(EPWM_SOC_TBCTR_U_CMPA, 30222))                  \
     T(EPWM_TripZoneEvent, X(EPWM_TZ_ACTION_EVENT_TZA, 30231))                                                          \
     T(EPWM_TripZoneAction, X(EPWM_TZ_ACTION_LOW, 30241) X(EPWM_TZ_ACTION_HIGH, 30242))                                 \
-    T(XBAR_InputNum, X(XBAR_INPUT1, 30251))                                                                            \
+    T(XBAR_InputNum, X(XBAR_INPUT1, 30251) X(XBAR_INPUT2, 30252))                                                      \
     T(ADC_ReferenceMode, X(ADC_REFERENCE_INTERNAL, 30261))                                                             \
     T(ADC_ReferenceVoltage, X(ADC_REFERENCE_3_3V, 30271))                                                              \
     T(ADC_ClkPrescale, X(ADC_CLK_DIV_2_0, 30281))                                                                      \
     T(ADC_PulseMode, X(ADC_PULSE_END_OF_CONV, 30291))                                                                  \
-    T(ADC_Trigger, X(ADC_TRIGGER_EPWM1_SOCA, 30301))                                                                   \
-    T(ADC_Channel, X(ADC_CH_ADCIN0, 30311) X(ADC_CH_ADCIN1, 30312) X(ADC_CH_ADCIN2, 30313))                            \
-    T(ADC_IntNumber, X(ADC_INT_NUMBER1, 30321))                                                                        \
-    T(ADC_SOCNumber, X(ADC_SOC_NUMBER0, 0) X(ADC_SOC_NUMBER1, 1) X(ADC_SOC_NUMBER2, 2)) /* also plain numbers */        \
+    T(ADC_Trigger, X(ADC_TRIGGER_EPWM1_SOCA, 30301) X(ADC_TRIGGER_EPWM2_SOCA, 30302) X(ADC_TRIGGER_SW_ONLY, 30303))    \
+    T(ADC_Channel, X(ADC_CH_ADCIN0, 30311) X(ADC_CH_ADCIN1, 30312) X(ADC_CH_ADCIN2, 30313) X(ADC_CH_ADCIN3, 30314) X(ADC_CH_ADCIN4, 30315))\
+    T(ADC_IntNumber, X(ADC_INT_NUMBER1, 30321) X(ADC_INT_NUMBER2, 30322))                                              \
+    T(ADC_SOCNumber, X(ADC_SOC_NUMBER0, 0) X(ADC_SOC_NUMBER1, 1) X(ADC_SOC_NUMBER2, 2) X(ADC_SOC_NUMBER3, 3)           \
+      X(ADC_SOC_NUMBER8, 8) X(ADC_SOC_NUMBER9, 9) X(ADC_SOC_NUMBER10, 10) X(ADC_SOC_NUMBER11, 11)                      \
+      X(ADC_SOC_NUMBER12, 12) X(ADC_SOC_NUMBER13, 13) X(ADC_SOC_NUMBER14, 14) X(ADC_SOC_NUMBER15, 15)) /* plain too */ \
+    T(ADC_PriorityMode, X(ADC_PRI_THRU_SOC7_HIPRI, 30331))                                                             \
+    T(EPWM_SyncOutPulseMode, X(EPWM_SYNC_OUT_PULSE_ON_COUNTER_ZERO, 30401))                                            \
     T(GPIO_Direction, X(GPIO_DIR_MODE_IN, 30341))                                                                      \
     T(GPIO_QualificationMode, X(GPIO_QUAL_ASYNC, 30351))                                                               \
     T(SysCtl_PeripheralPCLOCKCR, X(SYSCTL_PERIPH_CLK_TBCLKSYNC, 30361))                                                \
@@ -83,6 +88,14 @@ void EPWM_forceTripZoneEvent(uint32_t base, uint16_t event);
 void EPWM_clearTripZoneFlag(uint32_t base, uint16_t flags);
 uint16_t EPWM_getTripZoneFlagStatus(uint32_t base);
 
+void EPWM_setSyncOutPulseMode(uint32_t base, EPWM_SyncOutPulseMode mode);
+void EPWM_setPhaseShift(uint32_t base, uint16_t phaseCount);
+void EPWM_enablePhaseShiftLoad(uint32_t base);
+void EPWM_disableCounterCompareShadowLoadMode(uint32_t base, EPWM_CounterCompareModule module);
+
+void ADC_setSOCPriority(uint32_t base, ADC_PriorityMode mode);
+void ADC_setBurstModeConfig(uint32_t base, ADC_Trigger trigger, uint16_t size);
+void ADC_enableBurstMode(uint32_t base);
 void ADC_setVREF(uint32_t base, ADC_ReferenceMode mode, ADC_ReferenceVoltage voltage);
 void ADC_setPrescaler(uint32_t base, ADC_ClkPrescale prescale);
 void ADC_setInterruptPulseMode(uint32_t base, ADC_PulseMode mode);

@@ -27,6 +27,7 @@ typedef uint16_t Uint16;
 #define TB_ENABLE 1u
 #define TB_CTR_ZERO 1u
 #define CC_SHADOW 0u
+#define CC_IMMEDIATE 1u
 #define CC_CTR_ZERO 0u
 #define AQ_CLEAR 1u
 #define AQ_SET 2u
@@ -34,6 +35,7 @@ typedef uint16_t Uint16;
 #define TZ_FORCE_HI 1u
 #define TZ_FORCE_LO 2u
 #define ET_CTR_ZERO 1u
+#define ET_CTRU_CMPA 4u
 #define ET_CTRU_CMPB 6u
 #define ET_1ST 1u
 #define ET_2ND 2u
@@ -71,6 +73,11 @@ struct EPWM_REGS
     uint16_t CMPB;
     REGISTER(AQCTL_REG, uint16_t ZRO : 2; uint16_t PRD : 2; uint16_t CAU : 2; uint16_t CAD : 2; uint16_t CBU : 2;
              uint16_t CBD : 2;) AQCTLA;
+    REGISTER(AQCTLB_REG, uint16_t ZRO : 2;) AQCTLB;
+    REGISTER(DBCTL_REG, uint16_t OUT_MODE : 2; uint16_t POLSEL : 2; uint16_t IN_MODE : 2;) DBCTL;
+    REGISTER(PCCTL_REG, uint16_t CHPEN : 1;) PCCTL;
+    REGISTER(TZEINT_REG, uint16_t rsvd1 : 1; uint16_t CBC : 1; uint16_t OST : 1;) TZEINT;
+    REGISTER(HRCNFG_REG, uint16_t EDGMODE : 2; uint16_t CTLMODE : 1; uint16_t HRLOAD : 1;) HRCNFG;
     REGISTER(AQSFRC_REG, uint16_t ACTSFA : 2; uint16_t OTSFA : 1; uint16_t ACTSFB : 2; uint16_t OTSFB : 1;
              uint16_t RLDCSF : 2;) AQSFRC;
     REGISTER(AQCSFRC_REG, uint16_t CSFA : 2; uint16_t CSFB : 2;) AQCSFRC;
@@ -83,7 +90,7 @@ struct EPWM_REGS
     REGISTER(ETSEL_REG, uint16_t INTSEL : 3; uint16_t INTEN : 1; uint16_t rsvd1 : 4; uint16_t SOCASEL : 3;
              uint16_t SOCAEN : 1; uint16_t SOCBSEL : 3; uint16_t SOCBEN : 1;) ETSEL;
     REGISTER(ETPS_REG, uint16_t INTPRD : 2; uint16_t INTCNT : 2; uint16_t rsvd1 : 4; uint16_t SOCAPRD : 2;
-             uint16_t SOCACNT : 2;) ETPS;
+             uint16_t SOCACNT : 2; uint16_t SOCBPRD : 2; uint16_t SOCBCNT : 2;) ETPS;
     REGISTER(ETCLR_REG, uint16_t INT : 1; uint16_t rsvd1 : 1; uint16_t SOCA : 1; uint16_t SOCB : 1;) ETCLR;
 };
 
@@ -101,6 +108,10 @@ struct ADC_REGS
     REGISTER(ADCMAXCONV_REG, uint16_t MAX_CONV1 : 4; uint16_t MAX_CONV2 : 3;) ADCMAXCONV;
     REGISTER(ADCCHSELSEQ1_REG, uint16_t CONV00 : 4; uint16_t CONV01 : 4; uint16_t CONV02 : 4; uint16_t CONV03 : 4;)
     ADCCHSELSEQ1;
+    REGISTER(ADCCHSELSEQ3_REG, uint16_t CONV08 : 4; uint16_t CONV09 : 4; uint16_t CONV10 : 4; uint16_t CONV11 : 4;)
+    ADCCHSELSEQ3;
+    REGISTER(ADCCHSELSEQ4_REG, uint16_t CONV12 : 4; uint16_t CONV13 : 4; uint16_t CONV14 : 4; uint16_t CONV15 : 4;)
+    ADCCHSELSEQ4;
     REGISTER(ADCST_REG, uint16_t INT_SEQ1 : 1; uint16_t INT_SEQ2 : 1; uint16_t SEQ1_BSY : 1; uint16_t SEQ2_BSY : 1;
              uint16_t INT_SEQ1_CLR : 1; uint16_t INT_SEQ2_CLR : 1;) ADCST;
 };
@@ -145,7 +156,7 @@ struct SYS_CTRL_REGS
 
 struct GPIO_PAIRS
 {
-    uint16_t GPIO0 : 2, GPIO1 : 2, GPIO2 : 2, GPIO3_5 : 6, GPIO6_7 : 4, GPIO8_11 : 8, GPIO12 : 2, GPIO13_15 : 6;
+    uint16_t GPIO0 : 2, GPIO1 : 2, GPIO2 : 2, GPIO3_5 : 6, GPIO6_7 : 4, GPIO8_11 : 8, GPIO12 : 2, GPIO13 : 2, GPIO14_15 : 4;
 };
 
 struct GPIO_PAIRS_2
@@ -155,7 +166,7 @@ struct GPIO_PAIRS_2
 
 struct GPIO_BITS
 {
-    uint16_t GPIO0 : 1, GPIO1 : 1, GPIO2 : 1, GPIO3_11 : 9, GPIO12 : 1, GPIO13_15 : 3;
+    uint16_t GPIO0 : 1, GPIO1 : 1, GPIO2 : 1, GPIO3_11 : 9, GPIO12 : 1, GPIO13 : 1, GPIO14_15 : 2;
     uint16_t GPIO16_27 : 12, GPIO28 : 1, GPIO29 : 1, GPIO30_31 : 2;
 };
 

@@ -32,12 +32,12 @@ struct protected_registers
     struct SYS_CTRL_REGS sys_ctrl;
     struct GPIO_CTRL_REGS gpio_ctrl;
     struct PIE_VECT_TABLE vectors;
-    uint16_t tzsel[2], tzctl[2], tzclr[2], tzfrc[2];
+    uint16_t tzsel[2], tzctl[2], tzclr[2], tzfrc[2], tzeint[2], hrcnfg[2];
 };
 
 static volatile struct EPWM_REGS *const pwms[2] = {&EPwm1Regs, &EPwm2Regs};
 static struct protected_registers kept;
-static uint16_t unlocked, active_cmpa[2], active_force[2], etflg_int, pie_blocked, command_zero;
+static uint16_t unlocked, active_cmpa[2], active_force[2], etflg_int, pie_blocked, command_zero, command_half;
 static unsigned soca_count, int_count, sequencer, samples, period_begins;
 static volatile struct SCI_REGS scia;
 static uint8_t fifo[FIFO_OCTETS];
@@ -55,6 +55,8 @@ static struct protected_registers protected_now(void)
         now.tzctl[i] = pwms[i]->TZCTL.all;
         now.tzclr[i] = pwms[i]->TZCLR.all;
         now.tzfrc[i] = pwms[i]->TZFRC.all;
+        now.tzeint[i] = pwms[i]->TZEINT.all;
+        now.hrcnfg[i] = pwms[i]->HRCNFG.all;
     }
     return now;
 }
@@ -70,6 +72,8 @@ void device_settle(void)
         pwms[i]->TZCTL.all = kept.tzctl[i];
         pwms[i]->TZCLR.all = kept.tzclr[i];
         pwms[i]->TZFRC.all = kept.tzfrc[i];
+        pwms[i]->TZEINT.all = kept.tzeint[i];
+        pwms[i]->HRCNFG.all = kept.hrcnfg[i];
     }
 }
 
@@ -83,8 +87,10 @@ static void latch_trip_input(void)
 {
     for (unsigned i = 0u; i < 2u; i++)
     {
-        if ((GpioDataRegs.GPADAT.bit.GPIO12 == 0u) && (GpioCtrlRegs.GPAMUX1.bit.GPIO12 == 1u)
-            && (pwms[i]->TZSEL.bit.OSHT1 == 1u))
+        if (((GpioDataRegs.GPADAT.bit.GPIO12 == 0u) && (GpioCtrlRegs.GPAMUX1.bit.GPIO12 == 1u)
+             && (pwms[i]->TZSEL.bit.OSHT1 == 1u))
+            || ((GpioDataRegs.GPADAT.bit.GPIO13 == 0u) && (GpioCtrlRegs.GPAMUX1.bit.GPIO13 == 1u)
+                && (pwms[i]->TZSEL.bit.OSHT2 == 1u)))
         {
             pwms[i]->TZFLG.bit.OST = 1u;
         }
@@ -188,8 +194,25 @@ void device_power_up(void)
     scia.SCITXBUF = NOT_WRITTEN;
     EPwm1Regs.TBCTL.all = EPwm2Regs.TBCTL.all = 0x0083u; /* HSPCLKDIV = 1, counter frozen */
     GpioDataRegs.GPADAT.bit.GPIO12 = 1u;
+    GpioDataRegs.GPADAT.bit.GPIO13 = 1u;
     SysCtrlRegs.SCSR = 0x0005u;
     kept = protected_now();
+}
+
+void device_leave_behind(uint16_t value)
+{
+    EALLOW;
+    for (unsigned i = 0u; i < 2u; i++)
+    {
+        volatile struct EPWM_REGS *const pwm = pwms[i];
+
+        pwm->TBCTL.all = pwm->TBPRD = pwm->CMPCTL.all = pwm->CMPB = pwm->AQCTLA.all = pwm->AQCTLB.all = value;
+        pwm->AQSFRC.all = pwm->AQCSFRC.all = pwm->DBCTL.all = pwm->PCCTL.all = pwm->ETSEL.all = pwm->ETPS.all = value;
+        pwm->TZSEL.all = pwm->TZCTL.all = pwm->TZEINT.all = pwm->HRCNFG.all = value;
+        pwm->TBPHS.all = pwm->CMPA.all = (uint32_t)value << 16 | value;
+    }
+    AdcRegs.ADCTRL1.all = AdcRegs.ADCTRL2.all = AdcRegs.ADCMAXCONV.all = AdcRegs.ADCCHSELSEQ1.all = value;
+    EDIS;
 }
 
 void InitSysCtrl(void)
@@ -262,7 +285,7 @@ unsigned device_drive_samples, device_drive_ticks;
 
 void dz_drive_init(struct dz_drive *drive)
 {
-    const struct dz_drive at_rest = {0u, 0u, 0u, 0};
+    const struct dz_drive at_rest = {0u, 0u, 0u, 0u, 0};
     *drive = at_rest;
     device_drive_samples = device_drive_ticks = 0u;
 }
@@ -281,11 +304,19 @@ void dz_drive_tick(struct dz_drive *drive)
     device_drive_ticks++;
 }
 
-/* Codes of ADCINA0, A1, A2 in the n-th sample: 100 (n modulo 41), 1, 2; other channels give nonsense. */
+/* Codes of ADCINA0, A1, A2 in the n-th sample: 100 (n modulo 41), 1, 2; A4 is the supply; others give nonsense. */
 static uint16_t code_of(unsigned channel, char event)
 {
-    static const uint16_t of_59999[3] = {999u, 900u, 500u};
+    static const uint16_t of_59999[3] = {999u, 900u, 500u}, of_30000[3] = {1000u, 900u, 200u};
 
+    if (channel == 4u)
+    {
+        return device_supply_code();
+    }
+    if ((command_half != 0u) && (channel <= 2u))
+    {
+        return of_30000[channel];
+    }
     if (event == 'h')
     {
         return 0xFFFFu;
@@ -303,8 +334,8 @@ static uint16_t code_of(unsigned channel, char event)
 
 static void convert(char event)
 {
-    const unsigned channels[3] = {AdcRegs.ADCCHSELSEQ1.bit.CONV00, AdcRegs.ADCCHSELSEQ1.bit.CONV01,
-                                  AdcRegs.ADCCHSELSEQ1.bit.CONV02};
+    const unsigned channels[4] = {AdcRegs.ADCCHSELSEQ1.bit.CONV00, AdcRegs.ADCCHSELSEQ1.bit.CONV01,
+                                  AdcRegs.ADCCHSELSEQ1.bit.CONV02, AdcRegs.ADCCHSELSEQ1.bit.CONV03};
     volatile uint16_t *result = &AdcMirror.ADCRESULT0;
     unsigned i;
 
@@ -312,8 +343,8 @@ static void convert(char event)
     for (i = 0u; i <= AdcRegs.ADCMAXCONV.bit.MAX_CONV1; i++)
     {
         /* Start/stop mode: without a reset the sequencer goes on at the next state. */
-        result[sequencer] = code_of((sequencer < 3u) ? channels[sequencer] : 15u, event);
-        sequencer = (sequencer + 1u) % 16u;
+        result[sequencer] = code_of((sequencer < 4u) ? channels[sequencer] : 15u, event);
+        sequencer = (sequencer + 1u) % ((AdcRegs.ADCTRL1.bit.SEQ_CASC != 0u) ? 16u : 8u);
     }
     AdcRegs.ADCST.bit.INT_SEQ1 = 1u;
 }
@@ -355,6 +386,10 @@ static unsigned counts_of_sequence(void)
     return counts_to_hold()
            + adcclk_half_counts() * (8u + 2u * (AdcRegs.ADCTRL1.bit.ACQ_PS + 2u) * AdcRegs.ADCMAXCONV.bit.MAX_CONV1);
 }
+
+unsigned device_counts_to_hold(void) { return counts_to_hold(); }
+
+unsigned device_counts_to_result(void) { return counts_to_hold() + adcclk_half_counts() * 8u; }
 
 /* The event prescaler: INTPRD events make one interrupt, 0 makes none. */
 static int interrupt_is_due(void)
@@ -435,15 +470,17 @@ static void drive_pin(struct tick *tick)
 
 /* Events: '.' none; 'x' no conversion; 'l' conversion still busy at the interrupt; 'h' codes above 12 bits;
  * 'f' codes that make 59999 of the stand-in core; 'T' / 't' trip input low / high; 'z' / 'n' command zero / normal; 'B' / 'A' the
- * stand-in core drives solenoid B / A from here. */
+ * stand-in core drives solenoid B / A from here; 'm' codes that make 30000 of it from here; those of current.c. */
 struct tick device_period(char event)
 {
-    struct tick tick = {"", 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u};
+    struct tick tick = {"", 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u};
     const int due = conversion_is_due() && (event != 'x');
     const unsigned at = (EPwm1Regs.ETSEL.bit.INTSEL == ET_CTRU_CMPB) ? EPwm1Regs.CMPB : 0u;
     const int busy = due && ((event == 'l') || (at < counts_of_sequence()));
 
     GpioDataRegs.GPADAT.bit.GPIO12 = (event == 'T') ? 0u : (event == 't') ? 1u : GpioDataRegs.GPADAT.bit.GPIO12;
+    GpioDataRegs.GPADAT.bit.GPIO13 = (event == 'K') ? 0u : (event == 'k') ? 1u : GpioDataRegs.GPADAT.bit.GPIO13;
+    command_half = (uint16_t)((event == 'm') ? 1u : (event == 'n') ? 0u : command_half);
     command_zero = (uint16_t)((event == 'z') ? 1u : (event == 'n') ? 0u : command_zero);
     device_side = (event == 'B') ? -1 : (event == 'A') ? 1 : device_side;
     for (unsigned i = 0u; i < 2u; i++)
@@ -458,6 +495,8 @@ struct tick device_period(char event)
     {
         convert(event);
     }
+    device_current_event(event);
+    AdcRegs.ADCST.bit.SEQ2_BSY = device_current_before(&tick, tick.duty, at) ? 1u : 0u;
     if (interrupt_is_due() && (PieCtrlRegs.PIEIER3.bit.INTx1 != 0u) && ((IER & M_INT3) != 0u) && (pie_blocked == 0u))
     {
         serve_interrupt(&tick, busy);
@@ -466,6 +505,7 @@ struct tick device_period(char event)
     {
         convert(event);
     }
+    device_current_after(&tick);
     AdcRegs.ADCST.bit.SEQ1_BSY = 0u;
     period_begins += EPwm1Regs.TBPRD + 1u;
     return tick;

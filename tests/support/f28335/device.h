@@ -17,6 +17,11 @@ struct tick
     unsigned begins;    /* when the period began */
     unsigned falls;     /* when the pin fell in it, if it did */
     unsigned duty_b;    /* counts high of the second output */
+    unsigned converted; /* codes of the current */
+    unsigned before;    /* of them, those before the interrupt */
+    unsigned first;     /* when the first of them was held, since the period began */
+    unsigned apart;     /* from the first to the second */
+    unsigned current_mA; /* mean current of the solenoid */
 };
 
 extern void (*device_on_eint)(void);
@@ -33,6 +38,18 @@ extern int device_side;
 extern unsigned device_drive_samples, device_drive_ticks;
 
 void device_power_up(void);
+/* All registers of ePWM and ADC as another program may have left them, before this one starts. */
+void device_leave_behind(uint16_t value);
+
+/* The solenoid and the conversions of its current, in current.c: the pin is high for `duty` counts of the period, the
+ * interrupt comes at `at`. Both halves of a period, before the interrupt and from it on; 1 if a conversion runs then. */
+void device_current_event(char event);
+int device_current_before(struct tick *tick, unsigned duty, unsigned at);
+void device_current_after(struct tick *tick);
+uint16_t device_supply_code(void);
+/* Counts from a start of conversion until its sample is held, and to its result. */
+unsigned device_counts_to_hold(void);
+unsigned device_counts_to_result(void);
 /* SCI-A after so many counts more. */
 void device_transmit(unsigned counts);
 void device_settle(void);

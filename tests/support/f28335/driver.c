@@ -1,6 +1,6 @@
 /* Runs the generated firmware on the device model and prints what happened, one line a fact.
  *
- *   driver registers              start up, then the registers in hexadecimal
+ *   driver registers [VALUE]      start up, then the registers in hexadecimal; VALUE is in all of them before
  *   driver run EVENTS [W|C]       start up (after a watchdog reset, or without crystal), then one period an event
  *   driver telemetry PERIODS [B]  start up, so many periods with the main loop between them (B: the line stands still
  *                                 from one half on), then the octets of the line in hexadecimal, and the counts
@@ -40,6 +40,11 @@ static void show_registers(void)
     SHOW("ADCTRL3", AdcRegs.ADCTRL3.all);
     SHOW("ADCMAXCONV", AdcRegs.ADCMAXCONV.all);
     SHOW("ADCCHSELSEQ1", AdcRegs.ADCCHSELSEQ1.all);
+    SHOW("ADCCHSELSEQ3", AdcRegs.ADCCHSELSEQ3.all);
+    SHOW("ADCCHSELSEQ4", AdcRegs.ADCCHSELSEQ4.all);
+    SHOW("GPIO13_MUX", GpioCtrlRegs.GPAMUX1.bit.GPIO13);
+    SHOW("TRIGGER_CMPA", EPwm2Regs.CMPA.half.CMPA);
+    SHOW("TRIGGER_ETPS", EPwm2Regs.ETPS.all);
     SHOW("HISPCP", SysCtrlRegs.HISPCP.all);
     SHOW("PLLCR", SysCtrlRegs.PLLCR.all);
     SHOW("TBCLKSYNC", SysCtrlRegs.PCLKCR0.bit.TBCLKSYNC);
@@ -64,6 +69,22 @@ static void show_registers(void)
     SHOW("IER", IER);
     SHOW("OST", EPwm1Regs.TZFLG.bit.OST);
     SHOW("CMPA", EPwm1Regs.CMPA.half.CMPA);
+    SHOW("CMPAHR", EPwm1Regs.CMPA.half.CMPAHR);
+    SHOW("TBPHS", EPwm1Regs.TBPHS.half.TBPHS);
+    SHOW("AQCTLB", EPwm1Regs.AQCTLB.all);
+    SHOW("AQSFRC", EPwm1Regs.AQSFRC.all);
+    SHOW("AQCSFRC", EPwm1Regs.AQCSFRC.all);
+    SHOW("DBCTL", EPwm1Regs.DBCTL.all);
+    SHOW("PCCTL", EPwm1Regs.PCCTL.all);
+    SHOW("TZEINT", EPwm1Regs.TZEINT.all);
+    SHOW("HRCNFG", EPwm1Regs.HRCNFG.all);
+    SHOW("SECOND_DBCTL", EPwm2Regs.DBCTL.all);
+    SHOW("SECOND_PCCTL", EPwm2Regs.PCCTL.all);
+    SHOW("SECOND_AQCTLB", EPwm2Regs.AQCTLB.all);
+    SHOW("SECOND_TZEINT", EPwm2Regs.TZEINT.all);
+    SHOW("SECOND_HRCNFG", EPwm2Regs.HRCNFG.all);
+    SHOW("SECOND_CMPB", EPwm2Regs.CMPB);
+    SHOW("SECOND_ETPS", EPwm2Regs.ETPS.all);
     SHOW("SECOND_TBCTL", EPwm2Regs.TBCTL.all);
     SHOW("SECOND_TBPRD", EPwm2Regs.TBPRD);
     SHOW("SECOND_CMPCTL", EPwm2Regs.CMPCTL.all);
@@ -104,11 +125,18 @@ static void run(const char *events)
         const struct tick tick = device_period(*events);
         printf("tick event=%c output=%s duty=%u served=%u resets=%u reset_busy=%u pieack=%u cmpa=%u forced=%u "
                "without=%u released=%u fault=%u held=%u begins=%u falls=%u duty_b=%u cmpb=%u forced_b=%u "
-               "samples=%u drive_ticks=%u\n",
+               "samples=%u drive_ticks=%u free_soft=%u free_soft_b=%u",
                *events, tick.output, tick.duty, tick.served, tick.resets, tick.reset_busy, tick.acknowledged,
                EPwm1Regs.CMPA.half.CMPA, EPwm1Regs.TZFLG.bit.OST, dz_state.ticks_without_sample, dz_state.released,
                dz_state.fault, tick.held, tick.begins, tick.falls, tick.duty_b, EPwm2Regs.CMPA.half.CMPA,
-               EPwm2Regs.TZFLG.bit.OST, device_drive_samples, device_drive_ticks);
+               EPwm2Regs.TZFLG.bit.OST, device_drive_samples, device_drive_ticks, EPwm1Regs.TBCTL.bit.FREE_SOFT,
+               EPwm2Regs.TBCTL.bit.FREE_SOFT);
+#ifdef DZ_CURRENT_REST_TICKS
+        printf(" converted=%u before=%u first=%u apart=%u current=%u sum=%u offset=%u current_faults=%u set_point=%u",
+               tick.converted, tick.before, tick.first, tick.apart, tick.current_mA, dz_state.current_sum,
+               dz_state.current_offset, dz_state.current_faults, dz_state.set_point);
+#endif
+        puts("");
     }
 }
 
@@ -194,6 +222,10 @@ static void run_main(void)
 int main(int count, char **words)
 {
     device_power_up();
+    if ((count > 2) && (strcmp(words[1], "registers") == 0))
+    {
+        device_leave_behind((uint16_t)strtoul(words[2], NULL, 16));
+    }
     if ((count > 3) && (words[3][0] == 'W'))
     {
         EALLOW;

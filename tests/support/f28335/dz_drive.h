@@ -6,6 +6,7 @@ struct dz_drive
 {
     uint16_t compare_a;
     uint16_t compare_b;
+    uint16_t status;
     uint16_t law;
     int16_t side;
 };

@@ -53,7 +53,7 @@ int main(void)
     dz_state.fault = 0x000Fu;
     dz_state.u_adc = 4095u;
     dz_state.p_a_adc = 1234u;
-    dz_state.p_b_adc = 321u;
+    dz_state.p_b_adc = 900u;
     dz_state.compare_a = 59999u;
     pack = pass_cycles();
     feed = pass_cycles();

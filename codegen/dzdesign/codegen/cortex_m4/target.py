@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from dzdesign.codegen.target import Target
 from dzdesign.core.errors import DzdesignError
+from dzdesign.design.current.circuit import CurrentSampling
 from dzdesign.design.target_inputs import Converter
 
 FOLDER = "cortex_m4"
@@ -43,7 +44,7 @@ TARGET = Target(
     compare_max=COMPARE_MAX,
     converter=Converter(full_V=ADC_SPAN_V, levels=2**ADC_BITS),
     takes_any_signals=True,
-    controls_current=True,
+    current_sampling=CurrentSampling(),
     templates={f"{FOLDER}/{file}": f"{file}.jinja" for file in OWN_FILES + OTHER_FILES},
     board=frozenset(f"{FOLDER}/{file}" for file in BOARD_FILES),
     context={

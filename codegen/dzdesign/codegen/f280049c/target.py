@@ -6,7 +6,17 @@ converter: data sheet SPRS945.
 
 from fractions import Fraction
 
-from dzdesign.codegen.c2000 import ADC_BITS, CHANNELS, ISR_DELAY_S, c2000_target, exact, printed, pwm_timing, within
+from dzdesign.codegen.c2000 import (
+    ADC_BITS,
+    CHANNELS,
+    ISR_DELAY_S,
+    c2000_target,
+    current_timing,
+    exact,
+    printed,
+    pwm_timing,
+    within,
+)
 from dzdesign.design.target_inputs import Converter, peak_noise_codes
 
 SYSCLK_HZ = 100_000_000  # DEVICE_SYSCLK_FREQ of device.h: 20 MHz crystal, times 10, over 2
@@ -40,12 +50,17 @@ def converter() -> dict[str, str]:
     within(window_s, max(WINDOW_LEAST_S, 1 / adcclk_hz), 1, "the sample window in s")
     sequence_s = CHANNELS * (window_s + CONVERSION_ADCCLKS / adcclk_hz)
     within(sequence_s, 0, ISR_DELAY_S / 2, "the three conversions in s")
+    of_four_s = sequence_s * (CHANNELS + 1) / CHANNELS
+    current = current_timing(SYSCLK_HZ, window_s, window_s + CONVERSION_ADCCLKS / adcclk_hz)
+    within(of_four_s, 0, Fraction(current["current_start"]) / SYSCLK_HZ, "the four conversions in s")
     return {
         "adc_divider": f"{ADC_DIVIDER}_0",
         "adcclk_mhz": printed(adcclk_hz / 10**6),
         "window_sysclks": str(WINDOW_SYSCLKS),
         "window_us": printed(window_s * 10**6),
         "sequence_us": printed(sequence_s * 10**6),
+        "sequence_of_four_us": printed(of_four_s * 10**6),
+        **current,
         "adc_codes": str(2**ADC_BITS),
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": printed(ADC_SPAN_V),

@@ -12,6 +12,7 @@ from dzdesign.codegen.c2000 import (
     PWM_HZ,
     SAMPLE_HZ,
     c2000_target,
+    current_timing,
     exact,
     printed,
     pwm_timing,
@@ -35,6 +36,8 @@ LINE_LOAD_MAX = Fraction(1, 2)
 # Bound of what the main loop spends on one frame: tests/codegen/telemetry/test_frame.py holds it on an AVR, whose
 # 8 bits take several instructions where the C28x takes one.
 FRAME_CYCLES = 6_000
+#: WDFLAG: crystal periods from a falling XRS to the look at it, and those for which a watchdog reset holds it low.
+WDFLAG_PERIODS, WDRST_PERIODS = 4 * 8192 + 512, 512
 EVENT_PRESCALE = {1: "ET_1ST", 2: "ET_2ND", 3: "ET_3RD"}
 
 
@@ -57,6 +60,9 @@ def timing() -> dict[str, str]:
     return {
         **figures,
         "sysclkout_mhz": printed(sysclkout_hz / 10**6),
+        "wdflag_cycles": str(WDFLAG_PERIODS),
+        "wdflag_ms": f"{1e3 * WDFLAG_PERIODS / CRYSTAL_HZ:.2f}",
+        "wdrst_us": f"{1e6 * WDRST_PERIODS / CRYSTAL_HZ:.0f}",
         "crystal_mhz": printed(Fraction(CRYSTAL_HZ, 10**6)),
         "pll_div": str(PLL_DIV),
         "pll_divsel": str(PLL_DIVSEL),
@@ -75,6 +81,10 @@ def converter() -> dict[str, str]:
     held_s = (ADC_TRIGGER_ADCCLKS + ACQ_PS + 1) / adcclk_hz  # the first channel, the command: end of its window
     results = ADC_RESULT_ADCCLKS + (CHANNELS - 1) * next_channel
     sequence_s = within(held_s + results / adcclk_hz, 0, ISR_DELAY_S / 2, "the sequence of three, in s,")
+    of_four_s = sequence_s + next_channel / adcclk_hz
+    current = current_timing(sysclkout_hz, held_s, held_s + ADC_RESULT_ADCCLKS / adcclk_hz)
+    # The sequence of the sample must be over before the first conversion of the current starts.
+    within(of_four_s, 0, Fraction(current["current_start"]) / sysclkout_hz, "the sequence of four, in s,")
     period_s = Fraction(1, PWM_HZ)
     # The value is written before the period ends and loaded at its end; the latest falling edge is one count before
     # the next end. Between two samples the value is used once more.
@@ -93,6 +103,8 @@ def converter() -> dict[str, str]:
         "delay_to_period_us": in_us(to_period_s),
         "delay_to_edge_us": in_us(to_edge_s),
         "delay_to_last_edge_us": in_us(to_edge_s + (held_periods - 1) * period_s),
+        "sequence_of_four_us": printed(of_four_s * 10**6),
+        **current,
         "adc_codes": str(2**ADC_BITS),
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": str(ADC_SPAN_V),

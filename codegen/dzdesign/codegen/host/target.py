@@ -1,6 +1,7 @@
 """The core as a shared library, for simulation and test rigs on a PC."""
 
 from dzdesign.codegen.target import Target
+from dzdesign.design.current.circuit import CurrentSampling
 
 FILES = ("dz_host.c", "dz_host.h", "selftest.c", "dz_host.def", "dz_host.map", "dz_host.exp", "Makefile")
 SHARED_FILES = ("dz_selftest.c", "dz_selftest.h")
@@ -21,7 +22,7 @@ TARGET = Target(
     # Of the F28335, so that the library answers as that firmware does unless another target's design is given.
     compare_max=60_000,
     takes_any_signals=True,
-    controls_current=True,
+    current_sampling=CurrentSampling(),
     has_timer=False,
     templates={f"host/{file}": f"{file}.jinja" for file in (*FILES, *SHARED_FILES, "CMakeLists.txt", "README.md")},
     context={

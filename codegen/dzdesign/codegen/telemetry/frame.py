@@ -53,16 +53,22 @@ class Frame:
 
 
 NUMBERS: Mapping[str, Number] = {name: hint.__metadata__[0] for name, hint in Frame.__annotations__.items()}
-#: The status word: what the hardware reports, in its low octet, and in the high one what dz_status() finds wrong.
+#: The status word: what the hardware reports, in its low octet, and in the high one what dz_status() and the drive
+#: find wrong.
 STATUS_BITS = {
     0x0001: "no usable sample in time",
     0x0002: "trip input went low",
     0x0004: "watchdog reset",
     0x0008: "crystal or PLL not as expected",
+    0x0010: "current not converted in time",
+    0x0020: "current sensor, open load, short or over-current",
     0x0100: "command outside its valid range",
     0x0200: "pressure A outside its valid range",
     0x0400: "pressure B outside its valid range",
     0x0800: "pressure drop not plausible",
+    0x2000: "waits for a valid command, or for zero command",
+    0x4000: "smallest beta until the pressures are sound again",
+    0x8000: "fault latched until a reset",
 }
 #: The output is in use; without it the trip zone holds the pin low, whatever the compare value.
 STATUS_RELEASED = 0x0080

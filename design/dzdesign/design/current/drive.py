@@ -1,6 +1,7 @@
 """`CurrentDrive`: current control as compensator.json keeps it, with what it was designed for and what it holds."""
 
 from dataclasses import dataclass
+from math import ceil
 from typing import Annotated
 
 from msgspec import Meta
@@ -9,6 +10,7 @@ from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
+    SHORT_SHARE,
     CurrentSensor,
     choose_loop,
     gains_of,
@@ -42,6 +44,14 @@ class CurrentDrive:
             raise RuleError(
                 f"the current loop's phase margin is {self.phase_margin_deg:.1f} degrees, expected {LEAST_PHASE_DEG:g}"
             )
+
+    @property
+    def rest_ticks(self) -> int:
+        """PWM periods with the output off after which no current is left: of the largest, at the slowest corner."""
+        circuit = self.circuit
+        largest_A = SHORT_SHARE * circuit.rated_A
+        slowest_s = max(circuit.fastest_fall_s(corner, largest_A, 0.0) for corner in circuit.corners())
+        return ceil(slowest_s * self.sampling.tick_Hz)
 
     def in_words(self, units: RecordedUnits) -> tuple[str, ...]:
         """Return lines for a person."""

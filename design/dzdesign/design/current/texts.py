@@ -8,7 +8,7 @@ from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.choices import DRIVES, NEEDED, OF_CURRENT
 from dzdesign.design.current.choosing import CurrentSensor
-from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.circuit import CoilCircuit
 from dzdesign.design.current.drive import CurrentRequest
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.design.target_inputs import TargetInputs
@@ -31,6 +31,10 @@ def current_request(text: Mapping[str, str], target: TargetInputs) -> CurrentReq
         if useless := [flag_of(name) for name in OF_CURRENT if text[name]]:
             raise InputError(f"{useless[0]} is for --drive current, but --drive is duty; give --drive current")
         return None
+    if target.current_sampling is None:
+        raise InputError(
+            f"the files of target {target.name} sample no current; give --drive duty, or another --target"
+        )
     if missing := [flag_of(name) for name in NEEDED if not text[name]]:
         raise InputError(
             f"--drive current needs {', '.join(missing)}; write for example --coil '3.5 ohm 40 mH' --rated-current "
@@ -46,7 +50,7 @@ def current_request(text: Mapping[str, str], target: TargetInputs) -> CurrentReq
             offset_V=float(sensor.offset_V),
             supply_divider=float(supply.volts_per_unit) if supply else 0.0,
         ),
-        sampling=CurrentSampling(tick_Hz=target.tick_Hz),
+        sampling=target.current_sampling,
     )
 
 

@@ -44,6 +44,20 @@ uint16_t dz_start_faults(void)
     return faults;
 }
 
+/* What another program may have left, in registers that this one relies on and that only a reset would clear. */
+static void clear_leftovers(void)
+{
+    EPwm1Regs.DBCTL.all = 0u;   /* no dead band: it would delay the pin's edges, or take the other output's */
+    EPwm1Regs.PCCTL.all = 0u;   /* no chopper */
+    EPwm1Regs.AQCTLB.all = 0u;  /* no events on the output that is not used */
+    EPwm1Regs.TBPHS.all = 0u;
+    EPwm1Regs.CMPA.all = 0u;    /* with its high-resolution half */
+    EALLOW;
+    EPwm1Regs.HRCNFG.all = 0u;  /* no edge is placed finer than a count */
+    EPwm1Regs.TZEINT.all = 0u;  /* a trip is looked at in dz_isr(), it interrupts nothing */
+    EDIS;
+}
+
 static void init_pwm(void)
 {
     /* Whole registers first: after a restart from the debugger they hold what the last run left, and the
@@ -115,6 +129,7 @@ void dz_hardware_init(void)
     SysCtrlRegs.PCLKCR0.bit.TBCLKSYNC = 0u; /* ePWM counters stand still while they are set up */
     EDIS;
 
+    clear_leftovers();
     init_pwm();
     init_adc();
     init_pins();

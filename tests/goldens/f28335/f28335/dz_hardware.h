@@ -36,6 +36,9 @@
 #define DZ_FORCE_NONE 0u
 #define DZ_FORCE_LOW 1u
 
+/* TBCTL.FREE_SOFT: at an emulation stop the counter runs to the end of its period first. */
+#define DZ_STOP_AT_PERIOD 1u
+
 /* Faults, one bit each. A fault stays until the next reset; the output is low as long as any bit stands. */
 #define DZ_FAULT_NO_SAMPLE 0x0001u  /* the converter gave no usable sample in time */
 #define DZ_FAULT_TRIP_INPUT 0x0002u /* TZ1 (GPIO12) went low while the output was in use */

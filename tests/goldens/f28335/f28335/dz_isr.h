@@ -21,6 +21,7 @@ struct dz_state
     uint16_t compare_a;            /* last compare value, 0..60000 */
     uint16_t compare_b;            /* of solenoid B; one of the two is 0 */
     int16_t side;                  /* 1: solenoid A is driven, -1: B, 0: neither yet */
+    uint16_t status;               /* DZ_STATUS_..., what is wrong with the inputs and what the drive waits for */
 };
 
 extern volatile struct dz_state dz_state;

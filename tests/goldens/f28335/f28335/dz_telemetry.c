@@ -79,6 +79,7 @@ static uint16_t status_of(const struct dz_state *state)
     uint16_t status = state->fault;
 
     status |= (uint16_t)(dz_status(state->u_adc, state->p_a_adc, state->p_b_adc) << 8);
+    status |= (uint16_t)(state->status << 8);
     if (state->released != 0u)
     {
         status |= DZ_STATUS_RELEASED;

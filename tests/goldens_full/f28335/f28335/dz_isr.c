@@ -50,6 +50,7 @@ static void show_drive(void)
     dz_state.compare_a = drive.compare_a;
     dz_state.compare_b = drive.compare_b;
     dz_state.side = drive.side;
+    dz_state.status = drive.status;
 }
 
 /* 1 if a finished sequence with three 12-bit codes was there, 0 otherwise. */
@@ -110,10 +111,13 @@ static void force_output_low(void)
     EDIS;
 }
 
-/* Only from here on the drive runs: its ramps start from rest. */
+/* Only from here on the drive runs: its ramps start from rest, and it waits for zero command. */
 static void release_output(void)
 {
     dz_drive_init(&drive);
+    /* A halt of the debugger stops the counter at the end of its period, where the pin has gone low (README). */
+    EPwm1Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;
+    EPwm2Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;
     EALLOW;
     EPwm1Regs.TZCLR.bit.OST = 1u;
     EPwm2Regs.TZCLR.bit.OST = 1u;

@@ -81,6 +81,7 @@ static uint16_t status_of(const struct dz_state *state)
 
     status |= (uint16_t)(((state->side < 0) ? dz_status_negative(state->u_adc, state->p_a_adc, state->p_b_adc)
                                             : dz_status(state->u_adc, state->p_a_adc, state->p_b_adc)) << 8);
+    status |= (uint16_t)(state->status << 8);
     if (state->released != 0u)
     {
         status |= DZ_STATUS_RELEASED;
