@@ -11,6 +11,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
     os.environ.setdefault(_threads, "1")  # before NumPy is imported: ratios of one core
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
 
+from above_tests import print_above  # noqa: E402
 from all_inputs import print_inputs  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
 from current_valve import print_current_valve  # noqa: E402
@@ -32,6 +33,7 @@ PARTS = {
     "proof": (print_proof, 0),
     "current": (print_current_loop, 0),
     "current-valve": (print_current_valve, 0),
+    "above": (print_above, 0),
 }
 
 
