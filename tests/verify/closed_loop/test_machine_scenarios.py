@@ -230,9 +230,14 @@ def test_above_the_tests_the_stand_in_goes_straight_on(example_valve):
         assert closes(last + beyond) == pytest.approx(begins[-1][1] + slope * beyond, abs=0.02)
 
 
-def test_twice_the_tested_pressure_drop_is_tried(results):
-    flows = [each for each in results if each.name.startswith("dP above the tests, up to 10.00 MPa")]
-    assert len(flows) == 2 and all(each.q_zero_L_min > 0.5 for each in flows), "beta is held there"
+@pytest.mark.parametrize("above", ["hold", "lower", "release"])
+def test_twice_the_tested_pressure_drop_is_required_unless_the_offset_is_held_there(example_valve, above, tmp_path):
+    compensator = design(example_valve, options_of({"above": above}, target_named("f28335").inputs()))
+    made = generate(compensator, "f28335")
+    write_folder(tmp_path / "fw", made.files, made.manifest)
+    scene = scenes_of(tmp_path / "fw", compensator, None)[-1]
+    (found,) = [each for each in run_scenarios(scene) if each.name.startswith("dP above the tests, up to 10.00 MPa")]
+    assert found.must_shut == (above != "hold") and (found.q_zero_L_min > 0.5) == (above == "hold")
 
 
 def test_a_reset_at_full_command_waits_for_zero_with_the_interlock_alone(example_valve, results, tmp_path):
