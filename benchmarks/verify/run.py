@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that al
 
 from all_inputs import print_inputs  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
+from current_valve import print_current_valve  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from plant import print_plant  # noqa: E402
@@ -28,6 +29,7 @@ PARTS = {
     "mutants": (print_mutants, 202),
     "proof": (print_proof, 0),
     "current": (print_current_loop, 0),
+    "current-valve": (print_current_valve, 0),
 }
 
 

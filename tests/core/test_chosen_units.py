@@ -44,4 +44,4 @@ def test_a_choice_settles_what_the_recordings_differ_in():
 def test_what_is_no_unit_or_one_too_many_is_refused(given, wording):
     with pytest.raises(InputError) as refused:
         read_units(given, "--units")
-    wording(f"units that can't be shown: {given}", str(refused.value))
+    wording(f"units to show: {given}", str(refused.value))

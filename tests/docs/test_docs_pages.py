@@ -20,6 +20,7 @@ ADD_TARGET = DOCS / "howto" / "add-target.md"
 #: Pages that go on where the tutorial ended, each with a copy of its folder.
 HOW_TO = [
     DOCS / "before-after.md",
+    DOCS / "reference" / "budget.md",
     *sorted(
         page
         for page in (DOCS / "howto").glob("*.md")

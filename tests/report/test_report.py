@@ -33,6 +33,7 @@ from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.figures.figure import PALETTE, csv_text
 from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
+from dzdesign.report.sections.cells import whole
 from dzdesign.report.summary import headline, worst_of
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
@@ -77,10 +78,12 @@ def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo)
     evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
     loops = evidence["closed_loop"]["pressures"]
     head = html[: html.index('<section id="data">')]
-    assert f"Every requirement holds, all {len(evidence['checks'])} that were tried" in head
+    tried = f"all {len(evidence['checks'])} that were tried"
+    assert f"Every requirement holds, {tried}; the certificate is of the recording<" in head
+    assert "no machine was declared" in head and "Certificate of the recording<" in head
     before, after = (100 * max(each[key] for each in loops) for key in ("dead_zone_opening", "residual_opening"))
     assert f"{before:.1f} % → {after:.1f} %" in head
-    assert "33\u202f550\u202f336" in head and "99 %" in head and "Flow at zero command" in head
+    assert whole(evidence["inputs"][0]["inputs"]) in head and "99 %" in head and "Flow at zero command" in head
 
 
 def test_every_section_is_there_with_its_figures_and_tables(html):
@@ -88,10 +91,10 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     assert re.findall(r'<section id="(\w+)">', html) == [
-        "data", "thresholds", "beta", "law", "integers", "inputs", "loop", "acceptance", "checks", "warnings",
+        "data", "thresholds", "beta", "budget", "law", "integers", "inputs", "loop", "acceptance", "checks", "warnings",
         "provenance",
     ]  # fmt: skip
-    figures = ("fit", "thresholds", "beta", "law", "map", "zero", "dead-zone", "loop")
+    figures = ("fit", "thresholds", "beta", "budget", "law", "map", "zero", "dead-zone", "loop")
     assert [f"figure-{name}-positive" for name in figures] == [name for name in ids if name.startswith("figure-")]
     links = [each["href"] for each in page.of("a")]
     assert {link[1:] for link in links if link.startswith("#")} <= set(ids)
@@ -115,7 +118,7 @@ def test_the_page_needs_nothing_from_outside_and_runs_nothing(html):
 
 def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
     links = {each["download"]: each["href"] for each in Page(html).of("a") if "download" in each}
-    assert len(links) == 9  # eight figures, and the constants
+    assert len(links) == 11  # nine figures, the constants, and the budget's components
     tables = {name: unquote(link.removeprefix("data:text/csv;charset=utf-8,")) for name, link in links.items()}
     evidence = reported_demo / "evidence"
     assert tables["loop-positive.csv"] == (evidence / "closed_loop_positive.csv").read_text()
@@ -123,12 +126,13 @@ def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
     for name, text in tables.items():
         lines = text.splitlines()
         assert len(lines) > 2, name
-        assert name == "constants.csv" or len({line.count(",") for line in lines}) == 1, name
+        words = name.startswith(("constants", "budget-components"))
+        assert words or len({line.count(",") for line in lines}) == 1, name
 
 
 def test_figures_take_their_colours_from_the_page(html):
     drawings = re.findall(r'<svg class="drawing".*?</svg>', html, re.DOTALL)
-    assert len(drawings) == 8
+    assert len(drawings) == 9
     light = {shade for shade, _ in PALETTE.values()}
     for drawing in drawings:
         assert not {shade for shade in light if shade in drawing}
@@ -446,7 +450,7 @@ def test_a_valve_alone_is_reported_and_what_is_missing_said(copied, tmp_path):
     assert report.html.count("<figure") == 3
     shutil.copy(copied / "compensator.json", folder)
     report = report_of_folder(folder)
-    assert report.html.count("<figure") == 4 and "only a design" in report.verdict
+    assert report.html.count("<figure") == 5 and "only a design" in report.verdict
     assert main(["report", str(folder)]) == 1
     assert (folder / REPORT_NAME).read_text(encoding="utf-8") == report.html
 
@@ -465,7 +469,7 @@ def test_evidence_of_an_earlier_version_without_curves(copied):
     for path in (copied / "evidence").glob("*.csv"):
         path.unlink()
     html = report_of_folder(copied).html
-    assert "closed_loop_positive.csv is missing" in html and html.count("<figure") == 5
+    assert "closed_loop_positive.csv is missing" in html and html.count("<figure") == 6
 
 
 def test_a_neighbour_that_can_not_be_read_does_not_hinder_the_rest(copied):

@@ -13,7 +13,7 @@ LOOP = ClosedLoopResult(plant=None, plant_source="none", plant_sha256=None, dyna
 EVIDENCE = Evidence(
     tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), board_not_compiled="",
     checks=tuple(each.check(holds=True, text="yes") for each in ALWAYS), inputs=(), closed_loop=LOOP, scenarios=(),
-    monte_carlo=None, current_loop=None, mutants=None,
+    population=None, monte_carlo=None, current_loop=None, mutants=None,
 )  # fmt: skip
 
 

@@ -81,10 +81,12 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
             "where it opens, so flow at zero command is possible"
         )
     certificate = compensator.side(sign).certificate
-    lines.append(
-        f"the table's offset stays {units.text(1e3 * certificate.mean_loss_V, '.2f mV')} under the certified curve on "
-        f"average, {units.text(1e3 * certificate.largest_loss_V, '.2f mV')} at most{_of_which_dither(compensator)}"
-    )
+    if compensator.machine is None:  # else the budget says more
+        lines.append(
+            f"the table's offset stays {units.text(1e3 * certificate.mean_loss_V, '.2f mV')} under the certified curve "
+            f"on average, {units.text(1e3 * certificate.largest_loss_V, '.2f mV')} at most"
+            f"{_of_which_dither(compensator)}"
+        )
     guard = certificate.guard
     if guard != "closing":
         lines.append(
@@ -147,12 +149,11 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
             f"({declared}) lifts the drive by {compensator.valve.recorded_units.text(_lift_V(compensator), '.3f dV')}, "
             "which the certificate does not count"
         ]
-    leave = compensator.drive_functions.leave_zero_codes
+    leave, end = compensator.drive_functions.leave_zero_codes, compensator.transition_end
     return [
         f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero, "
-        f"{declared}; from rest the drive leaves at more than {leave} codes ({leave / span:.2%})",
-        f"the transition behind them is a power of two in codes of command: {compensator.transition_codes} "
-        f"({compensator.transition_codes / span:.2%})",
+        f"{declared}; from rest the drive leaves at more than {leave} codes ({leave / span:.2%}), and up to {end} "
+        f"({end / span:.2%}) it runs from the {compensator.positive.certificate.guard} to the opening threshold"
     ]
 
 

@@ -26,6 +26,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in
 from dzdesign.core.options import arguments_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
+from dzdesign.report.lot.budget import lot_budget
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.summary import LotSummary
 from dzdesign.report.lot.table import table_files
@@ -121,6 +122,7 @@ def _finished(
             if valve.name not in unwritten
         },
         anomalies=anomalies_of(found, output, valves),
+        budget=lot_budget(designed),
         units=units_of_lot(designed),
     )
     if setting is None:

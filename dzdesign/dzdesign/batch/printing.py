@@ -5,6 +5,7 @@ from pathlib import Path
 
 from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.report.lot.budget import lot_budget_lines
 from dzdesign.report.lot.setting_text import checked_line, cost_lines, span, untested_lines
 from dzdesign.report.lot.summary import LotSummary
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
@@ -23,7 +24,7 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
         values = (at.least, at.q05, at.median, at.q95, at.largest)
         table.add_row(_in_words(column, summary.recorded_units), *_numbers(column, values, summary.recorded_units))
     put_table(console, table)
-    for line in _setting_lines(summary):
+    for line in (*lot_budget_lines(summary.budget), *_setting_lines(summary)):
         put_line(console, line)
     warned = sorted(summary.warnings.items(), key=lambda item: len(item[1]))
     if warned:

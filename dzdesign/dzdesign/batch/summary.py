@@ -10,6 +10,7 @@ from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, common_unit
 from dzdesign.core.worded import in_units
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.compensator_sides import SIGNS
+from dzdesign.report.lot.budget import LotBudget
 from dzdesign.report.lot.spread import quantiles, spreads_of
 from dzdesign.report.lot.summary import (
     FailedValve,
@@ -53,6 +54,7 @@ def summary_of(
     why_no_setting: str | None = None,
     made_from: Mapping[str, bytes],
     anomalies: Sequence[str] = (),
+    budget: LotBudget | None = None,
     units: RecordedUnits = AS_COMPUTED,
 ) -> LotSummary:
     """Return what batch.json says of a finished lot.
@@ -81,6 +83,7 @@ def summary_of(
         quantiles={spread.column: spread.at for spread in spreads_of(rows)},
         lot_setting=setting,
         why_no_lot_setting=why_no_setting,
+        budget=budget,
         recorded_units=units,
     )
 

@@ -3,15 +3,17 @@
 import datetime
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.options import Argument, flag_of
+from dzdesign.core.options import MACHINE, Argument, flag_of
 
 #: Characters of a key to which the nearest known one is looked for.
 LONGEST_KEY = 80
+#: Groups of options that stand in a table of their own.
+TABLES = (MACHINE,)
 #: Of an option in the file: text, a list of texts, or a table.
 Value = str | list[str] | dict[str, str]
 
@@ -28,7 +30,7 @@ def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Valu
     for argument in declared:
         known.setdefault(_key(argument.name).replace("-", "_"), []).append(argument)
     options: dict[str, Value] = {}
-    for key, value in document.items():
+    for key, value in _without_tables(path, document, known):
         name = key.replace("-", "_")
         if name not in known:
             hint = nearest(name[:LONGEST_KEY], known).replace("_", "-")
@@ -40,6 +42,29 @@ def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Valu
         if not (free and value == {}):
             options[argument_name] = _texts(path, key, value, known[name], free)
     return options
+
+
+def _without_tables(
+    path: str, document: Mapping[str, object], known: Mapping[str, list[Argument]]
+) -> Iterator[tuple[str, object]]:
+    """Yield the options and, of the table of a group, those in it: they stand nowhere else."""
+
+    def table_of(key: str) -> str:
+        group = known[name][0].option.group if (name := key.replace("-", "_")) in known else ""
+        return group if group in TABLES else ""
+
+    for key, value in document.items():
+        if key not in TABLES:
+            if table := table_of(key):
+                raise InputError(f"'{path}': option '{key}' belongs in the table [{table}]; move it there")
+            yield key, value
+            continue
+        if not isinstance(value, dict):
+            raise InputError(f"'{path}': '{key}' is {quoted(value)}, expected a table [{key}]")
+        for inner, text in value.items():
+            if inner.replace("-", "_") in known and table_of(inner) != key:
+                raise InputError(f"'{path}': option '{inner}' does not belong in [{key}]; move it above all tables")
+            yield inner, text
 
 
 def _key(name: str) -> str:

@@ -39,7 +39,8 @@ class VerifyArguments:
     """Pressure behind the metering edge in the closed loop; repeatable. Ramps run at the highest, failing sensors at
     each (default: 0 and 1 MPa, or what the sensors span beside the tested pressure drops)."""
     tolerances: Annotated[AnyPath | None, Option("TOL.toml", CHECKS)] = None
-    """File with a series of plants to run too, like examples/paper_valve/tolerances.toml; needs a plant."""
+    """File with how many machines to draw from the declared budget, like examples/paper_valve/machines.toml, or with a
+    series of plants, like examples/paper_valve/tolerances.toml, which needs a plant."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
     """Folder of headers that your board files include, such as your chip's. Repeatable."""
     c2000ware: Annotated[AnyPath | None, Option("DIR", CHECKS)] = None

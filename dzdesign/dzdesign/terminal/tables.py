@@ -179,6 +179,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     from dzdesign.design.costs import hidden_failures, lines_of_tests
     from dzdesign.design.signal_descriptions import signals_in_words
     from dzdesign.design.signals import SIDE_NAMES
+    from dzdesign.terminal.budget_table import print_budgets
     from dzdesign.terminal.cost_table import print_costs_at_tests
 
     chosen, units = law(compensator.law), compensator.valve.recorded_units
@@ -206,13 +207,6 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
                 else compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)
             ),
         ]
-    if compensator.transition_codes:
-        span, guard = compensator.signals.command.span(1), compensator.positive.certificate.guard
-        band, end = compensator.zero_band_codes / span, compensator.transition_end / span
-        lines.append(
-            f"zero band: commands up to {band:.2%} count as zero; transition: from the {guard} to the opening "
-            f"threshold over those from there to {end:.2%}"
-        )
     if compensator.current_drive is not None:
         lines += compensator.current_drive.in_words(units)
     hidden = hidden_failures(compensator)
@@ -221,6 +215,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     for line in (*(f"warning: {line}" for line in hidden), *lines):
         put_line(console, line)
     print_costs_at_tests(compensator, console)
+    print_budgets(compensator, console)
     for line in compensator.costs:
         if line not in elsewhere:
             put_line(console, f"cost: {line}")

@@ -280,6 +280,40 @@ def test_a_file_of_options_that_is_no_text(refusal, bench):
     assert "'options.toml' is not TOML" in refusal("identify", "a.csv", "--config", "options.toml")
 
 
+MACHINE_TABLE = """pressure-span = "25 MPa"
+
+[machine]
+coil-temperature = "-20..80 degC"
+supply = "18..32 V"
+"""
+
+
+def test_the_machine_has_a_table_of_its_own(bench):
+    from dzdesign.command_line.invocation import parse
+
+    (bench / "options.toml").write_text(MACHINE_TABLE)
+    arguments = parse(["design", "valve.json", "--config", "options.toml", "--supply", "20..30 V"]).arguments
+    assert (arguments.coil_temperature, arguments.supply) == ("-20..80 degC", "20..30 V")
+    assert arguments.pressure_span == "25 MPa"
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ('oil = "0.2 %"', "oil"),
+        ('[machine]\nguard = "mean"', "guard"),
+        ('[machine]\ncoil-temperatur = "20 degC"', "coil-temperature"),
+        ('machine = "1 %"', "machine"),
+        ("[machine]\noil = {}", "oil"),
+        ('[machine]\nbench-coil = "20 degC"\nbench_coil = "20 degC"', "twice"),
+    ],
+)
+def test_a_table_of_the_machine_that_is_none_is_refused(bench, refusal, text, key):
+    (bench / "options.toml").write_text(text)
+    said = refusal("design", "valve.json", "--config", "options.toml")
+    assert "options.toml" in said and key in said
+
+
 def test_options_from_a_file_stand_in_for_the_defaults(bench, capsys):
     (bench / "options.toml").write_text(
         "\ufeffu-max = '20 V'\nconfidence = 0.9\ndp = ['2 MPa']\ntarget = 'f28335'\n", "utf-8"

@@ -113,7 +113,7 @@ def test_one_declaration_is_seen_everywhere(monkeypatch, tmp_path, capsys):
     @dataclass(frozen=True)
     class Arguments(design.DesignArguments):
         _: KW_ONLY
-        oil: Annotated[str, Option("GRADE", "law", choices=("HLP 32", "HLP 46"))] = "HLP 46"
+        fluid: Annotated[str, Option("GRADE", "law", choices=("HLP 32", "HLP 46"))] = "HLP 46"
         """Grade of the oil."""
 
     def stage(arguments: Arguments) -> str:
@@ -124,19 +124,19 @@ def test_one_declaration_is_seen_everywhere(monkeypatch, tmp_path, capsys):
         arguments : Arguments
             Of the stage.
         """
-        return arguments.oil
+        return arguments.fluid
 
     monkeypatch.setattr(command_module("design"), "Arguments", Arguments)
-    (tmp_path / "dz.toml").write_text("oil = 'HLP 32'\n")
-    assert parse(["design", "v.json"]).arguments.oil == "HLP 46"
-    assert parse(["design", "v.json", "--config", str(tmp_path / "dz.toml")]).arguments.oil == "HLP 32"
-    assert parse(["design", "v.json", "--oil", "HLP 68"]).arguments.oil == "HLP 68"
-    assert re.search(r"--oil GRADE +Grade of the oil \(HLP 32, HLP 46; default: HLP 46\)\.", help_of("design"))
+    (tmp_path / "dz.toml").write_text("fluid = 'HLP 32'\n")
+    assert parse(["design", "v.json"]).arguments.fluid == "HLP 46"
+    assert parse(["design", "v.json", "--config", str(tmp_path / "dz.toml")]).arguments.fluid == "HLP 32"
+    assert parse(["design", "v.json", "--fluid", "HLP 68"]).arguments.fluid == "HLP 68"
+    assert re.search(r"--fluid GRADE +Grade of the oil \(HLP 32, HLP 46; default: HLP 46\)\.", help_of("design"))
     told = with_keywords(Arguments, stage)
-    assert told("v.json", oil="HLP 32") == "HLP 32" and "Grade of the oil (" in told.__doc__
-    assert "oil" in inspect.signature(told).parameters
-    with pytest.raises(InputError, match="did you mean 'oil'"):
-        told("v.json", oill="HLP 32")
+    assert told("v.json", fluid="HLP 32") == "HLP 32" and "Grade of the oil (" in told.__doc__
+    assert "fluid" in inspect.signature(told).parameters
+    with pytest.raises(InputError, match="did you mean 'fluid'"):
+        told("v.json", fluidd="HLP 32")
     assert main(["completion", "bash"]) == 0
     assert "HLP 32" in capsys.readouterr().out
 

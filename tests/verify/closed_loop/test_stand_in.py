@@ -212,7 +212,8 @@ def test_at_a_test_it_does_not_jump(stand_in):
 def test_beyond_the_tests_the_flow_goes_with_the_root_of_the_pressure_drop(stand_in):
     loop, command, last = ClosedLoop(stand_in), QUICK.command(), stand_in.side.tests[-1].dp_MPa
     at, beyond = (loop.run(command, dp).q_mean_L_min.max() for dp in (last, 2.25 * last))
-    assert beyond == pytest.approx(1.5 * at, rel=1e-9)
+    # The threshold runs on, and the characteristic above it is stretched: its end is met to 1e-5.
+    assert beyond == pytest.approx(1.5 * at, rel=1e-5)
 
 
 def test_oil_of_another_density_scales_the_flow(stand_in):

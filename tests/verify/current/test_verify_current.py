@@ -10,7 +10,7 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.current.choosing import CurrentSensor, choose_loop, gains_of
 from dzdesign.design.current.circuit import CoilCircuit
-from dzdesign.design.current.margins import margins
+from dzdesign.design.current.margins import Gains, margins
 from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.verify.analysis import machine_code
@@ -171,6 +171,17 @@ def test_the_margins_are_those_of_design_by_another_way(name):
         ]
         assert ours.phase_deg == pytest.approx(min(each.phase_deg for each in theirs), abs=0.02)
         assert ours.gain == pytest.approx(min(each.gain for each in theirs), rel=0.01)
+
+
+def test_a_small_fast_coil_has_the_margins_that_were_chosen():
+    """Gains without a crossover up to half the PWM's frequency were once read as 180 degrees, and the largest taken."""
+    coil = CoilCircuit(resistance_ohm=3.5, inductance_H=0.01, rated_A=1.0, supply_V=(18.0, 32.0))
+    sensor = SENSORS["supply measured"]
+    huge = Gains(proportional=1e4, integral=1.0, feed_forward=1.0, supply_measured=True)
+    assert margins(coil, coil.nominal, SAMPLING, huge, 0.5).phase_deg == 0
+    loop = choose_loop(coil, sensor, CONVERTER, SAMPLING, compare_max=60000)
+    around = CoilLoop(loop=loop, circuit=coil, sensor=sensor, converter=CONVERTER, sampling=SAMPLING)
+    assert min(stability_margins(around, corner).phase_deg for corner in declared_corners(coil)) >= 50
 
 
 def test_the_least_rise_is_that_of_an_exponential():

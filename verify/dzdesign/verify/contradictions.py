@@ -7,7 +7,7 @@ from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.all_inputs import input_checks
 from dzdesign.verify.exhaustive.lot_check import lot_checked
-from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, ZERO_COMMAND, Check
+from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, POPULATION, ZERO_COMMAND, Check
 
 
 def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple[Check, ...]:
@@ -20,11 +20,13 @@ def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple
     follow = [check for each in inputs for check in input_checks(each, units, both_signs=len(inputs) > 1)]
     kinds = set(FROM_INPUTS)
     if compensator:
-        kinds |= {LOT, *FROM_LOOP}
+        kinds |= {LOT, POPULATION, *FROM_LOOP}
         follow += lot_checked(inputs, compensator)
         if loop.pressures and evidence.scenarios:
             given = loop.plant is not None
-            follow += loop_checks(loop.pressures, evidence.scenarios, compensator, plant_given=given)
+            follow += loop_checks(
+                loop.pressures, evidence.scenarios, compensator, evidence.population, plant_given=given
+            )
 
     def key(check: Check) -> tuple[object, ...]:  # another version may word it otherwise, and units be another valve's
         worded_alike = evidence.tool == THIS_TOOL and (compensator is not None or check.id != ZERO_COMMAND.id)

@@ -12,7 +12,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import Artefact, Sha256, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify.current.results import CurrentLoopResult
-from dzdesign.verify.loop_results import ClosedLoopResult, Count, MonteCarlo, ScenarioResult, Side, about
+from dzdesign.verify.loop_results import ClosedLoopResult, Count, MonteCarlo, Population, ScenarioResult, Side, about
 from dzdesign.verify.requirements import ALWAYS, OF_CURRENT, Check
 
 Sign = Literal[1, -1]
@@ -151,6 +151,9 @@ class Evidence(Artefact):
     ]
     closed_loop: Annotated[ClosedLoopResult, about("Ramps in closed loop with the generated C.")]
     scenarios: Annotated[tuple[ScenarioResult, ...], about("What happens beside ramps.")]
+    population: Annotated[
+        Population | None, about("Machines drawn from the declared budget, where --tolerances asked for them.")
+    ]
     monte_carlo: Annotated[MonteCarlo | None, about("The series of plants, where --tolerances was given.")]
     current_loop: Annotated[
         CurrentLoopResult | None, about("Of a drive by current its loop; null of one by duty, or if it did not run.")

@@ -194,6 +194,28 @@ class Scatter:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Population:
+    """Machines drawn from the declared one, each at zero command at every tested pressure drop and between."""
+
+    machines: Annotated[int, Meta(description="How many.", ge=1, le=10**6)]
+    seed: Annotated[int, Meta(description="Of the draw.", ge=0, le=2**60)]
+    flowing: Annotated[Count, about("How many pass flow at zero command, beyond what is allowed.")]
+    never_open: Annotated[Count, about("How many did not open at some pressure drop, so that their closing is none.")]
+    confidence: Annotated[float, quantity("1", "Of the upper limit.", ge=0.5, le=1)]
+    upper_limit: Annotated[
+        float,
+        quantity("1", "Upper limit of the probability that a machine passes flow, by Clopper and Pearson.", ge=0, le=1),
+    ]
+    pressures: Annotated[int, Meta(description="Pressure drops that each machine was tried at.", ge=1, le=10**6)]
+    largest_L_min: Annotated[Flow, about("Largest flow at zero command beyond what is allowed.")]
+    largest_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop of it.", ge=0, le=1000)]
+    worst: Annotated[
+        Mapping[str, float], about("That machine: place of each component in its half-width, from -1 to 1.")
+    ]
+    drawn: Annotated[tuple[str, ...], about("Components that were drawn; others stood at their worst ends.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MonteCarlo:
     """A series of plants about the one that was given."""
 

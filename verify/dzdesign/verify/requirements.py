@@ -71,6 +71,11 @@ UNDEFINED_BEHAVIOUR = Requirement(
 )
 MUTATION = Requirement(id="mutation", title="wrong C is caught", how="`verify --mutate`")
 C2000WARE = Requirement(id="c2000ware", title="compiles against C2000Ware", how="`verify --c2000ware`")
+POPULATION = Requirement(
+    id="population",
+    title="no flow at zero command of any machine drawn from the budget",
+    how="`verify --tolerances` with machines = 10000, of a declared machine",
+)
 OWN_PLANT = Requirement(
     id="own-plant", title="closed loop with a plant of the machine's own", how="`verify --plant`"
 )
@@ -86,6 +91,9 @@ CURRENT_STEP = Requirement(id="current-step", title="the current follows a step 
 CURRENT_FAULTS = Requirement(
     id="current-faults", title="an open, a shorted and an over-driven coil switch the output off"
 )
+CURRENT_VALVE = Requirement(
+    id="current-valve", title="the valve opens at the same command with every coil and supply"
+)
 #: What follows from the figures that stand beside the checks: of every input, and of the closed loop.
 FROM_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, PRESSURE_DIFFERENCE, FALLBACK)
 FROM_LOOP = (PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS)
@@ -95,6 +103,6 @@ ALWAYS = (
     PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CERTIFICATE, LAW, VALVE, REGENERATED,
 )  # fmt: skip
 #: What every `verify` checks beside it where the drive is by current.
-OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS)
+OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS, CURRENT_VALVE)
 #: What is checked if it is asked for.
 OPTIONAL = (MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)

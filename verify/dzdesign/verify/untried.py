@@ -10,6 +10,7 @@ from dzdesign.verify.requirements import (
     LOAD_STEPS,
     OPTIONAL,
     OWN_PLANT,
+    POPULATION,
     SERIES,
     Requirement,
 )
@@ -35,6 +36,8 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         untried.append(OWN_PLANT)
     if not any(each.is_load_step for each in evidence.scenarios):
         untried.append(LOAD_STEPS)
+    if evidence.population is None:
+        untried.append(POPULATION)
     if evidence.monte_carlo is None:
         untried.append(SERIES)
     optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())

@@ -16,6 +16,7 @@ from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.closed_loop.population import NOT_DECLARED
 from dzdesign.verify.closed_loop.tolerances import Tolerances
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
@@ -89,11 +90,13 @@ def verify(
 
     A folder that is no firmware, and a machine without a C compiler, are an `InputError`.
     """
-    if tolerances and plant is None:
+    if tolerances and tolerances.spreads and plant is None:
         raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
     manifest = read_firmware_manifest(folder)
     check_include(include, manifest)
     compensator = read_compensator(folder)
+    if tolerances and tolerances.machines and compensator.machine is None:
+        raise InputError(NOT_DECLARED)
     host_compiler()
     say("compiling the core with every warning an error")
     # A compiler's time, not ours.
@@ -125,8 +128,9 @@ def verify(
         inputs=core.inputs,
         closed_loop=loop.result(plant, plant_source, plant_sha256),
         scenarios=loop.scenarios,
+        population=loop.population,
         monte_carlo=loop.monte_carlo,
-        current_loop=current.result,
+        current_loop=current.result and replace(current.result, valve=loop.valve_at_corners),
         mutants=None,
     )
     derived = compensator if law.holds else None

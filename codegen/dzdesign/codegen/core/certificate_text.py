@@ -55,6 +55,8 @@ def _machine(compensator: Compensator, sign: int) -> str:
 def _counted(compensator: Compensator) -> str:
     """Return what the certificate's margin is left of."""
     rounding = "the rounding of readings to codes and of the drive to counts"
+    if compensator.machine is not None:
+        rounding += ", all that the declared machine may differ in"
     if not compensator.drive_functions.dither_counts:
         return rounding
     volts = compensator.dither_reserve_counts / compensator.signals.compare_max * float(compensator.u_max_V)

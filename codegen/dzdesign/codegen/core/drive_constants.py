@@ -62,7 +62,8 @@ def drive_interface_constants(compensator: Compensator) -> list[Define]:
         Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=signals.command.zero_code,
                  equation="Eq. (29), code of zero command",
                  engineering=compensator.valve.recorded_units.text(0.0, "g V"),
-                 rounding="the converter's code, rounded down", data=("signals.command.zero_code",), generator=SIGNALS),
+                 rounding="the converter's code, rounded down",
+                 data=("signals.command.zero_code",), generator=SIGNALS),
         *(
             Define(symbol=f"DZ_STATUS_{name}", value=1 << place, equation=f"bit {place} of the drive's status word",
                      engineering=text, rounding="a convention", generator=HERE)

@@ -88,6 +88,8 @@ def margins(
     phases = [phase[k] + part * (phase[k + 1] - phase[k]) for k, part in zip(crossings, at, strict=True)]
     turns = np.flatnonzero((phase[:-1] > -np.pi) != (phase[1:] > -np.pi))
     largest = max((float(np.abs(loop[k])) for k in turns), default=float(np.abs(loop[-1])))
+    if size[-1] > 0:  # a gain above 1 up to half the PWM's frequency: there is no crossover to read a phase at
+        phases.append(-np.pi)
     return Margins(
         phase_deg=float(180 + np.degrees(min(phases))) if phases else 180.0,
         gain=1 / largest,

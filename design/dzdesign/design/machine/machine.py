@@ -112,6 +112,9 @@ class Machine:
         ):
             if (bench is not None and ends is None) or (bench is None and self.drive == "duty"):
                 raise RuleError(f"{what} needs both, its range on the machine and its value on the bench")
+            low, high = COIL_C if unit == "degC" else SUPPLY_V
+            if any(not low <= value <= high for value in (*(ends or ()), *(() if bench is None else (bench,)))):
+                raise RuleError(f"{what} is beyond {low:g} to {high:g} {unit}")
             if ends is not None and ends[0] > ends[1]:
                 raise RuleError(f"{what} runs from {ends[0]:g} to {ends[1]:g} {unit}, expected the lower end first")
         for name, drives in NEEDED_BY.items():
@@ -120,6 +123,11 @@ class Machine:
                 raise RuleError(f"{name} is missing in a machine whose drive is '{self.drive}'")
             if not missing and self.drive not in drives and name not in OF_ANY_DRIVE:
                 raise RuleError(f"{name} stands in a machine whose drive is '{self.drive}'")
+        for name in self.__slots__:
+            value = getattr(self, name)
+            limit = LARGEST_MPa if name.endswith("_MPa") else LARGEST_SHARE
+            if "_error" in name and value is not None and not 0 <= value <= limit:
+                raise RuleError(f"{name} is {value:g}, expected 0 to {limit:g}")
         if unknown := set(self.defaults) - set(self.__slots__):
             raise RuleError(f"'defaults' names {sorted(unknown)[0]!r}, expected a key of the machine")
 

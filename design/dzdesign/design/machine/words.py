@@ -28,8 +28,8 @@ def taken_off(budget: Budget, units: RecordedUnits) -> str:
     largest = budget.largest
     return (
         f"its budget takes {units.text(budget.combined_mV[place], '.0f mV')} from the recorded threshold at "
-        f"{units.text(budget.dp_MPa[place], '.2f MPa')}, {units.text(largest.contribution_mV[place], '.0f mV')} of it "
-        f"for {largest.component} ({largest.origin})"
+        f"{units.text(budget.dp_MPa[place], '.2f MPa')}; its largest component is {largest.component} "
+        f"({largest.origin}), {units.text(largest.contribution_mV[place], '.0f mV')}"
     )
 
 

@@ -18,8 +18,8 @@ from dzdesign.report.figures.figure import (
     to_report_figure,
 )
 
-#: Components with a part of their own; what is left of the others is one part.
-SHOWN = 6
+#: Components with a part of their own, if it is no smaller than this share of the largest sum; the others are one part.
+SHOWN, SMALLEST = 5, 0.02
 #: Hatches in turn, as hues alone would be told apart by nobody in a grey print.
 HATCHES = ("", "///", "...", "\\\\\\", "xxx", "ooo", "---")
 
@@ -29,6 +29,7 @@ class _Part:
     """A part of every bar: a component, or all that are too small to be seen."""
 
     label: str
+    hue: str
     contribution_mV: tuple[float, ...]
 
 
@@ -43,12 +44,12 @@ def budget_figure(budget: Budget, name: str, both: bool, units: RecordedUnits) -
     for index, part in enumerate(parts):
         height = units.convert(np.maximum(part.contribution_mV, 0.0), "mV")
         axes.bar(
-            places, height, 0.62, bottom=below, label=part.label, facecolor=LIGHT[CYCLE[index % len(CYCLE)]],
+            places, height, 0.62, bottom=below, label=part.label, facecolor=LIGHT[part.hue],
             edgecolor=LIGHT["face"], hatch=HATCHES[index % len(HATCHES)], linewidth=0.6,
         )  # fmt: skip
         below = below + height
     together = units.convert(np.array(budget.combined_mV), "mV")
-    axes.plot(places, together, "_", color=LIGHT["ink"], ms=34, mew=2, label="all together", zorder=4)
+    axes.hlines(together, places - 0.4, places + 0.4, color=LIGHT["ink"], lw=2, label="all together", zorder=4)
     axes.set_xticks(places, [units.number(dp, ".2f MPa") for dp in budget.dp_MPa])
     axes.set(
         xlabel=f"pressure drop dP ({units.label('MPa')})", ylabel=f"taken off the threshold ({units.label('mV')})",
@@ -78,11 +79,16 @@ def budget_figure(budget: Budget, name: str, both: bool, units: RecordedUnits) -
 def _parts(budget: Budget) -> tuple[_Part, ...]:
     """Return the largest components in the order of the budget, and the others as one."""
     lines = [line for line in budget.lines if max(line.contribution_mV) > 0]
+    least = SMALLEST * max(budget.combined_mV)
     largest = sorted(lines, key=lambda line: -max(line.contribution_mV))[:SHOWN]
+    largest = [line for line in largest if max(line.contribution_mV) >= least]
     shown: Sequence[BudgetLine] = [line for line in lines if line in largest]
     others = [line for line in lines if line not in largest]
-    parts = [_Part(label=f"{line.component} ({line.origin})", contribution_mV=line.contribution_mV) for line in shown]
+    parts = [
+        _Part(label=f"{line.component} ({line.origin})", hue=hue, contribution_mV=line.contribution_mV)
+        for line, hue in zip(shown, CYCLE, strict=False)
+    ]
     if others:
         together = tuple(sum(each) for each in zip(*(line.contribution_mV for line in others), strict=True))
-        parts.append(_Part(label=f"{len(others)} smaller ones, in the table", contribution_mV=together))
+        parts.append(_Part(label=f"{len(others)} smaller ones, in the table", hue="soft", contribution_mV=together))
     return tuple(parts)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dzdesign.core.errors import and_more
+from dzdesign.report.lot.budget import lot_budget_lines
 from dzdesign.report.lot.folder import Lot, read_lot
 from dzdesign.report.lot.sections import sections_of
 from dzdesign.report.lot.setting_text import untested_lines
@@ -49,6 +50,8 @@ def lot_headline(lot: Lot) -> Headline:
     simulated = [row.name for row in lot.calibrated if "simulated" in row.warnings]
     if simulated:
         lines.insert(0, f"SIMULATED recordings, not of measured valves: {and_more(simulated, IN_VERDICT)}")
+    if lot.summary:
+        lines += lot_budget_lines(lot.summary.budget)
     if lot.summary and lot.summary.lot_setting:
         lines += untested_lines(lot.summary.lot_setting, lot.units)
     more = len(anomalies) - ANOMALIES_IN_VERDICT

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from dzdesign.core.errors import and_more
 from dzdesign.report.figures.figure import ReportFigure, figure_style
+from dzdesign.report.lot.budget import lot_budget_table
 from dzdesign.report.lot.figures import spread_figure
 from dzdesign.report.lot.folder import Lot
 from dzdesign.report.lot.reasons import reason_groups
@@ -100,7 +101,7 @@ def _spread_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     return Section(
         lines=tuple(_lot_lines(lot)),
         figures=_figures(lot, spreads, *SPREAD_FIGURES),
-        tables=(spread_table(spreads),),
+        tables=(spread_table(spreads), lot_budget_table(lot.summary.budget if lot.summary else None, lot.units)),
     )
 
 

@@ -8,6 +8,7 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, RuleError, quantity
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
+from dzdesign.report.lot.budget import LotBudget
 
 #: File of either type below.
 SUMMARY_NAME = "batch.json"
@@ -168,6 +169,9 @@ class LotSummary(Artefact):
         LotSettingSummary | None, Meta(description="One setting that is safe for each calibrated valve; null of none.")
     ]
     why_no_lot_setting: Annotated[str | None, Meta(description="Why there is none; null if there is one.")]
+    budget: Annotated[
+        LotBudget | None, Meta(description="Uncertainty budgets of the calibrated valves; null without such a valve.")
+    ] = None
     recorded_units: Annotated[
         RecordedUnits, Meta(description="Units of the valves' recordings; the numbers here are in V and MPa.")
     ] = AS_COMPUTED

@@ -41,7 +41,7 @@ def budget_table(budget: Budget, name: str, both: bool, units: RecordedUnits) ->
     return table_of(
         f"Uncertainty budget{f', {name} commands' if both else ''}",
         budget.lines,
-        ("component", lambda line: Cell(text=line.component, more=f"{line.origin}: {line.source}")),
+        ("component", lambda line: Cell(text=line.component, more=_origin(line))),
         ("half-width", lambda line: in_number_font(_half_width(line, units))),
         (f"sensitivity ({millivolts} per unit of it)", lambda line: in_number_font(_sensitivity(line, units))),
         *(
@@ -54,7 +54,7 @@ def budget_table(budget: Budget, name: str, both: bool, units: RecordedUnits) ->
              "price_percent"),
             _rows(budget),
         ),
-        name=f"budget-{name}",
+        name=f"budget-components-{name}",
         notes=(
             "Contribution: by how much the component alone lowers what is certified. Sensitivity: that for one unit of "
             "its half-width, from the least to the most over the pressure drops.",
@@ -80,6 +80,10 @@ def _contribution(at: int, units: RecordedUnits) -> Callable[[BudgetLine], Cell]
     return lambda line: recorded(line.contribution_mV[at], ".2f mV", units)
 
 
+def _origin(line: BudgetLine) -> str:
+    return line.source if line.source.startswith(line.origin) else f"{line.origin}: {line.source}"
+
+
 def _half_width(line: BudgetLine, units: RecordedUnits) -> str:
     form = SHOWN_UNITS.get(line.unit)
     if form is not None:
@@ -89,6 +93,8 @@ def _half_width(line: BudgetLine, units: RecordedUnits) -> str:
 
 def _sensitivity(line: BudgetLine, units: RecordedUnits) -> str:
     """Return from where to where the sensitivity runs, for one unit of the half-width as it is shown."""
+    if line.unit == "mV":  # of the threshold itself
+        return "–"
     one = units.convert(1.0, line.unit) if line.unit in SHOWN_UNITS else 1.0
     ends = (units.number(end(line.sensitivity_mV) / one, ".3g mV") for end in (min, max))
     return " to ".join(dict.fromkeys(ends))

@@ -23,6 +23,7 @@ from dzdesign.report.sections.cells import (
     verdict,
     whole,
 )
+from dzdesign.report.sections.current_loop import current_tables
 from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, PressureResult, ScenarioResult, Spread
@@ -105,6 +106,7 @@ def loop_section(chain: Chain) -> Section:
             scenarios_table(evidence.scenarios, units),
             series_table(evidence.monte_carlo, units),
             plant_table(loop),
+            *current_tables(evidence.current_loop, units),
         ),
         lines=(_plant_line(loop),),
         missing=missing,

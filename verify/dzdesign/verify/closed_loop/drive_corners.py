@@ -16,6 +16,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CoilCircuit
 from dzdesign.design.machine.machine import Machine
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
+from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.loop_results import ScenarioResult
 
@@ -149,15 +150,19 @@ def at_corner(scene: Scene, corner: DriveCorner) -> Scene | None:
     if scene.loop.controls_current and corner.current_ratio == 1.0:
         coil = scene.loop.with_coil(resistance=corner.resistance_ratio, supply_V=corner.supply_V)
         return replace(scene, loop=coil)
-    held = holds_current(scene.compensator)
-    # Of a stand-in the current alone counts, and a held one does not know of resistance and supply.
-    resistance = 1.0 if held and scene.loop.is_stand_in else corner.resistance_ratio
-    voltage = corner.current_ratio * (1.0 if held else corner.voltage_ratio)
-    if resistance == 1.0 == voltage and corner.current_rest == 0.0:
+    voltage, resistance = (corner.voltage_ratio, corner.resistance_ratio)
+    ratio, loop = corner.current_ratio, scene.loop
+    held, added_V = holds_current(scene.compensator), corner.current_rest * scene.loop.u_max_V
+    if isinstance(scene.plant, Plant):
+        loop = loop.with_plant(replace(scene.plant, R_c_ohm=scene.plant.R_c_ohm * resistance))
+        changes = resistance != 1.0
+        ratio *= 1.0 if held else voltage
+    else:  # Of a stand-in the current alone counts, and a held one does not know of resistance and supply.
+        changes = False
+        ratio *= 1.0 if held else voltage / resistance
+    if not changes and ratio == 1.0 and added_V == 0.0:
         return None
-    plant = scene.plant.with_coil(resistance, voltage)
-    loop = scene.loop.with_plant(plant).with_added_drive(corner.current_rest * scene.loop.u_max_V)
-    return replace(scene, loop=loop, plant=plant)
+    return replace(scene, loop=loop.with_drive(ratio).with_added_drive(added_V * ratio))
 
 
 def coil_and_supply(scene: Scene) -> Iterator[ScenarioResult]:

@@ -13,11 +13,14 @@ from dzdesign.verify.closed_loop.dead_zone import LoopComparison, compare_at_pre
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.closed_loop.population import run_population
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
-from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, ScenarioResult, Side
+from dzdesign.verify.closed_loop.valve_at_corners import valve_at_corners, valve_at_corners_check
+from dzdesign.verify.current.results import ValveAtCorners
+from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, Population, ScenarioResult, Side
 from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
@@ -40,7 +43,10 @@ class FirmwareLoop:
     backs_MPa: tuple[float, ...] = ()
     loops: tuple[LoopComparison, ...] = ()
     scenarios: tuple[ScenarioResult, ...] = ()
+    population: Population | None = None
     monte_carlo: MonteCarlo | None = None
+    #: Of a drive by current.
+    valve_at_corners: tuple[ValveAtCorners, ...] = ()
 
     def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
         """Return what the evidence has of the ramps and of the plant, given from a file or made of the recordings."""
@@ -127,16 +133,42 @@ def close_the_loop(
         say("running the scenarios")
         done = pool.map(lambda scene: tuple(run_scenarios(scene)), scenes)
         scenarios = tuple(result for results in watch(done, len(scenes)) for result in results)
+        valve = _at_every_coil(scenes, compensator, pool, watch, say)
     series = None
-    if tolerances and plant:
+    population = None
+    if tolerances and tolerances.machines:
+        say(f"running {tolerances.machines} machines drawn from the budget (seed {tolerances.seed})")
+        population = run_population(scenes, tolerances.machines, tolerances.seed)
+    if tolerances and tolerances.spreads and plant:
         say(f"running {tolerances.plants} plants at {len(scenes)} pressure drops")
         pieces = watch(scenes, len(scenes))
         series = monte_carlo(tolerances, [scatter(s.loop, plant, tolerances, s.dp_MPa, s.side) for s in pieces])
+    results = [loop.result for loop in loops]
+    checks = loop_checks(results, scenarios, compensator, population, plant_given=plant is not None)
+    if valve:
+        checks += (valve_at_corners_check(valve, compensator.valve.recorded_units),)
     return FirmwareLoop(
-        checks=loop_checks([loop.result for loop in loops], scenarios, compensator, plant_given=plant is not None),
+        checks=checks,
+        valve_at_corners=valve,
         dynamics=scenes[0].plant.parameters if scenes else None,
         backs_MPa=scenes[0].backs_MPa if scenes else (),
         loops=loops,
         scenarios=scenarios,
+        population=population,
         monte_carlo=series,
     )
+
+
+def _at_every_coil(
+    scenes: tuple[Scene, ...],
+    compensator: Compensator,
+    pool: ThreadPoolExecutor,
+    watch: Watch,
+    say: Callable[[str], None],
+) -> tuple[ValveAtCorners, ...]:
+    """Run the valve with every coil and supply; nothing of a drive by duty."""
+    drive = compensator.current_drive
+    if drive is None:
+        return ()
+    say("running the closed loop with every coil and supply")
+    return tuple(watch(pool.map(lambda scene: valve_at_corners(scene, drive.circuit), scenes), len(scenes)))

@@ -178,6 +178,13 @@ class ClosedLoop:
         """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""
         return None if self._stand_in is None else self._stand_in.unseen_below_L_min(dp_MPa)
 
+    def with_drive(self, ratio: float) -> "ClosedLoop":
+        """Return the same loop with so many times the drive at the plant: another voltage, or another current."""
+        other = copy.copy(self)
+        other._plant = self._plant.driven(ratio)
+        other._of_current = self._of_current.driven(ratio) if self._coil else other._plant
+        return other
+
     def with_added_drive(self, added_V: float) -> "ClosedLoop":
         """Return the same loop with so much added to the plant's drive, V of command."""
         other = copy.copy(self)

@@ -11,10 +11,11 @@ from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.recorded_agreement import check_recorded
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
-from dzdesign.verify.loop_results import PressureResult, ScenarioResult
+from dzdesign.verify.loop_results import Population, PressureResult, ScenarioResult
 from dzdesign.verify.requirements import (
     PLANT_IS_THE_VALVE,
     PLANT_OPENS,
+    POPULATION,
     ZERO_FLOW,
     ZERO_FLOW_AFTER_SCENARIOS,
     Check,
@@ -30,8 +31,9 @@ SAME_FLOW = 0.03
 
 
 def loop_checks(
-    ramps: Sequence[PressureResult], scenarios: Sequence[ScenarioResult], compensator: Compensator, *, plant_given: bool
-) -> tuple[Check, ...]:
+    ramps: Sequence[PressureResult], scenarios: Sequence[ScenarioResult], compensator: Compensator,
+    population: Population | None = None, *, plant_given: bool,
+) -> tuple[Check, ...]:  # fmt: skip
     """Return all of them, in the order of the report."""
     zero_flow, valve = no_flow_at_zero(ramps, compensator, plant_given=plant_given), compensator.valve
     units = valve.recorded_units
@@ -40,6 +42,7 @@ def loop_checks(
         plant_is_the_valve(ramps, valve) if plant_given else stand_in_is_the_recording(ramps, valve),
         zero_flow,
         shut_after_scenarios(scenarios, zero_flow, units, plant_given=plant_given),
+        *([of_population(population, zero_flow, units)] if population else []),
     )
 
 
@@ -205,3 +208,24 @@ def shut_after_scenarios(
     return ZERO_FLOW_AFTER_SCENARIOS.check(
         holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN, text=text, name=_name(ZERO_FLOW_AFTER_SCENARIOS, worst)
     )
+
+
+def of_population(population: Population, zero_flow: Check, units: RecordedUnits) -> Check:
+    """Tell whether any machine drawn from the budget passes flow at zero command."""
+    text = (
+        f"{population.flowing} of {population.machines} machines at {population.pressures} pressure drops each (seed "
+        f"{population.seed}), so with {population.confidence:.0%} confidence fewer than {population.upper_limit:.2g} "
+        "of all machines"
+    )
+    if population.flowing:
+        most = sorted(population.worst.items(), key=lambda item: -abs(item[1]))[:3]
+        at = ", ".join(f"{name} {share:+.2f}" for name, share in most)
+        text += (
+            f"; most {units.text(population.largest_L_min, '.2g L/min')} at "
+            f"{units.text(population.largest_dp_MPa, '.2f MPa')}, by one with {at} of its half-width"
+        )
+    if population.never_open:
+        text += f"; {population.never_open} did not open, so that their closing says nothing"
+    if zero_flow.holds is None:
+        return POPULATION.check(holds=None, text=f"{text}; see the ramps")
+    return POPULATION.check(holds=population.flowing == 0 == population.never_open, text=text)

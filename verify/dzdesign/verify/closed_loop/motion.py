@@ -96,6 +96,15 @@ class Numbers:
     fine: np.ndarray
 
 
+    def driven(self, ratio: float) -> "Numbers":
+        """Return those of the same plant whose PWM has so many times the voltage when it is on."""
+        flat, fine = self.flat.copy(), self.fine.copy()
+        for name, power in (("U_MAX_V", 1), ("PER_SETTLED", -1), ("REACH_M", 1)):
+            flat[NAMED.index(name)] *= ratio**power
+        fine[:, 8:] *= ratio
+        return Numbers(flat, self.coarse * ratio, fine)
+
+
 def numbers_of(plant: Plant, compare_max: int) -> Numbers:
     """Return the numbers of one plant, for a PWM of so many counts."""
     parameters = np.array([getattr(plant, field.name) for field in fields(Plant)], dtype=float)

@@ -91,10 +91,6 @@ class Plant:
         """Return it with oil of so many times the viscosity, with which its damping goes, and density."""
         return replace(self, B_e_N_s_m=self.B_e_N_s_m * viscosity, rho_kg_m3=self.rho_kg_m3 * density)
 
-    def with_coil(self, resistance_ratio: float, voltage_ratio: float) -> "Plant":
-        """Return it with so many times the coil's resistance, and the PWM's voltage when it is on."""
-        return replace(self, R_c_ohm=self.R_c_ohm * resistance_ratio, u_max_V=self.u_max_V * voltage_ratio)
-
     @property
     def fastest_rad_s(self) -> float:
         """Rate of the spool's fastest free motion: against spring and flow force, or against its damping."""

@@ -216,10 +216,16 @@ def readings_off(scene: Scene) -> Iterator[ScenarioResult]:
 
 def _restart(scene: Scene) -> ScenarioResult:
     """The processor is reset while full command is there; judged until the command has been at zero."""
-    full = scene.held(1, 2)
+    full, has_interlock = scene.held(1, 2), scene.compensator.drive_functions.interlock_codes is not None
     run = scene.run(np.concatenate([full, scene.held(0), scene.opened_and_closed()]))
+    # Then it must follow: a drive that never opens would pass.
+    figures = {"flow_after_zero_command_L_min": run.q_mean_L_min[full.size :].max()}
     return scene.result(
-        "restart with full command present", run, judged=slice(full.size), not_required="there is no interlock"
+        "restart with full command present",
+        run,
+        judged=slice(full.size),
+        figures=figures,
+        not_required="" if has_interlock else "there is no interlock",
     )
 
 

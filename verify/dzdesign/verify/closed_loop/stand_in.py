@@ -35,13 +35,11 @@ class StandIn:
     dynamics: Plant
     #: Flow over that of the tests, for oil of another density.
     flow_scale: float = 1.0
-    #: Drive over that of the tests, for another coil or supply.
-    drive_ratio: float = 1.0
 
     @property
     def parameters(self) -> Plant:
         """The plant that moves the spool."""
-        return replace(self.dynamics, u_max_V=self.drive_ratio * self.dynamics.u_max_V)
+        return self.dynamics
 
     @property
     def table(self) -> np.ndarray:
@@ -89,10 +87,6 @@ class StandIn:
         """Return it with oil of so many times the viscosity and density."""
         scale = self.flow_scale / density**0.5
         return replace(self, dynamics=self.dynamics.with_oil(viscosity, density), flow_scale=scale)
-
-    def with_coil(self, resistance_ratio: float, voltage_ratio: float) -> "StandIn":
-        """Return it with so many times the coil's resistance and voltage: its current goes with one over the other."""
-        return replace(self, drive_ratio=self.drive_ratio * voltage_ratio / resistance_ratio)
 
 
 def _first_seen(branch: RecordedBranch, u_max_V: float) -> float:

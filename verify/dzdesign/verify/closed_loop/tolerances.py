@@ -1,9 +1,12 @@
-"""Monte Carlo over the tolerances of a plant: how the compensated valve scatters where no two valves are alike."""
+"""Tolerances: how the plants of a series scatter, and how many machines are drawn from the declared budget.
+
+Of a series: Monte Carlo over the tolerances of a plant, as no two valves are alike. Machines stand in population.py.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +19,7 @@ from dzdesign.verify.closed_loop.plant import Plant, read_parameters
 from dzdesign.verify.loop_results import MonteCarlo, Scatter, Side, Spread
 
 #: Keys of a file of tolerances beside the parameters.
-COUNTS = ("plants", "seed")
+COUNTS = ("plants", "machines", "seed")
 #: Ramps quick enough for hundreds of plants; the lag of a spool is a thousandth of them.
 SEQUENCE = RampSequence(rest=1.0, ramp=10.0, top=0.5)
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
@@ -26,12 +29,14 @@ MOST_PLANTS = 100_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """How the plants of a series scatter."""
+    """How the plants of a series scatter, and how many machines are drawn."""
 
     #: Parameter of `Plant` to its relative spread and the distribution: "uniform" (plus and minus that much) or
-    #: "normal" (its standard deviation).
-    spreads: dict[str, tuple[float, str]]
+    #: "normal" (its standard deviation); without one there is no series.
+    spreads: dict[str, tuple[float, str]] = field(default_factory=dict)
     plants: int = 200
+    #: Drawn from the declared budget, which says how they scatter.
+    machines: int = 0
     seed: int = 1
 
     def draw(self, nominal: Plant) -> list[Plant]:
@@ -51,16 +56,23 @@ class Tolerances:
 
 
 def read_tolerances(path: Path) -> Tolerances:
-    """Read tolerances from TOML: parameters as "3 %" (uniform) or "1 % sd" (normal), ``plants`` and ``seed``."""
+    """Read tolerances from TOML: parameters as "3 %" (uniform) or "1 % sd" (normal), and how many are drawn.
+
+    ``plants`` are those of a series over the parameters, ``machines`` those drawn from the declared budget, which needs
+    no parameter; ``seed`` is of both.
+    """
     values = read_parameters(path, "file of tolerances", COUNTS)
     counts = {name: _count(path, name, values.pop(name)) for name in COUNTS if name in values}
-    if not values:
-        raise InputError(f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\"")
+    if not values and ("plants" in counts or "machines" not in counts):
+        raise InputError(
+            f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\", or machines = 10000 to draw "
+            "machines from the declared budget"
+        )
     return Tolerances(spreads={name: _spread(path, name, value) for name, value in values.items()}, **counts)
 
 
 def _count(path: Path, name: str, value: Any) -> int:
-    least = 1 if name == "plants" else 0
+    least = 0 if name == "seed" else 1
     if type(value) is not int or not least <= value <= MOST_PLANTS:
         raise InputError(f"'{path}': {name} is {quoted(value)}, expected a whole number from {least} to {MOST_PLANTS}")
     return value

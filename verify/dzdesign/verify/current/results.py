@@ -79,6 +79,38 @@ class FaultRun:
         return self.seen_after_s is not None and self.seen_after_s <= self.limit_s and self.latched
 
 
+Flow = Annotated[float, quantity("L/min", "Flow.", ge=-1e6, le=1e6)]
+OpeningShare = Annotated[float, quantity("1", "Of full command.", ge=0, le=1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveAtCorners:
+    """The valve in closed loop at one pressure drop, its current made by every coil at every supply."""
+
+    dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=0, le=1000)]
+    runs: Annotated[Number, about("Coils at a supply: the declared one, and the ends of all ranges.")]
+    opening_least: Annotated[OpeningShare, about("Least dead zone on opening that the compensator leaves.")]
+    opening_largest: Annotated[OpeningShare, about("The largest.")]
+    q_zero_L_min: Annotated[Flow, about("Largest flow at zero command after closing; a leak is in it.")]
+    q_released_L_min: Annotated[
+        Flow, about("Largest flow before the ramp, as the set point steps to the offset when the drive is released.")
+    ]
+    unseen_below_L_min: Annotated[
+        Flow | None,
+        about("Flow below which the recordings show none, so that the plant's is not known; null of a given plant."),
+    ]
+    leak_L_min: Annotated[Flow, about("Flow without any drive, which no compensator can stop.")]
+    allowed_at_zero_L_min: Annotated[
+        Flow | None,
+        about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
+    ]
+
+    @property
+    def q_beyond_L_min(self) -> float:
+        """Flow at zero command beyond what is allowed there."""
+        return self.q_zero_L_min - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentLoopResult:
     """What was found of the current loop: the C by itself, and with the coil at every corner of the declared ranges."""
@@ -95,3 +127,7 @@ class CurrentLoopResult:
         float, quantity("codes", "Largest departure of the mean reading from the set point with them.", ge=0, le=1e6)
     ]
     faults: Annotated[tuple[FaultRun, ...], about("One entry a fault.")]
+    valve: Annotated[
+        tuple[ValveAtCorners, ...],
+        about("The valve behind it, one entry a tested pressure drop; none if the closed loop did not run."),
+    ] = ()

@@ -1,0 +1,80 @@
+"""Valves behind the current loop: how far coil and supply move the dead zone on opening; flow at zero command.
+
+The example, and two valves from elsewhere: their recorded flow, moved by the true current of the declared coil and of
+those at the ends of all ranges, at every tested pressure drop; the example's plant of equations too.
+"""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from scoreboard import Row, print_rows, say
+from stand_in_flow import RECORDINGS, ROOT
+
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.identify.identification import identify
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.verify.closed_loop.firmware_loop import scenes_of
+from dzdesign.verify.closed_loop.plant import Plant, read_plant
+from dzdesign.verify.closed_loop.valve_at_corners import MOST_MOVED, valve_at_corners
+
+CONTROLLED = {
+    "drive": "current",
+    "coil": "3.5 ohm 40 mH",
+    "rated_current": "1 A",
+    "supply": "18..32 V",
+    "current_signal": "0..1.2 A on 2 ohm + 0.15 V",
+}
+FORMS = {"supply unknown": CONTROLLED, "supply measured": CONTROLLED | {"supply_signal": "0..36 V x 0.075"}}
+TARGET = "cortex-m4"
+
+
+def print_current_valve(quick: bool = False, seed: int = 0) -> list[Row]:
+    """Judge each valve with both forms of the loop, print and return the rows."""
+    rows = []
+    inputs = target_named(TARGET).inputs()
+    for name, folder in RECORDINGS.items():
+        if not folder.is_dir():
+            rows.append(Row(what=f"{name}: '{folder}' is not here", value=1, limit=0))
+            continue
+        valve = identify([read_ramp_file(path) for path in sorted(folder.glob("*.csv.gz"))])
+        for form, texts in list(FORMS.items())[: 1 if quick else None]:
+            compensator = design(valve, options_of(texts, inputs))
+            rows += _rows(f"{name}, {form}", compensator, None)
+            if name == "the example":
+                plant = read_plant(ROOT / "examples" / "paper_valve" / "plant.toml")
+                rows += _rows(f"{name}'s plant of equations, {form}", compensator, plant)
+    print_rows("Valves behind the current loop: R x 0.75-1.35, L x 0.5-1.5, 18-32 V", rows)
+    return rows
+
+
+def _rows(name: str, compensator: Compensator, plant: Plant | None) -> list[Row]:
+    say(f"{name} ...")
+    drive = compensator.current_drive
+    if drive is None:
+        raise ValueError("the drive is by duty")
+    with TemporaryDirectory() as temporary:
+        folder = Path(temporary) / "firmware"
+        firmware = generate(compensator, TARGET, to_json_bytes(compensator))
+        write_folder(folder, firmware.files, firmware.manifest)
+        found = [valve_at_corners(scene, drive.circuit) for scene in scenes_of(folder, compensator, plant)]
+    moved = max(found, key=lambda each: each.opening_largest - each.opening_least)
+    closed = max(found, key=lambda each: each.q_beyond_L_min)
+    released = max(found, key=lambda each: each.q_released_L_min)
+    return [
+        Row(what=f"{name}: dead zone on opening moves by", value=100 * (moved.opening_largest - moved.opening_least),
+            limit=100 * MOST_MOVED, unit="%", note=f"{100 * moved.opening_least:.2f} to "
+            f"{100 * moved.opening_largest:.2f} % at {moved.dp_MPa:.1f} MPa, of {len(found)} pressure drops"),
+        Row(what=f"{name}: flow at zero command beyond what is allowed", value=closed.q_beyond_L_min, limit=1e-9,
+            unit="L/min"),
+        Row(what=f"{name}: on release, as the set point steps to the offset", value=released.q_released_L_min,
+            unit="L/min", note="by the current's overshoot, for some ms"),
+    ]  # fmt: skip
+
+
+if __name__ == "__main__":
+    print_current_valve()

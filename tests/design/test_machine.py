@@ -1,0 +1,255 @@
+"""A declared machine: the offset under the band less the budget, at every corner, and what says so can't be edited."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from dzdesign.codegen.project import target_named
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import RuleError, to_json_bytes
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.designing import design
+from dzdesign.design.lot.margins import lot_margins, prove_lot
+from dzdesign.design.lot.setting import lot_setting
+from dzdesign.design.machine.bench_current import check_bench_current, recorded_full_A
+from dzdesign.design.machine.colder_coil import colder_coil
+from dzdesign.design.option_texts import options_of
+from dzdesign.design.redesign_check import prove_certificates, prove_derived
+from tests.support.machine_oracle import worst_margin_mV
+
+TARGET = target_named("f28335").inputs()
+CURRENT = {
+    "drive": "current",
+    "coil": "3.5 ohm 40 mH",
+    "rated_current": "1 A",
+    "supply": "18..32 V",
+    "current_signal": "0..1.2 A on 2 ohm + 0.15 V",
+}
+DECLARED = {
+    "duty": {"coil_temperature": "-20..80 degC", "supply": "18..32 V"},
+    "amplifier": {"amplifier": "1 %"},
+    "current": CURRENT,
+}
+#: Ten times too small, of each key that lowers the offset.
+SMALLER = {
+    "coil_temperature_C": lambda machine: (16.0, 26.0),
+    "supply_V": lambda machine: (23.4, 24.8),
+    "amplifier_error": lambda machine: machine.amplifier_error / 10,
+    "current_error": lambda machine: machine.current_error / 10,
+    "current_rest_error": lambda machine: machine.current_rest_error / 10,
+    "bench_current_error": lambda machine: machine.bench_current_error / 10,
+    "pressure_error_a_MPa": lambda machine: machine.pressure_error_a_MPa / 10,
+    "pressure_error_b_MPa": lambda machine: machine.pressure_error_b_MPa / 10,
+    "bench_pressure_error_MPa": lambda machine: machine.bench_pressure_error_MPa / 10,
+    "pressure_offset_codes": lambda machine: machine.pressure_offset_codes // 10,
+    "pressure_gain_codes": lambda machine: machine.pressure_gain_codes // 10,
+    "pressure_noise_codes": lambda machine: machine.pressure_noise_codes // 10,
+    "oil_error": lambda machine: machine.oil_error / 10,
+    "ageing_error": lambda machine: machine.ageing_error / 10,
+}
+OF_ALL = [name for name in SMALLER if name.startswith(("pressure", "bench_pressure", "oil", "ageing"))]
+#: The sensors ten times as bad as the paper's, so that none hides in the rounding.
+COARSE = {"pressure_error": "1 %", "bench_pressure_error": "0.2 MPa"}
+
+
+def options(texts):
+    return options_of({"accept": "broken-sensor"} | texts, TARGET)
+
+
+@pytest.fixture(scope="module", params=DECLARED)
+def designed(request, example_valve):
+    return design(example_valve, options(DECLARED[request.param] | COARSE))
+
+
+def test_the_offset_is_under_the_bound_at_every_corner(designed):
+    margin = worst_margin_mV(designed, designed.machine, TARGET.converter)
+    assert 0 <= margin < 6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("drive", "key"),
+    [
+        *(("amplifier", key) for key in ["amplifier_error", *OF_ALL]),
+        *(("duty", key) for key in ("coil_temperature_C", "supply_V")),
+        *(("current", key) for key in ("current_error", "current_rest_error", "bench_current_error")),
+    ],
+)
+def test_a_component_ten_times_too_small_is_seen(example_valve, drive, key):
+    chosen = options(DECLARED[drive] | COARSE)
+    truth = chosen.machine
+    wrong = replace(chosen, machine=replace(truth, **{key: SMALLER[key](truth)}))
+    assert worst_margin_mV(design(example_valve, wrong), truth, TARGET.converter) < 0
+
+
+def test_the_offset_of_a_converter_no_longer_lifts_the_law_over_the_bound(example_valve, example_compensator):
+    """15 codes on each pressure channel, nothing else: over the bound of the recording, and under it once declared."""
+    exact = options({"amplifier": "0 %", "oil": "0 %", "ageing": "0 %", "pressure_error": "0 %"}).machine
+    only = replace(exact, bench_pressure_error_MPa=0.0, pressure_gain_codes=0, pressure_noise_codes=0)
+    assert only.pressure_offset_codes == 15
+    assert worst_margin_mV(example_compensator, only, TARGET.converter) < -9
+    declared = design(example_valve, options(DECLARED["amplifier"]))
+    assert worst_margin_mV(declared, only, TARGET.converter) >= 0
+
+
+def test_the_factors_of_the_budget_are_those_of_copper_and_voltage():
+    machine = options(DECLARED["duty"]).machine
+    assert machine.drive_factor(-20.0, 32.0) == Fraction("0.8428") * 24 / 32
+    assert machine.drive_factor(80.0, 18.0) == Fraction("1.2358") * 24 / 18
+    assert machine.least_factor == machine.drive_factor(-20.0, 32.0) * Fraction("0.998") * Fraction("0.995")
+    assert machine.largest_factor == machine.drive_factor(80.0, 18.0) * Fraction("1.002") * Fraction("1.005")
+    warm = replace(machine, bench_coil_C=40.0)
+    assert warm.drive_factor(40.0, 24.0) == 1 and warm.least_factor < machine.least_factor
+
+
+def test_the_bench_is_a_machine_too():
+    """A coil that is always hotter than on the bench raises no offset: the valve may be driven there as well."""
+    machine = options(DECLARED["duty"] | {"coil_temperature": "40..80 degC"}).machine
+    assert machine.least_factors["coil temperature"] == 1
+
+
+def test_the_budget_adds_up_to_the_ceiling(designed):
+    """Where one component counts alone its price is its contribution; together they are at most their sum."""
+    budget = designed.positive.budget
+    assert [budget.line(name) is not None for name in ("oil", "ageing", "recording")] == [True] * 3
+    for at, combined in enumerate(budget.combined_mV):
+        assert 0 < combined <= sum(line.contribution_mV[at] for line in budget.lines) * 1.05 + 50
+    assert all(line.price >= 0 and line.source for line in budget.lines)
+    kinds = {line.component: line.origin for line in budget.lines}
+    assert kinds["recording"] == "measured" and kinds["oil"] == "default" and kinds["pressure sensor A"] == "declared"
+
+
+def test_a_price_is_what_a_design_without_the_component_gains(example_valve):
+    """The price of the oil, by a design in which it is zero: at dP0, where both touch their ceilings."""
+    texts = DECLARED["amplifier"]
+    with_oil, without = (design(example_valve, options(texts | {"oil": oil})) for oil in ("1 %", "0 %"))
+    line = with_oil.positive.budget.line("oil")
+    gained = [
+        high - low
+        for high, low in zip(without.positive.budget.ceiling_V, with_oil.positive.budget.ceiling_V, strict=True)
+    ]
+    assert line.price == pytest.approx(max(gained) / 10, rel=1e-5)
+    assert line.contribution_mV[0] == pytest.approx(line.sensitivity_mV[0] * line.half_width, rel=1e-4)
+
+
+def test_without_a_machine_the_certificate_is_of_the_recording(example_compensator):
+    assert example_compensator.machine is None and example_compensator.certified_of == "the recording"
+    assert {line.component for line in example_compensator.positive.budget.lines} == {
+        "recording",
+        "rounding of pressures",
+        "rounding of the drive",
+    }
+    found = colder_coil(example_compensator, 1)
+    assert found.seen and found.lowered_V == pytest.approx(40 * 0.00393 * 5.0, rel=0.03) and found.flow_L_min > 1
+    assert any("40 K" in line for line in example_compensator.costs)
+
+
+def test_an_edited_machine_or_budget_is_refused(example_valve):
+    made = design(example_valve, options(DECLARED["amplifier"]))
+    prove_derived(made)
+    machine = replace(made, machine=replace(made.machine, ageing_error=0.0001))
+    lines = made.positive.budget.lines
+    cheap = replace(made.positive.budget, lines=(replace(lines[0], price=0.0), *lines[1:]))
+    budget = replace(made, sides=replace(made.sides, positive=replace(made.positive, budget=cheap)))
+    none = replace(made, sides=replace(made.sides, positive=replace(made.positive, budget=None)))
+    for wrong in (machine, budget, none, replace(made, machine=None)):
+        with pytest.raises(InputError):
+            prove_certificates(wrong)
+    # Designed for other words than it states: every number agrees with the machine, and the machine with no option.
+    other = replace(options(DECLARED["amplifier"]), machine=machine.machine)
+    with pytest.raises(InputError):
+        prove_derived(design(example_valve, other))
+
+
+def test_compensator_json_keeps_machine_and_budget(designed):
+    assert read_artefact(to_json_bytes(designed), Compensator, "compensator.json") == designed
+
+
+@pytest.mark.parametrize(
+    ("texts", "flag"),
+    [
+        ({"coil_temperature": "-20..80 degC"}, "--supply"),
+        ({"supply": "18..32 V"}, "--coil-temperature"),
+        ({"bench_coil": "20 degC"}, "--coil-temperature"),
+        ({"bench_supply": "24 V"}, "--supply"),
+        ({"oil": "0.2 %"}, "--oil"),
+        ({"pressure_error": "0.1 %"}, "--pressure-error"),
+        ({"current_error": "1 %"}, "--drive current"),
+        ({"bench_current": "1 A"}, "--drive current"),
+        (CURRENT | {"amplifier": "1 %"}, "--amplifier"),
+        (CURRENT | {"coil_temperature": "-60..150 degC"}, "--coil-temperature"),
+        (DECLARED["duty"] | {"coil_temperature": "80..-20 degC"}, "--coil-temperature"),
+        (DECLARED["duty"] | {"coil_temperature": "20"}, "--coil-temperature"),
+        (DECLARED["duty"] | {"coil_temperature": "-300..80 degC"}, "temperature"),
+        (DECLARED["duty"] | {"supply": "9..32 V"}, "--bench-supply"),
+        (DECLARED["duty"] | {"supply": "0..32 V"}, "--supply"),
+        (DECLARED["duty"] | {"bench_coil": "0..20 degC"}, "--bench-coil"),
+        ({"amplifier": "60 %"}, "--amplifier"),
+        ({"amplifier": "1"}, "--amplifier"),
+        (DECLARED["amplifier"] | {"pressure_converter": "15 codes"}, "--pressure-converter"),
+        (DECLARED["amplifier"] | {"pressure_error": "0.1 % / 1 % / 2 %"}, "--pressure-error"),
+        (DECLARED["amplifier"] | {"bench_pressure_error": "-1 MPa"}, "--bench-pressure-error"),
+        (CURRENT | {"bench_current": "0 A"}, "--bench-current"),
+    ],
+)
+def test_contradictions_are_refused(texts, flag):
+    with pytest.raises(InputError) as caught:
+        options(texts)
+    assert flag in str(caught.value)
+
+
+def test_the_words_are_the_declared_numbers():
+    machine = options(
+        {
+            "coil_temperature": "-4 .. 176 °F",
+            "bench_coil": "25 C",
+            "supply": "9..16 V",
+            "pressure_error": "0.1 % / 0.05 MPa",
+            "bench_pressure_error": "0.3 bar",
+            "pressure_converter": "2 + 5 + 1 codes",
+            "oil": "0.3 %",
+        }
+    ).machine
+    assert machine.coil_temperature_C == (-20.0, 80.0) and machine.bench_coil_C == 25.0
+    assert machine.supply_V == (9.0, 16.0) and machine.bench_supply_V == 12.0
+    assert (machine.pressure_error_a_MPa, machine.pressure_error_b_MPa) == (0.02, 0.05)
+    assert machine.bench_pressure_error_MPa == 0.03 and machine.oil_error == 0.003
+    assert (machine.pressure_offset_codes, machine.pressure_gain_codes, machine.pressure_noise_codes) == (2, 5, 1)
+    assert set(machine.defaults) == {"bench_supply_V", "ageing_error"}
+
+
+def test_the_rated_current_must_be_that_of_full_command(example_valve):
+    by_current = replace(
+        example_valve, recorded_units=RecordedUnits(command=CommandUnit(unit="mA", factor=80.0, declared="0..800 mA"))
+    )
+    signal = replace(example_valve, recorded_units=RecordedUnits(command=CommandUnit(unit="mA", factor=2.0)))
+    assert recorded_full_A(by_current) == pytest.approx(0.8)
+    assert recorded_full_A(signal) is None and recorded_full_A(example_valve) is None
+    check_bench_current(by_current, 0.8, None, 0.01)
+    check_bench_current(example_valve, 1.0, None, 0.01)
+    for valve, declared in ((by_current, None), (example_valve, 1.2)):
+        with pytest.raises(InputError, match="--rated-current"):
+            check_bench_current(valve, 1.0, declared, 0.01)
+
+
+def test_a_machine_of_another_drive_is_no_machine_of_the_compensator(example_compensator):
+    with pytest.raises(RuleError):
+        replace(example_compensator, machine=options(CURRENT).machine)
+
+
+@pytest.mark.slow
+def test_a_lot_setting_is_under_every_bound_less_the_same_machine(example_valve):
+    valves = {"one": example_valve, "two": replace(example_valve, record={"serial": "2"})}
+    machine, recording = (
+        lot_setting({name: design(valve, options(texts)) for name, valve in valves.items()}).compensator
+        for texts in (DECLARED["amplifier"], {})
+    )
+    assert machine.machine.drive == "amplifier"
+    assert worst_margin_mV(machine, machine.machine, TARGET.converter) >= 0
+    assert all(each.margin_V >= 0 for each in lot_margins(machine))
+    prove_derived(machine)
+    with pytest.raises(RequirementError):
+        prove_lot(replace(recording, machine=machine.machine))

@@ -1,0 +1,46 @@
+"""The report's tables on a drive by current."""
+
+from dataclasses import replace
+
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.report.sections.current_loop import current_tables
+from dzdesign.verify.current.results import (
+    ControllerStates,
+    CurrentCorner,
+    CurrentLoopResult,
+    FaultRun,
+    ValveAtCorners,
+)
+
+CORNER = CurrentCorner(
+    resistance_ohm=4.0, inductance_H=0.04, supply_V=24.0, phase_margin_deg=55.0, gain_margin=2.8, limit_cycle_codes=0.3,
+    steady_error_codes=0.02, current_error_codes=0.6, rise_s=0.006, least_rise_s=0.0028, overshoot=0.05, faults=0,
+)  # fmt: skip
+VALVE = ValveAtCorners(
+    dp_MPa=2.0, runs=9, opening_least=0.011, opening_largest=0.0115, q_zero_L_min=0.1, q_released_L_min=0.0,
+    unseen_below_L_min=0.65, leak_L_min=0.0, allowed_at_zero_L_min=None,
+)  # fmt: skip
+RESULT = CurrentLoopResult(
+    states=ControllerStates(states=1000, seed=1, wrong=0, first_wrong=None),
+    seconds=10.0, shares=(0.5, 1.0), not_carried=1,
+    corners=(CORNER, replace(CORNER, rise_s=None, least_rise_s=None, overshoot=None)),
+    offset_codes=(), offset_error_codes=0.0,
+    faults=(FaultRun(name="the wire breaks", expected="OPEN", seen_after_s=None, limit_s=0.04, latched=False),),
+    valve=(VALVE,),
+)  # fmt: skip
+
+
+def texts(table) -> list[list[str]]:
+    return [[getattr(cell, "text", cell) for cell in row] for row in table.rows]
+
+
+def test_every_corner_fault_and_pressure_drop_has_a_row():
+    corners, faults, valve = current_tables(RESULT, AS_COMPUTED)
+    assert [row[-3:] for row in texts(corners)] == [["6.0", "2.8", "5.0"], ["not carried"] * 3]
+    assert texts(faults)[0][1:3] == ["DZ_CURRENT_OPEN", "not seen"] and texts(faults)[0][-1] == "no"
+    assert texts(valve)[0][1:] == ["1.10", "1.15", "below 0.65", "below 0.65"]
+
+
+def test_without_a_closed_loop_there_is_no_valve_and_by_duty_nothing():
+    assert current_tables(replace(RESULT, valve=()), AS_COMPUTED)[-1] is None
+    assert current_tables(None, AS_COMPUTED) == ()

@@ -1,0 +1,259 @@
+"""Machines drawn from the budget: none flows under the right budget, and every one that is too small is caught."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.errors import InputError
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.verify.closed_loop import population as population_module
+from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, drawn_machine, worst_ends
+from dzdesign.verify.closed_loop.firmware_loop import scenes_of
+from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
+from dzdesign.verify.closed_loop.loop_checks import of_population
+from dzdesign.verify.closed_loop.plant import Plant, read_plant
+from dzdesign.verify.closed_loop.population import draw, run_population, threshold_band, upper_limit
+from dzdesign.verify.closed_loop.scene import PERIODS, ramp
+from dzdesign.verify.closed_loop.stand_in import stand_in_of
+from dzdesign.verify.closed_loop.tolerances import Tolerances, read_tolerances
+from dzdesign.verify.requirements import ZERO_FLOW
+from dzdesign.verify.verification import verify
+from tests.support.synthetic import needs_compiler
+
+pytestmark = needs_compiler
+#: The coil and the supply of the issue; and an amplifier, with nothing else than what a test is about.
+DUTY = {"coil_temperature": "-20..80 degC", "supply": "18..32 V", "bench_supply": "24 V"}
+LITTLE = {
+    "amplifier": "1 %", "pressure_error": "0 %", "bench_pressure_error": "0 MPa", "oil": "0 %", "ageing": "0 %",
+    "pressure_converter": "0 + 0 + 1 codes",
+}  # fmt: skip
+
+
+def designed(valve, folder, **options):
+    compensator = design(valve, options_of(options, target_named("f28335").inputs()))
+    made = generate(compensator, "f28335")
+    write_folder(folder, made.files, made.manifest)
+    return compensator
+
+
+@pytest.fixture(scope="module")
+def duty(example_valve, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("population") / "fw"
+    return scenes_of(folder, designed(example_valve, folder, **DUTY), None)
+
+
+# --- what is drawn --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("flowing", "machines"), [(0, 10_000), (1, 200), (17, 500)])
+def test_the_upper_limit_is_where_so_few_or_fewer_have_a_chance_of_5_percent(flowing, machines):
+    assert binom.cdf(flowing, machines, upper_limit(flowing, machines)) == pytest.approx(0.05, rel=1e-6)
+
+
+def test_components_are_drawn_evenly_and_the_first_of_more_are_the_same():
+    worst = np.full(len(COMPONENTS), 0.25)
+    many = draw(20_000, 3, worst)
+    assert np.array_equal(many[:7], draw(7, 3, worst)) and not np.array_equal(many[:7], draw(7, 4, worst))
+    assert np.abs(many).max() <= 1 and np.abs(many.mean(axis=0)).max() < 0.02
+    assert many.std(axis=0) == pytest.approx(np.full(len(COMPONENTS), 3**-0.5), rel=0.02)
+    alone = draw(100, 3, worst, {"supply"})
+    kept = [name != "supply" for name in COMPONENTS]
+    assert np.all(alone[:, kept] == 0.25) and np.ptp(alone[:, COMPONENTS.index("supply")]) > 1.5
+
+
+def test_a_drive_is_that_of_a_plant_with_another_voltage(example_valve):
+    """The numbers of a plant multiplied, against those made of another plant."""
+    for plant in (Plant(), stand_in_of(example_valve.positive, 10.0)):
+        command = RampSequence(rest=0.2, ramp=3.0, top=0.3).command()
+        scaled = ClosedLoop(plant).with_drive(1.21).run(command, 2.0)
+        if isinstance(plant, Plant):
+            made = ClosedLoop(replace(plant, u_max_V=12.1)).run(command, 2.0)
+            assert np.abs(scaled.q_L_min - made.q_L_min).max() < 1e-9
+        usual = ClosedLoop(plant).run(np.minimum(1.21 * command, 1.0), 2.0)
+        assert np.abs(scaled.q_mean_L_min - usual.q_mean_L_min)[command < 0.8].max() < 0.05
+
+
+def test_the_corner_that_is_called_worst_is(duty):
+    """Turning any component round from there never brings the valve nearer to flow."""
+    scene = duty[2]
+    machine, worst = scene.compensator.machine, worst_ends(scene)
+    command = np.concatenate([ramp(0, 1, 0.5), ramp(1, 0, 0.5), np.zeros(1000)])
+
+    def flow(shares):
+        each = drawn_machine(scene, machine, shares, 0)
+        added = each.added_V - each.threshold * 0.02 + 0.3
+        run = each.loop.run(
+            command, scene.dp_MPa, "compensated", back_MPa=1.0, added_V=added, errors=each.errors,
+            periods_per_record=PERIODS,
+        )  # fmt: skip
+        return run.q_mean_L_min[-200:].mean()
+
+    most = flow(worst)
+    assert most > 0.1
+    for place, name in enumerate(COMPONENTS):
+        turned = worst.copy()
+        turned[place] *= -1
+        assert flow(turned) <= most + 1e-3, name
+
+
+# --- the right budget -----------------------------------------------------------------------------------------------
+
+
+def test_no_machine_of_the_right_budget_flows_not_even_where_all_is_at_its_worst(duty, wording):
+    found = run_population(duty, 150, 1)
+    assert (found.flowing, found.never_open, found.pressures) == (0, 0, 11)
+    assert found.upper_limit == pytest.approx(1 - 0.05 ** (1 / 150), rel=1e-9)
+    check = of_population(found, ZERO_FLOW.check(holds=True, text=""), duty[0].units)
+    assert check.holds
+    wording.of_test(check.text)
+    cornered = run_population(duty, 4, 1, drawn=())
+    assert (cornered.flowing, cornered.never_open) == (0, 0)
+
+
+def test_the_worst_corner_is_near_the_edge(duty, monkeypatch):
+    """25 mV of the valve more than the budget has, and every machine of the corner flows."""
+    monkeypatch.setattr(
+        population_module, "drawn_machine", lambda *given: replace(drawn_machine(*given), added_V=0.025)
+    )
+    found = run_population(duty, 4, 1, drawn=())
+    assert found.flowing == 4
+
+
+def test_the_threshold_may_come_down_to_its_certified_bound(duty):
+    band = threshold_band(duty[0], [scene.dp_MPa for scene in duty])
+    bounds = duty[0].compensator.valve.positive.certified["closing"]
+    tested = np.array([scene.dp_MPa for scene in duty])
+    closing = np.interp(tested, band.dp_MPa, band.closing_V)
+    assert closing - band.half_width_V(tested) == pytest.approx(np.array(bounds.u_lower_V), abs=1e-6)
+    begins = [test.recorded.falling.u_V[1] for test in duty[0].compensator.valve.positive.tests]
+    assert closing == pytest.approx(np.array(begins), abs=2e-3)
+
+
+def test_a_quick_closing_ends_where_a_slow_one_does(duty):
+    """A sample of machines that flow, closed in 100 s: the same flow at zero command.
+
+    A tenth of a code of the pressure drop decides between two drives, hence the hundredth of a litre.
+    """
+    scene = duty[-1]
+    machine, shares = scene.compensator.machine, draw(12, 5, worst_ends(scene))
+    openings = population_module.Openings.of(1)
+    slow = RampSequence(rest=0.5, top=0.5).command()
+    flowing = 0
+    for index, each_shares in enumerate(shares):
+        each = drawn_machine(scene, machine, each_shares, index)
+        quiet = replace(each.errors, noise_codes=(0, 0, 0))
+        flows = [
+            each.loop.run(command, scene.dp_MPa, "compensated", added_V=2.4, errors=quiet).q_mean_L_min[-1]
+            for command in (openings.command, slow)
+        ]
+        assert flows[0] == pytest.approx(flows[1], abs=0.01)
+        flowing += flows[1] > 0.1
+    assert flowing >= 3
+
+
+def test_a_plant_of_equations_is_drawn_too(example_valve, example_folder, tmp_path):
+    plant = read_plant(example_folder / "plant.toml")
+    scenes = scenes_of(tmp_path / "fw", designed(example_valve, tmp_path / "fw", amplifier="2 %"), plant)
+    assert run_population(scenes, 20, 1).flowing == 0
+    short = scenes_of(tmp_path / "short", designed(example_valve, tmp_path / "short", amplifier="0.2 %"), plant)
+    wrong = [replace(each, compensator=scenes[0].compensator) for each in short]
+    assert run_population(wrong, 40, 1).flowing > 0
+
+
+# --- a budget that is too small -------------------------------------------------------------------------------------
+
+
+def caught(valve, folder, true, wrong, *drawn, machines=60, change=lambda valve: valve):
+    """How many machines of the true budget flow with a firmware that was designed for a wrong one."""
+    compensator = designed(valve, folder / "true", **true)
+    right = scenes_of(folder / "true", compensator, None)
+    assert run_population(right, machines, 2, drawn=drawn or COMPONENTS).flowing == 0
+    designed(change(valve), folder / "wrong", **(true | wrong))
+    scenes = scenes_of(folder / "wrong", compensator, None)
+    return run_population(scenes, machines, 2, drawn=drawn or COMPONENTS)
+
+
+def test_the_largest_component_ten_times_too_small_fails_the_population(example_valve, tmp_path, wording):
+    found = caught(example_valve, tmp_path, DUTY, {"supply": "23.4..24.8 V"})
+    assert found.flowing > 5 and found.largest_L_min > 1
+    check = of_population(found, ZERO_FLOW.check(holds=True, text=""), example_valve.recorded_units)
+    assert check.holds is False
+    wording.of_test(check.text)
+
+
+#: Component that is drawn -> what is declared of it, and a tenth of that.
+IN_TURN = {
+    "coil temperature": (DUTY, {"coil_temperature": "16..26 degC"}),
+    "supply": (DUTY, {"supply": "23.4..24.8 V"}),
+    "current": (LITTLE, {"amplifier": "0.1 %"}),
+    "pressure sensor A": (LITTLE | {"pressure_error": "2 % / 0 %"}, {"pressure_error": "0.2 % / 0 %"}),
+    "pressure sensor B": (LITTLE | {"pressure_error": "0 % / 2 %"}, {"pressure_error": "0 % / 0.2 %"}),
+    "bench pressure drop": (LITTLE | {"bench_pressure_error": "0.4 MPa"}, {"bench_pressure_error": "0.04 MPa"}),
+    "offset of converter A": (
+        LITTLE | {"pressure_converter": "60 + 0 + 1 codes"}, {"pressure_converter": "6 + 0 + 1 codes"},
+    ),
+    "gain of converter A": (
+        LITTLE | {"pressure_converter": "0 + 300 + 1 codes"}, {"pressure_converter": "0 + 30 + 1 codes"},
+    ),
+    "oil": (LITTLE | {"oil": "1 %"}, {"oil": "0.1 %"}),
+    "ageing": (LITTLE | {"ageing": "1 %"}, {"ageing": "0.1 %"}),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("component", IN_TURN)
+def test_each_component_ten_times_too_small_fails_with_the_others_at_their_worst(example_valve, tmp_path, component):
+    true, wrong = IN_TURN[component]
+    found = caught(example_valve, tmp_path, true, wrong, component, machines=40)
+    assert found.drawn == (component,) and 0 < found.flowing < 40
+
+
+def test_a_recording_that_is_called_ten_times_too_good_fails(example_valve, tmp_path):
+    """The certified bound moved up by nine tenths of its least distance to the threshold."""
+
+    def called_better(valve):
+        curve = valve.positive.certified["closing"]
+        by = 0.9 * min(u - low for u, low in zip(curve.u_threshold_V, curve.u_lower_V, strict=True))
+        moved = replace(
+            curve,
+            u_lower_V=tuple(low + by for low in curve.u_lower_V),
+            offset_V=tuple(low + by for low in curve.offset_V),
+            u_min0_V=curve.u_min0_V + by,
+        )
+        certified = {**valve.positive.certified, "closing": moved}
+        tests = tuple(replace(each, u_guard_lower_V=each.u_guard_lower_V + by) for each in valve.positive.tests)
+        return replace(valve, sides={"positive": replace(valve.positive, certified=certified, tests=tests)})
+
+    found = caught(example_valve, tmp_path, LITTLE, {}, "recording", change=called_better)
+    assert found.flowing > 0
+
+
+# --- how it is asked for --------------------------------------------------------------------------------------------
+
+
+def test_machines_need_no_plant_and_no_parameter(tmp_path, example_folder):
+    assert read_tolerances(example_folder / "machines.toml") == Tolerances(machines=10_000, seed=1)
+    path = tmp_path / "t.toml"
+    path.write_text("machines = 12\nseed = 3")
+    assert read_tolerances(path) == Tolerances(machines=12, seed=3)
+
+
+def test_machines_of_an_undeclared_machine_are_refused(example_valve, tmp_path, wording):
+    designed(example_valve, tmp_path / "fw")
+    with wording.refusal(InputError):
+        verify(tmp_path / "fw", tolerances=Tolerances(machines=10))
+
+
+@pytest.mark.slow
+def test_the_evidence_has_the_population(example_valve, tmp_path):
+    designed(example_valve, tmp_path / "fw", **DUTY)
+    quick = RampSequence(rest=0.5, ramp=4.0, top=0.5)
+    found = verify(tmp_path / "fw", sequence=quick, tolerances=Tolerances(machines=20)).evidence
+    assert found.population.machines == 20 and found.population.flowing == 0
+    checks = {check.id: check for check in found.checks}
+    assert checks["population"].holds and checks["zero-flow-after-scenarios"].holds
