@@ -76,17 +76,15 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     """Return what the drive functions need."""
     functions, bipolar = compensator.drive_functions, compensator.negative is not None
     found = [_fault_samples(compensator)]
-    interlock = functions.interlock_codes is not None
-    if interlock:
+    if functions.interlock_codes is not None:
         found.append(_interlock(compensator))
-    if bipolar or functions.has_ramp or compensator.zero_band_codes or interlock:
-        found.append(
-            Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
-                     equation="Eq. (29), code of zero command",
-                     engineering=compensator.valve.recorded_units.text(0.0, "g V"),
-                     rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
-                     generator=SIGNALS)
-        )  # fmt: skip
+    found.append(
+        Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
+                 equation="Eq. (29), code of zero command",
+                 engineering=compensator.valve.recorded_units.text(0.0, "g V"),
+                 rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
+                 generator=SIGNALS)
+    )  # fmt: skip
     if compensator.zero_band_codes:
         found.append(_zero_band(compensator))
     if bipolar or compensator.zero_band_codes:
