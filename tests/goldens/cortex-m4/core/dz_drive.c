@@ -62,12 +62,10 @@ static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
     return ((at_rest | in_band) & stays) | (gone & 1u);
 }
 
-/* The code that the law is given. */
-static uint16_t code_at(uint32_t at_rest, uint16_t code)
+/* The command that the law is given: codes past the zero band, none at rest. */
+static uint32_t past_band(uint32_t at_rest, int32_t towards)
 {
-    const uint32_t awake = at_rest - 1u; /* all ones, or 0 */
-
-    return (uint16_t)((code & awake) | ((uint32_t)COMMAND_ZERO & ~awake));
+    return (uint32_t)(towards - ZERO_BAND) & (at_rest - 1u);
 }
 
 void dz_drive_init(struct dz_drive *drive)
@@ -100,16 +98,14 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     const uint32_t gone = unsound(sound);
     const int32_t command = asked;
     const uint32_t at_rest = rest(drive->at_rest, command, gone);
-    const uint16_t u_law = code_at(at_rest, u_adc);
+    const uint32_t past = past_band(at_rest, command);
     uint32_t held;
-    uint16_t p_a;
 
     drive->sound_commands = (uint16_t)sound;
     drive->at_rest = (uint16_t)at_rest;
     held = held_pressures(drive, status);
-    p_a = (uint16_t)(p_a_adc | (held >> 16)); /* no sensor's code: the smallest beta */
     drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD));
-    drive->law = (uint16_t)(dz_comp(u_law, p_a, p_b_adc) & ~gone);
+    drive->law = (uint16_t)(dz_comp_checked(past, p_a_adc, p_b_adc, held) & ~gone);
 }
 
 void dz_drive_tick(struct dz_drive *drive)

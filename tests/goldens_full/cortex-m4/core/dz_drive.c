@@ -121,12 +121,10 @@ static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
     return ((at_rest | in_band) & stays) | (gone & 1u);
 }
 
-/* The code that the law is given. */
-static uint16_t code_at(uint32_t at_rest, uint16_t code)
+/* The command that the law is given: codes past the zero band, none at rest. */
+static uint32_t past_band(uint32_t at_rest, int32_t towards)
 {
-    const uint32_t awake = at_rest - 1u; /* all ones, or 0 */
-
-    return (uint16_t)((code & awake) | ((uint32_t)COMMAND_ZERO & ~awake));
+    return (uint32_t)(towards - ZERO_BAND) & (at_rest - 1u);
 }
 
 void dz_drive_init(struct dz_drive *drive)
@@ -160,12 +158,10 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     const uint32_t gone = unsound(sound);
     const int32_t ramped = (gone != 0u) ? 0 : ramp(drive->ramped, asked * RAMP_UNIT);
     const int32_t command = ramped / RAMP_UNIT;
-    const int32_t code = COMMAND_ZERO + command;
-    const uint16_t u_ramped = (uint16_t)code; /* between zero and a valid code, so a code itself */
+    int32_t away;
+    uint32_t past;
     uint32_t at_rest;
-    uint16_t u_law;
     uint32_t held;
-    uint16_t p_a;
 
     drive->sound_commands = (uint16_t)sound;
     drive->faulty_commands = (uint16_t)(faulty & gone);
@@ -179,20 +175,20 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     } else {
         /* about zero: the side stays, so that noise does not throw the spool to and fro */
     }
-    at_rest = rest(drive->at_rest, (drive->side < 0) ? -command : command, gone);
-    u_law = code_at(at_rest, u_ramped);
+    away = (drive->side < 0) ? -command : command;
+    at_rest = rest(drive->at_rest, away, gone);
+    past = past_band(at_rest, away);
     drive->at_rest = (uint16_t)at_rest;
     if (drive->side < 0) {
         status = dz_status_negative(u_adc, p_a_adc, p_b_adc);
     }
     held = held_pressures(drive, status);
-    p_a = (uint16_t)(p_a_adc | (held >> 16)); /* no sensor's code: the smallest beta */
     drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD) |
                                ((latched(drive->faulty_commands) | latched(drive->faulty_pressures)) & DZ_STATUS_LATCHED));
     if (drive->side > 0) {
-        drive->law = dz_comp(u_law, p_a, p_b_adc);
+        drive->law = (uint16_t)dz_comp_checked(past, p_a_adc, p_b_adc, held);
     } else if (drive->side < 0) {
-        drive->law = dz_comp_negative(u_law, p_a, p_b_adc);
+        drive->law = (uint16_t)dz_comp_checked_negative(past, p_a_adc, p_b_adc, held);
     } else {
         drive->law = 0u;
     }
