@@ -177,7 +177,7 @@ SEEDED = {
     "pressure B's bit is no fault": (
         "DZ_STATUS_PRESSURE_B | ", ""),
     "an implausible difference is no fault": (
-        " | DZ_STATUS_DIFFERENCE)", ")"),
+        " | DZ_STATUS_DIFFERENCE);", ");"),
     "the law takes the pressures again": (
         "p_b_adc, held)", "p_b_adc, all_ones(status & 14u))"),
     "the status is silent": (

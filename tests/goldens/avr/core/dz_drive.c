@@ -44,7 +44,8 @@ static uint32_t too_few(uint32_t valid)
 /* All ones as long as the pressures are not to be used, for the status of a new sample. */
 static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
 {
-    const uint32_t fault = all_ones(status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE));
+    const uint32_t wrong = status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE);
+    const uint32_t fault = ((wrong - 1u) >> 31) - 1u; /* all ones, or 0 */
     const uint32_t valid = valid_samples(drive->valid_pressures, fault);
     const uint32_t held = too_few(valid);
 
@@ -105,7 +106,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     drive->at_rest = (uint16_t)at_rest;
     held = held_pressures(drive, status);
     drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD));
-    drive->law = (uint16_t)(dz_comp_checked(past, p_a_adc, p_b_adc, held) & ~gone);
+    drive->law = (uint16_t)(dz_comp_checked(past, p_a_adc, p_b_adc, held) & ~(gone >> 16)); /* of 16 bits */
 }
 
 void dz_drive_tick(struct dz_drive *drive)

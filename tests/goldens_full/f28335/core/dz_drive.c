@@ -101,7 +101,8 @@ static uint32_t latched(uint32_t faulty)
 /* All ones as long as the pressures are not to be used, for the status of a new sample. */
 static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
 {
-    const uint32_t fault = all_ones(status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE));
+    const uint32_t wrong = status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE);
+    const uint32_t fault = ((wrong - 1u) >> 31) - 1u; /* all ones, or 0 */
     const uint32_t faulty = faulty_samples(drive->faulty_pressures, fault);
     const uint32_t valid = valid_samples(drive->valid_pressures, fault | latched(faulty));
     const uint32_t held = too_few(valid);
