@@ -247,25 +247,16 @@ static uint32_t zero_beta(uint32_t row, uint32_t dp)
 
 /* ---- the law ---- */
 
-uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+/* The law of a command, codes past the zero band; `failed` is all ones for pressures that are
+ * not to be used, else 0. */
+static inline uint32_t law_of(uint32_t towards, uint32_t difference, uint32_t failed)
 {
-    const uint32_t u = u_adc;
-    const uint32_t p_a = p_a_adc;
-    const uint32_t p_b = p_b_adc;
-    /* The command, in codes from zero on; 0 where it is not valid. */
-    const uint32_t let_go = invalid_command(u);
-    const uint32_t from_zero = (uint32_t)((uint32_t)(u - COMMAND_ZERO) & (uint32_t)~let_go);
-    /* What of it lies past the zero band; 0 within. */
-    const uint32_t from_band = (uint32_t)(from_zero - ZERO_BAND);
-    const uint32_t towards = (uint32_t)(from_band & (uint32_t)~below_zero(from_band));
     const uint32_t past = towards;
     /* What of that lies in the transition, and the command that the law is given. */
     const uint32_t from_end = (uint32_t)(past - TRANSITION_CODES);
     const uint32_t reached = (uint32_t)(TRANSITION_CODES + (from_end & below_zero(from_end)));
     const uint32_t command = ((uint32_t)past << TRANSITION_SHIFT) + ((uint32_t)ZERO_BAND * reached);
     /* The pressure drop, and the segment it lies in. */
-    const uint32_t difference = pressure_difference(p_a, p_b);
-    const uint32_t failed = failed_pressures(p_a, p_b, difference);
     const uint32_t dp = pressure_drop(difference, failed);
     const uint32_t row = row_of(dp, failed);
     /* The law. Below 2^31 (proved when this was generated). */
@@ -287,7 +278,29 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     /* quotient / 2047 */
     const uint32_t compare = (uint32_t)(((uint64_t)quotient * RECIPROCAL) >> RECIPROCAL_SHIFT);
 
-    return (uint16_t)((uint16_t)compare & (uint16_t)~let_go);
+    return (uint32_t)compare;
+}
+
+uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    const uint32_t u = u_adc;
+    const uint32_t p_a = p_a_adc;
+    const uint32_t p_b = p_b_adc;
+    /* The command, in codes from zero on; 0 where it is not valid. */
+    const uint32_t let_go = invalid_command(u);
+    const uint32_t from_zero = (uint32_t)((uint32_t)(u - COMMAND_ZERO) & (uint32_t)~let_go);
+    /* What of it lies past the zero band; 0 within. */
+    const uint32_t from_band = (uint32_t)(from_zero - ZERO_BAND);
+    const uint32_t towards = (uint32_t)(from_band & (uint32_t)~below_zero(from_band));
+    const uint32_t difference = pressure_difference(p_a, p_b);
+    const uint32_t failed = failed_pressures(p_a, p_b, difference);
+
+    return (uint16_t)(law_of(towards, difference, failed) & (uint32_t)~let_go);
+}
+
+uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed)
+{
+    return law_of((uint32_t)command, pressure_difference(p_a_adc, p_b_adc), (uint32_t)failed);
 }
 
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
