@@ -10,12 +10,18 @@ from dzdesign.design.designing import design
 from dzdesign.example import example_folder
 from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.valve.model import ValveModel
+
+
+def example_valve() -> ValveModel:
+    """Return the bundled example, identified."""
+    ramps = example_folder() / "ramps"
+    return identify([read_ramp_file(ramp) for ramp in sorted(ramps.glob("*.csv.gz"))])
 
 
 def example_firmware(folder: Path, target: str = "f28335") -> Compensator:
     """Write the example's firmware to `folder` and return what it was made from."""
-    ramps = example_folder() / "ramps"
-    compensator = design(identify([read_ramp_file(ramp) for ramp in sorted(ramps.glob("*.csv.gz"))]))
+    compensator = design(example_valve())
     firmware = generate(compensator, target, to_json_bytes(compensator))
     write_folder(folder, firmware.files, firmware.manifest)
     return compensator

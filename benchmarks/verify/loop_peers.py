@@ -53,11 +53,12 @@ def core_of(firmware: Path) -> Core:
     library = load_library({**sources, "core.c": EXTERNAL}, "the core")
     library.dz_comp.restype = ctypes.c_uint16
     signals = read_artefact((firmware / "compensator.json").read_bytes(), Compensator, "compensator.json").signals
-    code_max = signals.code_max
+    ends = [(each.zero_code, each.full_code) for each in (signals.command, signals.pressure_a, signals.pressure_b)]
 
     def codes(command, dp_MPa, round_down):
         span = float(signals.pressure_a.span_MPa)
-        return tuple(round_down(share * code_max) for share in (command, (dp_MPa + 1.0) / span, 1.0 / span))
+        shares = (command, (dp_MPa + 1.0) / span, 1.0 / span)
+        return tuple(round_down(low + share * (high - low)) for share, (low, high) in zip(shares, ends, strict=True))
 
     return Core(
         lambda *codes: library.dz_comp(*map(ctypes.c_uint16, codes)),

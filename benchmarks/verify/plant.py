@@ -146,14 +146,28 @@ def _by_cvodes(plant: Plant, duties: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-def _monte_carlo(core: Core, firmware: Path, compensator: Compensator, quick: bool, seed: int) -> list[Row]:
-    """Time 200 plants: one after another, two at a time, and as CasADi's fold.map."""
+def _plants(seed: int) -> list[Plant]:
+    """Return the plants of the series."""
     rng = np.random.default_rng(seed)
     varied = ("preload_N", "K_et_N_m", "B_e_N_s_m", "C_d_W_mm", "rho_kg_m3")
-    plants = [replace(NONLINEAR, **{name: getattr(NONLINEAR, name) * (1 + SPREAD * (2 * rng.random() - 1))
-                                    for name in varied}) for _ in range(PLANTS)]  # fmt: skip
-    command = _ramp(RAMP_S, RECORD_S)
+    return [replace(NONLINEAR, **{name: getattr(NONLINEAR, name) * (1 + SPREAD * (2 * rng.random() - 1))
+                                  for name in varied}) for _ in range(PLANTS)]  # fmt: skip
 
+
+def fold_map_speed(core: Core, quick: bool, seed: int) -> float:
+    """Return how many times real time CasADi's fold.map runs a series of plants."""
+    say("plant: CasADi fold.map")
+    count = 500
+    fold = sample_function(core).fold(count).map(PLANTS)
+    given = np.repeat(np.stack([numbers(plant) for plant in _plants(seed)], axis=1), count, axis=1)
+    commands = np.tile(_ramp(RAMP_S, SAMPLE_S)[None, 50000:50000 + count], PLANTS)
+    taken = _least(lambda: fold(np.zeros((4, PLANTS)), commands, given), 1 if quick else 3)
+    return PLANTS * count * SAMPLE_S / taken
+
+
+def _monte_carlo(core: Core, firmware: Path, compensator: Compensator, quick: bool, seed: int) -> list[Row]:
+    """Time 200 plants: one after another, two at a time, and as CasADi's fold.map."""
+    plants, command = _plants(seed), _ramp(RAMP_S, RECORD_S)
     loop = ClosedLoop(NONLINEAR, firmware, compensator)
 
     def one(plant: Plant) -> float:
@@ -166,13 +180,7 @@ def _monte_carlo(core: Core, firmware: Path, compensator: Compensator, quick: bo
     repeats = 1 if quick else 3
     single, double = _least(lambda: list(map(one, plants)), repeats), _least(both, repeats)
     ours = PLANTS * RAMP_S / single
-    say("plant: CasADi fold.map")
-    count = 500
-    fold = sample_function(core).fold(count).map(PLANTS)
-    given = np.repeat(np.stack([numbers(plant) for plant in plants], axis=1), count, axis=1)
-    commands = np.tile(_ramp(RAMP_S, SAMPLE_S)[None, 50000:50000 + count], PLANTS)
-    taken = _least(lambda: fold(np.zeros((4, PLANTS)), commands, given), 1 if quick else 3)
-    theirs = PLANTS * count * SAMPLE_S / taken
+    theirs = fold_map_speed(core, quick, seed)
     return [
         Row(what="200 plants: times real time, one core", value=ours, note=f"each {RAMP_S:g} s, built and run"),
         Row(what="200 plants: CasADi fold.map", value=theirs, note="times real time"),

@@ -11,12 +11,14 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
     os.environ.setdefault(_threads, "1")  # before NumPy is imported: ratios of one core
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
 
+from above_tests import print_above  # noqa: E402
 from all_inputs import print_inputs  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
 from current_valve import print_current_valve  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from plant import print_plant  # noqa: E402
+from population import print_population  # noqa: E402
 from proof_of_c import print_proof  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 from stand_in_flow import print_stand_in  # noqa: E402
@@ -24,12 +26,14 @@ from stand_in_flow import print_stand_in  # noqa: E402
 PARTS = {
     "inputs": (print_inputs, 101),
     "plant": (print_plant, 303),
+    "population": (print_population, 1),
     "stand-in": (print_stand_in, 0),
     "hysteresis": (print_hysteresis, 404),
     "mutants": (print_mutants, 202),
     "proof": (print_proof, 0),
     "current": (print_current_loop, 0),
     "current-valve": (print_current_valve, 0),
+    "above": (print_above, 0),
 }
 
 

@@ -145,7 +145,7 @@ class TestEditedCompensators:
             ("dp_MPa", [[0, 1], [20, 1]], "certificate says dp_MPa = 0 to 20, but"),
             ("smallest_margin_V", [1, 1], "certificate says smallest_margin_V = 1, but"),
             ("confidence", 0.999, "certificate says confidence = 0.999, but 0.99 follows"),
-            ("guard", "mean", "follows from its valve"),
+            ("guard", "mean", "certificate does not hold"),
         ],
     )
     def test_a_certificate_that_does_not_follow(self, refused, key, value, words):

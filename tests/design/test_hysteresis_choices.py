@@ -1,5 +1,7 @@
 """The table of what each way with the hysteresis leaves."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -50,7 +52,8 @@ def test_the_dead_zone_between_the_tests_counts():
     middle = [test.dp_MPa for test in valve.positive.tests]
     knees = [test.u_knee_rising_V for test in valve.positive.tests]
     found = []
-    for code in range(205, 1024):  # 1 to 5 MPa of 20
+    first, last = (round(made_off.signals.dp_code(Fraction(dp))) for dp in (1, 5))
+    for code in range(first, last + 1):
         knee = np.interp(float(made_off.signals.dp_MPa(code)), middle, knees) / 10
         found.append(corners_of(made_off, code, 1).command_at(knee))
     assert off.onset == pytest.approx(max(found), abs=1e-3) and off.onset > 1.1 * at_tests

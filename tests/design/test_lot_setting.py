@@ -11,7 +11,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.beta_table import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
-from dzdesign.design.lot.setting import _limit, lot_setting
+from dzdesign.design.lot.setting import lot_setting
 from dzdesign.design.machine.allowance import allowance_of
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
@@ -98,7 +98,7 @@ def test_the_doubles_find_the_exact_limit(falling, rising):
         places = [Fraction(number, 64) for number in range(1, 400)]
         places += [node + tiny for node in curve.dp_MPa for tiny in (-Fraction(1, 10**6), 0, Fraction(1, 10**6))]
         exact = [min(value for value in (curve.at(dp), curve.bound(dp)) if value is not None) for dp in places]
-        found = _limit(curve, np.array([float(dp) for dp in places]))
+        found = curve.in_doubles(np.array([float(dp) for dp in places]))
         np.testing.assert_allclose(found, [float(value) for value in exact], atol=1e-9)
 
 

@@ -8,12 +8,14 @@ import pytest
 from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import RuleError, to_json_bytes
+from dzdesign.core.dither import Dither, DrivenDither
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.lot.margins import lot_margins, prove_lot
 from dzdesign.design.lot.setting import lot_setting
+from dzdesign.design.machine.allowance import dither_reserve
 from dzdesign.design.machine.bench_current import check_bench_current, recorded_full_A
 from dzdesign.design.machine.colder_coil import colder_coil
 from dzdesign.design.option_texts import options_of
@@ -162,6 +164,22 @@ def test_an_edited_machine_or_budget_is_refused(example_valve):
     other = replace(options(DECLARED["amplifier"]), machine=machine.machine)
     with pytest.raises(InputError):
         prove_derived(design(example_valve, other))
+
+
+def test_a_table_edited_beyond_the_tests_is_refused(example_valve):
+    """Sensors that read 5 MPa as 5.2 take the law there: its table is part of the certificate too."""
+    made = design(example_valve, options(DECLARED["amplifier"] | {"transition": "off"}))
+    node = int(made.signals.dp_code(Fraction(5))) // made.beta_step_codes + 2
+    table = tuple(made.positive.beta[0] if place == node else each for place, each in enumerate(made.positive.beta))
+    with pytest.raises(InputError):
+        prove_certificates(replace(made, sides=replace(made.sides, positive=replace(made.positive, beta=table))))
+
+
+def test_a_recorded_dither_is_stronger_where_a_drive_gives_more_current():
+    machine, recorded = options(DECLARED["duty"]).machine, Dither(frequency_Hz=125.0, peak=0.01)
+    driven = DrivenDither(counts=600, compare_max=60000, frequency_Hz=Fraction(125))
+    assert dither_reserve(driven, recorded) == 0 and dither_reserve(driven, None, machine) == 600
+    assert dither_reserve(driven, recorded, machine) == pytest.approx(600 * (1 - machine.least_factor), abs=1)
 
 
 def test_compensator_json_keeps_machine_and_budget(designed):

@@ -7,14 +7,19 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from math import ceil, floor
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
 from dzdesign.design.machine.allowance import Allowance
+from dzdesign.design.offset.above_tests import AboveChoice, OffsetAbove
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.certified_bound import CertifiedBound
+from dzdesign.identify.valve.certified_bound import CertifiedBound, NEAR_MPa
+
+if TYPE_CHECKING:
+    import cvxpy as cp
 
 #: Pressure codes between neighbouring nodes: a power of two, so that the firmware finds a node by a shift.
 STEP_CODES = 64
@@ -22,6 +27,8 @@ STEP_CODES = 64
 DECIMALS = Fraction(1, 10**6)
 #: Distance kept from the bounds for the LP solver's tolerance; the exact proof below does not rely on it.
 SOLVER_MARGIN = 1e-7
+#: Worth of a code above the tests beside one of a tested pressure drop.
+WORTH_ABOVE = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,13 +53,17 @@ class OffsetCurve:
     certified: CertifiedBound | None
     #: Up to this dP0 the offset is at most the one there, as Eq. (7) holds beta = 1; None follows the tests.
     hold_below_MPa: Fraction | None
+    #: How it goes on above the tests; None: the last offset is held, and nothing is certified.
+    above: OffsetAbove | None = None
 
     def at(self, dp_MPa: Fraction) -> Fraction:
         """Return the offset in V by the selector of Eq. (7).
 
         For dP <= dP0 the paper holds beta = 1; where the threshold grows with dP that would over-compensate, so there
-        the smaller of the two is taken. Outside the tested interval the nearest node is held.
+        the smaller of the two is taken. Below the tested interval the first node is held.
         """
+        if self.above is not None and dp_MPa > self.dp_MPa[-1]:
+            return self.above.at(dp_MPa)
         value = self._straight(dp_MPa)
         if self.hold_below_MPa is not None and dp_MPa <= self.hold_below_MPa:
             value = min(value, self._straight(self.hold_below_MPa))
@@ -69,8 +80,24 @@ class OffsetCurve:
         return offset[right - 1] + share * (offset[right] - offset[right - 1])
 
     def bound(self, dp_MPa: Fraction) -> Fraction | None:
-        """Return the lower bound of the guarded threshold at dP in V, or None outside the tested interval."""
+        """Return the lower bound of the guarded threshold at dP in V, or None where nothing is certified."""
+        if self.above is not None and dp_MPa > self.dp_MPa[-1]:
+            return self.above.bound_at(dp_MPa)
         return None if self.certified is None else self.certified.at(dp_MPa)
+
+    def in_doubles(self, dp_MPa: np.ndarray) -> np.ndarray:
+        """Return the offset in double precision, V, and where a bound is certified the lower of both.
+
+        The pressure drops rise.
+        """
+        nodes, offset = (np.array([float(value) for value in values]) for values in (self.dp_MPa, self.offset_V))
+        value: np.ndarray = np.interp(dp_MPa, nodes, offset)
+        if self.above is not None:
+            value = np.where(dp_MPa > nodes[-1], self.above.in_doubles(dp_MPa), value)
+        if self.hold_below_MPa is not None:
+            hold = float(self.hold_below_MPa)
+            value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
+        return value if self.certified is None else np.minimum(value, self.certified.in_doubles(dp_MPa))
 
 
 @lru_cache(maxsize=8)
@@ -137,8 +164,22 @@ def _least_of_windows(values: Sequence[Fraction], width: int) -> list[Fraction]:
     return found
 
 
+def _with_release(ceiling: OffsetCeiling, least: Fraction, above: AboveChoice) -> OffsetCeiling:
+    """Return a ceiling that above the tests leaves room for the least offset, and for no other where it is let go."""
+    limit, released_from = list(ceiling.limit), above.released_from(ceiling.certified)
+    for code in range(ceiling.certified.stop, len(limit)):
+        limit[code] = least if released_from is not None and code >= released_from else max(limit[code], least)
+    return OffsetCeiling(limit=tuple(limit), certified=ceiling.certified)
+
+
 def choose_beta_table(
-    ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, *, denominator: int, above_one: bool
+    ceiling: OffsetCeiling,
+    u_min0: Fraction,
+    trend: str | None,
+    *,
+    denominator: int,
+    above_one: bool,
+    above: AboveChoice | None = None,
 ) -> tuple[int, ...]:
     """Choose the nodes of beta that give the largest offset under the ceiling: a linear programme, then integers.
 
@@ -154,6 +195,9 @@ def choose_beta_table(
         Of the nodes.
     above_one : bool
         Whether beta may exceed 1: where the threshold grows with dP, or the tests below dP0 are followed.
+    above : AboveChoice, optional
+        What is to happen above the tests: there beta falls, whatever the trend, and what it has at the tests comes
+        first. Without it the trend goes on to the last code.
 
     Returns
     -------
@@ -163,6 +207,8 @@ def choose_beta_table(
     import cvxpy as cp
     from scipy.sparse import csr_array
 
+    if above is not None:
+        ceiling = _with_release(ceiling, u_min0 / denominator, above)
     codes = np.arange(len(ceiling.limit))
     index, share = codes // STEP_CODES, (codes % STEP_CODES) / STEP_CODES
     size = int(index[-1]) + 2
@@ -173,27 +219,40 @@ def choose_beta_table(
     limit = np.array([float(value / u_min0) for value in ceiling.limit]) - SOLVER_MARGIN
     beta = cp.Variable(size)
     constraints = [weights @ beta <= limit, beta <= (2 - 2 / denominator if above_one else 1)]
-    if trend == "decreasing":
-        constraints.append(cp.diff(beta) <= 0)
-    elif trend == "increasing":
-        constraints.append(cp.diff(beta) >= 0)
-    else:
-        constraints.append(cp.diff(beta) == 0)
-    problem = cp.Problem(cp.Maximize(cp.sum(weights @ beta) + beta[-1]), constraints)
+    last, worth = size - 1, np.ones(codes.size)
+    if above is not None:
+        last = min((ceiling.certified.stop - 1) // STEP_CODES, size - 1)
+        worth[ceiling.certified.stop :] = WORTH_ABOVE
+    constraints += _one_way(beta, trend, last)
+    problem = cp.Problem(cp.Maximize(worth @ (weights @ beta) + worth[-1] * beta[-1]), constraints)
     problem.solve(solver=cp.HIGHS)  # a simplex ends in a vertex: no interior-point fuzz to round away
     if problem.status != cp.OPTIMAL:
         raise RequirementError(f"no table of beta lies under the certified offset (solver: {problem.status})")
     # A thousandth of a count, so that a beta of 1 to within the solver's error stays 1.
-    nodes = [int(np.floor(value * denominator + 1e-3)) for value in beta.value]
+    nodes = [max(int(np.floor(value * denominator + 1e-3)), 1) for value in beta.value]
     # Rounding down keeps the direction; a last node above its neighbour by the solver's error is put right.
     for position in range(1, size):
-        if trend != "increasing":
+        if trend != "increasing" or position > last + 1:
             nodes[position] = min(nodes[position], nodes[position - 1])
-    return _lower_until_proved(nodes, ceiling, u_min0, trend, denominator)
+    return _lower_until_proved(nodes, ceiling, u_min0, trend, denominator, last)
+
+
+def _one_way(beta: "cp.Variable", trend: str | None, last: int) -> list["cp.Constraint"]:
+    """Return that beta runs the way of the trend up to the node `last`, and falls behind it.
+
+    The tests end between that node and the next, which lies above them: where they rise it may be either way.
+    """
+    import cvxpy as cp
+
+    steps = cp.diff(beta[: last + 1]) if last else np.zeros(1)
+    of_trend = {"decreasing": steps <= 0, "increasing": steps >= 0}.get(trend or "", steps == 0)
+    falls_from = last + 1 if trend == "increasing" else last
+    found = [of_trend] if last else []
+    return [*found, cp.diff(beta[falls_from:]) <= 0] if falls_from + 1 < beta.size else found
 
 
 def _lower_until_proved(
-    nodes: list[int], ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, denominator: int
+    nodes: list[int], ceiling: OffsetCeiling, u_min0: Fraction, trend: str | None, denominator: int, last: int
 ) -> tuple[int, ...]:
     """Lower nodes by single counts until every code is proved, in exact arithmetic, to lie under the ceiling."""
     scale = denominator * STEP_CODES
@@ -204,10 +263,8 @@ def _lower_until_proved(
             nodes[high] -= 1
             if nodes[high] <= 0:
                 raise RequirementError("no positive offset lies under the certified one; check valve.json")
-    order = range(len(nodes) - 1, 0, -1) if trend == "increasing" else range(1, len(nodes))
-    for position in order:
-        if trend == "increasing":
-            nodes[position - 1] = min(nodes[position - 1], nodes[position])
-        else:
-            nodes[position] = min(nodes[position], nodes[position - 1])
+    for position in range(last, 0, -1) if trend == "increasing" else ():
+        nodes[position - 1] = min(nodes[position - 1], nodes[position])
+    for position in range(last + 2 if trend == "increasing" else 1, len(nodes)):
+        nodes[position] = min(nodes[position], nodes[position - 1])
     return tuple(nodes)

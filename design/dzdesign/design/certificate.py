@@ -12,6 +12,7 @@ from dzdesign.core.worded import in_units
 from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.accounting import budget_of
+from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.side_law import Certificate
 from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
@@ -39,14 +40,18 @@ def certify(
     table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
     refused.
     """
+    margin = _smallest_margin(ceiling, table, u_min0, denominator)
     losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
+    holds_to, released_from = _above(curve, ceiling, signals, table, u_min0 / denominator)
     return Certificate(
         confidence=side.certificate.confidence,
         guard=guard,
         level_L_min=side.certificate.level_L_min,
         zero_flow_L_min=side.zero_flow_L_min,
         dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]),
-        smallest_margin_V=_smallest_margin(ceiling, table, u_min0, denominator) * u_max_V,
+        holds_to_MPa=holds_to,
+        released_from_MPa=released_from,
+        smallest_margin_V=margin * u_max_V,
         mean_loss_V=round(sum(losses) / len(losses), LOSS_DIGITS),
         largest_loss_V=round(max(losses), LOSS_DIGITS),
     )
@@ -61,7 +66,8 @@ def prove_certificates(compensator: Compensator) -> None:
         if model is None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
         stated = law.certificate
-        curve = guarded_curve(model, stated.guard, compensator.below_dp0)
+        above = AboveChoice(choice=compensator.above, step_codes=STEP_CODES)
+        curve = guarded_curve(model, stated.guard, compensator.below_dp0, above)
         allowance = compensator.allowance(sign)
         ceiling = offset_ceiling(curve, compensator.u_max_V, allowance)
         try:
@@ -98,8 +104,11 @@ def _words(value: object) -> str:
     return f"{float(value):.6g}" if isinstance(value, Fraction) else str(value)
 
 
-def guarded_curve(side: SideModel, guard: str, below_dp0: str) -> OffsetCurve:
-    """Return the certified offset of the threshold that is to be guarded, or say what to do if there is none."""
+def guarded_curve(side: SideModel, guard: str, below_dp0: str, above: AboveChoice | None = None) -> OffsetCurve:
+    """Return the certified offset of the threshold that is to be guarded, or say what to do if there is none.
+
+    Without a choice `above` the tests the last offset is held there.
+    """
     if not side.curve.dp_MPa:
         raise InputError(
             "the valve was identified without a pressure drop, so no offset can be certified at any pressure; "
@@ -111,6 +120,7 @@ def guarded_curve(side: SideModel, guard: str, below_dp0: str) -> OffsetCurve:
         offset_V=tuple(Fraction(repr(value)) for value in curve.offset_V),
         certified=curve.bound(side.trend or "flat"),
         hold_below_MPa=hold_below(side, below_dp0),
+        above=above.of(curve) if above else None,
     )
 
 
@@ -142,17 +152,49 @@ def _remedy(side: SideModel, guard: str) -> str:
 
 
 def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int) -> Fraction:
-    """Return the least distance over u_max between ceiling and offset on the certified codes; never negative."""
+    """Return the least distance over u_max between ceiling and offset on the certified codes.
+
+    On no code it is negative: those outside the tests may be read at a tested pressure drop.
+    """
     scale = denominator * STEP_CODES
     margins = []
-    for code in ceiling.certified or range(len(ceiling.limit)):
+    for code, limit in enumerate(ceiling.limit):
         index, share = divmod(code, STEP_CODES)
         beta = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, scale)
-        margins.append(ceiling.limit[code] - beta * u_min0)
-    smallest = min(margins)
-    if smallest < 0:
-        raise RequirementError(f"the offset exceeds the certified one by {float(-smallest):.2e} of u_max")
-    return smallest
+        margins.append(limit - beta * u_min0)
+    if min(margins) < 0:
+        raise RequirementError(f"the offset exceeds the certified one by {float(-min(margins)):.2e} of u_max")
+    return min(margins[code] for code in ceiling.certified or range(len(margins)))
+
+
+def _above(
+    curve: OffsetCurve, ceiling: OffsetCeiling, signals: Signals, table: tuple[int, ...], unit: Fraction
+) -> tuple[Fraction, Fraction | None]:
+    """Return up to which pressure drop the certificate holds, and from which on the offset is let go, MPa.
+
+    Above the tests it holds as far as the continued bound does, code by code, and where the drive is zero whatever the
+    threshold. An offset that is let go is one `unit` of beta over u_max; another one above the ceiling is refused.
+    """
+    tests_end = curve.dp_MPa[-1]
+    if curve.above is None:
+        return tests_end, None
+    holds_to, released_from, holds = tests_end, None, curve.above.certified
+    for code in range(ceiling.certified.stop, len(ceiling.limit)):
+        index, share = divmod(code, STEP_CODES)
+        offset = unit * Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
+        limit, here = ceiling.limit[code], max(signals.dp_MPa(code), tests_end)
+        if offset > max(limit, unit):
+            raise RequirementError(
+                f"the offset at {float(here):.3f} MPa, above the tests, exceeds the continued bound by "
+                f"{float(offset - limit):.2e} of u_max"
+            )
+        holds = holds and (offset <= limit or offset * signals.compare_max < Fraction(1, 2))
+        holds_to = here if holds else holds_to
+        if offset > unit:
+            released_from = None
+        elif released_from is None:
+            released_from = here
+    return holds_to, released_from
 
 
 def _losses_V(

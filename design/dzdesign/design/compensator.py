@@ -15,7 +15,7 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
 from dzdesign.design.current.drive import CurrentDrive
-from dzdesign.design.design_choices import BelowDp0
+from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
@@ -47,6 +47,13 @@ class Compensator(ShownInNotebooks, Artefact):
     ]
     law: Annotated[str, Meta(description="paper (Eq. 18), or target (meets Eq. 16).")]
     below_dp0: Annotated[BelowDp0, Meta(description="For dP <= dP0 hold beta = 1, or follow the tests there.")] = "hold"
+    above: Annotated[
+        Above,
+        Meta(
+            description="Above the last test hold its offset, lower it with the continued bound of valve.json, or let "
+            "it go. Of one test, hold in place of lower."
+        ),
+    ] = "lower"
     u_max_V: Annotated[Fraction, quantity("V", "Full command.")]
     signals: Annotated[Signals, Meta(description="Scalings of command, pressures and compare value.")]
     beta_denominator: Annotated[int, Meta(description="Unit of the nodes of beta, a power of two.", ge=1, le=2**30)]

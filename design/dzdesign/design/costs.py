@@ -7,6 +7,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.machine.costs import machine_costs
+from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.design.signal_descriptions import unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.reading_flow import default_reading_flow
@@ -22,13 +23,10 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
         lines += lines_of_tests(compensator, sign)
         lines += [label + line for line in machine_costs(compensator, sign)]
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
-    low, high = (float(end) for end in compensator.positive.certificate.dp_MPa)
     units = valve.recorded_units
-    first, last = units.number(low, ".2f MPa"), units.text(high, ".2f MPa")
-    beyond = f"outside {first} to {last}" if high > low else f"at any pressure drop but {last}"
     lines.append(
-        f"{beyond} the nearest tested beta is held and nothing is certified; "
         f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
+        + (", which leaves no offset" if compensator.positive.certificate.released_from_MPa is not None else "")
     )
     if compensator.reading_flow_L_min < (least := default_reading_flow(valve)):
         lines.append(
@@ -81,6 +79,8 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
             "where it opens, so flow at zero command is possible"
         )
     certificate = compensator.side(sign).certificate
+    lines.append(below_in_words(certificate, side, units.of_side(SIDE_NAMES[sign])))
+    lines.append(above_in_words(compensator.above, certificate, side, units.of_side(SIDE_NAMES[sign])))
     if compensator.machine is None:  # else the budget says more
         lines.append(
             f"the table's offset stays {units.text(1e3 * certificate.mean_loss_V, '.2f mV')} under the certified curve "

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
 BelowDp0 = Literal["hold", "extend"]
 BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
+#: What to do above the last tested pressure drop: hold its offset, lower it with the continued bound, or let it go.
+Above = Literal["hold", "lower", "release"]
+ABOVE: tuple[Above, ...] = get_args(Above)
 POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")
 HYSTERESIS = ("keep", "play")
 ON_OFF = ("on", "off")
@@ -39,6 +42,9 @@ class DesignChoices(MachineChoices, CurrentChoices):
     codes count as zero, the zero band (default: the target's converter)."""
     below_dp0: Annotated[Text, Option("B", LAW, "hold", choices=BELOW_DP0)] = None
     """Below dP0: hold beta = 1 as the paper does, or extend it to the tests there."""
+    above: Annotated[Text, Option("A", LAW, "lower", choices=ABOVE)] = None
+    """Above the highest tested pressure drop: hold the offset (not certified there), lower it with the bound that the
+    curve's premise continues, or release it: the dead zone comes back."""
     reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min")] = None
     """Flow at which dead zones are read beside the onset (default: the meter's floor, or the noise level of a meter
     without one)."""

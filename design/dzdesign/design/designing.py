@@ -10,28 +10,28 @@ from dzdesign.core.worded import errors_in, worded
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
-from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling
+from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, choose_beta_table, offset_ceiling
 from dzdesign.design.broken_sensor import ACCEPTED, refuse_hidden_failures
-from dzdesign.design.certificate import certify, guarded_curve, hold_below
+from dzdesign.design.certificate import certify, guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.bench_current import check_bench_current
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.opening import opening_ceiling, opening_offset
+from dzdesign.design.offset.refusals import refuse_crossed_branches, refuse_two_signs
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
 from dzdesign.design.quantise import Units, finest_units, fits
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.reading_flow import default_reading_flow
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
-#: Standard errors by which the transition's end stands above the opening threshold.
-OPENING_ERRORS = 3
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
@@ -67,7 +67,7 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
-        _refuse_two_signs(valve, options.guard)
+        refuse_two_signs(valve, options.guard)
     functions = options.drive_functions(transition_codes)
     dither = functions.dither(signals)
     dither.check(valve.dither)
@@ -84,6 +84,7 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
         options=request.options if request else None,
         law=options.law,
         below_dp0=options.below_dp0,
+        above=options.above,
         signals=signals,
         u_max_V=u_max,
         sides=Sides(positive=laws[1], negative=laws.get(-1)),
@@ -153,12 +154,14 @@ def _side_law(
     """Choose the coefficients and tables of one side, and prove its certificate."""
     signals = options.signals
     if "branch-order" not in options.accept:
-        _refuse_crossed_branches(side)
-    certified = guarded_curve(side, options.guard, options.below_dp0)
-    opening = _opening_curve(side, options) if transition_codes else None
+        refuse_crossed_branches(side)
+    above = AboveChoice(choice=options.above, step_codes=STEP_CODES)
+    certified = guarded_curve(side, options.guard, options.below_dp0, above)
+    opening = opening_offset(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))
     ceiling = offset_ceiling(certified, u_max, allowance)
-    if min(ceiling.limit) <= 0:
+    tested, goes_on = ceiling.certified, certified.above is not None
+    if min(ceiling.limit[: tested.stop] if goes_on else ceiling.limit) <= 0:
         raise InputError(
             "dither and declared machine leave no offset under the certified one; make the dither smaller, declare "
             "narrower ranges, or control the current"
@@ -176,13 +179,27 @@ def _side_law(
         )
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
 
-    def table(under: OffsetCeiling) -> tuple[int, ...]:
-        return choose_beta_table(under, u_min0, side.trend, denominator=units.beta, above_one=above_one)
+    def table(under: OffsetCeiling, beyond: AboveChoice) -> tuple[int, ...]:
+        return choose_beta_table(
+            under,
+            u_min0,
+            side.trend,
+            denominator=units.beta,
+            above_one=above_one,
+            above=beyond if goes_on else None,
+        )
 
-    beta = table(ceiling)
+    beta = table(ceiling, above)
     transition_beta = None
     if opening is not None:
-        upper = table(_opening_ceiling(opening, signals, u_max, allowance.sign))
+        released_from = above.released_from(tested) if goes_on else None
+        upper = table(
+            opening_ceiling(
+                opening, certified, tested, released_from=released_from, signals=signals, u_max=u_max,
+                sign=allowance.sign,
+            ),
+            AboveChoice(choice="lower", step_codes=STEP_CODES),
+        )
         transition_beta = tuple(map(max, upper, beta))
     return SideLaw(
         drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
@@ -202,69 +219,6 @@ def _side_law(
         ),
         budget=budget_of(side, certified, u_max, allowance, options.guard, options.machine),
     )
-
-
-def _refuse_crossed_branches(side: SideModel) -> None:
-    """Refuse knees in an order that no valve has: the guarded one is not where the valve closes."""
-    for test in side.tests:
-        if test.closes_above_opening:
-            raise InputError(
-                worded(
-                    "'{source}': the valve closes ({closes:.3f V}) above where it opens ({opens:.3f V}), as no valve "
-                    "does, so flow at zero command is possible; run `identify` again with the meter's true "
-                    "--meter-lag or a right column of time, or take it as it is by --accept branch-order",
-                    source=test.source,
-                    closes=test.u_knee_falling_V,
-                    opens=test.u_knee_rising_V,
-                )
-            )
-
-
-def _refuse_two_signs(valve: ValveModel, guard: str) -> None:
-    """Refuse a command of both signs where a side was not tested, or does not bound the guarded threshold."""
-    if "negative" not in valve.sides:
-        raise InputError(
-            "the command has both signs, but the valve's negative side was not tested; record its ramps, or give a "
-            "command of one sign"
-        )
-    guards = {name: valve.sides[name].certified for name in ("positive", "negative")}
-    lacking = [name for name, found in guards.items() if guard not in found]
-    if not lacking:
-        return
-    common = [name for name in GUARDS if all(name in found for found in guards.values())]
-    raise InputError(
-        f"the {' and the '.join(lacking)} side's ramp tests do not bound the {guard} threshold, which is to be "
-        "guarded; "
-        + (f"take --guard {common[0]}, or " if common else "no guard serves both sides: ")
-        + "record both branches of both sides"
-    )
-
-
-def _opening_curve(side: SideModel, options: DesignOptions) -> OffsetCurve:
-    """Return where the transition ends and the law goes on: the opening threshold, and its error on top.
-
-    A law that starts above the threshold only shortens the dead zone that is left; one that starts below lengthens it.
-    """
-    opening = side.opening_curve
-    if opening is None:
-        raise InputError(
-            "a transition ends at the opening threshold, of which valve.json has no curve; record the rising branch "
-            "with a column of dP, make valve.json again, or give --transition off"
-        )
-    error = max(opening.u_se_V)
-    offset = [Fraction(repr(value)) + OPENING_ERRORS * Fraction(repr(error)) for value in opening.u_V]
-    return OffsetCurve(
-        dp_MPa=tuple(Fraction(repr(value)) for value in opening.dp_MPa),
-        offset_V=tuple(offset),
-        certified=None,
-        hold_below_MPa=hold_below(side, options.below_dp0),
-    )
-
-
-def _opening_ceiling(opening: OffsetCurve, signals: Signals, u_max: Fraction, sign: int) -> OffsetCeiling:
-    """Return the opening threshold at every pressure code: no bound, so rounding to codes does not count."""
-    codes = range(signals.largest_difference(sign) + 1)
-    return OffsetCeiling(limit=tuple(opening.at(signals.dp_MPa(code)) / u_max for code in codes), certified=range(0))
 
 
 def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:

@@ -17,6 +17,7 @@ from dzdesign.design.design_choices import (
     NEGATIVE_DP,
     ON_OFF,
     POLARITIES,
+    Above,
     BelowDp0,
     DesignRequest,
 )
@@ -81,6 +82,7 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         signals=signals,
         guard=cast(Guard, text["guard"]),
         below_dp0=cast(BelowDp0, text["below_dp0"]),
+        above=cast(Above, text["above"]),
         transition=_transition(text["transition"]),
         command_error=command_error_of(text["command_error"], converter, command),
         ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),

@@ -7,7 +7,7 @@ from math import ceil, floor
 from dzdesign.core.dither import HIGHEST_HZ, LARGEST_PEAK, LOWEST_HZ
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.current.drive import CurrentDrive, CurrentRequest, design_current_drive
-from dzdesign.design.design_choices import BELOW_DP0, BelowDp0, DesignRequest
+from dzdesign.design.design_choices import ABOVE, BELOW_DP0, Above, BelowDp0, DesignRequest
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES, RAMP_UNIT, DriveFunctions
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.signals import Signals
@@ -45,6 +45,8 @@ class DesignOptions:
         falling branch was recorded is refused unless "opening" is asked for.
     below_dp0 : {"hold", "extend"}
         For dP <= dP0 hold beta = 1 (the paper, Eq. 7), or follow the tests there, beta above 1.
+    above : {"hold", "lower", "release"}
+        Above the highest tested pressure drop hold the offset, lower it with the continued bound, or let it go.
     transition : Fraction or None
         Share of full command over which, behind the zero band, the drive runs from the closing to the opening
         threshold; 0: none, and no zero band either; None: `TRANSITION`, or as many codes as the noise wants.
@@ -83,6 +85,7 @@ class DesignOptions:
     signals: Signals = field(default_factory=Signals)
     guard: Guard = "closing"
     below_dp0: BelowDp0 = "hold"
+    above: Above = "lower"
     transition: Fraction | None = None
     command_error: CommandError | None = None
     ramp_up_s: tuple[float, float] = (0.0, 0.0)
@@ -105,6 +108,7 @@ class DesignOptions:
         for what, given, known in (
             ("guard", self.guard, GUARDS),
             ("choice below dP0", self.below_dp0, BELOW_DP0),
+            ("choice above the tests", self.above, ABOVE),
         ):
             if given not in known:
                 raise InputError(

@@ -36,6 +36,22 @@ class Certificate:
         ),
     ] | None
     dp_MPa: Annotated[tuple[Fraction, Fraction], quantity("MPa", "Interval of the pressure drop on which it holds.")]
+    holds_to_MPa: Annotated[
+        Fraction,
+        quantity(
+            "MPa",
+            "Pressure drop up to which it holds if the curve's premise holds above the tests too; the end of `dp_MPa` "
+            "where nothing is certified above.",
+        ),
+    ]
+    released_from_MPa: Annotated[
+        Fraction | None,
+        quantity(
+            "MPa",
+            "Pressure drop from which on the offset is let go: beta is one unit of the table, and the dead zone is "
+            "back. Null: nowhere in the sensors' range.",
+        ),
+    ]
     smallest_margin_V: Annotated[
         Fraction, quantity("V", "Smallest distance from the offset to the lower bound, over all those codes.")
     ]

@@ -215,7 +215,8 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     for line in (*(f"warning: {line}" for line in hidden), *lines):
         put_line(console, line)
     print_costs_at_tests(compensator, console)
-    print_budgets(compensator, console)
+    if compensator.machine is not None:
+        print_budgets(compensator, console)
     for line in compensator.costs:
         if line not in elsewhere:
             put_line(console, f"cost: {line}")

@@ -10,10 +10,11 @@ from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.worded import all_of, worded
 from dzdesign.identify.constants import L_MIN, MPA
 from dzdesign.identify.data_quality.side_warnings import find_warnings
-from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds, opening_curve
+from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.guarded_thresholds import Guarding, guard_thresholds
 from dzdesign.identify.fitting.identifying import identify_curve
+from dzdesign.identify.fitting.opening import opening_curve
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps

@@ -25,9 +25,8 @@ from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve import estimated_curvature
-from dzdesign.identify.valve.certified_bound import CertifiedBound
+from dzdesign.identify.valve.certified_bound import CertifiedBound, largest_excess
 from dzdesign.identify.valve.estimated_curvature import second_differences
-from dzdesign.identify.valve.guard_curve import largest_excess
 from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp

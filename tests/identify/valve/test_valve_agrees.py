@@ -54,9 +54,15 @@ class TestPremise:
         document = deepcopy(smooth)
         curve = side_of(document)["certified"]["closing"]
         assert max(curve["curvature_V_MPa2"]) > 0
+        above = curve["above"]
+        start = above["slope_from_MPa"]
+        bends = [above["curvature_V_MPa2"] / 2 * (dp - above["dp_MPa"][0]) * (dp - start) for dp in above["dp_MPa"]]
         curve["curvature_V_MPa2"] = [0.0] * 4
         assert "estimated" in refused(document)
         curve["curvature_is"] = "declared"
+        assert "above the tests" in refused(document)
+        above["curvature_V_MPa2"] = 0.0
+        above["u_lower_V"] = [lower + bend for lower, bend in zip(above["u_lower_V"], bends, strict=True)]
         read(document)  # what was declared stands in no recording
 
     def test_a_declared_curvature_is_one(self, smooth):

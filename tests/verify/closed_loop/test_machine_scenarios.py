@@ -113,7 +113,7 @@ def test_errors_of_the_converter_reach_the_core(firmware, example_compensator):
     for errors in (
         ReadingErrors(offset_codes=(0.0, 40.0, 0.0)),
         ReadingErrors(gain_codes=(0.0, 0.0, 100.0)),
-        ReadingErrors(offset_codes=(25.0, -40.0, 7.0), gain_codes=(0.0, 80.0, 0.0)),
+        ReadingErrors(offset_codes=(15.0, -40.0, 7.0), gain_codes=(0.0, 80.0, 0.0)),
     ):
         wrong = [
             int((code + 0.5) * (1 + gain / signals.code_max) + offset)

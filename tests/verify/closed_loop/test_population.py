@@ -5,12 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import binom
+from small_budgets import DUTY, IN_TURN, LARGEST, LITTLE, called_ten_times_better, designed, right_and_wrong
 
-from dzdesign.codegen.project import generate, target_named
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
 from dzdesign.verify.closed_loop import population as population_module
 from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, drawn_machine, worst_ends
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
@@ -26,21 +23,6 @@ from dzdesign.verify.verification import verify
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
-#: The coil and the supply of the issue; and an amplifier, with nothing else than what a test is about.
-DUTY = {"coil_temperature": "-20..80 degC", "supply": "18..32 V", "bench_supply": "24 V"}
-LITTLE = {
-    "amplifier": "1 %", "pressure_error": "0 %", "bench_pressure_error": "0 MPa", "oil": "0 %", "ageing": "0 %",
-    "pressure_converter": "0 + 0 + 1 codes",
-}  # fmt: skip
-
-
-def designed(valve, folder, **options):
-    compensator = design(valve, options_of(options, target_named("f28335").inputs()))
-    made = generate(compensator, "f28335")
-    write_folder(folder, made.files, made.manifest)
-    return compensator
-
-
 @pytest.fixture(scope="module")
 def duty(example_valve, tmp_path_factory):
     folder = tmp_path_factory.mktemp("population") / "fw"
@@ -168,41 +150,19 @@ def test_a_plant_of_equations_is_drawn_too(example_valve, example_folder, tmp_pa
 # --- a budget that is too small -------------------------------------------------------------------------------------
 
 
-def caught(valve, folder, true, wrong, *drawn, machines=60, change=lambda valve: valve):
-    """How many machines of the true budget flow with a firmware that was designed for a wrong one."""
-    compensator = designed(valve, folder / "true", **true)
-    right = scenes_of(folder / "true", compensator, None)
-    assert run_population(right, machines, 2, drawn=drawn or COMPONENTS).flowing == 0
-    designed(change(valve), folder / "wrong", **(true | wrong))
-    scenes = scenes_of(folder / "wrong", compensator, None)
-    return run_population(scenes, machines, 2, drawn=drawn or COMPONENTS)
+def caught(valve, folder, true, wrong, *drawn, **more):
+    """The machines of the true budget with a firmware that was designed for a wrong one; with its own none flows."""
+    right, short = right_and_wrong(valve, folder, true, wrong, *drawn, **more)
+    assert (right.flowing, right.never_open) == (0, 0)
+    return short
 
 
 def test_the_largest_component_ten_times_too_small_fails_the_population(example_valve, tmp_path, wording):
-    found = caught(example_valve, tmp_path, DUTY, {"supply": "23.4..24.8 V"})
+    found = caught(example_valve, tmp_path, *LARGEST, machines=60)
     assert found.flowing > 5 and found.largest_L_min > 1
     check = of_population(found, ZERO_FLOW.check(holds=True, text=""), example_valve.recorded_units)
     assert check.holds is False
     wording.of_test(check.text)
-
-
-#: Component that is drawn -> what is declared of it, and a tenth of that.
-IN_TURN = {
-    "coil temperature": (DUTY, {"coil_temperature": "16..26 degC"}),
-    "supply": (DUTY, {"supply": "23.4..24.8 V"}),
-    "current": (LITTLE, {"amplifier": "0.1 %"}),
-    "pressure sensor A": (LITTLE | {"pressure_error": "2 % / 0 %"}, {"pressure_error": "0.2 % / 0 %"}),
-    "pressure sensor B": (LITTLE | {"pressure_error": "0 % / 2 %"}, {"pressure_error": "0 % / 0.2 %"}),
-    "bench pressure drop": (LITTLE | {"bench_pressure_error": "0.4 MPa"}, {"bench_pressure_error": "0.04 MPa"}),
-    "offset of converter A": (
-        LITTLE | {"pressure_converter": "60 + 0 + 1 codes"}, {"pressure_converter": "6 + 0 + 1 codes"},
-    ),
-    "gain of converter A": (
-        LITTLE | {"pressure_converter": "0 + 300 + 1 codes"}, {"pressure_converter": "0 + 30 + 1 codes"},
-    ),
-    "oil": (LITTLE | {"oil": "1 %"}, {"oil": "0.1 %"}),
-    "ageing": (LITTLE | {"ageing": "1 %"}, {"ageing": "0.1 %"}),
-}  # fmt: skip
 
 
 @pytest.mark.slow
@@ -214,22 +174,7 @@ def test_each_component_ten_times_too_small_fails_with_the_others_at_their_worst
 
 
 def test_a_recording_that_is_called_ten_times_too_good_fails(example_valve, tmp_path):
-    """The certified bound moved up by nine tenths of its least distance to the threshold."""
-
-    def called_better(valve):
-        curve = valve.positive.certified["closing"]
-        by = 0.9 * min(u - low for u, low in zip(curve.u_threshold_V, curve.u_lower_V, strict=True))
-        moved = replace(
-            curve,
-            u_lower_V=tuple(low + by for low in curve.u_lower_V),
-            offset_V=tuple(low + by for low in curve.offset_V),
-            u_min0_V=curve.u_min0_V + by,
-        )
-        certified = {**valve.positive.certified, "closing": moved}
-        tests = tuple(replace(each, u_guard_lower_V=each.u_guard_lower_V + by) for each in valve.positive.tests)
-        return replace(valve, sides={"positive": replace(valve.positive, certified=certified, tests=tests)})
-
-    found = caught(example_valve, tmp_path, LITTLE, {}, "recording", change=called_better)
+    found = caught(example_valve, tmp_path, LITTLE, {}, "recording", machines=40, change=called_ten_times_better)
     assert found.flowing > 0
 
 

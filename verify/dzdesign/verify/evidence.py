@@ -11,6 +11,7 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import Artefact, Sha256, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
+from dzdesign.design.design_choices import Above
 from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.loop_results import ClosedLoopResult, Count, MonteCarlo, Population, ScenarioResult, Side, about
 from dzdesign.verify.requirements import ALWAYS, OF_CURRENT, Check
@@ -35,6 +36,26 @@ class LotCheck:
         float, quantity("V", "That margin; negative if the bound is exceeded.", ge=-MOST_V, le=MOST_V)
     ]
     confidence: Annotated[tuple[float, float], about("The least and the largest with which a valve's bounds hold.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AboveCheck:
+    """What one sign of command drives at zero command above the tested pressure drops; every count must be zero."""
+
+    choice: Annotated[Above, about("What `design --above` chose.")]
+    certified_to_MPa: Annotated[
+        float, quantity("MPa", "Up to where it is certified; null: nothing is.", ge=0, le=1000)
+    ] | None
+    released_from_MPa: Annotated[
+        float, quantity("MPa", "From where on the offset is let go; null: nowhere.", ge=0, le=1000)
+    ] | None
+    codes: Annotated[Count, about("Differences of pressure codes above the tests.")]
+    over_compensated: Annotated[Count, about("Those of the certified ones whose drive lies above the continued bound.")]
+    smallest_margin_V: Annotated[
+        float, quantity("V", "Smallest distance from a drive above zero to that bound.", ge=-MOST_V, le=MOST_V)
+    ] | None
+    rising: Annotated[Count, about("Those with more drive than the certified offset of the last test.")]
+    not_released: Annotated[Count, about("Those with more than one unit of beta where the offset is let go.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +107,7 @@ class InputCheck(InputCounts):
     ]  # fmt: skip
     pressure_pairs: Annotated[Count, about("Pairs of valid pressure codes, each of which was tried.")]
     first_wrong: Annotated[str | None, about("The first fault, in words.")]
+    above: Annotated[AboveCheck, about("The same above the tests.")]
     lot: Annotated[
         LotCheck | None,
         about("Of a lot setting: every valve of its lot against its own bounds; null of a valve's own."),
@@ -99,7 +121,8 @@ class InputCheck(InputCounts):
     @property
     def holds(self) -> bool:
         """True if nothing was found."""
-        return self.faults + self.over_compensated == 0 and not (self.lot and self.lot.over_compensated)
+        above = self.above.over_compensated + self.above.rising + self.above.not_released
+        return self.faults + self.over_compensated + above == 0 and not (self.lot and self.lot.over_compensated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

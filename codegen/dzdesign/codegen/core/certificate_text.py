@@ -6,6 +6,7 @@ from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.words import taken_off
+from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.design.signals import SIDE_NAMES
 
 
@@ -35,9 +36,18 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
         text += f", so that less than {flow} flows: what the recordings can't show."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
+    text += f" {_beyond(compensator, sign)}"
     text += f" {_machine(compensator, sign)}"
     lot = lot_in_words(compensator)
     return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
+
+
+def _beyond(compensator: Compensator, sign: int) -> str:
+    """Return what is certified above the tests, and what there is below them."""
+    certificate, side = compensator.side(sign).certificate, compensator.valve.sides[SIDE_NAMES[sign]]
+    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    above = above_in_words(compensator.above, certificate, side, units)
+    return f"{above[0].upper()}{above[1:]}; {below_in_words(certificate, side, units)}."
 
 
 def _machine(compensator: Compensator, sign: int) -> str:

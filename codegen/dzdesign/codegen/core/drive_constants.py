@@ -22,6 +22,7 @@ STATUS_BITS = {
     "PRESSURE_A": "pressure A outside its valid codes, so the smallest beta is used",
     "PRESSURE_B": "pressure B outside its valid codes, so the smallest beta is used",
     "DIFFERENCE": "valid pressures, but their drop too far below zero, so the smallest beta is used",
+    "ABOVE": "pressure drop above the highest tested one: no fault, but no recording either",
 }
 
 

@@ -1,6 +1,7 @@
 """What a code stands for: every `#define` of the core that comes from the scalings of command and pressures."""
 
 from dataclasses import dataclass
+from math import floor
 
 from dzdesign.codegen.core.command_shares import share_of_command
 from dzdesign.codegen.core.constants import EXACT, Define
@@ -52,6 +53,7 @@ class SignalConstants:
             *self._sensor("B", signals.pressure_b),
             *([] if signals.like_sensors else self._weights()),
             self._reverse(),
+            self._tested_to(),
             Define(
                 symbol="WORD_TOP",
                 value=self.word_bits - 1,
@@ -116,6 +118,20 @@ class SignalConstants:
             + (f", times {2**WEIGHT_SHIFT}" if weighted else ""),
             ("reverse_codes", "signals.pressure_a.span_MPa"),
             "a hundredth of the span, rounded down to a code",
+        )
+
+    def _tested_to(self) -> Define:
+        c, sensors = self.compensator, self.compensator.signals
+        last_MPa = c.side(self.sign).certificate.dp_MPa[1]
+        codes = floor(sensors.dp_code(last_MPa))
+        weighted = not sensors.like_sensors
+        return self._signal(
+            "TESTED_TO",
+            ((codes + 1) << WEIGHT_SHIFT) - 1 if weighted else codes,
+            "a pressure drop of more than this lies above the tests",
+            f"{float(last_MPa):.4g} MPa in codes of sensor A" + (f", times {2**WEIGHT_SHIFT}" if weighted else ""),
+            ("certificate.dp_MPa", "signals.pressure_a.span_MPa"),
+            "rounded down to a code" + (", with all that is rounded down to that code" if weighted else ""),
         )
 
     def steps(self) -> list[Define]:

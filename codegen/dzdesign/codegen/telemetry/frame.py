@@ -66,6 +66,7 @@ STATUS_BITS = {
     0x0200: "pressure A outside its valid range",
     0x0400: "pressure B outside its valid range",
     0x0800: "pressure drop not plausible",
+    0x1000: "pressure drop above the tests",
     0x2000: "waits for a valid command, or for zero command",
     0x4000: "smallest beta until the pressures are sound again",
     0x8000: "fault latched until a reset",

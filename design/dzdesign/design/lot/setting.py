@@ -18,7 +18,14 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
-from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, choose_beta_table, offset_ceiling, pressures_MPa
+from dzdesign.design.beta_table import (
+    STEP_CODES,
+    OffsetCeiling,
+    OffsetCurve,
+    choose_beta_table,
+    offset_ceiling,
+    pressures_MPa,
+)
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
@@ -27,18 +34,18 @@ from dzdesign.design.lot.margins import LotMargin, prove_lot
 from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.machine.allowance import Allowance
+from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES
-from dzdesign.identify.valve.certified_bound import NEAR_MPa
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
 CLEAR = 1e-6
 #: What all compensators of a batch must have in common.
 SHARED = (
-    "law", "below_dp0", "signals", "u_max_V",
+    "law", "below_dp0", "above", "signals", "u_max_V",
     "beta_denominator", "transition_codes", "command_error", "drive_functions",
     "current_drive", "machine",
 )  # fmt: skip
@@ -195,7 +202,8 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     allowance = first.allowance(sign)
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
-    curves = {name: guarded_curve(model, guard, first.below_dp0) for name, model in models.items()}
+    above = AboveChoice(choice=first.above, step_codes=STEP_CODES)
+    curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
     low, high = _common_interval([curves])
     least, near = _near_the_least(curves, allowance, float(u_max))
     exact = {
@@ -206,7 +214,7 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     limits = zip(*(each.limit for each in exact.values()), strict=True)
     certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
     ceiling = OffsetCeiling(limit=tuple(map(min, limits)), certified=certified)
-    if min(ceiling.limit) <= 0:
+    if min(ceiling.limit[: certified.stop]) <= 0:
         raise InputError("one of the valves leaves no positive offset for a lot setting")
     return _Side(sign=sign, models=models, curves=curves, exact=exact, least=ceiling, nearness=least)
 
@@ -221,21 +229,11 @@ def _near_the_least(
     (low, high), signals = allowance.window, allowance.signals
     code_max = signals.largest_difference(allowance.sign)
     dp_MPa = np.array([float(dp) for dp in pressures_MPa(signals, low, code_max + high)])
-    limits = np.array([_limit(curve, dp_MPa) / u_max_V for curve in curves.values()])
+    limits = np.array([curve.in_doubles(dp_MPa) / u_max_V for curve in curves.values()])
     limits = np.lib.stride_tricks.sliding_window_view(limits, high - low + 1, axis=1).min(axis=2)
     above = limits - limits.min(axis=0)
     mean = dict(zip(curves, map(float, above.mean(axis=1)), strict=True))
     return mean, dict(zip(curves, map(float, above.min(axis=1)), strict=True))
-
-
-def _limit(curve: OffsetCurve, dp_MPa: np.ndarray) -> np.ndarray:
-    """Return in doubles what `offset_ceiling` limits the offset to, V: the curve and, where tested, its bound."""
-    nodes, offset = (np.array([float(value) for value in values]) for values in (curve.dp_MPa, curve.offset_V))
-    value: np.ndarray = np.interp(dp_MPa, nodes, offset)
-    if curve.hold_below_MPa is not None:
-        hold = float(curve.hold_below_MPa)
-        value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
-    return value if curve.certified is None else np.minimum(value, curve.certified.in_doubles(dp_MPa))
 
 
 def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[str]:
@@ -259,12 +257,14 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
     if u_min0 <= 0:
         raise InputError("the least offset of all valves is less than one count of the PWM")
+    goes_on = any(curve.above is not None for curve in side.curves.values())
     table = choose_beta_table(
         side.least,
         u_min0,
         model.trend,
         denominator=first.beta_denominator,
         above_one=model.trend == "increasing" or first.below_dp0 == "extend",
+        above=AboveChoice(choice=first.above, step_codes=STEP_CODES) if goes_on else None,
     )
     # The longest travel: full command fully opens every valve.
     longest = max(travel(each, u_max, top) for each in side.models.values())

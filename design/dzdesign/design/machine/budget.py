@@ -52,13 +52,13 @@ class BudgetLine:
     origin: Annotated[Origin, Meta(description="Measured from the recordings, declared, or a default.")]
     source: Annotated[str, Meta(description="Where it is from, in words: an option, or whose default.")]
     half_width: Annotated[float, Meta(description="By how much, in `unit`; of a range its end that lowers the offset.")]
-    unit: Annotated[str, Meta(description="Unit of the half-width: V, MPa, codes, counts, K, V or 1 (a share).")]
+    unit: Annotated[str, Meta(description="Unit of the half-width: mV, MPa, codes, counts, K, V or %.")]
     sensitivity_mV: Annotated[
         tuple[float, ...], quantity("mV", "Contribution for one unit, at each tested pressure drop.")
     ]
     contribution_mV: Annotated[
         tuple[float, ...],
-        quantity("mV", "By how much it alone lowers the certified threshold, at each tested pressure drop."),
+        quantity("mV", "By how much it alone lowers the certified threshold where a tested pressure drop is read."),
     ]
     price: Annotated[
         float,

@@ -11,8 +11,8 @@ from dzdesign.core.worded import Worded, worded
 from dzdesign.identify.constants import MPA, REFUSED, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
 from dzdesign.identify.fitting.constrained_fits import fit_offset
+from dzdesign.identify.fitting.continuing import AtTests, bound_above
 from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
-from dzdesign.identify.fitting.guarding import OrderedKnees
 from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
 from dzdesign.identify.fitting.premises import (
     bound_line,
@@ -21,9 +21,10 @@ from dzdesign.identify.fitting.premises import (
 )
 from dzdesign.identify.fitting.vertices import Vertex, find_vertex
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.above_tests import AboveTests
 from dzdesign.identify.valve.certified_bound import CertifiedBound
 from dzdesign.identify.valve.estimated_curvature import FEWEST_FOR_CURVATURE
-from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, OpeningCurve, PremiseCheck
+from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard, PremiseCheck
 from dzdesign.identify.valve.quantity_types import LARGEST_BETA
 from dzdesign.identify.valve.staircase import Direction, staircase
 
@@ -152,23 +153,39 @@ def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
     bound, offset, vertex = bounds[taken], offsets[taken], bounds["monotone"].vertex
     declared: Literal["declared", "estimated"] = "declared" if tested.options.curvature is not None else "estimated"
     with_dp = tested.dp_MPa.size > 0 and not np.isnan(tested.dp_MPa).any()
+    value = np.maximum(bound.value, bound.lower)
     curve = CertifiedCurve(
         premise=taken,
         premises=tuple(checks.values()),
         curvature_V_MPa2=tuple(map(float, bound.curvature)),
         curvature_is=declared if taken == "smooth" else None,
         dp_MPa=tuple(map(float, tested.dp_MPa)) if with_dp else (),
-        u_threshold_V=tuple(map(float, np.maximum(bound.value, bound.lower))),
+        u_threshold_V=tuple(map(float, value)),
         u_lower_V=tuple(map(float, bound.lower)),
         u_min0_V=offset.u_min0,
         offset_dp_MPa=tuple(map(float, offset.dp_MPa)) if with_dp else (),
         offset_V=tuple(map(float, offset.offset)),
+        above=_above(bound, guarded, tested) if with_dp and tested.dp_MPa.size > 1 else None,
     )
     costs = taken == "monotone" or ("monotone" in offsets and offsets["monotone"].mean > offset.mean)
     return Certified(
         curve=curve, active=offset.active, refused=checks[refused] if refused else None,
         vertex=vertex if costs else None,
     )  # fmt: skip
+
+
+def _above(bound: BoundUnderPremise, guarded: GuardedThreshold, tested: Tested) -> AboveTests:
+    """Continue the bound above the last test."""
+    dp, lower = tested.dp_MPa, bound.lower
+    whole = CertifiedBound.of(bound.premise, dp.tolist(), lower.tolist(), bound.curvature.tolist(), tested.direction)
+    at_tests = AtTests(
+        premise=bound.premise,
+        trend=tested.direction,
+        dp_MPa=dp,
+        value=np.maximum(bound.value, lower),
+        last_lower=float(whole.pieces[-1].at(whole.dp_MPa[1])),
+    )
+    return bound_above(at_tests, guarded, tested.options)
 
 
 def _asked(options: IdentifyOptions) -> Premise | None:
@@ -277,21 +294,3 @@ def _check(bound: BoundUnderPremise, offset: OffsetUnderBound | None, tested: Te
         above = (opens_V - offset_V) / np.maximum(tested.options.u_max - offset_V, np.finfo(float).tiny)
         left = float(np.clip(above.max(), 0.0, 1.0))
     return PremiseCheck(premise=bound.premise, lack_of_fit_p=bound.p_value, dead_zone_over_u_max=left)
-
-
-def opening_curve(
-    rising: OrderedKnees, direction: Direction, guards: Mapping[str, CertifiedCurve], u_max: float
-) -> OpeningCurve | None:
-    """Return where useful flow begins on opening, from the knees of the rising branch; None where dP is unknown.
-
-    It must not lie below the curves of the guards.
-    """
-    dp = next(iter(guards.values())).dp_MPa
-    if not dp:
-        return None
-    knee, se = rising.knee, rising.knee_se
-    if direction == "flat":
-        knee = np.full_like(knee, np.average(knee, weights=np.maximum(se, FINEST_ERROR * u_max) ** -2))
-    # The larger of two curves that run one way runs that way too.
-    highest = np.max([knee, *(np.array(curve.u_offset_V) for curve in guards.values())], axis=0)
-    return OpeningCurve(dp_MPa=dp, u_V=tuple(map(float, highest)), u_se_V=tuple(map(float, se)))

@@ -15,8 +15,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting.casadi_problems import KEPT, QUADRATIC, SOLVER_LOCK
 from dzdesign.identify.fitting.constrained_fits import ACTIVE
-from dzdesign.identify.valve.certified_bound import CertifiedBound
-from dzdesign.identify.valve.guard_curve import largest_excess
+from dzdesign.identify.valve.certified_bound import CertifiedBound, largest_excess
 from dzdesign.identify.valve.staircase import Direction
 
 if TYPE_CHECKING:

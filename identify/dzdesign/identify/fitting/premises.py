@@ -131,7 +131,7 @@ def bound_line(
     rounding = (FINEST_ERROR * u_max) ** 2 * np.eye(dp_MPa.size)
     confidence = confidence_at_tests(confidence, SHARE_OF_LINE)
     covariance = between.covariance_of_mean(noise_se) + rounding
-    weights_of = _line_weights(dp_MPa, covariance)
+    weights_of = line_weights(dp_MPa, covariance)
     at_tests, along = weights_of(dp_MPa), weights_of(np.linspace(dp_MPa[0], dp_MPa[-1], PATH_POINTS))
     value = at_tests @ threshold
     drift, uneven = (between.drift.change, between.drift.uneven) if between.drift else (0.0, 0.0)
@@ -160,14 +160,20 @@ def critical_value(path: np.ndarray, degrees: float, confidence: float, tests: i
     by an angle phi from end to end, and P(sup > c) <= phi/2pi P(2 F(2, nu) > c²) + P(t(nu) > c): the tube formula, an
     upper bound for any path (Naiman 1986).
     """
+    from scipy.special import stdtrit
+
+    tail, degrees = 1 - confidence, min(degrees, LARGEST_DEGREES)
+    return min(float(stdtrit(degrees, 1 - tail / tests)), of_whole_path(path, degrees, tail))
+
+
+def of_whole_path(path: np.ndarray, degrees: float, tail: float) -> float:
+    """Return how many standard errors are exceeded anywhere on a path with at most the probability `tail`."""
     from scipy.optimize import brentq
     from scipy.special import stdtr, stdtrit
 
-    tail, degrees = 1 - confidence, min(degrees, LARGEST_DEGREES)
-    bonferroni = float(stdtrit(degrees, 1 - tail / tests))
-    scale = np.sqrt(np.diag(path))
-    if not np.all(scale > 0):
-        return bonferroni
+    degrees, scale = min(degrees, LARGEST_DEGREES), np.sqrt(np.diag(path))
+    if not np.all(scale > 0):  # nothing is uncertain somewhere: what is left turns by no known angle
+        return float(stdtrit(degrees, 1 - tail / scale.size))
     along = np.clip(np.diagonal(path, 1) / (scale[1:] * scale[:-1]), -1, 1)
     angle = float(np.sum(np.arccos(along)))
 
@@ -175,10 +181,13 @@ def critical_value(path: np.ndarray, degrees: float, confidence: float, tests: i
         of_angle = (1 + c**2 / degrees) ** (-degrees / 2) if degrees < LARGEST_DEGREES else math.exp(-(c**2) / 2)
         return angle / (2 * math.pi) * of_angle + float(stdtr(degrees, -c)) - tail
 
-    return min(bonferroni, float(brentq(excess, 0.0, bonferroni))) if excess(bonferroni) < 0 else bonferroni
+    largest = float(stdtrit(degrees, 1 - tail / 4))
+    while excess(largest) > 0:
+        largest *= 2
+    return float(brentq(excess, 0.0, largest))
 
 
-def _line_weights(dp_MPa: np.ndarray, covariance: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+def line_weights(dp_MPa: np.ndarray, covariance: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """Return what gives the weights (N, T) of the tests in the line at N pressure drops: generalised least squares."""
     tested = np.column_stack([np.ones_like(dp_MPa), dp_MPa])
     inverse = np.linalg.inv(covariance)

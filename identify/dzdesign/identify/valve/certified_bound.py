@@ -111,3 +111,23 @@ class CertifiedBound:
             value = low_V + share * (high_V - low_V) - bend / 2 * (dp_MPa - low) * (high - dp_MPa)
             least = np.where(inside, np.minimum(least, value), least)
         return least
+
+
+def largest_excess(bound: CertifiedBound, nodes: np.ndarray, offset: np.ndarray) -> float:
+    """Return by how much an offset, straight between its nodes (MPa, V), exceeds a bound at most, V."""
+    return max(_excess(piece, nodes, offset) for piece in bound.pieces)
+
+
+def _excess(piece: BoundPiece, nodes: np.ndarray, offset: np.ndarray) -> float:
+    """Return by how much it exceeds the bound between two tests at most, V."""
+    ends = [float(piece.from_MPa), float(piece.to_MPa)]
+    at = np.array([ends[0], *nodes[(nodes > ends[0]) & (nodes < ends[1])], ends[1]])
+    value, bend = np.interp(at, nodes, offset), float(piece.curvature)
+    places = [at]
+    if bend > 0:  # the bound is convex: where its slope is the offset's, it comes nearest
+        chord = float(piece.high_V - piece.low_V) / (ends[1] - ends[0])
+        nearest = (ends[0] + ends[1]) / 2 + (np.diff(value) / np.diff(at) - chord) / bend
+        places.append(np.clip(nearest, at[:-1], at[1:]))
+    points = np.concatenate(places)
+    bound = CertifiedBound(pieces=(piece,)).in_doubles(points)
+    return float(np.max(np.interp(points, nodes, offset) - bound))

@@ -54,3 +54,14 @@ def bends_of(dp_MPa: Sequence[float], threshold_V: Sequence[float], rounding: fl
     weights = second_differences(dp)
     steepest = float(np.abs(np.diff(threshold) / np.diff(dp)).max(initial=0.0))
     return weights @ threshold, np.abs(weights).sum(axis=1) * rounding * (1 + steepest)
+
+
+def curvature_above(found: np.ndarray) -> float:
+    """Return M above the last test, V/MPa², from the second differences (T - 2,) at the inner tests.
+
+    The rule of the last interval, with bends of either sign: above the tests a threshold that bends down is the lower
+    one, and no test shows a kink there.
+    """
+    tests, both = found.size + 2, np.abs(found)
+    end = END_FACTOR_OF_THREE if tests == FEWEST_FOR_CURVATURE else END_FACTOR
+    return float(max(INNER_FACTOR * both.max(), end * both[-1]))

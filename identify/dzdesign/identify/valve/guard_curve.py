@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
 from typing import Annotated, Literal, get_args
 
@@ -11,11 +12,13 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import REFUSED, Premise
-from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
+from dzdesign.identify.valve.above_tests import AboveTests
+from dzdesign.identify.valve.certified_bound import CertifiedBound, largest_excess
 from dzdesign.identify.valve.estimated_curvature import (
     END_FACTOR_OF_THREE,
     FEWEST_FOR_CURVATURE,
     bends_of,
+    curvature_above,
     estimated_curvature,
 )
 from dzdesign.identify.valve.quantity_types import (
@@ -109,6 +112,10 @@ class CertifiedCurve:
         tuple[Voltage, ...],
         quantity("V", "The largest offset that runs the way of the trend under the bound, straight between its nodes."),
     ]
+    above: Annotated[
+        AboveTests | None,
+        Meta(description="The bound above the last test; null of one test, and where the pressure drop is unknown."),
+    ]
 
     def __post_init__(self) -> None:
         for name, nodes, values in (
@@ -136,6 +143,8 @@ class CertifiedCurve:
             raise RuleError("where M is from must be said of a smooth curve, and of no other")
         if any(low > high + ROUNDING_V for low, high in zip(self.u_lower_V, self.u_threshold_V, strict=True)):
             raise RuleError("a lower bound lies above the threshold that it bounds")
+        if (self.above is None) != (len(self.dp_MPa) < 2):
+            raise RuleError("a bound above the tests must stand beside two tests or more, and beside no other")
         self._check_premise()
         if not self.u_min0_V > 0 or min(self.offset_V) <= 0:
             raise RuleError(f"u_min0 is {self.u_min0_V:g} V, expected a positive threshold")
@@ -168,6 +177,12 @@ class CertifiedCurve:
             raise RuleError(
                 f"M is {1e3 * stated[row]:.4g} mV/MPa² from {self.dp_MPa[row]:g} to {self.dp_MPa[row + 1]:g} MPa, but "
                 f"{1e3 * allowed[row]:.4g} follows from the thresholds at the tests, of which it is estimated"
+            )
+        above = 0.0 if self.above is None else self.above.curvature_V_MPa2
+        if abs(above - curvature_above(found)) > ROUNDING + END_FACTOR_OF_THREE * errors.max():
+            raise RuleError(
+                f"M is {1e3 * above:.4g} mV/MPa² above the tests, but {1e3 * curvature_above(found):.4g} follows from "
+                "the thresholds at the tests, of which it is estimated"
             )
 
     @property
@@ -210,6 +225,14 @@ class CertifiedCurve:
         """Return the bound on the whole tested interval, exact."""
         return CertifiedBound.of(self.premise, self.dp_MPa or ANYWHERE, self.u_lower_V, self.curvature_V_MPa2, trend)
 
+    def check_above(self, trend: Direction) -> None:
+        """Refuse a bound above the tests that does not follow from the tests and the premise."""
+        if self.above is not None:
+            lower = self.bound(trend).at(Fraction(repr(self.dp_MPa[-1])))
+            self.above.check(self.premise, trend, self.dp_MPa, self.u_threshold_V, float(lower or 0))
+            if self.curvature_is == "declared" and self.above.curvature_V_MPa2 != self.curvature_V_MPa2[-1]:
+                raise RuleError("a declared M is the same above the tests as between them")
+
     def check_offset(self, trend: Direction, dp0_MPa: float | None) -> None:
         """Refuse an offset that lies above the bound anywhere, or does not run the way of the trend."""
         bound, offset = self.bound(trend), np.array(self.offset_V)
@@ -223,26 +246,6 @@ class CertifiedCurve:
         at_dp0 = offset[0] if dp0_MPa is None or not self.dp_MPa else float(np.interp(dp0_MPa, nodes, offset))
         if abs(at_dp0 - self.u_min0_V) > ROUNDING_V:
             raise RuleError(f"u_min0 is {self.u_min0_V:g} V, but the offset at dP0 is {at_dp0:g} V")
-
-
-def largest_excess(bound: CertifiedBound, nodes: np.ndarray, offset: np.ndarray) -> float:
-    """Return by how much an offset, straight between its nodes (MPa, V), exceeds a bound at most, V."""
-    return max(_excess(piece, nodes, offset) for piece in bound.pieces)
-
-
-def _excess(piece: BoundPiece, nodes: np.ndarray, offset: np.ndarray) -> float:
-    """Return by how much it exceeds the bound between two tests at most, V."""
-    ends = [float(piece.from_MPa), float(piece.to_MPa)]
-    at = np.array([ends[0], *nodes[(nodes > ends[0]) & (nodes < ends[1])], ends[1]])
-    value, bend = np.interp(at, nodes, offset), float(piece.curvature)
-    places = [at]
-    if bend > 0:  # the bound is convex: where its slope is the offset's, it comes nearest
-        chord = float(piece.high_V - piece.low_V) / (ends[1] - ends[0])
-        nearest = (ends[0] + ends[1]) / 2 + (np.diff(value) / np.diff(at) - chord) / bend
-        places.append(np.clip(nearest, at[:-1], at[1:]))
-    points = np.concatenate(places)
-    bound = CertifiedBound(pieces=(piece,)).in_doubles(points)
-    return float(np.max(np.interp(points, nodes, offset) - bound))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -152,6 +152,7 @@ class SideModel:
         for guard in self.certified.values():
             self._check_nodes(guard.dp_MPa, len(guard.u_lower_V))
             guard.check_offset(self.trend or "flat", self.reference.dp_MPa)
+            guard.check_above(self.trend or "flat")
         self._check_guarded()
         self._check_zero_flow()
         self._check_identified()

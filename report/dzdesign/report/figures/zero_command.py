@@ -37,7 +37,8 @@ def zero_figure(curves: Curves, side: str, guard: str, units: RecordedUnits) -> 
         figure,
         f"zero-{side}",
         f"Zero command, {side} side, where it matters most: the drive against what is certified, at "
-        "every code of the tested interval. Ringed: the smallest margin. Outside the interval nothing is certified.",
+        "every code of the tested interval. Ringed: the smallest margin. What is certified outside the interval stands "
+        "beside the law.",
         f"At {int(above.sum())} of {dp.size} codes of the pressure drop the drive at zero command lies above the "
         f"threshold's lower bound; the smallest margin is {margin} at {at}.",
         curves.text,

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
+from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.figures.law import law_figure
@@ -31,6 +32,11 @@ def law_section(compensator: Compensator | None) -> Section:
             f"between {len(side.beta)} nodes, {compensator.beta_step_codes} pressure codes apart, each a "
             f"whole number of 1/{compensator.beta_denominator}."
         )
+        which = f"{name} commands: " if len(laws) > 1 else ""
+        units = valve.recorded_units.of_side(name)
+        lines.append(f"Beyond the tests, {which}{below_in_words(side.certificate, valve.sides[name], units)}.")
+        beyond = above_in_words(compensator.above, side.certificate, valve.sides[name], units)
+        lines.append(f"Beyond the tests, {which}{beyond}.")
     return Section(figures=tuple(law_figure(compensator, name, len(laws) > 1) for name in laws), lines=tuple(lines))
 
 

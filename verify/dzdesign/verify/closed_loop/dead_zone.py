@@ -43,11 +43,11 @@ def compare_at_pressure(
     Where the firmware has ramps of its own, the command goes no faster than they: then they hold nothing back, and
     what is read over the command is of the valve and the law, not of the ramps' lag.
     """
-    command = sequence.no_faster_than(loop.slowest_ramp_s).command()
+    command = sequence.for_drive(loop).command()
     direct = loop.run(command, dp_MPa)
     with_core = loop.run(command, dp_MPa, "compensated", back_MPa=back_MPa)
     # Only the flow at zero command is asked of this one, so it may open and close the valve quickly.
-    quick = RampSequence(rest=sequence.rest, ramp=5.0, top=0.5).no_faster_than(loop.slowest_ramp_s).command()
+    quick = RampSequence(rest=sequence.rest, ramp=5.0, top=0.5).for_drive(loop).command()
     without_beta = loop.run(quick, dp_MPa, "without beta", dp_frozen_MPa=dp0_MPa, back_MPa=back_MPa)
     leak, reading = loop.leak_L_min(dp_MPa), reading_flow_L_min
     level = leak + FLOW_SHARE * float(direct.q_L_min.max())

@@ -43,9 +43,9 @@ class RampSequence:
     ramp: float = 100.0
     top: float = 2.0
 
-    def no_faster_than(self, ramp: float) -> "RampSequence":
-        """Return the sequence with ramps of so many s at least."""
-        return replace(self, ramp=max(self.ramp, ramp))
+    def for_drive(self, loop: "ClosedLoop") -> "RampSequence":
+        """Return the sequence with ramps no faster than the drive's own, and a rest for which its interlock waits."""
+        return replace(self, ramp=max(self.ramp, loop.slowest_ramp_s), rest=max(self.rest, loop.waits_s))
 
     def command(self) -> np.ndarray:
         """Return the command as a share of u_max, one value a record."""
@@ -71,6 +71,12 @@ class LoopRun:
     q_mean_L_min: np.ndarray
     q_largest_L_min: np.ndarray
     position_mm: np.ndarray
+
+
+def _waits_s(compensator: Compensator) -> float:
+    """Return for how long the drive waits for zero command after a reset, s; 0 without an interlock."""
+    functions = compensator.drive_functions
+    return 0.0 if functions.interlock_codes is None else functions.fault_samples / compensator.signals.sample_Hz
 
 
 def _slowest_ramp_s(compensator: Compensator, sign: int) -> float:
@@ -129,6 +135,8 @@ class ClosedLoop:
         self.channels = Channels(self._signals, sign)
         #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
         self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
+        #: For which an interlock must see zero command, s; 0: none.
+        self.waits_s = _waits_s(compensator) if compensator else 0.0
         self._has_core = firmware is not None
         self._side = compensator.valve.sides.get(SIDE_NAMES[sign]) if compensator else None
         #: Added to the plant's drive, V of command.

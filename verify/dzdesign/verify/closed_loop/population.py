@@ -56,7 +56,9 @@ class Openings:
     judged: np.ndarray
 
     @classmethod
-    def of(cls, count: int, *, down_to: float | np.ndarray = 0.0, settle_s: float = SETTLE_S) -> "Openings":
+    def of(
+        cls, count: int, *, down_to: float | np.ndarray = 0.0, settle_s: float = SETTLE_S, waits_s: float = 0.0
+    ) -> "Openings":
         """Return so many of them, that close down to a command, (count,) where these differ."""
         opened, quick, slow, rest, judged = (
             round(seconds / RECORD_S) for seconds in (OPEN_S + settle_s - SETTLE_S, QUICK_S, SLOW_S, settle_s, JUDGED_S)
@@ -66,7 +68,7 @@ class Openings:
         closing = np.concatenate([np.linspace(SLOW_FROM, 0, slow, endpoint=False), np.zeros(rest + judged)])
         each = np.concatenate([np.tile(from_full, (count, 1)), np.tile(closing, (count, 1))], axis=1)
         each = ends + each * (1 - ends)
-        before = round(REST_S / RECORD_S)
+        before = round(max(REST_S, waits_s) / RECORD_S)
         at_end = np.arange(each.shape[1]) >= each.shape[1] - judged
         return cls(
             command=np.concatenate([np.zeros(before), each.ravel()]),
@@ -244,7 +246,7 @@ class _Run:
         between = band.dp_MPa[steps + NODES * np.arange(tested.size - 1)]
         dp = np.concatenate([np.tile(tested, (machines, 1)), between], axis=1)
         none = np.array([_no_flow(scene, one) for one in tested])
-        openings = Openings.of(dp.shape[1], settle_s=scene.settle_s)
+        openings = Openings.of(dp.shape[1], settle_s=scene.settle_s, waits_s=scene.loop.waits_s)
 
         def one(index: int) -> tuple[np.ndarray, np.ndarray]:
             each = drawn_machine(scene, machine, shares[index], index)

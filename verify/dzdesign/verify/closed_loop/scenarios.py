@@ -172,7 +172,7 @@ def _converter_off_at_zero(scene: Scene) -> Iterator[ScenarioResult]:
     ):
         wrong = scene.loop.channels.command_of_codes(offset + noise)
         # The valve closes onto the wrong zero: from a true one the spool would have to open first.
-        before = np.concatenate([ramp(0, 1), scene.held(1), ramp(1, float(np.mean(wrong)))])
+        before = np.concatenate([scene.waited(), ramp(0, 1), scene.held(1), ramp(1, float(np.mean(wrong)))])
         run = scene.run(np.concatenate([before, wrong]))
         yield scene.result(
             f"{name}, with ±{error.noise_codes} codes of noise",

@@ -72,9 +72,18 @@ class Scene:
         """Return a command held for so many times the time to come to rest."""
         return np.full(round(times * self.settle_s / STEP_S), level)
 
+    def waited(self, ramp_s: float = RAMP_S) -> np.ndarray:
+        """Return the zero command that an interlock must see before a ramp up, beyond what the ramp begins with."""
+        functions = self.compensator.drive_functions
+        if functions.interlock_codes is None:
+            return np.zeros(0)
+        span = self.compensator.signals.command.span(self.sign)
+        of_ramp = int(functions.interlock_codes / span * ramp_s / STEP_S) - 1
+        return np.zeros(max(functions.fault_samples - of_ramp, 0))
+
     def opened_and_closed(self, ramp_s: float = RAMP_S) -> np.ndarray:
         """Return the command that leaves the spool as its hysteresis leaves it after use."""
-        return np.concatenate([ramp(0, 1, ramp_s), self.held(1), ramp(1, 0), self.held(0, 2)])
+        return np.concatenate([self.waited(ramp_s), ramp(0, 1, ramp_s), self.held(1), ramp(1, 0), self.held(0, 2)])
 
     def run(
         self,

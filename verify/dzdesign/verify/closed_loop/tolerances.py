@@ -94,7 +94,7 @@ def scatter(
 ) -> Scatter:
     """Run every plant through a ramp at one pressure drop."""
     plants = tolerances.draw(nominal)
-    command = SEQUENCE.no_faster_than(loop.slowest_ramp_s).command()
+    command = SEQUENCE.for_drive(loop).command()
 
     def one(plant: Plant) -> tuple[float, ...]:
         run = loop.with_plant(plant).run(command, dp_MPa, "compensated")

@@ -22,7 +22,7 @@ MOST_MOVED = 0.003
 
 def valve_at_corners(scene: Scene, circuit: CoilCircuit) -> ValveAtCorners:
     """Run the ramp with the declared coil at its nominal supply, and at the ends of all three ranges."""
-    command = SEQUENCE.no_faster_than(scene.loop.slowest_ramp_s).command()
+    command = SEQUENCE.for_drive(scene.loop).command()
     direct = scene.loop.run(command, scene.dp_MPa)
     level = scene.loop.leak_L_min(scene.dp_MPa) + FLOW_SHARE * float(direct.q_L_min.max())
     ends = product(circuit.resistance_factors, circuit.inductance_factors, circuit.supply_V)

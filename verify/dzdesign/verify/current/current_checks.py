@@ -172,7 +172,7 @@ def _settles_check(result: CurrentLoopResult) -> Check:
         text += f"; with a sensor's zero off by {shifts} codes {result.offset_error_codes:.2f} codes, once calibrated"
     faults = [corner for corner in result.corners if corner.faults]
     if faults:
-        text += f"; faults {faults[0].faults:#x} of a sound circuit at {_at(faults[0])}"
+        text += f"; faults {faults[0].faults:#x} of a circuit without a fault at {_at(faults[0])}"
     settles = not faults and max(error.steady_error_codes, result.offset_error_codes) <= MOST_ERROR_CODES
     return CURRENT_SETTLES.check(holds=settles and swing.limit_cycle_codes <= MOST_SWING_CODES and tried > 0, text=text)
 

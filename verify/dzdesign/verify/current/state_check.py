@@ -10,7 +10,7 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.current.loop import CurrentLoop
-from dzdesign.verify.current.exact_controller import ExactController, exact_ticks
+from dzdesign.verify.current.exact_controller import NO_OFFSET, ExactController, exact_ticks
 from dzdesign.verify.toolchain.host_compiler import load_library
 from dzdesign.verify.toolchain.machines import Machine
 
@@ -102,6 +102,13 @@ class HostStates:
         hashed = self._library.current_states(ctypes.c_uint32(seed), ctypes.c_uint32(count), pointer)
         return found, hashed
 
+    def initial(self) -> dict[str, int]:
+        """Return the state before anything."""
+        found = np.full(1, 0, dtype=STATE)
+        found.view(np.uint8)[:] = 0xAA  # what is not set shows
+        self._library.current_initial(found.ctypes.data_as(ctypes.c_void_p))
+        return {name: int(found[name][0]) for name in STATE.names or ()}
+
     def offsets(self, seed: int, count: int) -> tuple[np.ndarray, np.ndarray, int]:
         """Return the states at the end of so many calibrations, their sums, and the hash."""
         ends = np.zeros(count, dtype=STATE)
@@ -109,6 +116,11 @@ class HostStates:
         pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (ends, sums)]
         hashed = self._library.current_offsets(ctypes.c_uint32(seed), ctypes.c_uint32(count), *pointers)
         return ends, sums, hashed
+
+
+def _initial(loop: CurrentLoop) -> dict[str, int]:
+    """Return the state before anything: nothing but the designed offset, and a fault until it is calibrated."""
+    return {**dict.fromkeys(STATE.names or (), 0), "offset": loop.offset_nominal, "faults": NO_OFFSET}
 
 
 def given_of(periods: np.ndarray, loop: CurrentLoop) -> dict[str, np.ndarray]:
@@ -133,6 +145,9 @@ def check_states(loop: CurrentLoop, core: Mapping[str, str], states: int, seed: 
             at = int(places[0])
             field = next(name for name in COMPARED if differs[name][at])
             first = f"{field} of {periods[at]}, expected {int(expected[field][at])}"
+    if (initial := host.initial()) != (expected_initial := _initial(loop)):
+        wrong += 1
+        first = first or f"initial state {initial}, expected {expected_initial}"
     ends, sums, hashed = host.offsets(seed, OFFSETS)
     for end, totals in zip(ends, sums, strict=True):
         exact = ExactController(loop)
@@ -141,7 +156,7 @@ def check_states(loop: CurrentLoop, core: Mapping[str, str], states: int, seed: 
         if (exact.offset, exact.faults) != (end["offset"], end["faults"]):
             wrong += 1
             first = first or f"calibration {end}, expected offset {exact.offset}, faults {exact.faults}"
-    return StateFindings(states=BLOCK * len(hashes) + OFFSETS, wrong=wrong, first=first, hashes=(*hashes, hashed))
+    return StateFindings(states=BLOCK * len(hashes) + OFFSETS + 1, wrong=wrong, first=first, hashes=(*hashes, hashed))
 
 
 def hashes_on(

@@ -8,6 +8,7 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
 from dzdesign.verify.evidence import InputCheck, InputCounts
+from dzdesign.verify.exhaustive.above_tests import above_checked, check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
@@ -15,6 +16,9 @@ from dzdesign.verify.exhaustive.zero_command import guarded_bounds, zero_command
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
+
+#: Place of the requirement on what lies above the tests.
+AFTER_ZERO_COMMAND = 3
 
 
 def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | None = None) -> InputCheck:
@@ -47,6 +51,7 @@ def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -
         outputs_hash=found.outputs_hash,
         pressure_pairs=differences.pairs,
         first_wrong=first_wrong(prepared, found),
+        above=check_above(exact, differences, found.at_zero),
         lot=check_lot(exact, differences, found.at_zero),
         **{field.name: getattr(found, field.name) for field in fields(InputCounts)},
     )
@@ -101,4 +106,6 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
         ),
     )
     sign = f"{inputs.side} commands: " if both_signs else ""
-    return [each.check(name=sign + each.title, holds=faults == 0, text=text) for each, faults, text in found]
+    checks = [each.check(name=sign + each.title, holds=faults == 0, text=text) for each, faults, text in found]
+    checks.insert(AFTER_ZERO_COMMAND, above_checked(inputs, units, sign))
+    return checks

@@ -149,7 +149,11 @@ class DriveModel:
         low, high = signals.command.valid_codes
         a, b = self._sound(p_a, p_b)
         reversed_ = a and b and signals.difference(p_a, p_b, sign) < -self.compensator.reverse_codes
-        return (not low <= command <= high) + 2 * (not a) + 4 * (not b) + 8 * reversed_
+        last_MPa = self.compensator.side(sign).certificate.dp_MPa[1]
+        drop_MPa = signals.difference(p_a, p_b, sign) * signals.pressure_a.per_code_MPa
+        # Of whole codes the first above the last test is one that stands for more than it.
+        above = a and b and drop_MPa > last_MPa
+        return (not low <= command <= high) + 2 * (not a) + 4 * (not b) + 8 * reversed_ + 16 * above
 
     def _law(self, code: int, p_a: int, p_b: int) -> int:
         failed = -self.compensator.reverse_codes - 1

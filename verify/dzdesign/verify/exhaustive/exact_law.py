@@ -6,6 +6,7 @@ reciprocal is shared with the generated C.
 """
 
 from fractions import Fraction
+from math import floor
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,8 @@ class ExactLaw:
         self.sound_commands = range(command.valid_codes[0], command.valid_codes[1] + 1)
         self.a, self.b = signals.pressure_a, signals.pressure_b
         self.reverse = compensator.reverse_codes
+        # A code above the last test's own says that the pressure drop lies above the tests.
+        self.tested_to = floor(side.certificate.dp_MPa[1] / self.a.per_code_MPa)
         self.turn = -1 if sign < 0 and signals.swapped else 1
         self.zero_band, self.transition_end = compensator.zero_band_codes, compensator.transition_end
         self._law = law(compensator.law)

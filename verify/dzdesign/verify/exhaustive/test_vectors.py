@@ -29,7 +29,7 @@ SCALARS = (
     "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
     "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",
     "places", "stride", "cube", "impatient", "laws_at", "rows_at", "directions_at", "slant_at", "pairs_at",
-    "places_at", "betas_at", "unused",
+    "places_at", "betas_at", "tested_to",
 )  # fmt: skip
 PLAN = np.dtype([("denominator", "<i8", PARTS), ("part_end", "<i4", PARTS), *((name, "<i4") for name in SCALARS)])
 PART = np.dtype([("remainder", "<i8"), ("carry", "<i8"), ("quotient", "<i4"), ("step", "<i4")])
@@ -246,6 +246,7 @@ class PreparedInputs:
             "compare_limit": exact.compare_limit,
             "turn": exact.turn,
             "reverse": exact.reverse,
+            "tested_to": exact.tested_to,
             "lowest": self.differences.values[0],
             "safe_law": np.searchsorted(used, safe),
             "safe_at_zero": min(max(at_zero, 0), exact.compare_limit),

@@ -139,7 +139,7 @@ def zero_command_margins(
     return [
         _margin(Staircase(each), drops, at_peak, unit_V)
         if each.premise == "monotone" or len(each.dp_MPa) == 1
-        else _margin_of_sagging(SaggingBound(each), drops, at_peak, unit_V)
+        else margin_of_sagging(SaggingBound(each), drops, at_peak, unit_V)
         for each in bounds
     ]
 
@@ -158,7 +158,7 @@ def counted_dither(compensator: Compensator) -> int:
     return ceil(other_peak + functions.dither_counts * abs(1 - half_waves * half_waves))
 
 
-def _margin_of_sagging(
+def margin_of_sagging(
     bound: SaggingBound, drops: PressureDrops, at_peak: np.ndarray, unit_V: Fraction
 ) -> ZeroCommandMargin | None:
     """Return what drives, counts of `unit_V`, leave to a bound that sags: by doubles, and exactly where they decide."""

@@ -111,9 +111,15 @@ uint32_t current_offsets(uint32_t seed, uint32_t count, struct dz_current *ends,
     for (uint32_t k = 0u; k < count; k++) {
         struct dz_current loop;
 
+        /* Of four calibrations three lie about one value, their mean at half a code: the ends that matter are met. */
+        const uint16_t about = drawn(offset_edges, COUNT(offset_edges));
+        const int scattered = (any() & 0x300u) == 0u;
+
         dz_current_init(&loop);
+        hash = hash_of(hash, &loop);
         for (uint16_t tick = 0u; tick <= DZ_CURRENT_OFFSET_TICKS; tick++) {
-            const uint16_t sum = drawn(offset_edges, COUNT(offset_edges));
+            const uint16_t sum = scattered ? drawn(offset_edges, COUNT(offset_edges))
+                                           : (uint16_t)(about + ((any() >> 8) & 1u));
 
             dz_current_calibrate(&loop, sum);
             hash = hash_of(hash, &loop);
@@ -127,4 +133,9 @@ uint32_t current_offsets(uint32_t seed, uint32_t count, struct dz_current *ends,
         }
     }
     return hash;
+}
+
+void current_initial(struct dz_current *loop)
+{
+    dz_current_init(loop);
 }

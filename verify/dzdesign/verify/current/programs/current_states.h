@@ -22,4 +22,7 @@ uint32_t current_states(uint32_t seed, uint32_t count, struct period *periods);
 /* The same for calibrations: two to the power of `shift` + 1 sums each, the last state of each is kept. */
 uint32_t current_offsets(uint32_t seed, uint32_t count, struct dz_current *ends, uint16_t *sums);
 
+/* The state before anything. */
+void current_initial(struct dz_current *loop);
+
 #endif

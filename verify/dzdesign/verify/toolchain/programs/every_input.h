@@ -37,7 +37,7 @@ struct dz_plan {
     int32_t cube;                /* 1: every pair of pressures at zero command too */
     int32_t impatient;           /* 1: the first row with a fault is the last */
     int32_t laws_at, rows_at, directions_at, slant_at, pairs_at, places_at, betas_at;
-    int32_t unused;
+    int32_t tested_to; /* largest difference of the tests: above it the status says so */
 };
 
 /* A part of the law, straight in the command: counts (and a half) at its first place, and what a place adds. */

@@ -38,6 +38,12 @@ static uint16_t outside(int32_t code, int32_t low, int32_t high)
     return code < low || code > high;
 }
 
+/* What the status says of the difference of two sound pressure codes. */
+static uint16_t of_difference(const struct dz_plan *plan, int32_t difference)
+{
+    return (uint16_t)((difference < -plan->reverse ? 8u : 0u) + (difference > plan->tested_to ? 16u : 0u));
+}
+
 /* Every `stride`-th code of each input, with the others at the ends of their sound codes. */
 void dz_check_status(const struct dz_plan *plan, const int32_t DZ_TABLE *slant, struct dz_findings *findings)
 {
@@ -60,8 +66,8 @@ void dz_check_status(const struct dz_plan *plan, const int32_t DZ_TABLE *slant, 
                 uint16_t expected = (uint16_t)(outside(code[0], low[0], high[0]) + 2u * a + 4u * b);
 
                 /* Of pressures that are not sound the difference says nothing. */
-                if (!a && !b && plan->turn * (code[1] - slant[code[2]]) < -plan->reverse) {
-                    expected = (uint16_t)(expected + 8u);
+                if (!a && !b) {
+                    expected = (uint16_t)(expected + of_difference(plan, plan->turn * (code[1] - slant[code[2]])));
                 }
                 findings->bad_status +=
                     DZ_STATUS((uint16_t)code[0], (uint16_t)code[1], (uint16_t)code[2]) != expected;
@@ -70,7 +76,8 @@ void dz_check_status(const struct dz_plan *plan, const int32_t DZ_TABLE *slant, 
         }
     }
 }
-/* What is shown of beta: at the first, the last and another pair of each difference, and where it can't be right. */
+/* What is shown of beta: at the first, the last and another pair of each difference, and where it can't be right. What
+ * the status says of that difference, too. */
 void dz_check_betas(const struct dz_plan *plan, const uint8_t DZ_TABLE *prepared, struct dz_findings *findings)
 {
     const struct dz_row DZ_TABLE *rows = (const struct dz_row DZ_TABLE *)(prepared + plan->rows_at);
@@ -84,7 +91,11 @@ void dz_check_betas(const struct dz_plan *plan, const uint8_t DZ_TABLE *prepared
         const uint16_t tried[3] = {row.b_low, last, (uint16_t)(row.b_low + row.first)};
 
         for (int16_t k = 0; row.pairs != 0u && k < 3; k++) {
-            findings->bad_betas += DZ_BETA((uint16_t)(row.offset + slant[tried[k]]), tried[k]) != beta;
+            const uint16_t p_a = (uint16_t)(row.offset + slant[tried[k]]);
+
+            findings->bad_betas += DZ_BETA(p_a, tried[k]) != beta;
+            findings->bad_status +=
+                DZ_STATUS((uint16_t)plan->zero_code, p_a, tried[k]) != of_difference(plan, plan->turn * row.offset);
         }
     }
     for (int32_t index = 0; index < plan->pairs; index++) {

@@ -26,7 +26,7 @@ static void core(uint16_t u, uint16_t a, uint16_t b)
     const uint16_t beta = BETA(a, b);
     const uint16_t status = STATUS(u, a, b);
 
-    /*@ assert status: status <= 15; */
+    /*@ assert status: status <= 31; */
     (void)compare;
     (void)beta;
     (void)status;

@@ -1,0 +1,28 @@
+"""Where useful flow begins on opening, as a curve over the pressure drop."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from dzdesign.identify.fitting.bounds import FINEST_ERROR
+from dzdesign.identify.fitting.guarding import OrderedKnees
+from dzdesign.identify.valve.guard_curve import CertifiedCurve, OpeningCurve
+from dzdesign.identify.valve.staircase import Direction
+
+
+def opening_curve(
+    rising: OrderedKnees, direction: Direction, guards: Mapping[str, CertifiedCurve], u_max: float
+) -> OpeningCurve | None:
+    """Return where useful flow begins on opening, from the knees of the rising branch; None where dP is unknown.
+
+    It must not lie below the curves of the guards.
+    """
+    dp = next(iter(guards.values())).dp_MPa
+    if not dp:
+        return None
+    knee, se = rising.knee, rising.knee_se
+    if direction == "flat":
+        knee = np.full_like(knee, np.average(knee, weights=np.maximum(se, FINEST_ERROR * u_max) ** -2))
+    # The larger of two curves that run one way runs that way too.
+    highest = np.max([knee, *(np.array(curve.u_offset_V) for curve in guards.values())], axis=0)
+    return OpeningCurve(dp_MPa=dp, u_V=tuple(map(float, highest)), u_se_V=tuple(map(float, se)))

@@ -1,0 +1,207 @@
+"""Above the highest tested pressure drop: what each `--above` drives at zero command, on truths of the test's own."""
+
+import ctypes
+import subprocess
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from dzdesign.codegen.project import generate
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.errors import InputError
+from dzdesign.design.beta_table import STEP_CODES
+from dzdesign.design.certificate import guarded_curve, prove_certificates
+from dzdesign.design.designing import design
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.options import DesignOptions
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.verify.exhaustive.above_tests import check_above
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.test_vectors import differences
+from tests.support.repeatable_valves import identify
+from tests.support.synthetic import Truth, synthetic_ramp
+
+TESTED = (1.0, 2.0, 3.5, 5.0)
+#: Declared, V/MPa²; and a bend of the truth at the tests, a third of it.
+M, BEND = 6e-3, 2e-3
+
+
+def threshold_V(dp_MPa: float, bend_V_MPa2: float = BEND, *, rising: bool = False) -> float:
+    """Return the truth: it bends upwards at the tests, and above the last one by as much as is asked."""
+    last = TESTED[-1]
+    inside = min(dp_MPa, last)
+    value = 5.6 - 0.06 * inside + BEND / 2 * inside**2
+    beyond = dp_MPa - inside
+    value += (-0.06 + BEND * last) * beyond + bend_V_MPa2 / 2 * beyond**2
+    return 10.8 - value if rising else value
+
+
+@pytest.fixture(scope="module", params=["line", "smooth", "monotone"])
+def valve(request):
+    """A valve under each premise; that of the line is straight."""
+    straight = request.param == "line"
+    truths = {dp: 5.6 - 0.05 * dp if straight else threshold_V(dp) for dp in TESTED}
+    ramps = [synthetic_ramp(dp, Truth(knee_rising=u, slope=4 * dp**0.5, noise=0.02)) for dp, u in truths.items()]
+    curvature = M * 1e-12 if request.param == "smooth" else None
+    return identify(ramps, IdentifyOptions(meter_lag=0.0, curve=request.param, curvature=curvature))
+
+
+@pytest.fixture(scope="module")
+def core_of(tmp_path_factory):
+    """The compiled core of a compensator: drive, V, and status at zero command and a pressure drop."""
+
+    def call(compensator):
+        folder = tmp_path_factory.mktemp("core") / "fw"
+        firmware = generate(compensator, "host", to_json_bytes(compensator))
+        write_folder(folder, firmware.files, firmware.manifest)
+        library = folder.parent / "core.so"
+        subprocess.run(["cc", "-shared", "-fPIC", "-o", library, folder / "core" / "dz_comp.c"], check=True)
+        core, signals = ctypes.CDLL(str(library)), compensator.signals
+
+        def at_zero(dp_MPa: float) -> tuple[float, int]:
+            sensor = signals.pressure_a
+            per_MPa = (sensor.full_code - sensor.zero_code) / float(sensor.span_MPa)
+            codes = [sensor.zero_code + int(each * per_MPa) for each in (1.0 + dp_MPa, 1.0)]
+            compare = core.dz_comp(signals.command.zero_code, *codes)
+            status = core.dz_status(signals.command.zero_code, *codes)
+            return compare / signals.compare_max * float(compensator.u_max_V), status
+
+        return at_zero
+
+    return call
+
+
+def closing_V(valve, dp_MPa: float, bend: float) -> float:
+    """Return the truth of the closing knee under the valve's premise."""
+    curve = valve.positive.certified["closing"]
+    hysteresis = threshold_V(5.0) - curve.u_threshold_V[-1]
+    if curve.premise == "line":
+        return 5.6 - 0.05 * dp_MPa + bend / 2 * max(dp_MPa - 5.0, 0.0) ** 2 - (5.35 - curve.u_threshold_V[-1])
+    return threshold_V(dp_MPa, bend) - hysteresis
+
+
+class TestDrive:
+    @pytest.mark.parametrize("choice", ["lower", "release"])
+    def test_within_the_premise_no_drive_lies_above_the_truth_and_the_status_says_above(self, valve, core_of, choice):
+        made = design(valve, DesignOptions(above=choice))
+        curve = valve.positive.certified["closing"]
+        at_zero = core_of(made)
+        # Of a threshold that is known to run one way nothing is certified; straight on is what it is continued by.
+        assert curve.above.certified == (curve.premise != "monotone")
+        for bend in {"line": (0.0,), "smooth": (0.0, M, -M), "monotone": (0.0,)}[curve.premise]:
+            for dp in (5.1, 6.0, 8.0, 10.0, 15.0, 18.5):
+                drive, status = at_zero(dp)
+                assert drive <= max(closing_V(valve, dp, bend), 0.0) + 1e-4 and status == 16, (bend, dp)
+        assert at_zero(4.9)[1] == 0
+
+    def test_held_it_lies_above_a_falling_truth(self, valve, core_of):
+        drive, status = core_of(design(valve, DesignOptions(above="hold")))(15.0)
+        assert drive > closing_V(valve, 15.0, 0.0) and status == 16
+
+    def test_what_is_beyond_the_premise_is_outside_the_promise_and_said(self, valve, core_of):
+        made, curve = design(valve, DesignOptions()), valve.positive.certified["closing"]
+        drive, _ = core_of(made)(10.0)
+        if curve.premise == "monotone":
+            (line,) = (each for each in made.costs if each.startswith("above"))
+            assert "not certified" in line
+        else:
+            assert drive > closing_V(valve, 10.0, -30 * M)
+            (line,) = (each for each in made.costs if each.startswith("above"))
+            assert "certified if" in line and ("bends by at most M" in line or "straight" in line)
+
+    def test_the_tests_keep_their_offset(self, valve):
+        held, lowered, released = (design(valve, DesignOptions(above=each)) for each in ("hold", "lower", "release"))
+        for dp in TESTED:
+            code = round(held.signals.dp_code(Fraction(dp)))
+            offsets = [float(each.beta(code) * each.positive.u_min0_over_u_max) for each in (held, lowered, released)]
+            assert min(offsets) > max(offsets) - 1e-3
+
+    def test_let_go_nothing_but_one_unit_is_left_two_segments_above_the_tests(self, valve):
+        made = design(valve, DesignOptions(above="release"))
+        last = round(made.signals.dp_code(Fraction(5)))
+        node = last // made.beta_step_codes + 2
+        assert set(made.positive.beta[node:]) == {1} and made.positive.beta[node - 1] > 1
+        assert made.positive.certificate.released_from_MPa == made.signals.dp_MPa(node * made.beta_step_codes)
+        assert made.positive.transition_beta is not None and min(made.positive.transition_beta) > 1
+
+
+def test_of_one_test_the_offset_is_held_and_said_to_be():
+    valve = identify([synthetic_ramp(1.0, Truth())], IdentifyOptions(meter_lag=0.0))
+    made = design(valve, DesignOptions())
+    assert valve.positive.certified["closing"].above is None
+    assert len(set(made.positive.beta)) == 1 and made.positive.certificate.released_from_MPa is None
+    (line,) = (each for each in made.costs if each.startswith("above"))
+    assert "one test shows no slope" in line and "nothing is certified" in line
+    assert min(design(valve, DesignOptions(above="release")).positive.beta) == 1
+
+
+def test_a_rising_threshold_known_to_run_one_way_is_certified_where_it_is_held():
+    ramps = [synthetic_ramp(dp, Truth(knee_rising=threshold_V(dp, rising=True), slope=4 * dp**0.5, noise=0.02))
+             for dp in TESTED]  # fmt: skip
+    valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="monotone"))
+    made = design(valve, DesignOptions())
+    assert valve.positive.trend == "increasing" and valve.positive.certified["closing"].above.certified
+    assert float(made.positive.certificate.holds_to_MPa) > 19 and made.positive.certificate.released_from_MPa is None
+    (line,) = (each for each in made.costs if each.startswith("below"))
+    assert "possible" in line
+
+
+@pytest.fixture(scope="module")
+def lowered():
+    """A compensator under a declared curvature, without a transition."""
+    ramps = [synthetic_ramp(dp, Truth(knee_rising=threshold_V(dp), slope=4 * dp**0.5, noise=0.02)) for dp in TESTED]
+    valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="smooth", curvature=M * 1e-12))
+    return design(valve, DesignOptions(transition=Fraction(0)))
+
+
+def test_the_doubles_agree_with_the_exact_offset_above_the_tests(lowered):
+    side, above = lowered.valve.positive, AboveChoice(choice="lower", step_codes=STEP_CODES)
+    curve = guarded_curve(side, "closing", "hold", above)
+    places = [Fraction(number, 64) for number in range(320, 1400)]
+    exact = [min(value for value in (curve.at(dp), curve.bound(dp)) if value is not None) for dp in places]
+    found = curve.in_doubles(np.array([float(dp) for dp in places]))
+    np.testing.assert_allclose(found, [float(value) for value in exact], atol=1e-9)
+
+
+class TestFaults:
+    """Seeded: each is found by the one check that is there for it."""
+
+    def drives(self, compensator):
+        exact = ExactLaw(compensator)
+        found = differences(exact)
+        drive = [exact.compare_value(exact.zero, exact.corners(exact.betas(int(dp)))) for dp in found.values]
+        return exact, found, np.array(drive)
+
+    def test_its_own_drive_passes(self, lowered):
+        found = check_above(*self.drives(lowered))
+        assert found.over_compensated + found.rising + found.not_released == 0
+        assert found.certified_to_MPa > 8 and 0 < found.smallest_margin_V < 1e-2 and found.codes > 1000
+
+    def test_a_drive_above_the_continued_bound(self, lowered):
+        exact, found, drive = self.drives(lowered)
+        dp = found.values * float(exact.a.per_code_MPa)
+        drive[(dp > 7) & (dp < 7.1)] += 60
+        assert check_above(exact, found, drive).over_compensated > 0
+
+    def test_an_offset_that_is_not_let_go(self, lowered):
+        released = design(lowered.valve, DesignOptions(transition=Fraction(0), above="release"))
+        exact, found, drive = self.drives(released)
+        drive[-3:] = 5
+        assert check_above(exact, found, drive).not_released > 0
+
+    def test_a_table_that_is_held_is_not_certified_as_lowered(self, lowered):
+        nodes, first = list(lowered.positive.beta), round(lowered.signals.dp_code(Fraction(5))) // 64 + 2
+        nodes[first:] = [nodes[first]] * len(nodes[first:])
+        side = replace(lowered.positive, beta=tuple(nodes))
+        forged = replace(lowered, sides=replace(lowered.sides, positive=side))
+        with pytest.raises(InputError, match="above the tests"):
+            prove_certificates(forged)
+
+    def test_a_certificate_that_reaches_too_far(self, lowered):
+        certificate = replace(lowered.positive.certificate, holds_to_MPa=Fraction(25))
+        side = replace(lowered.positive, certificate=certificate)
+        with pytest.raises(InputError, match="holds_to_MPa"):
+            prove_certificates(replace(lowered, sides=replace(lowered.sides, positive=side)))
