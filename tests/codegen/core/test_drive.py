@@ -41,7 +41,7 @@ class Drive(ctypes.Structure):
         ("rising", ctypes.c_uint16),
         ("played", ctypes.c_int16),
         ("ramped", ctypes.c_int32),
-        *((f"{kind}_{of}", ctypes.c_uint16) for kind in ("sound", "faulty") for of in ("commands", "pressures")),
+        *((f"{kind}_{of}", ctypes.c_uint16) for kind in ("valid", "faulty") for of in ("commands", "pressures")),
     ]
 
 

@@ -10,7 +10,7 @@ HERE = "codegen/dzdesign/codegen/core/drive_constants.py"
 #: Bits that the drive adds to those of the core, each with its place.
 DRIVE_BITS = {
     "WAITING": (5, "the drive waits: for valid commands, and with the interlock for zero command"),
-    "HELD": (6, "the smallest beta is used until the pressures have been sound for long enough"),
+    "HELD": (6, "the smallest beta is used until the pressures have been valid for long enough"),
     "LATCHED": (7, "a fault that stays until dz_drive_init()"),
 }
 OPTIONS, SIGNALS = "design/dzdesign/design/options.py", "design/dzdesign/design/signals.py"
@@ -104,7 +104,7 @@ def _fault_samples(compensator: Compensator) -> Define:
     return Define(
         symbol="FAULT_SAMPLES",
         value=samples,
-        equation="sound samples in a row after which a fault is over",
+        equation="valid samples in a row after which a fault is over",
         engineering=f"{1e3 * samples / signals.sample_Hz:.4g} ms",
         data=("drive_functions.fault_samples", "signals.sample_Hz"),
         generator=OPTIONS,

@@ -274,7 +274,8 @@ static struct wide product(uint32_t left, uint32_t right)
     return result;
 }
 
-/* The law of a command, by its codes past the zero band; `failed` is all ones for pressures that are not to be used, else 0. */
+/* The law of a command, codes past the zero band; `failed` is all ones for pressures that are
+ * not to be used, else 0. */
 static inline uint16_t law_of(uint16_t towards, uint16_t difference, uint16_t failed)
 {
     const uint16_t past = towards;

@@ -224,7 +224,8 @@ static uint32_t zero_beta_negative(uint32_t row, uint32_t dp)
 
 /* ---- the law ---- */
 
-/* The law of a command, by its codes past the zero band; `failed` is all ones for pressures that are not to be used, else 0. */
+/* The law of a command, codes past the zero band; `failed` is all ones for pressures that are
+ * not to be used, else 0. */
 static inline uint32_t law_of_negative(uint32_t towards, uint32_t difference, uint32_t failed)
 {
     const uint32_t past = towards;
