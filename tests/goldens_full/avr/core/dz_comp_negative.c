@@ -315,20 +315,23 @@ uint32_t dz_comp_checked_negative(uint32_t command, uint16_t p_a_adc, uint16_t p
 
 uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
+    const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
-    const uint32_t a = below_zero_negative(
-        (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a)));
-    const uint32_t b = below_zero_negative(
-        (uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b)));
-    /* Of a pressure outside its valid range the difference says nothing. */
+    /* The top bit is set where a code is outside its valid range, and where the difference is beyond its limits. */
+    const uint32_t command = (uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u));
+    const uint32_t a = (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a));
+    const uint32_t b = (uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b));
     const uint32_t difference = pressure_difference_negative(p_a, p_b);
-    const uint32_t below = below_zero_negative((uint32_t)(difference + REVERSE));
-    const uint32_t above = below_zero_negative((uint32_t)(TESTED_TO - difference));
-    const uint32_t of_drop = (uint32_t)((below & DZ_STATUS_DIFFERENCE) | (above & DZ_STATUS_ABOVE));
+    const uint32_t below = (uint32_t)(difference + REVERSE);
+    const uint32_t above = (uint32_t)(TESTED_TO - difference);
+    const uint32_t of_drop = (uint32_t)((below >> WORD_TOP) |
+                                    ((above >> WORD_TOP) * (DZ_STATUS_ABOVE / DZ_STATUS_DIFFERENCE)));
 
-    return (uint16_t)((invalid_command_negative(u_adc) & DZ_STATUS_COMMAND) | (a & DZ_STATUS_PRESSURE_A) |
-                      (b & DZ_STATUS_PRESSURE_B) | (of_drop & (uint32_t)~(a | b)));
+    /* Of a pressure outside its valid range the difference says nothing. */
+    return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |
+                      ((b >> WORD_TOP) * DZ_STATUS_PRESSURE_B) |
+                      ((of_drop & (uint32_t)~below_zero_negative((uint32_t)(a | b))) * DZ_STATUS_DIFFERENCE));
 }
 
 uint16_t dz_beta_negative(uint16_t p_a_adc, uint16_t p_b_adc)
