@@ -40,7 +40,9 @@ def certify(
     table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
     refused.
     """
-    margin = _smallest_margin(ceiling, table, u_min0, denominator)
+    # Codes above the tests may be read at a tested pressure drop; where the offset goes on there, `_above` proves it.
+    proved = range(len(ceiling.limit) if curve.above is None else ceiling.certified.stop)
+    margin = _smallest_margin(ceiling, table, u_min0, denominator, proved)
     losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
     holds_to, released_from = _above(curve, ceiling, signals, table, u_min0 / denominator)
     return Certificate(
@@ -151,20 +153,20 @@ def _remedy(side: SideModel, guard: str) -> str:
     )
 
 
-def _smallest_margin(ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int) -> Fraction:
-    """Return the least distance over u_max between ceiling and offset on the certified codes.
-
-    On no code it is negative: those outside the tests may be read at a tested pressure drop.
-    """
+def _smallest_margin(
+    ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int, proved: range
+) -> Fraction:
+    """Return the least distance over u_max between ceiling and offset on the certified codes; negative on none."""
     scale = denominator * STEP_CODES
-    margins = []
-    for code, limit in enumerate(ceiling.limit):
+    margins = {}
+    for code in proved:
         index, share = divmod(code, STEP_CODES)
         beta = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, scale)
-        margins.append(limit - beta * u_min0)
-    if min(margins) < 0:
-        raise RequirementError(f"the offset exceeds the certified one by {float(-min(margins)):.2e} of u_max")
-    return min(margins[code] for code in ceiling.certified or range(len(margins)))
+        margins[code] = ceiling.limit[code] - beta * u_min0
+    smallest = min(margins.values())
+    if smallest < 0:
+        raise RequirementError(f"the offset exceeds the certified one by {float(-smallest):.2e} of u_max")
+    return min(margins[code] for code in ceiling.certified or proved)
 
 
 def _above(
