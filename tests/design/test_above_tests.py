@@ -197,7 +197,7 @@ class TestFaults:
         nodes[first:] = [nodes[first]] * len(nodes[first:])
         side = replace(lowered.positive, beta=tuple(nodes))
         forged = replace(lowered, sides=replace(lowered.sides, positive=side))
-        with pytest.raises(InputError, match="above the tests"):
+        with pytest.raises(InputError, match="exceeds the certified one"):
             prove_certificates(forged)
 
     def test_a_certificate_that_reaches_too_far(self, lowered):

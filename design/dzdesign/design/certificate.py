@@ -40,9 +40,7 @@ def certify(
     table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
     refused.
     """
-    # Codes above the tests may be read at a tested pressure drop; where the offset goes on there, `_above` proves it.
-    proved = range(len(ceiling.limit) if curve.above is None else ceiling.certified.stop)
-    margin = _smallest_margin(ceiling, table, u_min0, denominator, proved)
+    margin = _smallest_margin(ceiling, table, u_min0, denominator, lets_go=curve.above is not None)
     losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
     holds_to, released_from = _above(curve, ceiling, signals, table, u_min0 / denominator)
     return Certificate(
@@ -154,19 +152,24 @@ def _remedy(side: SideModel, guard: str) -> str:
 
 
 def _smallest_margin(
-    ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int, proved: range
+    ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int, *, lets_go: bool
 ) -> Fraction:
-    """Return the least distance over u_max between ceiling and offset on the certified codes; negative on none."""
+    """Return the least distance over u_max between ceiling and offset on the certified codes.
+
+    On no code it is negative: those outside the tests may be read at a tested pressure drop. But for an offset that is
+    let go above them, which is the least that the table has.
+    """
     scale = denominator * STEP_CODES
-    margins = {}
-    for code in proved:
+    above, margins = ceiling.certified.stop, []
+    for code, limit in enumerate(ceiling.limit):
         index, share = divmod(code, STEP_CODES)
         beta = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, scale)
-        margins[code] = ceiling.limit[code] - beta * u_min0
-    smallest = min(margins.values())
-    if smallest < 0:
-        raise RequirementError(f"the offset exceeds the certified one by {float(-smallest):.2e} of u_max")
-    return min(margins[code] for code in ceiling.certified or proved)
+        margin = limit - beta * u_min0
+        let_go = lets_go and code >= above and beta <= Fraction(1, denominator)
+        margins.append(max(margin, Fraction(0)) if let_go else margin)
+    if min(margins) < 0:
+        raise RequirementError(f"the offset exceeds the certified one by {float(-min(margins)):.2e} of u_max")
+    return min(margins[code] for code in ceiling.certified or range(len(margins)))
 
 
 def _above(
@@ -175,7 +178,7 @@ def _above(
     """Return up to which pressure drop the certificate holds, and from which on the offset is let go, MPa.
 
     Above the tests it holds as far as the continued bound does, code by code, and where the drive is zero whatever the
-    threshold. An offset that is let go is one `unit` of beta over u_max; another one above the ceiling is refused.
+    threshold. An offset that is let go is one `unit` of beta over u_max.
     """
     tests_end = curve.dp_MPa[-1]
     if curve.above is None:
@@ -185,11 +188,6 @@ def _above(
         index, share = divmod(code, STEP_CODES)
         offset = unit * Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
         limit, here = ceiling.limit[code], max(signals.dp_MPa(code), tests_end)
-        if offset > max(limit, unit):
-            raise RequirementError(
-                f"the offset at {float(here):.3f} MPa, above the tests, exceeds the continued bound by "
-                f"{float(offset - limit):.2e} of u_max"
-            )
         holds = holds and (offset <= limit or offset * signals.compare_max < Fraction(1, 2))
         holds_to = here if holds else holds_to
         if offset > unit:
