@@ -123,10 +123,13 @@ def test_the_budget_adds_up_to_the_ceiling(designed):
     above = AboveChoice(choice=designed.above, step_codes=designed.beta_step_codes)
     curve = guarded_curve(designed.valve.positive, "closing", designed.below_dp0, above)
     limit = offset_ceiling(curve, designed.u_max_V, designed.allowance(1)).limit
+    curve_V = designed.valve.positive.certified["closing"].u_threshold_V
     for at, dp in enumerate(budget.dp_MPa):
-        code = round(signals.dp_code(Fraction(repr(dp))))
+        code = min(round(signals.dp_code(Fraction(repr(dp)))), int(signals.dp_code(Fraction(repr(budget.dp_MPa[-1])))))
+        assert budget.threshold_V[at] <= curve_V[at] + 2e-3
         assert budget.ceiling_V[at] == pytest.approx(float(limit[code] * designed.u_max_V), abs=1e-6)
         assert designed.beta(code) * designed.positive.u_min0_over_u_max <= limit[code]
+        assert budget.threshold_V[-1] == pytest.approx(curve_V[-1], abs=2e-3)
         assert budget.combined_mV[at] >= max(line.contribution_mV[at] for line in budget.lines)
     assert all(line.price >= 0 and line.source for line in budget.lines)
     kinds = {line.component: line.origin for line in budget.lines}

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from math import floor
 from typing import NamedTuple
 
 from dzdesign.design.beta_table import OffsetCurve, certified_V
@@ -72,8 +73,9 @@ class _Table:
 
     @property
     def codes(self) -> tuple[int, ...]:
-        """Differences of pressure codes at the tests."""
-        return tuple(round(self.allowance.signals.dp_code(dp)) for dp in self.threshold.dp_MPa)
+        """Differences of pressure codes at the tests, none beyond the last of them: there another rule begins."""
+        exact = [self.allowance.signals.dp_code(dp) for dp in self.threshold.dp_MPa]
+        return tuple(min(round(code), floor(exact[-1])) for code in exact)
 
     def at_tests(self, curve: OffsetCurve) -> list[Fraction]:
         """Return a curve at the tests' codes, V."""
