@@ -11,6 +11,8 @@ from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.dither import Dither, DrivenDither
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
+from dzdesign.design.beta_table import offset_ceiling
+from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.lot.margins import lot_margins, prove_lot
@@ -18,6 +20,7 @@ from dzdesign.design.lot.setting import lot_setting
 from dzdesign.design.machine.allowance import dither_reserve
 from dzdesign.design.machine.bench_current import check_bench_current, recorded_full_A
 from dzdesign.design.machine.colder_coil import colder_coil
+from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_certificates, prove_derived
 from tests.support.machine_oracle import worst_margin_mV
@@ -114,14 +117,20 @@ def test_the_bench_is_a_machine_too():
 
 
 def test_the_budget_adds_up_to_the_ceiling(designed):
-    """Where one component counts alone its price is its contribution; together they are at most their sum.
-
-    Not at the last test: what the pressures' errors add up to reaches above the tests, where the bound falls faster.
-    """
-    budget = designed.positive.budget
+    """It ends where the table's own ceiling is; no component alone takes more than all of them."""
+    budget, signals = designed.positive.budget, designed.signals
     assert [budget.line(name) is not None for name in ("oil", "ageing", "recording")] == [True] * 3
-    for at, combined in enumerate(budget.combined_mV[:-1]):
-        assert 0 < combined <= sum(line.contribution_mV[at] for line in budget.lines) * 1.05 + 50
+    above = AboveChoice(choice=designed.above, step_codes=designed.beta_step_codes)
+    curve = guarded_curve(designed.valve.positive, "closing", designed.below_dp0, above)
+    limit = offset_ceiling(curve, designed.u_max_V, designed.allowance(1)).limit
+    curve_V = designed.valve.positive.certified["closing"].u_threshold_V
+    for at, dp in enumerate(budget.dp_MPa):
+        code = min(round(signals.dp_code(Fraction(repr(dp)))), int(signals.dp_code(Fraction(repr(budget.dp_MPa[-1])))))
+        assert budget.threshold_V[at] <= curve_V[at] + 2e-3
+        assert budget.ceiling_V[at] == pytest.approx(float(limit[code] * designed.u_max_V), abs=1e-6)
+        assert designed.beta(code) * designed.positive.u_min0_over_u_max <= limit[code]
+        assert budget.threshold_V[-1] == pytest.approx(curve_V[-1], abs=2e-3)
+        assert budget.combined_mV[at] >= max(line.contribution_mV[at] for line in budget.lines)
     assert all(line.price >= 0 and line.source for line in budget.lines)
     kinds = {line.component: line.origin for line in budget.lines}
     assert kinds["recording"] == "measured" and kinds["oil"] == "default" and kinds["pressure sensor A"] == "declared"
