@@ -13,6 +13,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
     os.environ.setdefault(_threads, "1")  # before NumPy is imported: ratios of one core
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
 
+from above_coverage import print_above_coverage  # noqa: E402
 from accuracy import print_accuracy  # noqa: E402
 from between_ramps import print_between_ramps  # noqa: E402
 from bound_coverage import print_coverage, print_over_compensation, print_residual  # noqa: E402
@@ -48,6 +49,7 @@ PARTS = {
     "soft-edges": (print_soft_edges, 1313),
     "premises": (print_curve_premises, 1414),
     "choice": (print_curve_choice, 1616),
+    "above": (print_above_coverage, 1717),
     "recorded-premises": (print_recorded_premises, 1515),
     "worn-valves": (print_worn_valves, 1616),
     "random": (print_random_valves, 404),

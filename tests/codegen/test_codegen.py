@@ -203,4 +203,4 @@ def test_a_law_whose_divisor_cancels_needs_no_reciprocal(example_compensator):
     assert form.divisor == 1
     for command in (0, 1, 1000, 4095):
         assert evaluate(form, even, command, 500) == even.compare(command, 500)
-    assert "273" not in generate(even, "f28335").files["core/dz_comp.c"].split("uint16_t dz_comp(")[1]
+    assert "273" not in generate(even, "f28335").files["core/dz_comp.c"].split("law_of(")[1]

@@ -159,12 +159,12 @@ def test_the_wiring_table_is_that_of_the_signals(firmware, target):
     assert f"zero = 0, full = {signals.command.full_code}, valid 0..{signals.command.valid_codes[1]}" in row
     a, b = signals.pressure_a, signals.pressure_b
     row = wiring_row(text, "pressure A")
-    assert row.startswith("| pressure A, 0-25 MPa |") and "0 MPa = 0.596 V, 25 MPa = 2.980 V" in row
+    assert row.startswith("| pressure A, 0 MPa to 25 MPa |") and "0 MPa = 0.596 V, 25 MPa = 2.980 V" in row
     assert "4-20 mA on a shunt of 149 ohm" in row
     low, high = a.valid_codes
     assert f"0 MPa = {a.zero_code}, 25 MPa = {a.full_code}, valid {low}..{high}" in row
     row = wiring_row(text, "pressure B")
-    assert row.startswith("| pressure B, 0-10 MPa |") and "0 MPa = 0.000 V, 10 MPa = 3.000 V" in row
+    assert row.startswith("| pressure B, 0 MPa to 10 MPa |") and "0 MPa = 0.000 V, 10 MPa = 3.000 V" in row
     assert f"0 MPa = 0, 10 MPa = {b.full_code}, valid" in row and "shunt" not in row
     assert f"`p_a_adc` near {a.zero_code}, `p_b_adc` near 0" in step(text, 4)
     assert not re.search(r"\bratio\b|sensor output 0-", text)

@@ -77,7 +77,7 @@ class DesignChoices(MachineChoices, CurrentChoices):
     dither: Annotated[Text, Option("D", DRIVE, "off", example="150 Hz 1 %")] = None
     """Square wave on the output, such as "150 Hz 1 %", plus and minus 1 % of full drive."""
     fault_debounce: Annotated[Text, Option("N", DRIVE, "5 samples", example="5 samples")] = None
-    """Sound samples in a row after which a fault is over, such as "5 samples" or "4 ms". It acts at once: an invalid
+    """Valid samples in a row after which a fault is over, such as "5 samples" or "4 ms". It acts at once: an invalid
     command lets the valve go, a failed pressure gives the smallest beta."""
     fault_latch: Annotated[Text, Option("L", DRIVE, "off", choices=ON_OFF)] = None
     """Latch faults: on keeps one that has lasted for the debounce until a reset; off."""

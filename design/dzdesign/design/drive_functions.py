@@ -79,7 +79,7 @@ class DriveFunctions:
     fault_samples: Annotated[
         int,
         Meta(
-            description="Sound samples in a row after which a fault is over. Until then, from the first faulty sample "
+            description="Valid samples in a row after which a fault is over. Until then, from the first faulty sample "
             "on, the valve is let go where the command is invalid, and has the smallest beta where a pressure is.",
             ge=1,
             le=MOST_FAULT_SAMPLES,
@@ -88,7 +88,7 @@ class DriveFunctions:
     fault_latch: Annotated[
         bool,
         Meta(
-            description="Whether a fault of `fault_samples` faulty samples, with fewer sound ones in a row between "
+            description="Whether a fault of `fault_samples` faulty samples, with fewer valid ones in a row between "
             "them, stays until the drive is initialised again."
         ),
     ] = False

@@ -37,17 +37,20 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.model import DECIMALS
 
+#: Options that take one of a few words.
+ONE_OF = (
+    ("negative_dp", NEGATIVE_DP),
+    ("polarity", POLARITIES),
+    ("hysteresis", HYSTERESIS),
+    ("fault_latch", ON_OFF),
+    ("interlock", ON_OFF),
+)
+
 
 def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
     """Return the engineer's choices, each from its text; the default stands for one that is missing or empty."""
     text = {name: texts.get(name) or default for name, default in DEFAULTS.items()}
-    for name, known in (
-        ("negative_dp", NEGATIVE_DP),
-        ("polarity", POLARITIES),
-        ("hysteresis", HYSTERESIS),
-        ("fault_latch", ON_OFF),
-        ("interlock", ON_OFF),
-    ):
+    for name, known in ONE_OF:
         if text[name] not in known:
             raise InputError(
                 f"{flag_of(name)} is '{text[name]}'{nearest(text[name], known)}, expected {' or '.join(known)}"

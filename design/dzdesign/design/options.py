@@ -61,7 +61,7 @@ class DesignOptions:
     output_max : Fraction
         Largest drive over full drive.
     fault_samples : int
-        Sound samples in a row after which a fault is over.
+        Valid samples in a row after which a fault is over.
     fault_latch : bool
         Whether a fault of that many samples stays until a reset.
     interlock : bool

@@ -30,7 +30,8 @@ def _valve_heading(valve: "ValveModel") -> str:
 
 def _compensator_heading(compensator: "Compensator") -> str:
     target = f" for {compensator.target.name}" if compensator.target else ""
-    return f"Compensator{target}, law {compensator.law}, of a valve of {float(compensator.u_max_V):g} V"
+    full = compensator.valve.recorded_units.text(float(compensator.u_max_V), "g V")
+    return f"Compensator{target}, law {compensator.law}, of a valve of {full}"
 
 
 def _print_firmware(firmware: "Firmware", console: "Console") -> None:

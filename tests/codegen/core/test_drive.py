@@ -41,7 +41,7 @@ class Drive(ctypes.Structure):
         ("rising", ctypes.c_uint16),
         ("played", ctypes.c_int16),
         ("ramped", ctypes.c_int32),
-        *((f"{kind}_{of}", ctypes.c_uint16) for kind in ("sound", "faulty") for of in ("commands", "pressures")),
+        *((f"{kind}_{of}", ctypes.c_uint16) for kind in ("valid", "faulty") for of in ("commands", "pressures")),
     ]
 
 
@@ -157,13 +157,13 @@ FAULTS = [
     ("(LEAVE_ZERO + 1)", "LEAVE_ZERO", "two solenoids alone"),
     ("(LEAVE_ZERO + 1)", "(ZERO_BAND + 1)", "two solenoids alone"),
     ("(ZERO_BAND + 1)", "(LEAVE_ZERO + 1)", "two solenoids alone"),
-    ("(drive->side < 0) ? -command : command, gone", "command, gone", "two solenoids alone"),
-    ("u_law = code_at(at_rest, u_adc)", "u_law = u_adc", "two solenoids alone"),
+    ("away = (drive->side < 0) ? -command : command", "away = command", "two solenoids alone"),
+    (" & (at_rest - 1u)", "", "two solenoids alone"),
     ("(ZERO_BAND + 1)", "(LEAVE_ZERO + 1)", "one solenoid, ramps"),
     ("towards - PLAY_NOISE,", "towards,", "two solenoids, play"),
     ("(PLAY_CODES - rising)", "rising", "two solenoids, play"),
     ("0, PLAY_CODES);", "0, PLAY_CODES - 1);", "two solenoids, play"),
-    ("towards - ZERO_BAND", "towards", "two solenoids, play"),
+    ("within(towards - ZERO_BAND", "within(towards", "two solenoids, play"),
     ("(drive->side < 0) ? play_negative : play_positive", "play_positive", "two solenoids, play"),
     ("place & (PLAY_STEP - 1u)", "0u", "two solenoids, play"),
     (" || (drive->side != driven)", "", "two solenoids, play"),
@@ -173,14 +173,14 @@ FAULTS = [
     ("(gone != 0u) ? 0 : ramp(", "ramp(", "everything"),
     ("        drive->side = 0;\n    } else", "    } else", "everything"),
     (" | (gone & 1u)", "", "one solenoid alone"),
-    ("_adc) & ~gone", "_adc)", "one solenoid alone"),
+    (", held) & ~gone", ", held)", "one solenoid alone"),
     ("if (compare > DZ_COMPARE_LIMIT)", "if (compare > 65535u)", "everything"),
     ("if (compare == 0u)", "if (compare == 1u)", ONE_SIDE),
     ("compare -= DITHER_COUNTS;", ";", ONE_SIDE),
     ("(to > 0) ? to : 0", "to", "everything"),
-    ("dz_comp_negative(u_law", "dz_comp_negative(u_adc", "everything"),
+    ("negative(past, p_a_adc, p_b_adc, held)", "negative(past, p_a_adc, p_b_adc, 0u)", "everything"),
     ("dz_status_negative(", "dz_status(", "everything"),
-    ("COMMAND_ZERO - command;", "COMMAND_ZERO + command;", ONE_SIDE),
+    ("(uint32_t)(towards - ZERO_BAND)", "(uint32_t)towards", ONE_SIDE),
 ]
 
 
@@ -335,6 +335,8 @@ def test_the_plain_drive_is_the_law_and_rests_at_zero_until_the_bands_outer_end(
     inner, outer = compensator.zero_band_codes, compensator.drive_functions.leave_zero_codes
     assert (inner, outer) == (19, 24)
     firmware, offset = Firmware(compensator), compensator.compare(0, 500)
+    for _ in range(compensator.drive_functions.fault_samples):  # the interlock
+        firmware.sample(0, 1500, 1000)
     for command in (*range(0, 4096), *range(4095, -1, -1)):  # up, and down again
         rising = firmware.state.at_rest
         firmware.sample(command, 1500, 1000)

@@ -151,21 +151,21 @@ def test_a_latched_fault_stays_whatever_comes_until_the_drive_is_initialised():
 #: What is put for what in dz_drive.c, and the options that show it.
 SEEDED = {
     "the interlock is forgotten after an invalid command": (
-        "unsound(drive->sound_commands) &", "unsound(drive->sound_commands) & all_ones((drive->status & 1u) ^ 1u) &"),
+        "too_few(drive->valid_commands) &", "too_few(drive->valid_commands) & all_ones((drive->status & 1u) ^ 1u) &"),
     "no interlock after a reset": (
-        "drive->sound_commands = 0u;", "drive->sound_commands = FAULT_SAMPLES;"),
+        "drive->valid_commands = 0u;", "drive->valid_commands = FAULT_SAMPLES;"),
     "an invalid command does not wait": (
-        " = sound_samples(drive->sound_commands, invalid |", " = sound_samples(drive->sound_commands,"),
+        " = valid_samples(drive->valid_commands, invalid |", " = valid_samples(drive->valid_commands,"),
     "zero one code too wide": (
         "(INTERLOCK - asked)", "(INTERLOCK + 1 - asked)"),
     "zero one code too narrow": (
         "(INTERLOCK - asked)", "(INTERLOCK - 1 - asked)"),
     "back one sample early": (
-        "return 0u - ((sound - FAULT_SAMPLES) >> 31);", "return 0u - ((sound + 1u - FAULT_SAMPLES) >> 31);"),
+        "return 0u - ((valid - FAULT_SAMPLES) >> 31);", "return 0u - ((valid + 1u - FAULT_SAMPLES) >> 31);"),
     "back one sample late": (
-        "(sound + ((sound - FAULT_SAMPLES) >> 31))", "(sound + ((sound - FAULT_SAMPLES - 1u) >> 31))"),
-    "sound samples need not be in a row": (
-        " >> 31)) & ~fault;", " >> 31)) & (~fault | sound);"),
+        "(valid + ((valid - FAULT_SAMPLES) >> 31))", "(valid + ((valid - FAULT_SAMPLES - 1u) >> 31))"),
+    "valid samples need not be in a row": (
+        " >> 31)) & ~fault;", " >> 31)) & (~fault | valid);"),
     "latched one sample early": (
         "((FAULT_SAMPLES - 1u) - faulty)", "((FAULT_SAMPLES - 2u) - faulty)"),
     "a single sound command clears the latch": (
@@ -177,9 +177,9 @@ SEEDED = {
     "pressure B's bit is no fault": (
         "DZ_STATUS_PRESSURE_B | ", ""),
     "an implausible difference is no fault": (
-        " | DZ_STATUS_DIFFERENCE)", ")"),
+        " | DZ_STATUS_DIFFERENCE);", ");"),
     "the law takes the pressures again": (
-        "p_a = (uint16_t)(p_a_adc | (held >> 16));", "p_a = p_a_adc;"),
+        "p_b_adc, held)", "p_b_adc, all_ones(status & 14u))"),
     "the status is silent": (
         "(gone & DZ_STATUS_WAITING) | ", ""),
 }  # fmt: skip

@@ -74,7 +74,7 @@ SEEDED = {
     "5.9": ("dz_comp_negative.c", "below_zero_negative", "below_zero"),
     "7.2": ("dz_comp.c", "#define WORD_TOP 31u", "#define WORD_TOP 0xFFFF"),
     "10.8": ("dz_comp.c", "(int64_t)(int32_t)beta * factor", "(int64_t)(factor * factor)"),
-    "15.6": ("dz_drive.c", "    drive->ramped = 0;\n}", "    if (drive->law == 0u) drive->ramped = 0;\n}"),
+    "15.6": ("dz_drive.c", "    drive->faulty_pressures = 0u;\n}", "    if (drive->law == 0u) drive->side = 0;\n}"),
     "2.5": ("dz_comp.c", "#define WORD_TOP", "#define NOBODY 1u\n#define WORD_TOP"),
 }
 

@@ -93,3 +93,53 @@ class TestPremise:
         document = deepcopy(smooth)
         side_of(document)["certified"]["closing"]["premises"] = []
         assert "allow" in refused(document)
+
+
+class TestAboveTheTests:
+    """The bound above the last test follows from the thresholds, the band and M."""
+
+    def edited(self, document, **changes):
+        found = deepcopy(document)
+        side_of(found)["certified"]["closing"]["above"] |= changes
+        return found
+
+    @pytest.fixture
+    def above(self, smooth):
+        return side_of(smooth)["certified"]["closing"]["above"]
+
+    @pytest.mark.parametrize("place", [1, 3])
+    def test_a_bound_that_is_raised_is_refused(self, smooth, above, place):
+        raised = list(above["u_lower_V"])
+        raised[place] += 1e-3
+        assert "follows from the thresholds" in refused(self.edited(smooth, u_lower_V=raised))
+
+    def test_so_is_one_that_begins_above_the_last_test(self, smooth, above):
+        raised = [above["u_lower_V"][0] + 1e-3, *above["u_lower_V"][1:]]
+        assert "begin at the last test" in refused(self.edited(smooth, u_lower_V=raised))
+
+    def test_a_smaller_estimated_curvature_is_refused(self, smooth, above):
+        assert "estimated" in refused(self.edited(smooth, curvature_V_MPa2=above["curvature_V_MPa2"] / 2))
+
+    def test_a_band_that_shrinks_is_refused(self, smooth, above):
+        band, lower = list(above["band_V"]), list(above["u_lower_V"])
+        taken = band[4] / 2
+        band[4], lower[4] = band[4] - taken, lower[4] + taken
+        assert "faster and faster" in refused(self.edited(smooth, band_V=band, u_lower_V=lower))
+
+    def test_a_slope_from_no_test_is_refused(self, smooth):
+        assert "expected a test" in refused(self.edited(smooth, slope_from_MPa=1.7))
+
+    def test_what_the_tests_refuse_is_not_certified(self, smooth):
+        assert "refuse" in refused(self.edited(smooth, lack_of_fit_p=0.001))
+
+    def test_a_bound_that_is_missing_is_refused(self, smooth):
+        found = deepcopy(smooth)
+        side_of(found)["certified"]["closing"]["above"] = None
+        assert "above the tests" in refused(found)
+
+    def test_a_falling_threshold_that_only_runs_one_way_is_never_certified(self):
+        document = valve_json(curve="monotone")
+        above = side_of(document)["certified"]["closing"]["above"]
+        assert not above["certified"]
+        above["certified"] = True
+        assert "only known to run one way" in refused(document)

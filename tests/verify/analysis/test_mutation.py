@@ -110,7 +110,7 @@ JUDGED = [
     ("dz_comp.h", "DZ_ADC_CODE_MAX 4095u", "DZ_ADC_CODE_MAX 4096u", SAME_OBJECT),
     ("dz_comp.c", "#define HALF UINT64_C(4690104287232)", "#define HALF UINT64_C(4690104287233)", SAME_OUTPUTS),
     ("dz_drive.c", "drive->status = 0u;", "drive->status = 1u;", KILLED),
-    ("dz_drive.c", "drive->law = dz_comp(u_law", "drive->law = dz_comp(p_a_adc", KILLED),
+    ("dz_drive.c", "dz_comp_checked(past, p_a_adc", "dz_comp_checked(past, p_b_adc", KILLED),
 ]
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.core.artefact_types import RuleError
+from dzdesign.core.errors import RequirementError
 from dzdesign.verify.current.exact_controller import NO_OFFSET, OPEN, OVER, SENSOR, SHORT, ExactController
 from dzdesign.verify.current.state_check import (
     COMPARED,
@@ -124,6 +125,10 @@ SEEDED = {
     "highest offset by one": ("(OFFSET_HIGH - OFFSET_LOW)", "(OFFSET_HIGH - OFFSET_LOW + 1u)"),
     "another initial offset": ("loop->offset = OFFSET_NOMINAL", "loop->offset = OFFSET_NOMINAL + 1u"),
     "initial state not set": ("    loop->offset_total = 0u;\n", ""),
+    "a short forgotten by the calibration": (
+        "&= DZ_CURRENT_SENSOR | DZ_CURRENT_OPEN | DZ_CURRENT_SHORT |",
+        "&= DZ_CURRENT_SENSOR | DZ_CURRENT_OPEN |",
+    ),
     "offset never wrong": ("? DZ_CURRENT_SENSOR : 0u", "? 0u : 0u"),
     "feed-forward of the current": ("(aim * FEED", "(current * FEED"),
     "set point without its rate": ("loop->ramped + RATE)", "loop->ramped + RATE + 1u)"),
@@ -141,6 +146,17 @@ def test_a_wrong_controller_is_seen(fault):
     assert core["dz_current.c"].count(right) == 1
     core["dz_current.c"] = core["dz_current.c"].replace(right, wrong)
     assert check_states(loop, core, 100_000).wrong > 0
+
+
+@needs_compiler
+def test_a_controller_that_crashes_is_a_failure_and_not_the_end():
+    core = current_texts(PLAIN)
+    crash = "    if (set_point > 65530u) {\n        *(volatile uint32_t *)0 = 1u;\n    }\n"
+    begin = "    /* The set point, no faster than RATE."
+    assert core["dz_current.c"].count(begin) == 1
+    core["dz_current.c"] = core["dz_current.c"].replace(begin, crash + begin)
+    with pytest.raises(RequirementError, match="ended with"):
+        check_states(PLAIN, core, 100_000)
 
 
 @pytest.mark.skipif(bool(AVR.missing()), reason=AVR.missing())

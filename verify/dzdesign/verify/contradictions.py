@@ -4,10 +4,13 @@ from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.loop_checks import loop_checks
+from dzdesign.verify.closed_loop.valve_at_corners import valve_at_corners_check
+from dzdesign.verify.current.coil_simulation import coil_loop_of
+from dzdesign.verify.current.current_checks import checks_of
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.all_inputs import input_checks
 from dzdesign.verify.exhaustive.lot_check import lot_checked
-from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, POPULATION, ZERO_COMMAND, Check
+from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, OF_CURRENT, POPULATION, ZERO_COMMAND, Check
 
 
 def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple[Check, ...]:
@@ -20,8 +23,12 @@ def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple
     follow = [check for each in inputs for check in input_checks(each, units, both_signs=len(inputs) > 1)]
     kinds = set(FROM_INPUTS)
     if compensator:
-        kinds |= {LOT, POPULATION, *FROM_LOOP}
+        kinds |= {LOT, POPULATION, *FROM_LOOP, *OF_CURRENT}
         follow += lot_checked(inputs, compensator)
+        drive, around, current = compensator.current_drive, coil_loop_of(compensator), evidence.current_loop
+        if drive and around and current:
+            follow += checks_of(current, drive, around)
+            follow += [valve_at_corners_check(current.valve, units)] if current.valve else []
         if loop.pressures and evidence.scenarios:
             given = loop.plant is not None
             follow += loop_checks(

@@ -10,7 +10,7 @@ HERE = "codegen/dzdesign/codegen/core/drive_constants.py"
 #: Bits that the drive adds to those of the core, each with its place.
 DRIVE_BITS = {
     "WAITING": (5, "the drive waits: for valid commands, and with the interlock for zero command"),
-    "HELD": (6, "the smallest beta is used until the pressures have been sound for long enough"),
+    "HELD": (6, "the smallest beta is used until the pressures have been valid for long enough"),
     "LATCHED": (7, "a fault that stays until dz_drive_init()"),
 }
 OPTIONS, SIGNALS = "design/dzdesign/design/options.py", "design/dzdesign/design/signals.py"
@@ -77,17 +77,15 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     """Return what the drive functions need."""
     functions, bipolar = compensator.drive_functions, compensator.negative is not None
     found = [_fault_samples(compensator)]
-    interlock = functions.interlock_codes is not None
-    if interlock:
+    if functions.interlock_codes is not None:
         found.append(_interlock(compensator))
-    if bipolar or functions.has_ramp or compensator.zero_band_codes or interlock:
-        found.append(
-            Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
-                     equation="Eq. (29), code of zero command",
-                     engineering=compensator.valve.recorded_units.text(0.0, "g V"),
-                     rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
-                     generator=SIGNALS)
-        )  # fmt: skip
+    found.append(
+        Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
+                 equation="Eq. (29), code of zero command",
+                 engineering=compensator.valve.recorded_units.text(0.0, "g V"),
+                 rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
+                 generator=SIGNALS)
+    )  # fmt: skip
     if compensator.zero_band_codes:
         found.append(_zero_band(compensator))
     if bipolar or compensator.zero_band_codes:
@@ -106,7 +104,7 @@ def _fault_samples(compensator: Compensator) -> Define:
     return Define(
         symbol="FAULT_SAMPLES",
         value=samples,
-        equation="sound samples in a row after which a fault is over",
+        equation="valid samples in a row after which a fault is over",
         engineering=f"{1e3 * samples / signals.sample_Hz:.4g} ms",
         data=("drive_functions.fault_samples", "signals.sample_Hz"),
         generator=OPTIONS,

@@ -129,7 +129,8 @@ class SignalConstants:
             "TESTED_TO",
             ((codes + 1) << WEIGHT_SHIFT) - 1 if weighted else codes,
             "a pressure drop of more than this lies above the tests",
-            f"{float(last_MPa):.4g} MPa in codes of sensor A" + (f", times {2**WEIGHT_SHIFT}" if weighted else ""),
+            f"{c.valve.recorded_units.text(float(last_MPa), '.4g MPa')} in codes of sensor A"
+            + (f", times {2**WEIGHT_SHIFT}" if weighted else ""),
             ("certificate.dp_MPa", "signals.pressure_a.span_MPa"),
             "rounded down to a code" + (", with all that is rounded down to that code" if weighted else ""),
         )

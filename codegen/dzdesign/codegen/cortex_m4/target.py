@@ -1,7 +1,7 @@
-"""An example for the Cortex-M4 that needs nothing but a compiler: vector table, start-up, SysTick, three functions.
+"""An example for the Cortex-M4 that needs nothing but a compiler: vector table, start-up, SysTick, four functions.
 
 SysTick and the vector table: ARMv7-M architecture reference manual (DDI 0403), B1.5.3 and B3.3. Memory and clock are
-those of ARM's image AN386 for the MPS2 board, which QEMU models; a user's chip has its own, and three functions too.
+those of ARM's image AN386 for the MPS2 board, which QEMU models; a user's chip has its own, and four functions too.
 """
 
 from fractions import Fraction
@@ -40,7 +40,7 @@ OTHER_FILES = ("dz_selftest.c", "dz_selftest.h", "mps2_an386.ld", "Makefile", "R
 
 TARGET = Target(
     name="cortex-m4",
-    description="ARM Cortex-M4 without CMSIS: start-up, SysTick at 2.5 kHz, three functions to fill in; runs in QEMU",
+    description="ARM Cortex-M4 without CMSIS: start-up, SysTick at 2.5 kHz, four functions to fill in; runs in QEMU",
     compare_max=COMPARE_MAX,
     converter=Converter(full_V=ADC_SPAN_V, levels=2**ADC_BITS),
     takes_any_signals=True,

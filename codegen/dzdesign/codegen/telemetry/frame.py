@@ -68,7 +68,7 @@ STATUS_BITS = {
     0x0800: "pressure drop not plausible",
     0x1000: "pressure drop above the tests",
     0x2000: "waits for a valid command, or for zero command",
-    0x4000: "smallest beta until the pressures are sound again",
+    0x4000: "smallest beta until the pressures are valid again",
     0x8000: "fault latched until a reset",
 }
 #: The output is in use; without it the trip zone holds the pin low, whatever the compare value.

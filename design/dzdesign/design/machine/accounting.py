@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from math import ceil, floor
 from typing import NamedTuple
 
 from dzdesign.design.beta_table import OffsetCurve, certified_V
@@ -72,8 +73,9 @@ class _Table:
 
     @property
     def codes(self) -> tuple[int, ...]:
-        """Differences of pressure codes at the tests."""
-        return tuple(round(self.allowance.signals.dp_code(dp)) for dp in self.threshold.dp_MPa)
+        """Differences of pressure codes at the tests: of the first and the last the next one between them."""
+        at = [self.allowance.signals.dp_code(dp) for dp in self.threshold.dp_MPa]
+        return tuple(min(max(round(code), ceil(at[0])), floor(at[-1])) for code in at)
 
     def at_tests(self, curve: OffsetCurve) -> list[Fraction]:
         """Return a curve at the tests' codes, V."""

@@ -75,9 +75,10 @@ def lot_budget_lines(budget: LotBudget | None) -> tuple[str, ...]:
     """Return what the certificates of a lot are of, as a line for a person."""
     if budget is None:
         return ()
-    of = " and of ".join(budget.certified_of)
+    if len(budget.certified_of) > 1:
+        return (f"The certificates are of some valves of {', of others of '.join(budget.certified_of)}.",)
     if any("machine" in each for each in budget.certified_of):
-        return (f"The certificates are of {of}.",)
+        return (f"The certificates are of {budget.certified_of[0]}.",)
     return (
         "The certificates are of the recordings: no machine was declared, so coil temperature, supply, pressure "
         "sensors, oil and ageing are not counted.",

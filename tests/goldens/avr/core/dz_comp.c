@@ -274,25 +274,16 @@ static struct wide product(uint32_t left, uint32_t right)
     return result;
 }
 
-uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+/* The law of a command, codes past the zero band; `failed` is all ones for pressures that are
+ * not to be used, else 0. */
+static inline uint16_t law_of(uint16_t towards, uint16_t difference, uint16_t failed)
 {
-    const uint16_t u = u_adc;
-    const uint16_t p_a = p_a_adc;
-    const uint16_t p_b = p_b_adc;
-    /* The command, in codes from zero on; 0 where it is not valid. */
-    const uint16_t let_go = invalid_command(u);
-    const uint16_t from_zero = (uint16_t)((uint16_t)(u - COMMAND_ZERO) & (uint16_t)~let_go);
-    /* What of it lies past the zero band; 0 within. */
-    const uint16_t from_band = (uint16_t)(from_zero - ZERO_BAND);
-    const uint16_t towards = (uint16_t)(from_band & (uint16_t)~below_zero(from_band));
     const uint16_t past = towards;
     /* What of that lies in the transition, and the command that the law is given. */
     const uint16_t from_end = (uint16_t)(past - TRANSITION_CODES);
     const uint16_t reached = (uint16_t)(TRANSITION_CODES + (from_end & below_zero(from_end)));
     const uint32_t command = ((uint32_t)past << TRANSITION_SHIFT) + ((uint32_t)ZERO_BAND * reached);
     /* The pressure drop, and the segment it lies in. */
-    const uint16_t difference = pressure_difference(p_a, p_b);
-    const uint16_t failed = failed_pressures(p_a, p_b, difference);
     const uint16_t dp = pressure_drop(difference, failed);
     const uint16_t row = row_of(dp, failed);
     /* The law. Below 2^31 (proved when this was generated). */
@@ -320,25 +311,50 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
         ((uint16_t)(rest - REST_1) >> 15) -
         ((uint16_t)(rest - REST_2) >> 15));
 
-    return (uint16_t)((uint16_t)compare & (uint16_t)~let_go);
+    return (uint16_t)compare;
+}
+
+uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    const uint16_t u = u_adc;
+    const uint16_t p_a = p_a_adc;
+    const uint16_t p_b = p_b_adc;
+    /* The command, in codes from zero on; 0 where it is not valid. */
+    const uint16_t let_go = invalid_command(u);
+    const uint16_t from_zero = (uint16_t)((uint16_t)(u - COMMAND_ZERO) & (uint16_t)~let_go);
+    /* What of it lies past the zero band; 0 within. */
+    const uint16_t from_band = (uint16_t)(from_zero - ZERO_BAND);
+    const uint16_t towards = (uint16_t)(from_band & (uint16_t)~below_zero(from_band));
+    const uint16_t difference = pressure_difference(p_a, p_b);
+    const uint16_t failed = failed_pressures(p_a, p_b, difference);
+
+    return (uint16_t)(law_of(towards, difference, failed) & (uint16_t)~let_go);
+}
+
+uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed)
+{
+    return law_of((uint16_t)command, pressure_difference(p_a_adc, p_b_adc), (uint16_t)failed);
 }
 
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
+    const uint16_t u = u_adc;
     const uint16_t p_a = p_a_adc;
     const uint16_t p_b = p_b_adc;
-    const uint16_t a = below_zero(
-        (uint16_t)((uint16_t)(p_a - PRESSURE_A_LOW) | (uint16_t)(PRESSURE_A_HIGH - p_a)));
-    const uint16_t b = below_zero(
-        (uint16_t)((uint16_t)(p_b - PRESSURE_B_LOW) | (uint16_t)(PRESSURE_B_HIGH - p_b)));
-    /* Of a pressure outside its valid range the difference says nothing. */
+    /* The top bit is set where a code is outside its valid range, and where the difference is beyond its limits. */
+    const uint16_t command = (uint16_t)((uint16_t)(u - COMMAND_LOW) | (uint16_t)(COMMAND_HIGH - u));
+    const uint16_t a = (uint16_t)((uint16_t)(p_a - PRESSURE_A_LOW) | (uint16_t)(PRESSURE_A_HIGH - p_a));
+    const uint16_t b = (uint16_t)((uint16_t)(p_b - PRESSURE_B_LOW) | (uint16_t)(PRESSURE_B_HIGH - p_b));
     const uint16_t difference = pressure_difference(p_a, p_b);
-    const uint16_t below = below_zero((uint16_t)(difference + REVERSE));
-    const uint16_t above = below_zero((uint16_t)(TESTED_TO - difference));
-    const uint16_t of_drop = (uint16_t)((below & DZ_STATUS_DIFFERENCE) | (above & DZ_STATUS_ABOVE));
+    const uint16_t below = (uint16_t)(difference + REVERSE);
+    const uint16_t above = (uint16_t)(TESTED_TO - difference);
+    const uint16_t of_drop = (uint16_t)((below >> WORD_TOP) |
+                                    ((above >> WORD_TOP) * (DZ_STATUS_ABOVE / DZ_STATUS_DIFFERENCE)));
 
-    return (uint16_t)((invalid_command(u_adc) & DZ_STATUS_COMMAND) | (a & DZ_STATUS_PRESSURE_A) |
-                      (b & DZ_STATUS_PRESSURE_B) | (of_drop & (uint16_t)~(a | b)));
+    /* Of a pressure outside its valid range the difference says nothing. */
+    return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |
+                      ((b >> WORD_TOP) * DZ_STATUS_PRESSURE_B) |
+                      ((of_drop & (uint16_t)~below_zero((uint16_t)(a | b))) * DZ_STATUS_DIFFERENCE));
 }
 
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)

@@ -34,11 +34,10 @@ void dz_tick_start(void)
 
 static void take_sample(void)
 {
-    uint16_t p_a_adc;
-    uint16_t p_b_adc;
     const uint16_t u_adc = dz_board_read_command();
+    const uint16_t p_a_adc = dz_board_read_pressure_a();
+    const uint16_t p_b_adc = dz_board_read_pressure_b();
 
-    dz_board_read_pressures(&p_a_adc, &p_b_adc);
     dz_drive_sample(&drive, u_adc, p_a_adc, p_b_adc);
     dz_state.u_adc = u_adc;
     dz_state.p_a_adc = p_a_adc;

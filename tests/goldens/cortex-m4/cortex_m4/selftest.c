@@ -66,10 +66,14 @@ uint16_t dz_board_read_command(void)
     return command_at(dz_state.ticks);
 }
 
-void dz_board_read_pressures(uint16_t *p_a_adc, uint16_t *p_b_adc)
+uint16_t dz_board_read_pressure_a(void)
 {
-    *p_a_adc = PRESSURE_A;
-    *p_b_adc = PRESSURE_B;
+    return PRESSURE_A;
+}
+
+uint16_t dz_board_read_pressure_b(void)
+{
+    return PRESSURE_B;
 }
 
 void dz_board_write_compare(uint16_t compare_a, uint16_t compare_b)

@@ -237,25 +237,16 @@ static uint32_t zero_beta(uint32_t row, uint32_t dp)
 
 /* ---- the law ---- */
 
-uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+/* The law of a command, codes past the zero band; `failed` is all ones for pressures that are
+ * not to be used, else 0. */
+static inline uint32_t law_of(uint32_t towards, uint32_t difference, uint32_t failed)
 {
-    const uint32_t u = u_adc;
-    const uint32_t p_a = p_a_adc;
-    const uint32_t p_b = p_b_adc;
-    /* The command, in codes from zero on; 0 where it is not valid. */
-    const uint32_t let_go = invalid_command(u);
-    const uint32_t from_zero = (uint32_t)((uint32_t)(u - COMMAND_ZERO) & (uint32_t)~let_go);
-    /* What of it lies past the zero band; 0 within. */
-    const uint32_t from_band = (uint32_t)(from_zero - ZERO_BAND);
-    const uint32_t towards = (uint32_t)(from_band & (uint32_t)~below_zero(from_band));
     const uint32_t past = towards;
     /* What of that lies in the transition, and the command that the law is given. */
     const uint32_t from_end = (uint32_t)(past - TRANSITION_CODES);
     const uint32_t reached = (uint32_t)(TRANSITION_CODES + (from_end & below_zero(from_end)));
     const uint32_t command = ((uint32_t)past << TRANSITION_SHIFT) + ((uint32_t)ZERO_BAND * reached);
     /* The pressure drop, and the segment it lies in. */
-    const uint32_t difference = pressure_difference(p_a, p_b);
-    const uint32_t failed = failed_pressures(p_a, p_b, difference);
     const uint32_t dp = pressure_drop(difference, failed);
     const uint32_t row = row_of(dp, failed);
     /* The law. Below 2^31 (proved when this was generated). */
@@ -275,25 +266,50 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     /* quotient / 819 */
     const uint32_t compare = (uint32_t)(((uint64_t)quotient * RECIPROCAL) >> RECIPROCAL_SHIFT);
 
-    return (uint16_t)((uint16_t)compare & (uint16_t)~let_go);
+    return (uint32_t)compare;
+}
+
+uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    const uint32_t u = u_adc;
+    const uint32_t p_a = p_a_adc;
+    const uint32_t p_b = p_b_adc;
+    /* The command, in codes from zero on; 0 where it is not valid. */
+    const uint32_t let_go = invalid_command(u);
+    const uint32_t from_zero = (uint32_t)((uint32_t)(u - COMMAND_ZERO) & (uint32_t)~let_go);
+    /* What of it lies past the zero band; 0 within. */
+    const uint32_t from_band = (uint32_t)(from_zero - ZERO_BAND);
+    const uint32_t towards = (uint32_t)(from_band & (uint32_t)~below_zero(from_band));
+    const uint32_t difference = pressure_difference(p_a, p_b);
+    const uint32_t failed = failed_pressures(p_a, p_b, difference);
+
+    return (uint16_t)(law_of(towards, difference, failed) & (uint32_t)~let_go);
+}
+
+uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed)
+{
+    return law_of((uint32_t)command, pressure_difference(p_a_adc, p_b_adc), (uint32_t)failed);
 }
 
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
+    const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
-    const uint32_t a = below_zero(
-        (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a)));
-    const uint32_t b = below_zero(
-        (uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b)));
-    /* Of a pressure outside its valid range the difference says nothing. */
+    /* The top bit is set where a code is outside its valid range, and where the difference is beyond its limits. */
+    const uint32_t command = (uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u));
+    const uint32_t a = (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a));
+    const uint32_t b = (uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b));
     const uint32_t difference = pressure_difference(p_a, p_b);
-    const uint32_t below = below_zero((uint32_t)(difference + REVERSE));
-    const uint32_t above = below_zero((uint32_t)(TESTED_TO - difference));
-    const uint32_t of_drop = (uint32_t)((below & DZ_STATUS_DIFFERENCE) | (above & DZ_STATUS_ABOVE));
+    const uint32_t below = (uint32_t)(difference + REVERSE);
+    const uint32_t above = (uint32_t)(TESTED_TO - difference);
+    const uint32_t of_drop = (uint32_t)((below >> WORD_TOP) |
+                                    ((above >> WORD_TOP) * (DZ_STATUS_ABOVE / DZ_STATUS_DIFFERENCE)));
 
-    return (uint16_t)((invalid_command(u_adc) & DZ_STATUS_COMMAND) | (a & DZ_STATUS_PRESSURE_A) |
-                      (b & DZ_STATUS_PRESSURE_B) | (of_drop & (uint32_t)~(a | b)));
+    /* Of a pressure outside its valid range the difference says nothing. */
+    return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |
+                      ((b >> WORD_TOP) * DZ_STATUS_PRESSURE_B) |
+                      ((of_drop & (uint32_t)~below_zero((uint32_t)(a | b))) * DZ_STATUS_DIFFERENCE));
 }
 
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)

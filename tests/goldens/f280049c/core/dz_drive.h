@@ -6,8 +6,8 @@
  * write compare_a and compare_b to the PWM. Inputs are those of dz_comp(), see dz_comp.h.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file but for
- *   deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE: it is for those who call the drive; who is told
- *   of a new sample does without.
+ *   deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, DZ_DRIVE_COMMAND_ZERO, DZ_STATUS_LATCHED: they
+ *   are for those who call the drive; not every firmware needs all of them.
  */
 #ifndef DZ_DRIVE_H
 #define DZ_DRIVE_H
@@ -23,7 +23,7 @@
 /* Bit 5 of the drive's status word: the drive waits: for valid commands, and with the interlock for zero command (a
  * convention). */
 #define DZ_STATUS_WAITING 32u
-/* Bit 6 of the drive's status word: the smallest beta is used until the pressures have been sound for long enough (a
+/* Bit 6 of the drive's status word: the smallest beta is used until the pressures have been valid for long enough (a
  * convention). */
 #define DZ_STATUS_HELD 64u
 /* Bit 7 of the drive's status word: a fault that stays until dz_drive_init() (a convention). */
@@ -32,7 +32,7 @@
 /* All the memory that the compensator has: one for each valve, set by dz_drive_init().
  * Options of this firmware: Zero band. Interlock.
  * A fault acts at once: without a valid command the valve is let go, and of pressures that can't be right the smallest
- * beta is used. It is over after 5 sound samples in a row; a command must be zero in these. */
+ * beta is used. It is over after 5 valid samples in a row; a command must be zero in these. */
 struct dz_drive
 {
     uint16_t compare_a; /* compare value of solenoid A, positive commands */
@@ -45,8 +45,8 @@ struct dz_drive
     uint16_t rising;    /* how far the command counts as rising, codes of travel; 0 without a play */
     int16_t played;     /* command without its noise, codes from zero on; 0 without a play */
     int32_t ramped;     /* command after the ramps, codes from zero on times 65536; positive ones above zero */
-    uint16_t sound_commands;   /* valid commands in a row, of zero until the drive follows; from 5 on it follows them */
-    uint16_t sound_pressures;  /* pressures in a row that can be right; from 5 on they are used */
+    uint16_t valid_commands;   /* valid commands in a row, of zero until the drive follows; from 5 on it follows them */
+    uint16_t valid_pressures;  /* pressures in a row that can be right; from 5 on they are used */
     uint16_t faulty_commands;  /* invalid commands since the drive last followed one; 0 without a latch */
     uint16_t faulty_pressures; /* pressures that can't be right since they were last used; 0 without a latch */
 };

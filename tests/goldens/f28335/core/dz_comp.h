@@ -74,6 +74,10 @@
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
+/* For dz_drive.c, which has checked the inputs itself: the same for a command of so many codes past the zero band, 0
+ * below; `failed` is all ones for pressures that are not to be used, else 0. */
+uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
+
 /* Returns what there is to say of the inputs, DZ_STATUS_... together, or 0: valid, and a tested pressure drop or less. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 

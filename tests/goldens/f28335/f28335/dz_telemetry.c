@@ -69,6 +69,7 @@ static uint16_t read_state(struct dz_state *copy)
         copy->p_b_adc = dz_state.p_b_adc;
         copy->compare_a = dz_state.compare_a;
         copy->compare_b = dz_state.compare_b;
+        copy->status = dz_state.status;
         whole = (dz_state.ticks == copy->ticks) ? 1u : 0u;
     }
     return whole;

@@ -9,7 +9,7 @@
 
 #include "dz_drive.h"
 
-/* Sound samples in a row after which a fault is over: 2.4 ms (exact). */
+/* Valid samples in a row after which a fault is over: 2.4 ms (exact). */
 #define FAULT_SAMPLES 3u
 /* Codes of command up to which it counts as the zero command that the interlock waits for: 1.66% of command, 0.1661
  * V (exact). */
@@ -75,15 +75,15 @@ static uint32_t all_ones(uint32_t x)
 }
 
 /* Samples in a row without a fault, this one included, up to FAULT_SAMPLES; `fault` is all ones or 0. */
-static uint32_t sound_samples(uint32_t sound, uint32_t fault)
+static uint32_t valid_samples(uint32_t valid, uint32_t fault)
 {
-    return (sound + ((sound - FAULT_SAMPLES) >> 31)) & ~fault;
+    return (valid + ((valid - FAULT_SAMPLES) >> 31)) & ~fault;
 }
 
 /* All ones as long as there have not been FAULT_SAMPLES of them. */
-static uint32_t unsound(uint32_t sound)
+static uint32_t too_few(uint32_t valid)
 {
-    return 0u - ((sound - FAULT_SAMPLES) >> 31);
+    return 0u - ((valid - FAULT_SAMPLES) >> 31);
 }
 
 /* Faults since the last one was over, up to FAULT_SAMPLES. */
@@ -101,13 +101,14 @@ static uint32_t latched(uint32_t faulty)
 /* All ones as long as the pressures are not to be used, for the status of a new sample. */
 static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
 {
-    const uint32_t fault = all_ones(status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE));
+    const uint32_t wrong = status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE);
+    const uint32_t fault = ((wrong - 1u) >> 31) - 1u; /* all ones, or 0 */
     const uint32_t faulty = faulty_samples(drive->faulty_pressures, fault);
-    const uint32_t sound = sound_samples(drive->sound_pressures, fault | latched(faulty));
-    const uint32_t held = unsound(sound);
+    const uint32_t valid = valid_samples(drive->valid_pressures, fault | latched(faulty));
+    const uint32_t held = too_few(valid);
 
     drive->faulty_pressures = (uint16_t)(faulty & held);
-    drive->sound_pressures = (uint16_t)sound;
+    drive->valid_pressures = (uint16_t)valid;
     return held;
 }
 
@@ -121,12 +122,10 @@ static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
     return ((at_rest | in_band) & stays) | (gone & 1u);
 }
 
-/* The code that the law is given. */
-static uint16_t code_at(uint32_t at_rest, uint16_t code)
+/* The command that the law is given: codes past the zero band, none at rest. */
+static uint32_t past_band(uint32_t at_rest, int32_t towards)
 {
-    const uint32_t awake = at_rest - 1u; /* all ones, or 0 */
-
-    return (uint16_t)((code & awake) | ((uint32_t)COMMAND_ZERO & ~awake));
+    return (uint32_t)(towards - ZERO_BAND) & (at_rest - 1u);
 }
 
 void dz_drive_init(struct dz_drive *drive)
@@ -141,8 +140,8 @@ void dz_drive_init(struct dz_drive *drive)
     drive->rising = 0u;
     drive->played = 0;
     drive->ramped = 0;
-    drive->sound_commands = 0u; /* zero command must be seen first */
-    drive->sound_pressures = FAULT_SAMPLES;
+    drive->valid_commands = 0u; /* zero command must be seen first */
+    drive->valid_pressures = FAULT_SAMPLES;
     drive->faulty_commands = 0u;
     drive->faulty_pressures = 0u;
 }
@@ -153,21 +152,19 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     const uint32_t invalid = all_ones(status & DZ_STATUS_COMMAND);
     const int32_t asked = (int32_t)u_adc - COMMAND_ZERO; /* codes from zero, positive ones above */
     /* A command while the drive waits for zero command. */
-    const uint32_t early = unsound(drive->sound_commands) & (0u - (((uint32_t)(INTERLOCK - asked) | (uint32_t)(INTERLOCK + asked)) >> 31));
+    const uint32_t early = too_few(drive->valid_commands) & (0u - (((uint32_t)(INTERLOCK - asked) | (uint32_t)(INTERLOCK + asked)) >> 31));
     const uint32_t faulty = faulty_samples(drive->faulty_commands, invalid);
-    const uint32_t sound = sound_samples(drive->sound_commands, invalid | early | latched(faulty));
+    const uint32_t valid = valid_samples(drive->valid_commands, invalid | early | latched(faulty));
     /* All ones without a command to be followed: let go at once, and start from rest when it comes back. */
-    const uint32_t gone = unsound(sound);
+    const uint32_t gone = too_few(valid);
     const int32_t ramped = (gone != 0u) ? 0 : ramp(drive->ramped, asked * RAMP_UNIT);
     const int32_t command = ramped / RAMP_UNIT;
-    const int32_t code = COMMAND_ZERO + command;
-    const uint16_t u_ramped = (uint16_t)code; /* between zero and a valid code, so a code itself */
+    int32_t away;
+    uint32_t past;
     uint32_t at_rest;
-    uint16_t u_law;
     uint32_t held;
-    uint16_t p_a;
 
-    drive->sound_commands = (uint16_t)sound;
+    drive->valid_commands = (uint16_t)valid;
     drive->faulty_commands = (uint16_t)(faulty & gone);
     drive->ramped = ramped;
     if (gone != 0u) {
@@ -179,20 +176,20 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     } else {
         /* about zero: the side stays, so that noise does not throw the spool to and fro */
     }
-    at_rest = rest(drive->at_rest, (drive->side < 0) ? -command : command, gone);
-    u_law = code_at(at_rest, u_ramped);
+    away = (drive->side < 0) ? -command : command;
+    at_rest = rest(drive->at_rest, away, gone);
+    past = past_band(at_rest, away);
     drive->at_rest = (uint16_t)at_rest;
     if (drive->side < 0) {
         status = dz_status_negative(u_adc, p_a_adc, p_b_adc);
     }
     held = held_pressures(drive, status);
-    p_a = (uint16_t)(p_a_adc | (held >> 16)); /* no sensor's code: the smallest beta */
     drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD) |
                                ((latched(drive->faulty_commands) | latched(drive->faulty_pressures)) & DZ_STATUS_LATCHED));
     if (drive->side > 0) {
-        drive->law = dz_comp(u_law, p_a, p_b_adc);
+        drive->law = (uint16_t)dz_comp_checked(past, p_a_adc, p_b_adc, held);
     } else if (drive->side < 0) {
-        drive->law = dz_comp_negative(u_law, p_a, p_b_adc);
+        drive->law = (uint16_t)dz_comp_checked_negative(past, p_a_adc, p_b_adc, held);
     } else {
         drive->law = 0u;
     }

@@ -16,10 +16,14 @@ uint16_t dz_board_read_command(void)
     return dz_board_u_adc;
 }
 
-void dz_board_read_pressures(uint16_t *p_a_adc, uint16_t *p_b_adc)
+uint16_t dz_board_read_pressure_a(void)
 {
-    *p_a_adc = dz_board_p_a_adc;
-    *p_b_adc = dz_board_p_b_adc;
+    return dz_board_p_a_adc;
+}
+
+uint16_t dz_board_read_pressure_b(void)
+{
+    return dz_board_p_b_adc;
 }
 
 void dz_board_write_compare(uint16_t compare_a, uint16_t compare_b)

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: ddaa87b576ebf4f74c86db0d7e802b738d742d8c662c80af0513778823e15507 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* The three functions that stand between the compensator and your hardware; dz_board.c has them to fill in. */
+/* The functions that stand between the compensator and your hardware; dz_board.c has them to fill in. */
 #ifndef DZ_BOARD_H
 #define DZ_BOARD_H
 
@@ -15,8 +15,9 @@
 /* Converter code of the command, right-justified; called once a sample. */
 uint16_t dz_board_read_command(void);
 
-/* Converter codes of the pressures ahead of and behind the metering edge. */
-void dz_board_read_pressures(uint16_t *p_a_adc, uint16_t *p_b_adc);
+/* Converter codes of the pressures ahead of and behind the metering edge; each called once a sample. */
+uint16_t dz_board_read_pressure_a(void);
+uint16_t dz_board_read_pressure_b(void);
 
 /* Compare values 0 to DZ_COMPARE_MAX of solenoids A and B to the PWM, in its shadow registers; 0 must be a pin that stays
  * low. One of the two is always 0; without a second solenoid it is compare_b. */

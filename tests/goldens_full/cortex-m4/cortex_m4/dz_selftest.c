@@ -170,9 +170,9 @@ static uint16_t next_command(struct walk *walk)
 
 static uint16_t next_pressure(struct walk *walk, uint16_t least, uint16_t count)
 {
-    const uint16_t sound = (uint16_t)(least + draw(walk, count));
+    const uint16_t usual = (uint16_t)(least + draw(walk, count));
 
-    return (draw(walk, 32u) == 0u) ? draw(walk, (uint16_t)(DZ_ADC_CODE_MAX + 2u)) : sound;
+    return (draw(walk, 32u) == 0u) ? draw(walk, (uint16_t)(DZ_ADC_CODE_MAX + 2u)) : usual;
 }
 
 static uint32_t with_number(uint32_t hash, uint16_t number)

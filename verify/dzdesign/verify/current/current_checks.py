@@ -72,14 +72,18 @@ def current_checks(
         result = _result(CoilSimulation(around, core), found)
     except RequirementError as error:
         return CurrentChecks(checks=(CURRENT_STATES.check(holds=False, text=str(error)),))
-    checks = (
+    return CurrentChecks(checks=checks_of(result, drive, around), result=result)
+
+
+def checks_of(result: CurrentLoopResult, drive: CurrentDrive, around: CoilLoop) -> tuple[Check, ...]:
+    """Return the requirements on a loop by its figures, in the order of the report."""
+    return (
         _states_check(result.states),
         _margins_check(result, drive),
         _settles_check(result),
         _step_check(result, drive, around),
         _faults_check(result.faults),
     )
-    return CurrentChecks(checks=checks, result=result)
 
 
 def controller_on_machine(folder: Path, compensator: Compensator, machine: Machine, states: int = STATES) -> Check:

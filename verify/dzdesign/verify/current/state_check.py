@@ -10,14 +10,24 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.current.loop import CurrentLoop
-from dzdesign.verify.current.exact_controller import NO_OFFSET, ExactController, exact_ticks
+from dzdesign.verify.current.exact_controller import (
+    NO_OFFSET,
+    OPEN,
+    OVER,
+    SENSOR,
+    SHORT,
+    ExactController,
+    exact_ticks,
+)
 from dzdesign.verify.toolchain.host_compiler import load_library
-from dzdesign.verify.toolchain.machines import Machine
+from dzdesign.verify.toolchain.machines import HOST, Machine
 
 PROGRAMS = Path(str(files("dzdesign.verify.current"))) / "programs"
 BLOCK = 10_000
 OFFSETS = 200
 SEED = 22
+#: Faults of which every combination stands at the start of some calibration.
+STANDING = SENSOR | OPEN | SHORT | OVER
 STATE = np.dtype(
     [("integral", "<i4"), ("offset_total", "<u4")]
     + [(name, "<u4") for name in ("offset_ticks", "offset", "compare", "faults", "over_ticks", "open_ticks", "ramped")]
@@ -131,7 +141,11 @@ def given_of(periods: np.ndarray, loop: CurrentLoop) -> dict[str, np.ndarray]:
 
 
 def check_states(loop: CurrentLoop, core: Mapping[str, str], states: int, seed: int = SEED) -> StateFindings:
-    """Compare so many states on the host, and a few calibrations, with the exact controller."""
+    """Compare so many states on the host, and a few calibrations, with the exact controller.
+
+    A controller that crashes is a `RequirementError`: it is run in a program of its own first.
+    """
+    hashes_on(HOST, loop, core, states, seed)
     host = HostStates(loop, core)
     wrong, first, hashes = 0, "", []
     for block in range(-(-states // BLOCK)):
@@ -149,8 +163,8 @@ def check_states(loop: CurrentLoop, core: Mapping[str, str], states: int, seed: 
         wrong += 1
         first = first or f"initial state {initial}, expected {expected_initial}"
     ends, sums, hashed = host.offsets(seed, OFFSETS)
-    for end, totals in zip(ends, sums, strict=True):
-        exact = ExactController(loop)
+    for place, (end, totals) in enumerate(zip(ends, sums, strict=True)):
+        exact = ExactController(loop, faults=NO_OFFSET | (2 * place & STANDING))
         for total in totals:
             exact.calibrate(int(total))
         if (exact.offset, exact.faults) != (end["offset"], end["faults"]):

@@ -25,7 +25,7 @@ INVALID = 65535
 #: The dragged point of a play is put as a number from this on; beyond the transition so far apart are the commands.
 PLAYED_SHIFTED, PLAYED_STRIDE = 8192, 61
 FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "rising", "played", "ramped",
-          "sound_commands", "sound_pressures", "faulty_commands", "faulty_pressures")  # fmt: skip
+          "valid_commands", "valid_pressures", "faulty_commands", "faulty_pressures")  # fmt: skip
 #: Most samples at zero command in a row among the random ones, for an interlock that waits for them.
 MOST_AT_ZERO = 60
 
@@ -47,8 +47,8 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes
     low, high = signals.command.valid_codes
     corners = [0, low, high, signals.code_max, signals.code_max + 1, 65535, zero, signals.command.full_code]
     corners += [max(zero + sign * (window + step), 0) for sign in (1, -1) for step in (-1, 0, 1)]
-    sound_pressures = (signals.pressure_a.valid_codes, signals.pressure_b.valid_codes)
-    p_a, p_b = (sum(codes) // 2 for codes in sound_pressures)
+    valid_pressures = (signals.pressure_a.valid_codes, signals.pressure_b.valid_codes)
+    p_a, p_b = (sum(codes) // 2 for codes in valid_pressures)
     at_zero = [(zero, p_a, p_b)] * min(compensator.drive_functions.fault_samples, MOST_AT_ZERO)
     made: list[Codes] = list(at_zero)
     while len(made) < count:
@@ -62,7 +62,7 @@ def drive_samples(compensator: Compensator, seed: int, count: int) -> list[Codes
             end = held if held % 2 else (low, high)[held // 2 % 2]
             command = (anything, int(rng.choice(corners)), held, about_zero, near, end, corner)[kind]
             sound = rng.random() < 0.9
-            p_a, p_b = (int(rng.integers(least, most + 1)) for least, most in sound_pressures)
+            p_a, p_b = (int(rng.integers(least, most + 1)) for least, most in valid_pressures)
             if not sound:
                 p_a, p_b = map(int, rng.choice([0, 700, 4014, 4095, 4096, 65535], 2))
             made.append((command, p_a, p_b))

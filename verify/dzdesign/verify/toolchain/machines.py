@@ -41,8 +41,8 @@ class Machine:
     check_flags: tuple[str, ...]
     #: The program's file in programs/.
     main: str
-    #: File there with how a program starts, puts numbers and ends, which it includes as machine.h; empty: not needed.
-    start_up: str = ""
+    #: File there with how a program starts, puts numbers and ends, for what includes machine.h.
+    start_up: str
     #: ``{programs}`` is the folder of that name.
     link_flags: tuple[str, ...] = ()
     #: Of the prepared inputs in the program; empty: they are a file that it reads.
@@ -64,8 +64,8 @@ class Machine:
 
     @property
     def headers(self) -> dict[str, bytes]:
-        """What a program's own file includes of the machine, by name."""
-        return {"machine.h": (PROGRAMS / self.start_up).read_bytes()} if self.start_up else {}
+        """What a program's own file may include of the machine, by name."""
+        return {"machine.h": (PROGRAMS / self.start_up).read_bytes()}
 
     @property
     def _compiler(self) -> str:
@@ -111,7 +111,9 @@ def stored(content: bytes) -> Path:
     return file
 
 
-HOST = Machine(name="host", core_flags=HOST_FLAGS, check_flags=("-std=c99", "-O3"), main="host.c")
+HOST = Machine(
+    name="host", core_flags=HOST_FLAGS, check_flags=("-std=c99", "-O3"), main="host.c", start_up="start_host.h"
+)
 _M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft")
 CORTEX_M4 = Machine(
     name="Cortex-M4",

@@ -117,6 +117,8 @@ uint32_t current_offsets(uint32_t seed, uint32_t count, struct dz_current *ends,
 
         dz_current_init(&loop);
         hash = hash_of(hash, &loop);
+        /* Faults that stand already must stay: every combination of them. */
+        loop.faults |= (2u * k) & (DZ_CURRENT_SENSOR | DZ_CURRENT_OPEN | DZ_CURRENT_SHORT | DZ_CURRENT_OVER);
         for (uint16_t tick = 0u; tick <= DZ_CURRENT_OFFSET_TICKS; tick++) {
             const uint16_t sum = scattered ? drawn(offset_edges, COUNT(offset_edges))
                                            : (uint16_t)(about + ((any() >> 8) & 1u));

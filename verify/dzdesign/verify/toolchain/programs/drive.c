@@ -13,7 +13,7 @@ static long wrong_field(const struct dz_drive *drive, const int32_t *expected)
     const int32_t found[FIELDS] = {drive->compare_a, drive->compare_b, drive->status, drive->law,
                                    drive->side,      drive->ticks,     drive->at_rest,
                                    drive->rising,    drive->played,    drive->ramped,
-                                   drive->sound_commands,  drive->sound_pressures,
+                                   drive->valid_commands,  drive->valid_pressures,
                                    drive->faulty_commands, drive->faulty_pressures};
 
     for (long field = 0; field < FIELDS; field++) {
@@ -86,8 +86,8 @@ static int run(FILE *file)
                 drive.played = (int16_t)((words[sample] >> 9) - 8192);
             }
             if (sound[sample] != INT32_MIN) {
-                drive.sound_commands = (uint16_t)(sound[sample] & 0x7FFF);
-                drive.sound_pressures = (uint16_t)(sound[sample] >> 15);
+                drive.valid_commands = (uint16_t)(sound[sample] & 0x7FFF);
+                drive.valid_pressures = (uint16_t)(sound[sample] >> 15);
                 drive.faulty_commands = (uint16_t)(faulty[sample] & 0x7FFF);
                 drive.faulty_pressures = (uint16_t)(faulty[sample] >> 15);
             }
