@@ -56,8 +56,14 @@ def called_ten_times_better(valve: ValveModel) -> ValveModel:
     """Return a valve whose certified bound is moved up by nine tenths of its least distance to the threshold."""
     curve = valve.positive.certified["closing"]
     by = 0.9 * min(u - low for u, low in zip(curve.u_threshold_V, curve.u_lower_V, strict=True))
+    above = curve.above and replace(
+        curve.above,
+        band_V=tuple(band - by for band in curve.above.band_V),
+        u_lower_V=tuple(low + by for low in curve.above.u_lower_V),
+    )
     moved = replace(
         curve,
+        above=above,
         u_lower_V=tuple(low + by for low in curve.u_lower_V),
         offset_V=tuple(low + by for low in curve.offset_V),
         u_min0_V=curve.u_min0_V + by,
