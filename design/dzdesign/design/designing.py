@@ -1,12 +1,13 @@
 """`design`: a `ValveModel` and an engineer's choices in, a proved `Compensator` out."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.core.worded import errors_in, worded
+from dzdesign.core.worded import errors_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
@@ -161,22 +162,11 @@ def _side_law(
     reference = Fraction(repr(side.reference.dp_MPa))
     ceiling = offset_ceiling(certified, u_max, allowance)
     tested, goes_on = ceiling.certified, certified.above is not None
-    if min(ceiling.limit[: tested.stop] if goes_on else ceiling.limit) <= 0:
-        raise InputError(
-            "dither and declared machine leave no offset under the certified one; make the dither smaller, declare "
-            "narrower ranges, or control the current"
-            if options.machine
-            else "the dither's peak leaves no offset under the certified one; make it smaller"
-        )
+    _refuse_no_offset(ceiling.limit[: tested.stop] if goes_on else ceiling.limit, options)
     top = (opening or certified).at(reference)
     if opening is None and options.machine:
         top = left_by_machine(top, ceiling, signals, reference, u_max)
-    # Half a count less, because the compare value of the offset may be rounded up.
-    u_min0 = over(top / u_max - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
-    if u_min0 <= 0:
-        raise InputError(
-            worded("u_min0 is {top:.4f V}, less than one count of the PWM: no dead zone", top=float(top))
-        )
+    u_min0 = _offset_at_reference(top / u_max, signals, units)
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
 
     def table(under: OffsetCeiling, beyond: AboveChoice) -> tuple[int, ...]:
@@ -219,6 +209,26 @@ def _side_law(
         ),
         budget=budget_of(side, certified, u_max, allowance, options.guard, options.machine),
     )
+
+
+def _refuse_no_offset(limits: Sequence[Fraction], options: DesignOptions) -> None:
+    """Refuse limits of the offset, over u_max, that leave none at some pressure drop."""
+    if min(limits) > 0:
+        return
+    raise InputError(
+        "dither and declared machine leave no offset under the certified one; make the dither smaller, declare "
+        "narrower ranges, or control the current"
+        if options.machine
+        else "the dither's peak leaves no offset under the certified one; make it smaller"
+    )
+
+
+def _offset_at_reference(top: Fraction, signals: Signals, units: Units) -> Fraction:
+    """Return u_min0 over u_max: half a count below, for the offset's compare value may be rounded up."""
+    u_min0 = over(top - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
+    if u_min0 <= 0:
+        raise InputError(f"u_min0 is {float(top):.2%} of full command, less than one count of the PWM: no dead zone")
+    return u_min0
 
 
 def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:

@@ -104,7 +104,7 @@ def test_the_original_passes_and_a_wrong_one_is_no_bench(plain, tmp_path, wordin
 
 #: By hand, one a verdict.
 JUDGED = [
-    ("dz_comp.c", "#define REVERSE 40u", "#define REVERSE 41u", KILLED),
+    ("dz_comp.c", "#define REVERSE 30u", "#define REVERSE 31u", KILLED),
     ("dz_comp.c", "return (uint16_t)((invalid_command", "return (uint16_t)(((invalid_command", REFUSED),
     ("dz_comp.c", "/* The law, Eq. (18):", "/* The law:", SAME_OBJECT),
     ("dz_comp.h", "DZ_ADC_CODE_MAX 4095u", "DZ_ADC_CODE_MAX 4096u", SAME_OBJECT),
