@@ -31,8 +31,14 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
+from dzdesign.design.signals import PressureSignal, Signals
 
 KNOWN_LENGTHS = (0, 7, 300)
+#: Sensors over the whole range of the converter, without a live zero: the rivals take them so.
+WHOLE_RANGE = PressureSignal(
+    zero_code=0, full_code=4095, valid_codes=(0, 4095), error_MPa=(-Fraction(20, 4096), Fraction(20, 4096))
+)
+SIGNALS = Signals(pressure_a=WHOLE_RANGE, pressure_b=WHOLE_RANGE)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -77,7 +83,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _with_zero_band(plain: Compensator, folder: Path) -> list[Measured]:
     """Measure the product's core as it is by default, with zero band and transition: what the rivals do not have."""
-    default = design(plain.valve)
+    default = design(plain.valve, DesignOptions(signals=SIGNALS, accept=("broken-sensor",)))
     inputs = tried_inputs(default)
     expected = expected_compares(default, inputs)
     found = []
@@ -97,7 +103,8 @@ def _compensator(path: Path | None) -> Compensator:
 
     ramps = example_folder() / "ramps"
     valve = identify([read_ramp_file(ramp) for ramp in sorted(ramps.glob("*.csv.gz"))])
-    return design(valve, DesignOptions(transition=Fraction(0)))  # as the rivals: the paper's law alone
+    # As the rivals: the paper's law alone.
+    return design(valve, DesignOptions(transition=Fraction(0), signals=SIGNALS, accept=("broken-sensor",)))
 
 
 def _validate(inputs: Sequence[Codes], folder: Path) -> None:

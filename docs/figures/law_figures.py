@@ -138,9 +138,9 @@ def every_input(example: Example) -> "Figure":
     """The compare value over all pairs of command and difference codes, a coarse grid of the exact law."""
     figure, (axes,) = panels(3.9)
     compensator = example.compensator
-    top = compensator.signals.code_max
+    top, widest = compensator.signals.code_max, compensator.signals.largest_difference(1)
     commands = np.linspace(0, top, 41).astype(int)
-    differences = np.linspace(-top, top, 64).astype(int)
+    differences = np.linspace(-widest, widest, 64).astype(int)
     values = np.array([[compensator.compare(int(u), int(dp)) for u in commands] for dp in differences])
     drawn = axes.pcolormesh(commands, differences, values, cmap="cividis", shading="nearest", rasterized=True)
     figure.colorbar(drawn, label="compare value (60000: full drive)")
@@ -150,8 +150,8 @@ def every_input(example: Example) -> "Figure":
     axes.axhline(-compensator.reverse_codes, color="white", lw=1.2, ls=":")
     note(axes, "tested interval of pressure: certified", (2050, sum(tested) / 2), color="white")
     note(axes, "below: a sensor has failed, smallest beta", (2050, -1700), color="white")
-    note(axes, "above: the nearest tested beta is held", (2050, 2700), color="white")
-    total = (top + 1) * (2 * top + 1)
+    note(axes, "above: lowered with the continued bound", (2050, 2300), color="white")
+    total = (top + 1) * (2 * widest + 1)
     axes.set(
         xlabel="code of the command",
         ylabel="difference of both pressure codes",
