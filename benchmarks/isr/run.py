@@ -25,20 +25,18 @@ from interrupt import interrupt_goals
 from measuring import Measured, measure
 from rival_cores import rivals
 from scoreboard import keep_rows, markdown, markdown_rows, say
-from tried_inputs import RANDOM_INPUTS, SEED, Codes, expected_compares, tried_inputs
+from tried_inputs import RANDOM_INPUTS, SEED, SIGNALS, Codes, expected_compares, has_whole_range, tried_inputs
 
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.signals import PressureSignal, Signals
 
 KNOWN_LENGTHS = (0, 7, 300)
-#: Sensors over the whole range of the converter, without a live zero: the rivals take them so.
-WHOLE_RANGE = PressureSignal(
-    zero_code=0, full_code=4095, valid_codes=(0, 4095), error_MPa=(-Fraction(20, 4096), Fraction(20, 4096))
+WRONG_RANGE = (
+    "a command or pressure has codes that are none, as of 4..20 mA, and the rivals know only signals over the whole "
+    "range of the converter; design it with such, or leave --compensator out"
 )
-SIGNALS = Signals(pressure_a=WHOLE_RANGE, pressure_b=WHOLE_RANGE)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -53,6 +51,9 @@ def main(arguments: list[str] | None = None) -> int:
             return 2
     start = perf_counter()
     compensator = _compensator(chosen.compensator)
+    if not has_whole_range(compensator.signals):
+        print(f"benchmark: {chosen.compensator}: {WRONG_RANGE}", file=sys.stderr)
+        return 2
     inputs = tried_inputs(compensator)
     expected = expected_compares(compensator, inputs)
     contenders = our_forms(compensator) + rivals(compensator)

@@ -2,14 +2,31 @@
 
 import random
 from collections.abc import Sequence
+from fractions import Fraction
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.signals import PressureSignal, Signals
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 SEED = 7
 RANDOM_INPUTS = 64
 
 Codes = tuple[int, int, int]  # u_adc, p_a_adc, p_b_adc
+
+#: A sensor over the whole range of the converter, without a live zero: the rivals know no other.
+WHOLE_RANGE = PressureSignal(
+    zero_code=0, full_code=4095, valid_codes=(0, 4095), error_MPa=(-Fraction(20, 4096), Fraction(20, 4096))
+)
+SIGNALS = Signals(pressure_a=WHOLE_RANGE, pressure_b=WHOLE_RANGE)
+
+
+def has_whole_range(signals: Signals) -> bool:
+    """Return whether every code that the converter has is a pressure and a command, from zero on."""
+    ends = (0, signals.code_max)
+    pressures = (signals.pressure_a, signals.pressure_b)
+    return signals.command.valid_codes == ends and all(
+        (each.zero_code, each.full_code) == each.valid_codes == ends for each in pressures
+    )
 
 
 def tried_inputs(compensator: Compensator) -> list[Codes]:
@@ -64,7 +81,6 @@ def inputs_header(inputs: Sequence[Codes], repeats: int, *, program_memory: bool
 
 def exact_rows_header(compensator: Compensator) -> str:
     """Return ``exact_rows.h``: start and slope of each straight part of every row of constant pressure difference."""
-    from fractions import Fraction
     from itertools import pairwise
     from math import lcm
 

@@ -12,7 +12,7 @@ from goals import goals
 from interrupt import count_interrupt, with_current
 from measuring import Measured
 from rival_cores import rivals
-from tried_inputs import exact_rows_header, expected_compares, tried_inputs
+from tried_inputs import SIGNALS, exact_rows_header, expected_compares, has_whole_range, tried_inputs
 
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
@@ -33,14 +33,28 @@ on_every_machine = pytest.mark.parametrize(
 )
 
 
-@pytest.fixture(scope="module")
-def inputs(example_compensator):
-    return tried_inputs(example_compensator)
+def designed(valve, **choices):
+    """With sensors over the whole range of the converter, as the rivals know no others."""
+    return design(valve, DesignOptions(signals=SIGNALS, accept=("broken-sensor",), **choices))
 
 
 @pytest.fixture(scope="module")
-def expected(example_compensator, inputs):
-    return expected_compares(example_compensator, inputs)
+def compensator(example_valve):
+    return designed(example_valve)
+
+
+@pytest.fixture(scope="module")
+def inputs(compensator):
+    return tried_inputs(compensator)
+
+
+@pytest.fixture(scope="module")
+def expected(compensator, inputs):
+    return expected_compares(compensator, inputs)
+
+
+def test_sensors_with_a_live_zero_are_seen(example_compensator, compensator):
+    assert has_whole_range(compensator.signals) and not has_whole_range(example_compensator.signals)
 
 
 @on_every_machine
@@ -80,25 +94,25 @@ def test_what_depends_on_the_input_is_seen(machine, tmp_path):
 
 
 @on_every_machine
-def test_our_core_gives_the_exact_law_on_every_counted_input(machine, example_compensator, inputs, expected, tmp_path):
-    for index, form in enumerate(our_forms(example_compensator)):
+def test_our_core_gives_the_exact_law_on_every_counted_input(machine, compensator, inputs, expected, tmp_path):
+    for index, form in enumerate(our_forms(compensator)):
         found = machine.count(form, inputs, tmp_path / str(index))
         assert found.compares == tuple(expected), form.name
         assert found.least > 0
 
 
 @on_every_machine
-def test_our_core_takes_the_same_for_every_input(machine, example_compensator, inputs, tmp_path):
+def test_our_core_takes_the_same_for_every_input(machine, compensator, inputs, tmp_path):
     """Every form on machines with products of 32 bits; on AVR, whose library has branches, the one that is chosen."""
-    forms = our_forms(example_compensator)
+    forms = our_forms(compensator)
     found = [machine.count(form, inputs, tmp_path / str(index)) for index, form in enumerate(forms)]
     judged = [min(found, key=lambda each: each.most)] if machine is on_avr else found
     assert all(each.least == each.most for each in judged)
 
 
-def test_the_expected_values_are_those_of_the_compensator(example_compensator, inputs, expected):
+def test_the_expected_values_are_those_of_the_compensator(compensator, inputs, expected):
     """Two ways to the same numbers: addition with carry, and one exact product."""
-    c = example_compensator
+    c = compensator
     for (u, p_a, p_b), value in zip(inputs, expected, strict=True):
         if u > c.signals.code_max:
             assert value == 0
@@ -111,7 +125,7 @@ def test_the_expected_values_are_those_of_the_compensator(example_compensator, i
 @needs(on_x86.X86)
 def test_rivals_do_the_same_job(example_valve, inputs, tmp_path):
     """Within a count, impossible codes included; only the unchecked table leaves those out."""
-    law_alone = design(example_valve, DesignOptions(transition=Fraction(0)))  # as the paper has it
+    law_alone = designed(example_valve, transition=Fraction(0))  # as the paper has it
     expected = expected_compares(law_alone, inputs)
     for index, rival in enumerate(rivals(law_alone)):
         found = on_x86.count(rival, inputs, tmp_path / str(index))
@@ -127,10 +141,10 @@ def test_rivals_do_the_same_job(example_valve, inputs, tmp_path):
         pytest.param(on_cortex_m4, marks=needs(on_cortex_m4.CORTEX_M4), id="Cortex-M4"),
     ],
 )
-def test_a_core_that_is_wrong_once_is_seen(machine, example_compensator, tmp_path):
+def test_a_core_that_is_wrong_once_is_seen(machine, compensator, tmp_path):
     """Seeded: three counts more at one command and one pair of pressures, out of all inputs."""
-    (form, *_) = our_forms(example_compensator)
-    rows = exact_rows_header(example_compensator)
+    (form, *_) = our_forms(compensator)
+    rows = exact_rows_header(compensator)
     core = form.sources["dz_comp.c"].replace("uint16_t dz_comp(", "uint16_t right_comp(")
     fault = (
         "uint16_t dz_comp(uint16_t u, uint16_t a, uint16_t b)\n"
@@ -178,9 +192,10 @@ def test_each_machine_judges_the_form_that_is_fastest_there():
 
 
 @needs(on_cortex_m4.CORTEX_M4)
-def test_the_whole_interrupt_is_counted_from_its_first_instruction(example_compensator, inputs, tmp_path):
+def test_the_whole_interrupt_is_counted_from_its_first_instruction(example_compensator, tmp_path):
     """With a new sample it takes the law's instructions more; either takes the same for every input."""
-    controlled, some = with_current(example_compensator), [each for each in inputs if each[0] <= 4095][::40]
+    controlled = with_current(example_compensator)
+    some = [each for each in tried_inputs(example_compensator) if each[0] <= 4095][::40]
     held = count_interrupt(controlled, some, tmp_path / "held", fresh=False)
     fresh = count_interrupt(controlled, some, tmp_path / "fresh", fresh=True)
     assert held.least == held.most <= 160
