@@ -100,7 +100,26 @@ def test_every_number_of_the_file_counts(document):
         except InputError:
             pass
     # A converter's gain error counts where the command has two signs only: about zero volts the code is in mid-span.
-    assert unseen == [("target", "converter", "gain_codes")]
+    # When the current is sampled counts where it is controlled: see below.
+    assert unseen == [("target", "converter", "gain_codes"), ("target", "current_sampling", "before")]
+
+
+CURRENT = {
+    "drive": "current",
+    "coil": "3.5 ohm 40 mH",
+    "rated_current": "1 A",
+    "supply": "18..32 V",
+    "current_signal": "0..1.2 A on 2 ohm + 0.15 V",
+}
+
+
+@pytest.mark.slow
+def test_with_a_controlled_current_the_moments_of_its_sampling_count(example_valve):
+    document = json.loads(to_json_bytes(designed_for(example_valve, "f28335", **CURRENT)))
+    prove_derived(read(document))
+    said = refusal(edited(document, ("target", "current_sampling", "before"), larger))
+    assert "'current_drive." in said and "follows from its valve and its options" in said
+    refusal(edited(document, ("current_drive", "sampling", "before"), larger))
 
 
 def test_costs_are_compared(document):

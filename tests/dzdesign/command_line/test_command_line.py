@@ -187,7 +187,7 @@ def bash_script(tmp_path_factory):
         ("completion po", {"powershell"}),
         ("schema val", {"valve"}),
         ("schema as", {"assessment"}),
-        ("design valve.json --accept ", {"branch-order"}),
+        ("design valve.json --accept ", {"branch-order", "broken-sensor"}),
         ("identify ramp", {"ramp.csv"}),
         ("identify ramp.csv --config dz", {"dz.toml"}),
         ("verify fi", {"firmware"}),

@@ -29,6 +29,8 @@ WAIT_S = 30.0
 #: Looks in a row, 20 ms apart, at which nothing waits to be read.
 QUIET = 20
 TICKS = 25
+#: Of a pressure sensor of 4 to 20 mA, which spans 20 MPa: code of no pressure, and codes of its span.
+ZERO, SPAN = 764, 3822 - 764
 
 
 @dataclass
@@ -125,7 +127,8 @@ def test_good_frames_become_rows_in_units(bench):
     rows, index = table(bench.output), np.arange(300)
     assert np.allclose(rows[:, 0], index / 100, atol=1e-9), "100 frames a second, from the first on"
     assert np.allclose(rows[:, 1], 10 * index / 4095, atol=1e-5)
-    assert np.allclose(rows[:, 2], 20 * 1000 / 4095, atol=1e-5) and np.allclose(rows[:, 3], 20 * 795 / 4095, atol=1e-5)
+    assert np.allclose(rows[:, 2], 20 * (1000 - ZERO) / SPAN, atol=1e-5)
+    assert np.allclose(rows[:, 3], 20 * (795 - ZERO) / SPAN, atol=1e-5)
     assert np.allclose(rows[:, 4], 10 * 2 * index / 60000, atol=1e-5)
     assert np.all(rows[:, 5:] == np.column_stack([np.ones(300), 2 * index, 0 * index, np.full(300, STATUS_RELEASED)]))
     assert [path.name for path in bench.folder.iterdir()] == ["ramp.csv"]
@@ -199,7 +202,7 @@ def test_identify_reads_the_recording_with_the_flow_meters_column(bench):
     test = read_ramp_file(bench.output)
     assert test.time.size == codes.size and np.allclose(np.diff(test.time), 0.01)
     assert np.allclose(test.u, 10 * codes / 4095, atol=1e-5)
-    assert np.allclose(test.dp, 20e6 * 205 / 4095, atol=20.0)
+    assert np.allclose(test.dp, 20e6 * 205 / SPAN, atol=20.0)
     output = read_ramp_file(bench.output, columns={"u": "uO_V"})
     assert np.allclose(output.u, 10 * 14 * codes / 60000, atol=1e-5)
     done = subprocess.run(

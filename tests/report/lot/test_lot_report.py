@@ -5,7 +5,7 @@ import io
 import json
 import re
 import shutil
-from dataclasses import asdict, astuple, replace
+from dataclasses import astuple, replace
 from urllib.parse import unquote
 
 import numpy as np
@@ -17,6 +17,7 @@ from dzdesign.batch.results import Results
 from dzdesign.batch.summary import units_of_lot
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of, to_json
+from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.report.lot.folder import read_lot
@@ -559,7 +560,7 @@ def test_a_lot_is_shown_in_the_units_of_its_recordings(tmp_path, capsys):
     folder = write_lot_folder(tmp_path / "lot", rows)
     document = json.loads((folder / "batch.json").read_text(encoding="utf-8"))
     assert document["recorded_units"]["command"]["unit"] == "V"
-    document["recorded_units"] = asdict(units)
+    document["recorded_units"] = as_document(units)
     (folder / "batch.json").write_text(json.dumps(document), encoding="utf-8")
     lot = read_lot(folder)
     spread = spread_of(lot.calibrated, "knee_opening_V", "", lot.units)

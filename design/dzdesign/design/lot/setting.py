@@ -45,9 +45,8 @@ from dzdesign.identify.valve.side_model import SideModel
 CLEAR = 1e-6
 #: What all compensators of a batch must have in common.
 SHARED = (
-    "law", "below_dp0", "above", "signals", "u_max_V",
-    "beta_denominator", "transition_codes", "command_error", "drive_functions",
-    "current_drive", "machine",
+    "law", "below_dp0", "above", "signals", "u_max_V", "beta_denominator",
+    "transition_codes", "command_error", "drive_functions", "current_drive", "machine",
 )  # fmt: skip
 
 
@@ -61,7 +60,8 @@ class LotSetting:
     carrier: str
     #: Pressure drops that every valve was tested over: inside, the setting is certified for each of them.
     dp_MPa: tuple[float, float]
-    #: Valves that hold the offset down somewhere; for these `proved` has an exact certificate.
+    #: Valves that hold the offset down where one was tested, or below; for these `proved` has an exact certificate.
+    #: Above all tests, where the offset falls anyway, the steepest would: that costs no tested pressure drop anything.
     binding: tuple[str, ...]
     #: Name to a certificate per sign of command.
     proved: Mapping[str, tuple[Certificate, ...]]
@@ -84,6 +84,7 @@ class _Side:
     exact: Mapping[str, OffsetCeiling]
     least: OffsetCeiling
     nearness: Mapping[str, float]
+    binding: frozenset[str]
 
 
 def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
@@ -118,9 +119,8 @@ def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     prove_certificates(compensator)
     margins = prove_lot(compensator)
     proved = {
-        name: tuple(_certified(side, name, laws[side.sign], first) for side in sides if name in side.exact)
-        for name in batch
-        if any(name in side.exact for side in sides)
+        name: tuple(_certified(side, name, laws[side.sign], first) for side in sides if name in side.binding)
+        for name in batch if any(name in side.binding for side in sides)
     }
     line = (
         f"lot setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
@@ -205,24 +205,23 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     above = AboveChoice(choice=first.above, step_codes=STEP_CODES)
     curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
     low, high = _common_interval([curves])
-    least, near = _near_the_least(curves, allowance, float(u_max))
-    exact = {
-        name: offset_ceiling(curves[name], u_max, allowance)
-        for name, distance in near.items()
-        if distance < CLEAR
-    }
+    above_least = _above_the_least(curves, allowance, float(u_max))
+    exact = {name: offset_ceiling(curves[name], u_max, allowance) for name in _near(curves, above_least)}
     limits = zip(*(each.limit for each in exact.values()), strict=True)
     certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
     ceiling = OffsetCeiling(limit=tuple(map(min, limits)), certified=certified)
     if min(ceiling.limit[: certified.stop]) <= 0:
         raise InputError("one of the valves leaves no positive offset for a lot setting")
-    return _Side(sign=sign, models=models, curves=curves, exact=exact, least=ceiling, nearness=least)
+    tested = floor(signals.dp_code(max(curve.dp_MPa[-1] for curve in curves.values()))) + 1
+    return _Side(
+        sign=sign, models=models, curves=curves, exact=exact, least=ceiling,
+        nearness=dict(zip(curves, map(float, above_least.mean(axis=1)), strict=True)),
+        binding=frozenset(_near(curves, above_least[:, :tested])),
+    )  # fmt: skip
 
 
-def _near_the_least(
-    curves: Mapping[str, OffsetCurve], allowance: Allowance, u_max_V: float
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Return how far each valve's ceiling lies above the least of all, over u_max: on average, and where it is least.
+def _above_the_least(curves: Mapping[str, OffsetCurve], allowance: Allowance, u_max_V: float) -> np.ndarray:
+    """Return how far each valve's ceiling lies above the least of all, over u_max: a row a valve, a column a code.
 
     Factors, rounding and dither lower all ceilings alike, so they are left out.
     """
@@ -231,9 +230,12 @@ def _near_the_least(
     dp_MPa = np.array([float(dp) for dp in pressures_MPa(signals, low, code_max + high)])
     limits = np.array([curve.in_doubles(dp_MPa) / u_max_V for curve in curves.values()])
     limits = np.lib.stride_tricks.sliding_window_view(limits, high - low + 1, axis=1).min(axis=2)
-    above = limits - limits.min(axis=0)
-    mean = dict(zip(curves, map(float, above.mean(axis=1)), strict=True))
-    return mean, dict(zip(curves, map(float, above.min(axis=1)), strict=True))
+    above: np.ndarray = limits - limits.min(axis=0)
+    return above
+
+
+def _near(names: Iterable[str], above_least: np.ndarray) -> list[str]:
+    return [name for name, distance in zip(names, above_least.min(axis=1), strict=True) if distance < CLEAR]
 
 
 def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[str]:
