@@ -436,7 +436,7 @@ COMPENSATORS = [
     (("signals", "compare_max"), 10**9, "'signals.compare_max' is 1000000000, expected a whole number from 1 to 65535"),
     (("signals", "compare_max"), 1000, "the compare limit is 60000, above full drive, 1000"),
     (("signals", "pressure_a", "span_MPa"), [0, 1], "the sensor's span is 0 MPa"),
-    (("signals", "pressure_b", "zero_code"), 4095, "a pressure sensor has codes 4095 to 4095"),
+    (("signals", "pressure_b", "zero_code"), 4095, "a pressure sensor has codes 4095 to 3822"),
     (("signals", "command", "full_code"), 0, "zero and full command have the same code, 0"),
     (("signals", "command", "negative_full_code"), 9, "expected the other side of zero"),
     (("signals", "command", "valid_codes"), [0, 9], "full_code is 4095, outside the valid codes 0 to 9"),
