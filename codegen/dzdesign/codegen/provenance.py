@@ -26,6 +26,7 @@ def _valve_keys(compensator: Compensator) -> dict[str, tuple[str, ...]]:
         found |= {
             f"{side}.u_min0_over_u_max": opening or (offset,),
             f"{side}.drive_range_over_u_max": (f"{side}.k_x_max_over_u_max", f"{side}.tests", *(opening or (offset,))),
+            f"{side}.certificate.dp_MPa": (f"{curve}.dp_MPa",),
             f"{side}.beta": (offset, *bounds, f"{side}.trend"),
             f"{side}.transition_beta": (*opening, f"{side}.trend"),
         }

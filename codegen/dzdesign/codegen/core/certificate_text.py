@@ -13,8 +13,9 @@ from dzdesign.design.signals import SIDE_NAMES
 def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:
     """Return the least and the largest compare value at zero command of one sign."""
     zero = compensator.signals.command.zero_code
-    nodes = [node * compensator.beta_step_codes for node in range(compensator.nodes(sign) - 1)]
-    values = [compensator.compare(zero, code, sign) for code in nodes]
+    # Straight between nodes: the extremes stand at these, and at the largest difference, short of the last node.
+    last = compensator.signals.largest_difference(sign)
+    values = [compensator.compare(zero, code, sign) for code in (*range(0, last, compensator.beta_step_codes), last)]
     return min(values), max(values)
 
 
@@ -39,7 +40,8 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     text += f" {_beyond(compensator, sign)}"
     text += f" {_machine(compensator, sign)}"
     lot = lot_in_words(compensator)
-    return wrap(f"{text} {lot.certificate}" if lot else text, COLUMNS - 3)
+    # The C is ASCII: only a unit's square is not.
+    return wrap((f"{text} {lot.certificate}" if lot else text).replace("²", "^2"), COLUMNS - 3)
 
 
 def _beyond(compensator: Compensator, sign: int) -> str:

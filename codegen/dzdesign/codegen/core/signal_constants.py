@@ -5,8 +5,9 @@ from math import floor
 
 from dzdesign.codegen.core.command_shares import share_of_command
 from dzdesign.codegen.core.constants import EXACT, Define
+from dzdesign.codegen.core.drive_constants import STATUS_BITS
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.signals import WEIGHT_SHIFT, PressureSignal
+from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT, PressureSignal
 
 HERE, SIGNALS = "codegen/dzdesign/codegen/core/signal_constants.py", "design/dzdesign/design/signals.py"
 DOWN = "the converter's code, rounded down"
@@ -61,6 +62,7 @@ class SignalConstants:
                 engineering=f"bit {self.word_bits - 1} of {self.word_bits}",
                 generator=HERE,
             ),
+            _difference_place(),
         ]  # fmt: skip
 
     def _signal(
@@ -131,7 +133,10 @@ class SignalConstants:
             "a pressure drop of more than this lies above the tests",
             f"{c.valve.recorded_units.text(float(last_MPa), '.4g MPa')} in codes of sensor A"
             + (f", times {2**WEIGHT_SHIFT}" if weighted else ""),
-            ("certificate.dp_MPa", "signals.pressure_a.span_MPa"),
+            (
+                f"sides.{SIDE_NAMES[self.sign]}.certificate.dp_MPa",
+                *(f"signals.pressure_a.{key}" for key in ("zero_code", "full_code", "span_MPa")),
+            ),
             "rounded down to a code" + (", with all that is rounded down to that code" if weighted else ""),
         )
 
@@ -168,3 +173,16 @@ class SignalConstants:
                    equation="from codes to the unit of the law's command", engineering=f"1/{c.transition_codes} code",
                    data=("transition_codes",), generator=HERE),
         ]  # fmt: skip
+
+
+def _difference_place() -> Define:
+    """Return the place of a status bit, by which the one above it is shifted down to be masked with it."""
+    place = list(STATUS_BITS).index("DIFFERENCE")
+    return Define(
+        symbol="DIFFERENCE_PLACE",
+        value=place,
+        equation="place of DZ_STATUS_DIFFERENCE in the status word",
+        engineering=f"bit {place}",
+        rounding="a convention",
+        generator="codegen/dzdesign/codegen/core/drive_constants.py",
+    )
