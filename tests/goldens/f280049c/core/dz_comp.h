@@ -63,12 +63,12 @@
  *
  * A pressure drop, A less B, below -0.196 MPa means a failed sensor and gives the smallest beta too.
  *
- * At zero command it is 13287 to 20628, by the pressure drop.
+ * At zero command it is 13125 to 20628, by the pressure drop.
  * Certificate of the recording: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of
  * the closing threshold, by 0.0182 mV at the least beyond the rounding of readings to codes and of the drive to counts,
  * so that less than 0.13 L/min flows: what the recordings can't show. Above 5.00 MPa the offset is lowered with the
  * continued bound; certified if the threshold goes on from the last tests' value and slope, and bends by at most M = 0
- * mV/MPa², up to 21.8 MPa; below 1.00 MPa the offset of the lowest test is held and nothing is certified; a threshold
+ * mV/MPa^2, up to 21.8 MPa; below 1.00 MPa the offset of the lowest test is held and nothing is certified; a threshold
  * that goes on growing towards no pressure drop stays above it. No machine was declared: its coil temperature, supply,
  * pressure sensors and converters beyond rounding, oil and ageing are not in it.
  */
@@ -78,7 +78,7 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
  * below; `failed` is all ones for pressures that are not to be used, else 0. */
 uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
 
-/* Returns what there is to say of the inputs, DZ_STATUS_... together, or 0: valid, and a tested pressure drop or less. */
+/* Returns what there is to say of the inputs, DZ_STATUS_... together, or 0: valid, a tested pressure drop or less. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* Returns the beta that dz_comp() uses at these pressures, times 2^15, rounded down: for a display, not for control. */

@@ -93,7 +93,8 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     const uint32_t invalid = all_ones(status & DZ_STATUS_COMMAND);
     const int32_t asked = (int32_t)u_adc - COMMAND_ZERO; /* codes from zero, positive ones above */
     /* A command while the drive waits for zero command. */
-    const uint32_t early = too_few(drive->valid_commands) & (0u - ((uint32_t)(INTERLOCK - asked) >> 31));
+    const uint32_t early = too_few(drive->valid_commands) &
+                           (0u - ((uint32_t)(INTERLOCK - asked) >> 31));
     const uint32_t valid = valid_samples(drive->valid_commands, invalid | early);
     /* All ones without a command to be followed: let go at once, and start from rest when it comes back. */
     const uint32_t gone = too_few(valid);

@@ -32,7 +32,8 @@
 /* All the memory that the compensator has: one for each valve, set by dz_drive_init().
  * Options of this firmware: Zero band. Interlock.
  * A fault acts at once: without a valid command the valve is let go, and of pressures that can't be right the smallest
- * beta is used. It is over after 5 valid samples in a row; a command must be zero in these. */
+ * beta is used. It is over after 5 valid samples in a row; a command must be zero in these.
+ */
 struct dz_drive
 {
     uint16_t compare_a; /* compare value of solenoid A, positive commands */

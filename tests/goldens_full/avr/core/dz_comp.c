@@ -71,6 +71,8 @@
 #define TESTED_TO 2490367u
 /* Place of the top bit of a word, which is set after a subtraction below zero: bit 31 of 32 (exact). */
 #define WORD_TOP 31u
+/* Place of DZ_STATUS_DIFFERENCE in the status word: bit 3 (a convention). */
+#define DIFFERENCE_PLACE 3u
 
 /* ---- the segments of beta, zero band and transition ---- */
 
@@ -366,7 +368,7 @@ uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t below = (uint32_t)(difference + REVERSE);
     const uint32_t above = (uint32_t)(TESTED_TO - difference);
     const uint32_t of_drop = (uint32_t)((below >> WORD_TOP) |
-                                    ((above >> WORD_TOP) * (DZ_STATUS_ABOVE / DZ_STATUS_DIFFERENCE)));
+                                    ((above >> WORD_TOP) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE)));
 
     /* Of a pressure outside its valid range the difference says nothing. */
     return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |

@@ -63,12 +63,12 @@
  *
  * A pressure drop, A less B, below -0.247 MPa means a failed sensor and gives the smallest beta too.
  *
- * At zero command it is 16588 to 30902, by the pressure drop.
+ * At zero command it is 16539 to 30902, by the pressure drop.
  * Certificate of the recording: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of
  * the closing threshold, by 0.0739 mV at the least beyond the rounding of readings to codes and of the drive to counts
  * and the dither's peak of 100 mV, which dz_drive adds to it, so that less than 0.13 L/min flows: what the recordings
  * can't show. Above 5.00 MPa the offset is lowered with the continued bound; certified if the threshold goes on from
- * the last tests' value and slope, and bends by at most M = 0 mV/MPa², up to 27 MPa; below 1.00 MPa the offset of the
+ * the last tests' value and slope, and bends by at most M = 0 mV/MPa^2, up to 27 MPa; below 1.00 MPa the offset of the
  * lowest test is held and nothing is certified; a threshold that goes on growing towards no pressure drop stays above
  * it. No machine was declared: its coil temperature, supply, pressure sensors and converters beyond rounding, oil and
  * ageing are not in it.
@@ -84,7 +84,7 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
  * and the dither's peak of 100 mV, which dz_drive adds to it, so that less than 0.13 L/min flows: what the recordings
  * can't show. Above 5.00 MPa the offset is lowered with the continued bound, and none is left from 14.8 MPa on: the
  * dead zone is back, and the command drives the valve on; certified if the threshold goes on from the last tests' value
- * and slope, and bends by at most M = 39.8 mV/MPa², up to 15 MPa; below 1.00 MPa the offset of the lowest test is held
+ * and slope, and bends by at most M = 39.8 mV/MPa^2, up to 15 MPa; below 1.00 MPa the offset of the lowest test is held
  * and nothing is certified: the threshold grows with the pressure drop, so flow at zero command is possible there. No
  * machine was declared: its coil temperature, supply, pressure sensors and converters beyond rounding, oil and ageing
  * are not in it.
@@ -96,7 +96,7 @@ uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
 uint32_t dz_comp_checked_negative(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
 
-/* Returns what there is to say of the inputs, DZ_STATUS_... together, or 0: valid, and a tested pressure drop or less. */
+/* Returns what there is to say of the inputs, DZ_STATUS_... together, or 0: valid, a tested pressure drop or less. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* The same with the pressure drop of negative commands. */

@@ -32,7 +32,9 @@
 /* All the memory that the compensator has: one for each valve, set by dz_drive_init().
  * Options of this firmware: two solenoids. Zero band. Ramps. Dither. Interlock. Latched faults.
  * A fault acts at once: without a valid command the valve is let go, and of pressures that can't be right the smallest
- * beta is used. It is over after 3 valid samples in a row; a command must be zero in these. 3 faulty ones before that stay until dz_drive_init(). */
+ * beta is used. It is over after 3 valid samples in a row; a command must be zero in these.
+ * After 3 faulty ones before that it stays until dz_drive_init().
+ */
 struct dz_drive
 {
     uint16_t compare_a; /* compare value of solenoid A, positive commands */

@@ -152,7 +152,8 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     const uint32_t invalid = all_ones(status & DZ_STATUS_COMMAND);
     const int32_t asked = (int32_t)u_adc - COMMAND_ZERO; /* codes from zero, positive ones above */
     /* A command while the drive waits for zero command. */
-    const uint32_t early = too_few(drive->valid_commands) & (0u - (((uint32_t)(INTERLOCK - asked) | (uint32_t)(INTERLOCK + asked)) >> 31));
+    const uint32_t early = too_few(drive->valid_commands) &
+                           (0u - (((uint32_t)(INTERLOCK - asked) | (uint32_t)(INTERLOCK + asked)) >> 31));
     const uint32_t faulty = faulty_samples(drive->faulty_commands, invalid);
     const uint32_t valid = valid_samples(drive->valid_commands, invalid | early | latched(faulty));
     /* All ones without a command to be followed: let go at once, and start from rest when it comes back. */
@@ -185,7 +186,8 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     }
     held = held_pressures(drive, status);
     drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD) |
-                               ((latched(drive->faulty_commands) | latched(drive->faulty_pressures)) & DZ_STATUS_LATCHED));
+                               ((latched(drive->faulty_commands) | latched(drive->faulty_pressures)) &
+                                DZ_STATUS_LATCHED));
     if (drive->side > 0) {
         drive->law = (uint16_t)dz_comp_checked(past, p_a_adc, p_b_adc, held);
     } else if (drive->side < 0) {
