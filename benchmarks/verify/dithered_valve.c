@@ -102,7 +102,7 @@ void recorded(const double *p, int32_t n, int32_t every, const double *command_V
 #ifdef WITH_DRIVE
 /* The same with the firmware's drive on it: command codes in; a fourth number is the law's compare value. */
 void driven(const double *p, int32_t n, int32_t every, const uint16_t *codes, double supply_MPa, double full_V,
-            double counts, double back_MPa, double codes_a_MPa, double *out)
+            double counts, double back_MPa, double zero_code, double codes_a_MPa, double *out)
 {
     struct valve valve = at_rest(p, supply_MPa);
     struct dz_drive drive;
@@ -114,8 +114,9 @@ void driven(const double *p, int32_t n, int32_t every, const uint16_t *codes, do
 
         for (int32_t j = 0; j < every; j++) {
             if (tick == 0) {
-                dz_drive_sample(&drive, codes[k], (uint16_t)((valve.dp_MPa + back_MPa) * codes_a_MPa),
-                                (uint16_t)(back_MPa * codes_a_MPa));
+                dz_drive_sample(&drive, codes[k],
+                                (uint16_t)(zero_code + (valve.dp_MPa + back_MPa) * codes_a_MPa),
+                                (uint16_t)(zero_code + back_MPa * codes_a_MPa));
                 tick = (int32_t)DZ_DRIVE_TICKS_PER_SAMPLE;
             }
             tick--;

@@ -21,6 +21,8 @@ EVERY = 25
 FULL_V = 10.0
 #: Rates and noise of the bench.
 METER_LAG_S, METER_NOISE_L_MIN = 0.1, 0.03
+#: The machine's pressure sensors, 4 to 20 mA for 0 to 20 MPa, on a converter of 12 bits and 3 V; and behind the edge.
+LOWEST_A, HIGHEST_A, SENSOR_MPA, SHUNT_OHM, CONVERTER_V, CODES, BACK_MPA = 4e-3, 20e-3, 20.0, 140.0, 3.0, 4096, 1.0
 #: Loops within loops of the command: full, half, and small ones, back to zero at the end.
 CORNERS = (0, 1, 0, 0.5, 0.4, 0.5, 0.3, 0.35, 0.1, 0.2, 0)
 
@@ -132,26 +134,24 @@ def driven_loop(
     corners: Sequence[float] = CORNERS,
     *,
     records: int = 6000,
-    span: int = 4095,
-    sensor_MPa: float = 20.0,
 ) -> Loop:
     """Run the firmware over a command of those corners, `records` from zero to full, and a second of its last."""
     parts = [np.linspace(a, b, max(round(abs(b - a) * records), 2)) for a, b in pairwise(corners)]
     command = np.concatenate([*parts, np.full(100, float(corners[-1]))])
-    out = driven(plant, valve, dp_MPa, np.minimum(command * (span + 1), span), span=span, sensor_MPa=sensor_MPa)
+    out = driven(plant, valve, dp_MPa, command * CODES)
     ends = np.cumsum([0, *(part.size for part in parts)])
     return Loop(command=command, mean=out[:, 0], largest=out[:, 1], ends=ends)
 
 
 def driven(
-    plant: ctypes.CDLL, valve: Valve, dp_MPa: float, codes: np.ndarray, *, every: int = EVERY, span: int = 4095,
-    sensor_MPa: float = 20.0,
+    plant: ctypes.CDLL, valve: Valve, dp_MPa: float, codes: np.ndarray, *, every: int = EVERY
 ) -> np.ndarray:  # fmt: skip
     """Return mean and largest flow, pressure drop and compare value of the law after records of those command codes."""
-    held, numbers, out = np.clip(codes, 0, span).astype(np.uint16), valve.numbers(), np.empty((codes.size, 4))
-    real = ctypes.c_double
+    held, numbers, out = np.clip(codes, 0, CODES - 1).astype(np.uint16), valve.numbers(), np.empty((codes.size, 4))
+    real, codes_an_A = ctypes.c_double, SHUNT_OHM / CONVERTER_V * CODES
+    zero_code, codes_a_MPa = codes_an_A * LOWEST_A, codes_an_A * (HIGHEST_A - LOWEST_A) / SENSOR_MPA
     plant.driven(_pointer(numbers), held.size, every, _pointer(held), real(dp_MPa), real(FULL_V), real(60000.0),
-                 real(1.0), real(span / sensor_MPa), _pointer(out))  # fmt: skip
+                 real(BACK_MPA), real(zero_code), real(codes_a_MPa), _pointer(out))  # fmt: skip
     return out
 
 

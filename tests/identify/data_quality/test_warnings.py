@@ -16,6 +16,7 @@ from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
+from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.data_quality import knee_errors
@@ -93,8 +94,9 @@ class TestSimulated:
                 "valve.json": to_json_bytes(valve),
                 "compensator.json": to_json_bytes(compensator),
             }
-            cautions = headline(chain_of(shelf)).cautions
-            assert [text.startswith("SIMULATED") for text in cautions] == [True] * simulated
+            of_recording, *others = headline(chain_of(shelf)).cautions
+            assert of_recording == reach_of_certificate(compensator)
+            assert [text.startswith("SIMULATED") for text in others] == [True] * simulated
             html = make_report(chain_of(shelf)).html
             assert ("SIMULATED recordings" in html[: html.index('<section id="data">')]) is simulated
 

@@ -227,11 +227,13 @@ class TestDesign:
         compensator = design(valve, DesignOptions(guard=name))
         certificate = compensator.positive.certificate
         assert certificate.guard == name and certificate.smallest_margin_V >= 0
-        low, high = valve.positive.valid_dp_MPa
-        dp = np.array([float(compensator.signals.dp_MPa(code)) for code in range(4096)])
-        drive = np.array([compensator.compare(0, code) for code in range(4096)]) / compensator.signals.compare_max * 10
+        low = valve.positive.valid_dp_MPa[0]
+        codes = range(compensator.signals.largest_difference(1) + 1)
+        dp = np.array([float(compensator.signals.dp_MPa(code)) for code in codes])
+        drive = np.array([compensator.compare(0, code) for code in codes]) / compensator.signals.compare_max * 10
         below = OPENS[trend](dp) - BELOW_OPENING[name] - drive
-        assert below[(dp >= low) & (dp <= high)].min() > 0
+        # Above the tests too, where the offset is lowered with the continued bound.
+        assert below[dp >= low].min() > 0
 
     @pytest.mark.slow
     def test_the_offset_rises_from_guard_to_guard_and_flow_at_zero_command_is_said(self):

@@ -86,7 +86,9 @@ def test_a_dither_that_the_certificate_does_not_count_is_seen_at_the_waves_top(t
 def test_a_record_holds_a_whole_wave_of_any_dither(tmp_path):
     """The mean and the largest of a record settle, whatever the wave's place at the record's end."""
     loop, _ = compared(tmp_path / "dither", dither_Hz=104.0)
-    run = loop.run(np.full(400, 0.5), 3.0, "compensated")
-    settled = slice(300, None)
+    # Zero command first, for which the interlock waits.
+    run = loop.run(np.concatenate([np.zeros(50), np.full(400, 0.5)]), 3.0, "compensated")
+    settled = slice(350, None)
+    assert loop.waits_s < 0.5 and run.q_mean_L_min[-1] > 1
     assert np.ptp(run.q_mean_L_min[settled]) < 0.02 * run.q_mean_L_min[-1]
     assert np.all(run.q_largest_L_min[settled] >= run.q_mean_L_min[settled])

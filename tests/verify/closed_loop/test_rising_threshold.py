@@ -37,16 +37,20 @@ def valve(request):
     return found
 
 
-@pytest.mark.parametrize("signal", [NO_LIVE_ZERO, NO_ROOM, BOTH])
-def test_a_failure_is_required_to_be_harmless_where_the_core_can_know_of_it(valve, signal, tmp_path):
+def designed(valve, signal, folder, above):
     from dzdesign.codegen.project import generate
 
     sensor = pressure_signal(parse_signal(signal, "--pressure-a"), Converter(), Fraction(20))
-    compensator = design(
-        valve, DesignOptions(signals=Signals(pressure_a=sensor, pressure_b=sensor), accept=("broken-sensor",))
-    )
+    signals = Signals(pressure_a=sensor, pressure_b=sensor)
+    compensator = design(valve, DesignOptions(signals=signals, accept=("broken-sensor",), above=above))
     made = generate(compensator, "host")
-    write_folder(tmp_path / "fw", made.files, made.manifest)
+    write_folder(folder, made.files, made.manifest)
+    return compensator
+
+
+@pytest.mark.parametrize("signal", [NO_LIVE_ZERO, NO_ROOM, BOTH])
+def test_a_failure_is_required_to_be_harmless_where_the_core_can_know_of_it(valve, signal, tmp_path):
+    compensator = designed(valve, signal, tmp_path / "fw", "hold")
     rising = valve.positive.trend == "increasing"
     everything = []
     for scene in scenes_of(tmp_path / "fw", compensator, None):
@@ -69,3 +73,12 @@ def test_a_failure_is_required_to_be_harmless_where_the_core_can_know_of_it(valv
     told = [line.partition(",")[0] for line in hidden_failures(compensator) if "pressure signal" in line or "," in line]
     hides = signal != BOTH if rising else signal == NO_LIVE_ZERO
     assert hides == bool(opens) == ("accepted" in told) == ("live zero" in check.text)
+
+
+def test_an_offset_that_is_lowered_above_the_tests_shuts_at_a_reading_of_the_converters_end(valve, tmp_path):
+    """20 MPa is four times the highest test: of a threshold that grows nothing is left of the offset there."""
+    compensator = designed(valve, NO_ROOM, tmp_path / "fw", "lower")
+    for scene in scenes_of(tmp_path / "fw", compensator, None):
+        shorted = [each for each in sensor_failures(scene) if "A is shorted" in each.name]
+        assert len(shorted) == len(scene.backs_MPa)
+        assert all(each.must_shut and each.q_zero_L_min == 0 for each in shorted)
