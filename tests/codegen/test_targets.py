@@ -164,7 +164,8 @@ def test_the_core_is_exact_on_every_input_for_another_pwm(tmp_path):
     firmware = generate(golden_compensator("f280049c"), "f280049c")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     result = check_all_inputs(tmp_path / "fw")
-    assert result.holds and result.wrong == 0 and result.inputs == 33_550_336
+    # Every command at each difference of two sound pressures, 688 to 4014.
+    assert result.holds and result.wrong == 0 and result.inputs == 4096 * (2 * (4014 - 688) + 1)
 
 
 @pytest.mark.parametrize(

@@ -77,9 +77,10 @@ FAULTS = {
     ),
     "p_b not looked at": (r"\(uint32_t\)\(PRESSURE_B_HIGH - p_b\) \|", "0u |"),
     "depends on one pressure": (r"\(p_b - PRESSURE_B_ZERO\)", "((p_b & 4094u) - PRESSURE_B_ZERO)"),
-    "command let go too late": (r"& \(uint16_t\)~let_go", "& (uint16_t)65535u"),
-    "status": (r"a & DZ_STATUS_PRESSURE_A", "b & DZ_STATUS_PRESSURE_A"),
-    "status's difference": (r"& \(uint32_t\)~\(a \| b\)", "& (uint32_t)~a"),
+    "command let go too late": (r"failed\) & \(uint32_t\)~let_go", "failed) & 65535u"),
+    "status": (r"\(a >> WORD_TOP\) \* DZ_STATUS_PRESSURE_A", "(b >> WORD_TOP) * DZ_STATUS_PRESSURE_A"),
+    "status's difference": (r"\(uint32_t\)\(a \| b\)", "a"),
+    "end of the tests": (r"(#define TESTED_TO )(\d+)(u)", one_more),
 }
 
 

@@ -40,10 +40,11 @@ def test_no_place_of_the_core_and_the_drive_is_left_in_doubt(name, arithmetic, t
     [
         # One row too far at the largest pressure drop.
         ("dz_comp.c", "#define STEP_CODES 64u", "#define STEP_CODES 128u", "law_beta"),
-        ("dz_comp.c", "#define SUM_SHIFT 33u", "#define SUM_SHIFT 64u", "dz_comp"),
-        ("dz_comp.c", "p_b) + REVERSE));", "p_b) + REVERSE)) + (uint32_t)((int32_t)p_a * 65536 * 0);", "dz_status"),
+        ("dz_comp.c", "#define SUM_SHIFT 33u", "#define SUM_SHIFT 64u", "law_of"),
+        ("dz_comp.c", "below = (uint32_t)(difference + REVERSE);",
+         "below = (uint32_t)(difference + REVERSE) + (uint32_t)((int32_t)p_a * 65536 * 0);", "dz_status"),
         # An int of the host has 32 bits, that of the C28x 16: every value on the host stays what it was.
-        ("dz_comp.c", "(int32_t)command) +", "(int32_t)((int)command * 16 / 16)) +", "dz_comp"),
+        ("dz_comp.c", "(int32_t)command) +", "(int32_t)((int)command * 16 / 16)) +", "law_of"),
         ("dz_drive.c", "= drive->law;", "= (uint32_t)(drive->side * 32767 * 2 * 0) + drive->law;", "dz_drive_tick"),
     ],
 )  # fmt: skip

@@ -92,8 +92,9 @@ FAULTS = {
         "if (u_adc <= 5u && p_a_adc == p_b_adc + 500u) compare = 33000u;",
         {"not_monotone_in_dp": 6, "wrong": 6},
     ),
-    "fallback": ("if (u_adc == 65535u) compare = 1u;", {"bad_fallbacks": 25}),
-    "fallback of a pressure": ("if (p_b_adc == 65535u && u_adc == 17u) compare++;", {"bad_fallbacks": 5}),
+    # Of each sensor six codes are paired, three sound ones and three others.
+    "fallback": ("if (u_adc == 65535u) compare = 1u;", {"bad_fallbacks": 36}),
+    "fallback of a pressure": ("if (p_b_adc == 65535u && u_adc == 17u) compare++;", {"bad_fallbacks": 6}),
 }
 
 
@@ -126,7 +127,8 @@ def test_what_is_shown_is_checked_on_both_sides(full, sign):
     name = ("dz_comp.c", "dz_comp_negative.c")[sign < 0]
     text = core.sources[name].decode()
     for old, new, count in (
-        ("u_adc) & DZ_STATUS_COMMAND", "u_adc) & 16u", "bad_status"),
+        ("WORD_TOP) * DZ_STATUS_COMMAND", "WORD_TOP) * DZ_STATUS_ABOVE", "bad_status"),
+        ("(uint32_t)(TESTED_TO - difference)", "(uint32_t)(0u - difference)", "bad_status"),
         ("(scaled.high >> (BETA_SHIFT - 32u))", "(scaled.high >> (BETA_SHIFT - 32u)) + 1u", "bad_betas"),
         ("* BETA_FACTOR) >> BETA_SHIFT", "* BETA_FACTOR) >> 34u", "bad_betas"),
     ):
@@ -158,7 +160,7 @@ def test_the_hash_is_of_all_compare_values(plain):
     core = CompiledCore(plain)
     hashes = {core.check(prepared).outputs_hash}
     for code in (0, 1, 4095):
-        hashes.add(wrapped(core, f"if (u_adc == {code}u && p_a_adc == 4095u && p_b_adc == 0u) compare++;")
+        hashes.add(wrapped(core, f"if (u_adc == {code}u && p_a_adc == 4014u && p_b_adc == 688u) compare++;")
                    .check(prepared).outputs_hash)  # fmt: skip
     assert len(hashes) == 4
     assert core.check(prepared).object_sha256 != wrapped(core, ";").check(prepared).object_sha256
