@@ -199,12 +199,16 @@ class ClosedLoop:
         other._added_V = added_V
         return other
 
+    @property
+    def span_MPa(self) -> float:
+        """The largest pressure that both sensors span."""
+        return float(self.channels.spans[1:].min())
+
     def back_within_span(self, back_MPa: float, dp_MPa: float) -> float:
         """Return a pressure behind the edge, or the largest that leaves a pressure drop within the sensors' spans."""
-        span = float(self.channels.spans[1:].min())
-        if dp_MPa > span:
-            raise InputError(f"a pressure drop of {dp_MPa:g} MPa exceeds the sensors' span of {span:g} MPa")
-        return min(back_MPa, span - dp_MPa)
+        if dp_MPa > self.span_MPa:
+            raise InputError(f"a pressure drop of {dp_MPa:g} MPa exceeds the sensors' span of {self.span_MPa:g} MPa")
+        return min(back_MPa, self.span_MPa - dp_MPa)
 
     def with_plant(self, plant: Plant | StandIn) -> "ClosedLoop":
         """Return the same loop with another plant; nothing is compiled again."""
