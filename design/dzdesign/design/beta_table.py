@@ -20,6 +20,7 @@ from dzdesign.identify.valve.certified_bound import CertifiedBound, NEAR_MPa
 
 if TYPE_CHECKING:
     import cvxpy as cp
+    from scipy.sparse import csr_array
 
 #: Pressure codes between neighbouring nodes: a power of two, so that the firmware finds a node by a shift.
 STEP_CODES = 64
@@ -205,21 +206,15 @@ def choose_beta_table(
         Numerators, one node every `STEP_CODES` codes; proved exactly to lie under the ceiling.
     """
     import cvxpy as cp
-    from scipy.sparse import csr_array
 
     if above is not None:
         ceiling = _with_release(ceiling, u_min0 / denominator, above)
-    codes = np.arange(len(ceiling.limit))
-    index, share = codes // STEP_CODES, (codes % STEP_CODES) / STEP_CODES
-    size = int(index[-1]) + 2
-    weights = csr_array(
-        (np.concatenate([1 - share, share]), (np.tile(codes, 2), np.concatenate([index, index + 1]))),
-        shape=(codes.size, size),
-    )
+    weights = _node_weights(len(ceiling.limit))
+    count, size = weights.shape
     limit = np.array([float(value / u_min0) for value in ceiling.limit]) - SOLVER_MARGIN
     beta = cp.Variable(size)
     constraints = [weights @ beta <= limit, beta <= (2 - 2 / denominator if above_one else 1)]
-    last, worth = size - 1, np.ones(codes.size)
+    last, worth = size - 1, np.ones(count)
     if above is not None:
         last = min((ceiling.certified.stop - 1) // STEP_CODES, size - 1)
         worth[ceiling.certified.stop :] = WORTH_ABOVE
@@ -235,6 +230,18 @@ def choose_beta_table(
         if trend != "increasing" or position > last + 1:
             nodes[position] = min(nodes[position], nodes[position - 1])
     return _lower_until_proved(nodes, ceiling, u_min0, trend, denominator, last)
+
+
+def _node_weights(count: int) -> "csr_array":
+    """Return by how much each node counts at each of so many codes, straight between the nodes: (codes, nodes)."""
+    from scipy.sparse import csr_array
+
+    codes = np.arange(count)
+    index, share = codes // STEP_CODES, (codes % STEP_CODES) / STEP_CODES
+    return csr_array(
+        (np.concatenate([1 - share, share]), (np.tile(codes, 2), np.concatenate([index, index + 1]))),
+        shape=(count, int(index[-1]) + 2),
+    )
 
 
 def _one_way(beta: "cp.Variable", trend: str | None, last: int) -> list["cp.Constraint"]:

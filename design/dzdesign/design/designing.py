@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
@@ -168,28 +169,15 @@ def _side_law(
         top = left_by_machine(top, ceiling, signals, reference, u_max)
     u_min0 = _offset_at_reference(top / u_max, signals, units)
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
-
-    def table(under: OffsetCeiling, beyond: AboveChoice) -> tuple[int, ...]:
-        return choose_beta_table(
-            under,
-            u_min0,
-            side.trend,
-            denominator=units.beta,
-            above_one=above_one,
-            above=beyond if goes_on else None,
-        )
-
-    beta = table(ceiling, above)
+    table = partial(choose_beta_table, u_min0=u_min0, trend=side.trend, denominator=units.beta, above_one=above_one)
+    beta = table(ceiling, above=above if goes_on else None)
     transition_beta = None
     if opening is not None:
         released_from = above.released_from(tested) if goes_on else None
-        upper = table(
-            opening_ceiling(
-                opening, certified, tested, released_from=released_from, signals=signals, u_max=u_max,
-                sign=allowance.sign,
-            ),
-            AboveChoice(choice="lower", step_codes=STEP_CODES),
+        under = opening_ceiling(
+            opening, certified, tested, released_from=released_from, signals=signals, u_max=u_max, sign=allowance.sign
         )
+        upper = table(under, above=AboveChoice(choice="lower", step_codes=STEP_CODES) if goes_on else None)
         transition_beta = tuple(map(max, upper, beta))
     return SideLaw(
         drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),

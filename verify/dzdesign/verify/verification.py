@@ -83,20 +83,12 @@ def verify(
     Without a `plant` the recorded characteristic stands in for the valve in the closed loop; `plant_source` and
     `plant_sha256` are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about
     it. `sequence` is the command over time, by default 0-10 V in 100 s and back; `backs_MPa` are the pressures behind
-    the edge. In `include` lie headers of the user's
-    board files.
-    `say` is told each stage before it begins; `watch` is handed the pieces of a long one and their number, and gives
-    them back one by one, as they are done.
+    the edge. In `include` lie headers of the user's board files. `say` is told each stage before it begins; `watch` is
+    handed the pieces of a long one and their number, and gives them back one by one, as they are done.
 
     A folder that is no firmware, and a machine without a C compiler, are an `InputError`.
     """
-    if tolerances and tolerances.spreads and plant is None:
-        raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
-    manifest = read_firmware_manifest(folder)
-    check_include(include, manifest)
-    compensator = read_compensator(folder)
-    if tolerances and tolerances.machines and compensator.machine is None:
-        raise InputError(NOT_DECLARED)
+    manifest, compensator = _read(folder, plant, tolerances, include)
     host_compiler()
     say("compiling the core with every warning an error")
     # A compiler's time, not ours.
@@ -133,8 +125,21 @@ def verify(
         current_loop=current.result and replace(current.result, valve=loop.valve_at_corners),
         mutants=None,
     )
-    derived = compensator if law.holds else None
-    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=derived)
+    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=compensator if law.holds else None)
+
+
+def _read(
+    folder: Path, plant: Plant | None, tolerances: Tolerances | None, include: Sequence[Path]
+) -> tuple[FirmwareManifest, Compensator]:
+    """Read the firmware's manifest and compensator, and refuse what does not go with them or with each other."""
+    if tolerances and tolerances.spreads and plant is None:
+        raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
+    manifest = read_firmware_manifest(folder)
+    check_include(include, manifest)
+    compensator = read_compensator(folder)
+    if tolerances and tolerances.machines and compensator.machine is None:
+        raise InputError(NOT_DECLARED)
+    return manifest, compensator
 
 
 def _manifest_source(folder: Path) -> SourceFile:
