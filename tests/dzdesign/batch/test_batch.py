@@ -210,7 +210,7 @@ def offsets_above_their_bounds(common, made: Path, names) -> list[str]:
         curve = side["certified"]["closing"]
         nodes, lower = ([Fraction(repr(value)) for value in curve[key]] for key in ("dp_MPa", "u_lower_V"))
         bends = [Fraction(repr(value)) for value in curve["curvature_V_MPa2"]] or [None] * (len(nodes) - 1)
-        for code in range(common.signals.code_max + 1):
+        for code in range(common.signals.largest_difference(1) + 1):
             dp = common.signals.dp_MPa(code)
             bounds = [
                 min(low, high)
