@@ -23,6 +23,8 @@ from dzdesign.verify.verification import verify
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
+
+
 @pytest.fixture(scope="module")
 def duty(example_valve, tmp_path_factory):
     folder = tmp_path_factory.mktemp("population") / "fw"
@@ -140,11 +142,12 @@ def test_a_quick_closing_ends_where_a_slow_one_does(duty):
 
 def test_a_plant_of_equations_is_drawn_too(example_valve, example_folder, tmp_path):
     plant = read_plant(example_folder / "plant.toml")
-    scenes = scenes_of(tmp_path / "fw", designed(example_valve, tmp_path / "fw", amplifier="2 %"), plant)
+    true, wrong = LITTLE | {"amplifier": "2 %"}, LITTLE | {"amplifier": "0.2 %"}
+    scenes = scenes_of(tmp_path / "fw", designed(example_valve, tmp_path / "fw", **true), plant)
     assert run_population(scenes, 20, 1).flowing == 0
-    short = scenes_of(tmp_path / "short", designed(example_valve, tmp_path / "short", amplifier="0.2 %"), plant)
-    wrong = [replace(each, compensator=scenes[0].compensator) for each in short]
-    assert run_population(wrong, 40, 1).flowing > 0
+    short = scenes_of(tmp_path / "short", designed(example_valve, tmp_path / "short", **wrong), plant)
+    caught_out = [replace(each, compensator=scenes[0].compensator) for each in short]
+    assert run_population(caught_out, 40, 1).flowing > 0
 
 
 # --- a budget that is too small -------------------------------------------------------------------------------------

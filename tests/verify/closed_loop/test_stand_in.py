@@ -124,9 +124,7 @@ def test_verify_itself_sees_a_stand_in_that_is_not_the_recording(
     def checked(side):
         loop = ClosedLoop(stand_in_of(side, example_valve.u_max_V), firmware, example_compensator)
         results = [
-            compare_at_pressure(
-                loop, test.dp_MPa, 1.0, QUICK, reading_flow_L_min=0.6, recorded=test.recorded
-            ).result
+            compare_at_pressure(loop, test.dp_MPa, 1.0, QUICK, reading_flow_L_min=0.6, recorded=test.recorded).result
             for test in (example_valve.positive.tests[0], example_valve.positive.tests[-1])
         ]
         return stand_in_is_the_recording(results, example_valve)

@@ -137,10 +137,19 @@ def _above_the_tests(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     supply = np.concatenate([np.full(before.size, scene.dp_MPa), steps, np.full(ends.size, pressures[-1])])
     run = scene.run(command, supply_MPa=supply)
     last, first = (scene.units.text(dp_MPa, ".2f MPa") for dp_MPa in (pressures[-1], highest))
-    reason = f"held above {first}, not certified" if scene.compensator.above == "hold" else ""
+    reason = _not_certified_above(scene, first)
     found = scene.result(f"dP above the tests, up to {last}", run, not_required=reason, end_MPa=pressures[-1])
     rests = before.size + each.size * np.arange(1, len(pressures) + 1) - 1
     return replace(found, q_zero_L_min=max(found.q_zero_L_min, float(run.q_largest_L_min[rests].max())))
+
+
+def _not_certified_above(scene: Scene, first: str) -> str:
+    """Say why no flow is not required above the tests; empty where the certificate goes on, or no offset is left."""
+    choice, certificate = scene.compensator.above, scene.compensator.side(scene.sign).certificate
+    if choice == "hold":
+        return f"held above {first}, not certified"
+    goes_on = certificate.holds_to_MPa > certificate.dp_MPa[1]
+    return "" if goes_on or choice == "release" else f"not certified above {first}"
 
 
 def _noise_at_zero(scene: Scene) -> ScenarioResult:
