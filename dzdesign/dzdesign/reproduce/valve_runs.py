@@ -1,6 +1,7 @@
 """The ramps and steps of Sections 2 and 4 on a recovered valve: bare, with the paper's law, and with the product."""
 
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.report.reproduction import Driver
 from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
-from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
+from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S
 
 PRESSURES_MPA = (float(DP0_MPA), float(DP1_MPA))
@@ -112,7 +113,9 @@ def run_valve(valve: RecoveredValve, loop: ClosedLoop, compensator: Compensator 
                 ramps[Drive(PRODUCT, with_beta), dp_MPa] = _run_product(loop, command, dp_MPa, with_beta)
     duty = None
     if compensator:
-        at_duty = _run_product(loop, np.full(2, DUTY_COMMAND_V / U_MAX_V), PRESSURES_MPA[0], with_beta=True)
+        rest = np.zeros(ceil(loop.waits_s / RECORD_S) + 1)  # the drive waits for zero command after a reset
+        held = np.concatenate([rest, np.full(2, DUTY_COMMAND_V / U_MAX_V)])
+        at_duty = _run_product(loop, held, PRESSURES_MPA[0], with_beta=True)
         duty = 100 * float(at_duty.compare[-1]) / compensator.signals.compare_max
     steps = _steps(valve, loop, compensator is not None)
     return ValveRuns(valve=valve, ramps=ramps, steps=steps, product_duty_percent=duty)
