@@ -15,6 +15,7 @@ from bench_plant import commanded, lagged, ramp, with_play
 from recorded_ramps import L_MIN, recorded
 from scoreboard import Row, print_rows, say
 
+from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -131,15 +132,18 @@ def print_worn_valves(*, quick: bool, seed: int) -> list[Row]:
     rows = []
     for number, (name, (draw, guard)) in enumerate(CASES.items()):
         say(f"worn valves: {name}, {count} valves")
-        found = []
+        found, refused = [], 0
         for valve in range(count):
             rng = np.random.default_rng([seed, number, valve])
-            found.append(examine(draw(rng), guard, rng))
+            try:
+                found.append(examine(draw(rng), guard, rng))
+            except InputError:  # the tests bend as those with a lowest threshold between them do: another test is asked
+                refused += 1
         lost, before, declared = (
             float(np.mean([getattr(each, key) for each in found])) for key in ("lost", "lost_before", "declared")
         )
         note = (
-            f"of {count}; {lost:.1f} % of command lost, {before:.1f} % without --zero-flow; "
+            f"of {count}, {refused} refused; {lost:.1f} % of command lost, {before:.1f} % without --zero-flow; "
             f"{declared:.0%} of the tests answer for the declared flow"
         )
         opened = sum(each.excess > 1 for each in found)
