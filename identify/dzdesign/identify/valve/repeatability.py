@@ -26,7 +26,7 @@ class Repeatability:
         ),
     ]
     degrees_of_freedom: (
-        Annotated[float, quantity("1", "Of the measured one; null where it was not measured.", ge=1, le=1e9)] | None
+        Annotated[float, quantity("1", "Of the measured one; null where it was not measured.", gt=0, le=1e9)] | None
     )
     drift_V: Annotated[
         Voltage | None,
