@@ -49,6 +49,12 @@ def test_what_identify_writes_is_read(premise):
     read(document)
 
 
+def test_ramps_that_tell_a_drift_too_may_have_less_than_one_degree_of_freedom(smooth):
+    """With a drift in the model each ramp gives less than one; the largest scatter may be of two ramps alone."""
+    document = deepcopy(smooth)
+    side_of(document)["certificate"]["repeatability"] |= {"origin": "repeats", "degrees_of_freedom": 0.9}
+    assert read(document).positive.certificate.repeatability.degrees_of_freedom == 0.9
+
 class TestPremise:
     def test_an_estimated_curvature_is_recomputed(self, smooth):
         document = deepcopy(smooth)
