@@ -9,10 +9,8 @@ import pytest
 from dzdesign.codegen.project import generate, write_firmware
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
-from tests.conftest import default_options
 from tests.support.attacked_firmware import add, change_json, edit, seal, take_the_rest_as_held
 from tests.support.synthetic import needs_compiler
 
@@ -22,17 +20,15 @@ PROJECT = "f28335/dzdesign.projectspec"
 
 
 @pytest.fixture(scope="module")
-def firmware_of(example_valve, tmp_path_factory):
+def firmware_of(example_valve, example_compensator, tmp_path_factory):
     """The example's firmware of each target, made once, to be copied."""
     from dzdesign.codegen.project import target_named
 
     root = tmp_path_factory.mktemp("attacked")
-    valve_json = to_json_bytes(example_valve)
-    compensator = design(example_valve, default_options(), valve_json)
     for target in TARGETS:
-        own = compensator
+        own = example_compensator
         if target == "f280049c":  # another converter
-            own = design(example_valve, options_of({}, target_named(target).inputs()), valve_json)
+            own = design(example_valve, options_of({}, target_named(target).inputs()))
         write_firmware(generate(own, target), root / target)
     return root
 
@@ -203,6 +199,7 @@ BESIDE = {
     "a revision under SCCS": ("host", "host/SCCS/s.dz_host.map"),
     "presets of CMake": ("host", "host/CMakePresets.json"),
     "properties of MSBuild": ("host", "Directory.Build.props"),
+    "options of MSBuild": ("host", "host/Directory.Build.rsp"),
     "another build": ("host", "build.ninja"),
     "the compiler as a script": ("host", "host/cc.bat"),
     "the run-time library": ("f28335", "f28335/rts2800_fpu32.lib"),
@@ -264,11 +261,30 @@ IN_THE_USERS = {
     "in trigraphs": (in_tick("??=define dz_drive_tick my_tick"), "makes dz_drive_tick"),
     "behind a comment": (in_tick("/* */ #define dz_drive_tick my_tick"), "makes dz_drive_tick"),
     "within a comment": (in_tick("#/**/define/**/dz_drive_tick my_tick"), "makes dz_drive_tick"),
+    "behind a form feed": (in_tick("\f#define dz_drive_tick my_tick"), "makes dz_drive_tick"),
+    "between texts like a comment": (
+        in_tick('extern char a[sizeof "/*"];\n#define dz_drive_tick my_tick\nextern char b[sizeof "*/"];'),
+        "makes dz_drive_tick",
+    ),
     "taken away": (in_tick("#undef DZ_DRIVE_TICKS_PER_SAMPLE"), "makes DZ_DRIVE_TICKS_PER_SAMPLE"),
     "a function": (in_tick("static void dz_drive_tick(struct dz_drive *d) { (void)d; }"), "has dz_drive_tick"),
     "another name of it": (in_tick("#pragma redefine_extname dz_drive_tick my_tick"), "has dz_drive_tick"),
     "in a header of board": (included("board/my.h", "#define dz_drive_sample my_sample\n"), "board/my.h makes"),
     "in a text of board": (included("board/my.txt", "#define dz_drive_tick my_tick\n"), "includes my.txt"),
+    "in what a macro names": (
+        lambda folder: (
+            in_board("board/my.txt", "#define dz_drive_tick my_tick\n")(folder),
+            in_tick('#define MY "my.txt"\n#include MY')(folder),
+        ),
+        "by the macro MY",
+    ),
+    "in a script of the linker": (
+        lambda folder: (
+            in_board("board/my.txt", "dz_comp = my_comp;\n")(folder),
+            edit(folder, "cortex_m4/mps2_an386.ld", "ENTRY(", "INCLUDE ../board/my.txt\nENTRY("),
+        ),
+        "includes ../board/my.txt",
+    ),
     "in a text beside": (included("cortex_m4/my.txt", "#define dz_drive_tick my_tick\n"), "includes my.txt"),
     "an address of the linker": (
         lambda folder: edit(folder, "cortex_m4/mps2_an386.ld", "ENTRY(", "dz_drive_tick = my_tick;\nENTRY("),
@@ -293,7 +309,8 @@ def test_what_a_user_fills_in_holds_and_is_named_as_not_checked(verify):
         edit(folder, "cortex_m4/dz_tick.h", "#define DZ_TICK_RELOAD UINT32_C(9999)", "#define DZ_TICK_RELOAD 6399u")
         edit(folder, "cortex_m4/dz_tick.h", TICK, '#include "my_chip.h"\n' + TICK)
         edit(folder, "cortex_m4/mps2_an386.ld", "LENGTH = 4M", "LENGTH = 512K")
-        add(folder, "board/my_chip.h", '#include "core_cm4.h"\n#define MY_ADC ((struct adc *)0x40012000u)\n')
+        more = "#define DDI 0\n#define SUM_SHIFT 1\n"  # of a comment; of the core's C, apart
+        add(folder, "board/my_chip.h", f'#include "core_cm4.h"\n#define MY_ADC ((struct adc *)0x40012000u)\n{more}')
         add(folder, "board/my_sink.c", '#include "dz_comp.h"\nunsigned f(void) { return dz_comp(0u, 0u, 0u); }\n')
 
     status, said = verify("cortex-m4", fill_in)

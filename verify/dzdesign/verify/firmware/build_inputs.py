@@ -7,8 +7,8 @@ from pathlib import Path, PurePosixPath
 SOURCES = {
     ".c", ".h", ".cc", ".cpp", ".cxx", ".c++", ".hh", ".hpp", ".hxx", ".h++", ".inc", ".inl", ".ipp", ".tcc", ".s",
     ".sx", ".sa", ".asm", ".cla", ".y", ".l", ".w", ".ch", ".web", ".lib", ".a", ".ld", ".lds", ".lcf", ".cmd", ".opt",
-    ".icf", ".sct", ".def", ".mk", ".mak", ".cmake", ".ninja", ".bazel", ".props", ".targets", ".bat", ".projectspec",
-    ".ccxml", ".gel", ".syscfg", ".ioc", ".uvprojx", ".ewp", ".cproj", ".vcxproj",
+    ".icf", ".sct", ".def", ".mk", ".mak", ".cmake", ".ninja", ".bazel", ".props", ".targets", ".rsp", ".bat",
+    ".projectspec", ".ccxml", ".gel", ".syscfg", ".ioc", ".uvprojx", ".ewp", ".cproj", ".vcxproj",
 }  # fmt: skip
 BUILD_FILES = {
     "makefile", "gnumakefile", "cmakelists.txt", "cmakepresets.json", "cmakeuserpresets.json", "meson.build",

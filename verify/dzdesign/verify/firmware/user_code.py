@@ -6,16 +6,20 @@ from pathlib import Path, PurePosixPath
 
 from dzdesign.verify.firmware.build_inputs import SOURCES
 
-COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+#: Texts are kept: what looks like a comment in one is none.
+COMMENT = re.compile(r"""("(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')|/\*.*?\*/|//[^\n]*""", re.DOTALL)
 #: A line that goes on, as C and its trigraphs write it.
-CONTINUED = re.compile(r"(?:\\|\?\?/)\r?\n")
-MACRO = re.compile(r"^[ \t]*(?:#|%:|\?\?=)[ \t]*(?:define|undef)[ \t]+(\w+)", re.MULTILINE)
-INCLUDE = re.compile(r"^[ \t]*(?:#|%:|\?\?=)?[ \t]*(?:include|INCLUDE)[ \t]*[\"<]?([^\">\s]+)", re.MULTILINE)
+CONTINUED = re.compile(r"(?:\\|\?\?/)[ \t]*\r?\n")
+HASH, BLANK = r"^[^\S\n]*(?:#|%:|\?\?=)[^\S\n]*", r"[^\S\n]*"
+MACRO = re.compile(rf"{HASH}(?:define|undef){BLANK}(\w+)", re.MULTILINE)
+INCLUDE = re.compile(rf"{HASH}(?:include_next|include|import){BLANK}([^\n]*)", re.MULTILINE)
+INCLUDED_SCRIPT = re.compile(r"\bINCLUDE\s+(\S+)")
 NAME = re.compile(r"[A-Za-z_]\w*")
 FUNCTION = re.compile(r"\b(dz_\w+)\s*\(")
 #: A symbol that a linker file gives an address, over that of the C.
 ASSIGNED = re.compile(r"\b(\w+)\s*(?:[-+*/&|]|<<|>>)?=(?!=)")
 LINKER_FILES = {".ld", ".lds", ".lcf", ".icf", ".sct", ".cmd"}
+QUOTES = "\"'"
 C_FILES = {".c", ".s", ".asm"}
 
 
@@ -23,13 +27,13 @@ def interference(folder: Path, names: list[str], generated: Mapping[str, str], b
     """Yield in which file of the user's something stands that changes what the generated C means or where it lies.
 
     `names` are the user's files, `generated` the texts of all that codegen makes and `board` those of them that are for
-    the user to fill in: what was generated there may stay. A C file of the user's is compiled by itself and what it
-    does is not looked at, but for what it includes.
+    the user to fill in: what was generated there may stay. The core's C includes no file of the user's. A C file of the
+    user's is compiled by itself, and what it does is not looked at, but for what it includes.
     """
-    code = [_without_comments(text) for name, text in generated.items() if name.endswith((".c", ".h"))]
-    fixed = {name: text for name, text in generated.items() if name not in board}
-    used = {word for name, text in fixed.items() if name.endswith((".c", ".h")) for word in NAME.findall(text)}
-    functions = {word for text in code for word in FUNCTION.findall(text)}
+    code = {name: _without_comments(text) for name, text in generated.items() if name.endswith((".c", ".h"))}
+    reached = {name for name in code if name not in board and not (name.startswith("core/") and name.endswith(".c"))}
+    used = {word for name in reached for word in NAME.findall(code[name])}
+    functions = {word for text in code.values() for word in FUNCTION.findall(text)}
     for name in names:
         path = folder / name
         if not path.is_file():
@@ -37,7 +41,7 @@ def interference(folder: Path, names: list[str], generated: Mapping[str, str], b
         text = _without_comments(path.read_text(encoding="utf-8", errors="replace"))
         before = _without_comments(generated.get(name, ""))
         yield from (f"{name} {fault}" for fault in _faults(path, text, before, used, functions))
-        yield from (f"{name} includes {found}, which is no header" for found in _odd_includes(path, text, folder))
+        yield from (f"{name} includes {found}" for found in _odd_includes(path, text, folder))
 
 
 def _faults(path: Path, text: str, before: str, used: set[str], functions: set[str]) -> Iterator[str]:
@@ -57,12 +61,20 @@ def _faults(path: Path, text: str, before: str, used: set[str], functions: set[s
 
 
 def _odd_includes(path: Path, text: str, folder: Path) -> Iterator[str]:
-    """Yield what is included of the firmware's folder and has no ending by which it would be looked at."""
-    for name in INCLUDE.findall(text):
-        places = {path.parent, folder, *(place for place in folder.iterdir() if place.is_dir())}
+    """Yield what is included of the firmware's folder and is not looked at here, by its ending or by a macro."""
+    places = {path.parent, folder, *(place for place in folder.iterdir() if place.is_dir())}
+    if path.suffix.lower() in LINKER_FILES:
+        words = [f'"{word.strip(QUOTES)}"' for word in INCLUDED_SCRIPT.findall(text)]
+    else:
+        words = INCLUDE.findall(text)
+    for word in words:
+        if word[:1] not in ('"', "<"):
+            yield f"by the macro {word.strip()[:40]}, which is not followed; write the header's name"
+            continue
+        name = word[1:].partition('"' if word[0] == '"' else ">")[0]
         if any((place / name).is_file() for place in places) and PurePosixPath(name).suffix.lower() not in SOURCES:
-            yield name
+            yield f"{name}, which is no header by its ending"
 
 
 def _without_comments(text: str) -> str:
-    return COMMENT.sub(" ", CONTINUED.sub("", text))
+    return COMMENT.sub(lambda found: found[1] or " ", CONTINUED.sub("", text))
