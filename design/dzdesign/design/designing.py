@@ -64,8 +64,7 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
     law(options.law)
     u_max = _full_command(valve, options)
     if options.current is not None and (machine := options.machine) is not None:
-        rated_A = options.current.circuit.rated_A
-        check_bench_current(valve, rated_A, machine.bench_full_A, machine.bench_current_error or 0.0)
+        check_bench_current(valve, options.current.circuit.rated_A, machine.bench_full_A)
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
