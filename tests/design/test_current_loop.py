@@ -7,6 +7,7 @@ import pytest
 
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
     CurrentSensor,
@@ -16,6 +17,7 @@ from dzdesign.design.current.choosing import (
     worst_step,
 )
 from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
+from dzdesign.design.current.drive import CurrentRequest, design_current_drive
 from dzdesign.design.current.margins import Gains, impulse_response, loop_transfer, margins, worst_margins
 from dzdesign.design.current.step_response import Coils, run_loop, step_responses
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
@@ -114,7 +116,9 @@ def test_a_wider_supply_costs_speed():
     "sensor",
     [
         CurrentSensor(V_per_A=2.6, offset_V=0.15),
-        CurrentSensor(V_per_A=2.0, supply_divider=0.1),
+        CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.1),
+        CurrentSensor(V_per_A=2.0),  # an offset below the converter's zero is not seen
+        CurrentSensor(V_per_A=2.0, offset_V=0.06),  # nor is all that is calibrated away
     ],
 )
 def test_a_sensor_beyond_the_converter_is_refused(sensor):
@@ -128,3 +132,22 @@ def test_a_circuit_that_is_none_is_refused(changed):
         CoilCircuit(
             **{"resistance_ohm": 3.5, "inductance_H": 0.04, "rated_A": 1.0, "supply_V": (18.0, 32.0), **changed}
         )
+
+
+@pytest.mark.parametrize("changed", [{"rated_A": 50.0}, {"supply_V": (1.0, 1000.0)}])
+def test_a_current_that_no_supply_drives_in_time_is_refused(changed):
+    circuit = replace(COIL, **changed)
+    sensor = CurrentSensor(V_per_A=2.0 / circuit.rated_A, offset_V=0.15)
+    with pytest.raises(InputError, match=r"carries|reach"):
+        design_current_drive(CurrentRequest(circuit=circuit, sensor=sensor, sampling=SAMPLING), CONVERTER, 60000)
+
+
+def test_corners_that_cannot_carry_the_rated_current_are_said():
+    """They have no step, so "the slowest" is none of them."""
+
+    def words(rated_A, V_per_A):
+        sensor = CurrentSensor(V_per_A=V_per_A, offset_V=0.15)
+        request = CurrentRequest(circuit=replace(COIL, rated_A=rated_A), sensor=sensor, sampling=SAMPLING)
+        return design_current_drive(request, CONVERTER, 60000).in_words(RecordedUnits())
+
+    assert len(words(1.0, 2.0)) == 2 and "3.44 A" in words(5.0, 0.4)[2]

@@ -1,12 +1,13 @@
 """`CurrentDrive`: current control as compensator.json keeps it, with what it was designed for and what it holds."""
 
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, isfinite
 from typing import Annotated
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
@@ -20,7 +21,7 @@ from dzdesign.design.current.choosing import (
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.current.margins import worst_margins
-from dzdesign.design.current.step_response import step_responses
+from dzdesign.design.current.step_response import STEP_S, step_responses
 from dzdesign.design.target_inputs import Converter
 
 
@@ -67,6 +68,19 @@ class CurrentDrive:
             f"the worst corner; 10 to 90 % in {1e3 * self.rise_s:.1f} ms at the slowest ({1e3 * self.least_rise_s:.1f} "
             f"ms with the switch on all the time), overshoot up to {self.overshoot:.1%}; 90 to 10 % takes up to "
             f"{1e3 * self.fall_s:.0f} ms, as the freewheeling diode alone brakes",
+            *self._weak_in_words(units),
+        )
+
+    def _weak_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
+        """Say what flows at most where no supply drives the rated current; those corners have no step."""
+        circuit = self.circuit
+        weakest = min(circuit.corners(), key=lambda corner: corner.supply_V / corner.resistance_ohm)
+        if circuit.duty(weakest, circuit.rated_A) < 1:
+            return ()
+        most_A, at_V = weakest.supply_V / weakest.resistance_ohm, weakest.supply_V
+        return (
+            f"at {at_V:g} V the hottest coil of {weakest.resistance_ohm:.3g} ohm carries {units.text(most_A, '.3g A')} "
+            "at most, so that full command has less than the rated current; step and margins are of the others",
         )
 
 
@@ -89,6 +103,12 @@ def design_current_drive(request: CurrentRequest, converter: Converter, compare_
     loop = choose_loop(circuit, sensor, converter, sampling, compare_max=compare_max)
     phase, gain = worst_margins(circuit, sampling, gains_of(loop, circuit))
     slowest, largest = worst_step(step_responses(loop, circuit, sampling, sensor_line(sensor, converter)))
+    if not isfinite(slowest.rise_s):
+        raise InputError(
+            f"with {slowest.corner.resistance_ohm:.3g} ohm and {slowest.corner.inductance_H:.3g} H at "
+            f"{slowest.corner.supply_V:.3g} V the current does not reach 90 % of the rated one in {1e3 * STEP_S:g} ms; "
+            "declare narrower ranges of coil and supply, or a lower --rated-current"
+        )
     high, low = 0.9 * circuit.rated_A, 0.1 * circuit.rated_A
     return CurrentDrive(
         circuit=circuit,
