@@ -72,7 +72,8 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
     functions = options.drive_functions(transition_codes)
     dither = functions.dither(signals)
     dither.check(valve.dither)
-    reserve, laws = dither_reserve(dither, valve.dither, options.machine), {}
+    current_drive = options.current_drive()
+    reserve, laws = dither_reserve(dither, valve.dither, options.machine, current_drive), {}
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
         allowance = allowance_of(signals, options.machine, sign=sign, dither_counts=reserve)
@@ -97,7 +98,7 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
         zero_band_codes=options.error.zero_band_codes if transition_codes else 0,
         command_error=options.error,
         drive_functions=functions,
-        current_drive=options.current_drive(),
+        current_drive=current_drive,
         machine=options.machine,
         costs=(),
         valve=valve,
