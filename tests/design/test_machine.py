@@ -259,11 +259,19 @@ def test_the_rated_current_must_be_that_of_full_command(example_valve):
     signal = replace(example_valve, recorded_units=RecordedUnits(command=CommandUnit(unit="mA", factor=2.0)))
     assert recorded_full_A(by_current) == pytest.approx(0.8)
     assert recorded_full_A(signal) is None and recorded_full_A(example_valve) is None
-    check_bench_current(by_current, 0.8, None, 0.01)
-    check_bench_current(example_valve, 1.0, None, 0.01)
-    for valve, declared in ((by_current, None), (example_valve, 1.2)):
+    check_bench_current(by_current, 0.8, 0.8)
+    check_bench_current(example_valve, 1.0, None)
+    for valve, declared in ((by_current, None), (example_valve, 1.2), (example_valve, 0.999)):
         with pytest.raises(InputError, match="--rated-current"):
-            check_bench_current(valve, 1.0, declared, 0.01)
+            check_bench_current(valve, 1.0, declared)
+
+
+def test_a_bench_current_beside_the_rated_one_is_not_hidden_in_its_error(example_valve):
+    """0.96 A +- 5 % may be 0.912 A, but the budget's factor is 0.95: the threshold over 1 A would be 4 % lower."""
+    with pytest.raises(InputError, match="--rated-current"):
+        design(example_valve, options(CURRENT | {"bench_current": "0.96 A +- 5 %"}))
+    exact = design(example_valve, options(CURRENT | {"rated_current": "0.96 A", "bench_current": "0.96 A +- 5 %"}))
+    assert exact.machine.least_factors["bench current"] == Fraction("0.95")
 
 
 def test_a_machine_of_another_drive_is_no_machine_of_the_compensator(example_compensator):

@@ -24,7 +24,7 @@ RESULT = CurrentLoopResult(
     states=ControllerStates(states=1000, seed=1, wrong=0, first_wrong=None),
     seconds=10.0, shares=(0.5, 1.0), not_carried=1,
     corners=(CORNER, replace(CORNER, rise_s=None, least_rise_s=None, overshoot=None)),
-    offset_codes=(), offset_error_codes=0.0,
+    offset_codes=(), offset_error_codes=0.0, dither_above_counts=0.0, dither_below_counts=0.0,
     faults=(FaultRun(name="the wire breaks", expected="OPEN", seen_after_s=None, limit_s=0.04, latched=False),),
     valve=(VALVE,),
 )  # fmt: skip

@@ -233,3 +233,14 @@ def test_a_set_point_that_the_supply_cannot_carry_is_said(controlled, tmp_path):
     assert found.result.not_carried > 0
     settles = next(check for check in found.checks if check.id == "current-settles")
     assert str(found.result.not_carried) in settles.text
+
+
+@pytest.mark.parametrize("kept", ["what the coil makes", "the set point's peak alone"])
+def test_a_dither_that_the_current_overshoots_is_kept_free_or_seen(kept, example_valve, tmp_path):
+    target = target_named("cortex-m4").inputs()
+    made = design(example_valve, options_of(TEXTS | {"dither": "150 Hz 1 %"}, target))
+    if kept == "the set point's peak alone":
+        made = replace(made, current_drive=replace(made.current_drive, dither_above_counts=0))
+    found = current_checks(firmware_of(made, tmp_path / "firmware"), made, silent, STATES)
+    assert failing(found.checks) == ({"current-settles"} if kept == "the set point's peak alone" else set())
+    assert found.result.dither_above_counts > 150 and found.result.dither_below_counts > 100

@@ -94,6 +94,12 @@ def choose_loop(
     compare_limit: int | None = None,
 ) -> CurrentLoop:
     """Return the current loop in integers; a coil or a sensor that allows none is an `InputError`."""
+    if circuit.duty(circuit.nominal, circuit.rated_A) >= 1:
+        raise InputError(
+            f"the coil carries at most {circuit.nominal_V / circuit.nominal.resistance_ohm:.3g} A at "
+            f"{circuit.nominal_V:.3g} V, expected more than the rated current of {circuit.rated_A:g} A; check --coil, "
+            "--rated-current and --supply"
+        )
     gains = choose_gains(circuit, sampling, sensor.supply_divider > 0)
     sums = _Sums(circuit=circuit, sensor=sensor, converter=converter, sampling=sampling)
     counts = circuit.rated_A / circuit.nominal_V  # of the PWM for a count of current, over V/A
@@ -175,6 +181,13 @@ class _Sums:
             raise InputError(
                 f"at {OVER_SHARE:.0%} of the rated current its sensor gives {top_V:.4g} V, expected at most "
                 f"{SHORT_RANGE * full_V:.4g} V of the converter's {full_V:g} V; lower the shunt or its gain"
+            )
+        least_V = OFFSET_SHARE * full_V
+        if not self.sensor.offset_V > least_V:
+            raise InputError(
+                f"without current its sensor gives {self.sensor.offset_V:g} V, expected more than {least_V:.3g} V: an "
+                "offset below the converter's zero is not seen, so that the calibration leaves it in the current; "
+                "shift the sensor, such as '0..1.2 A on 2 ohm + 0.15 V'"
             )
         if self.sampling.samples * self.converter.code_max > 65535:
             raise InputError(f"{self.sampling.samples} samples of the current do not fit a sum of 16 bits")

@@ -126,6 +126,10 @@ class CurrentLoopResult:
     offset_error_codes: Annotated[
         float, quantity("codes", "Largest departure of the mean reading from the set point with them.", ge=0, le=1e6)
     ]
+    dither_above_counts: Annotated[
+        float, quantity("counts", "By how much the current's peak in the dither lies above the set point's.", ge=0)
+    ]
+    dither_below_counts: Annotated[float, quantity("counts", "The same below it.", ge=0)]
     faults: Annotated[tuple[FaultRun, ...], about("One entry a fault.")]
     valve: Annotated[
         tuple[ValveAtCorners, ...],
