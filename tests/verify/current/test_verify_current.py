@@ -147,7 +147,9 @@ def test_one_code_too_many_in_one_of_a_million_states_is_seen(controlled, tmp_pa
     assert failing(found.checks) == {"current-controller"}
 
 
-TAMPERED = {"gain": {"proportional": 2}, "feed-forward": {"feed_forward": 3}, "rate": {"rate": 6}, "release": {"release": 0}}
+TAMPERED = {
+    "gain": {"proportional": 2}, "feed-forward": {"feed_forward": 3}, "rate": {"rate": 6}, "release": {"release": 0},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("number", TAMPERED)
