@@ -20,7 +20,7 @@ from dzdesign.design.current.choosing import (
 from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
 from dzdesign.design.current.drive import CurrentRequest, design_current_drive
 from dzdesign.design.current.margins import Gains, impulse_response, loop_transfer, margins, worst_margins
-from dzdesign.design.current.step_response import Coils, run_loop, step_responses
+from dzdesign.design.current.step_response import Coils, released_overshoot_A, run_loop, step_responses
 from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.verify.exhaustive.zero_command import counted_dither
@@ -71,6 +71,18 @@ def test_every_corner_has_its_margins_step_and_little_overshoot(name):
     assert len(steps) == 27
     assert slowest.rise_s <= RISE_S[name] and largest.overshoot <= 0.10
     assert all(step.rise_s > step.least_s for step in steps)
+
+
+@on_both
+def test_no_corner_overshoots_as_it_is_released_and_none_is_held_down_for_nothing(name):
+    """Every fortieth of the rated current: less than a code. Beginning at the integral it is dozens of codes."""
+    loop, line = example_loop(name), sensor_line(SENSORS[name], CONVERTER)
+    corners, code_A = list(COIL.corners()), 1 / (line.V_per_A * line.codes_per_V)
+    for share in np.arange(0.025, 1.01, 0.025):
+        means, _ = run_loop(loop, COIL, corners, SAMPLING, line, [round(share * 60000)] * 300)
+        assert means.max() <= share + code_A
+    assert released_overshoot_A(replace(loop, release=0), COIL, SAMPLING, line) > 50 * code_A
+    assert released_overshoot_A(replace(loop, release=loop.release // 2), COIL, SAMPLING, line) > code_A
 
 
 def test_gains_beyond_the_gain_margin_oscillate_and_gains_within_do_not():

@@ -157,7 +157,7 @@ def _side_law(
     signals = options.signals
     if "branch-order" not in options.accept:
         refuse_crossed_branches(side)
-    above = AboveChoice(choice=options.above, step_codes=STEP_CODES)
+    above = AboveChoice.on(options.machine, options.above, STEP_CODES)
     certified = guarded_curve(side, options.guard, options.below_dp0, above)
     opening = opening_offset(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))

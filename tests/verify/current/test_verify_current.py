@@ -147,7 +147,9 @@ def test_one_code_too_many_in_one_of_a_million_states_is_seen(controlled, tmp_pa
     assert failing(found.checks) == {"current-controller"}
 
 
-TAMPERED = {"gain": {"proportional": 2}, "feed-forward": {"feed_forward": 3}, "rate": {"rate": 6}}
+TAMPERED = {
+    "gain": {"proportional": 2}, "feed-forward": {"feed_forward": 3}, "rate": {"rate": 6}, "release": {"release": 0},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("number", TAMPERED)
@@ -155,7 +157,7 @@ def test_another_loop_in_compensator_json_is_seen(number, controlled, tmp_path):
     """C and compensator.json agree: what is stated of the loop, and the loop itself, must tell."""
     drive = controlled.current_drive
     changed = {name: min(getattr(drive.loop, name) * by, 8191) for name, by in TAMPERED[number].items()}
-    changed = changed if number != "rate" else {"rate": 60000}
+    changed |= {"rate": {"rate": 60000}, "release": {"release": 0}}.get(number, {})
     tampered = replace(controlled, current_drive=replace(drive, loop=replace(drive.loop, **changed)))
     found = current_checks(firmware_of(tampered, tmp_path / "firmware"), tampered, silent, STATES)
     assert "current-controller" not in failing(found.checks)

@@ -11,7 +11,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
 from dzdesign.design.current.loop import CORRECTION_SHIFT, LARGEST_ERROR, LARGEST_GAIN, CurrentLoop, SupplyCorrection
 from dzdesign.design.current.margins import SEARCH_GRID, Gains, worst_margins
-from dzdesign.design.current.step_response import SensorLine, StepResponse, step_responses
+from dzdesign.design.current.step_response import SensorLine, StepResponse, released_overshoot_A, step_responses
 from dzdesign.design.target_inputs import Converter
 
 #: Phase margin that the gains are chosen for, and the least that a loop may have.
@@ -22,6 +22,10 @@ INTEGRAL_TIME = 2.0
 #: current.
 CHOSEN_OVERSHOOT = 0.08
 RATE_PERIODS = (4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 25, 32, 40, 50, 64, 80, 100, 125, 160, 200, 250, 320, 400, 500)
+#: How far the output begins below the integral, in 64ths of the largest power of two in the PWM's range (a constant of
+#: few bits is one instruction); and the overshoot that a release may have, codes.
+RELEASES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64)
+RELEASED_CODES = 0.5
 #: Share of the rated current above which it is too high, and for how long it may be, s.
 OVER_SHARE, OVER_S = 1.2, 2e-3
 #: Shares of the converter's range and of the rated current beyond which the load counts as shorted, the lower one.
@@ -123,7 +127,8 @@ def choose_loop(
         current_shift=current_shift,
         gain_shift=gain_shift,
         **{name: round(value * 2**gain_shift) for name, value in real.items()},
-        integral_limit=1 << (compare_max.bit_length() - 1),  # a power of two is one instruction
+        integral_limit=3 << (compare_max.bit_length() - 2),  # two bits are one instruction
+        release=0,
         offset_nominal=sums.offset,
         offset_tolerance=round(OFFSET_SHARE * converter.levels) * sampling.samples,
         offset_shift=OFFSET_SHIFT,
@@ -135,7 +140,8 @@ def choose_loop(
         open_ticks=ceil(OPEN_PATIENCE * slowest_s * log(OPEN_TIMES / (OPEN_TIMES - 1)) * sampling.tick_Hz),
         supply=_supply_correction(circuit, sensor, converter),
     )
-    return _with_rate(loop, circuit, sampling, sensor_line(sensor, converter))
+    line = sensor_line(sensor, converter)
+    return _with_release(_with_rate(loop, circuit, sampling, line), circuit, sampling, line)
 
 
 def sensor_line(sensor: CurrentSensor, converter: Converter) -> SensorLine:
@@ -159,6 +165,25 @@ def _with_rate(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSamplin
         f"the current overshoots by more than {CHOSEN_OVERSHOOT:.0%} however slowly the set point moves; declare "
         "narrower ranges of resistance, inductance or supply, or measure the supply"
     )
+
+
+def _with_release(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, line: SensorLine) -> CurrentLoop:
+    """Return the loop whose output begins low enough that no current overshoots as the drive is released.
+
+    What the integral takes up on the way would carry the current past the
+    offset, where the valve opens. It comes up from below instead, within some time constants of the integral.
+    """
+    unit = max((1 << (loop.full_counts.bit_length() - 1)) // 64, 1)
+    allowed_A = RELEASED_CODES / (line.V_per_A * line.codes_per_V)
+    low, high = -1, len(RELEASES) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        tried = replace(loop, release=RELEASES[middle] * unit)
+        if released_overshoot_A(tried, circuit, sampling, line) <= allowed_A:
+            high = middle
+        else:
+            low = middle
+    return replace(loop, release=RELEASES[high] * unit)
 
 
 def worst_step(steps: Sequence[StepResponse]) -> tuple[StepResponse, StepResponse]:

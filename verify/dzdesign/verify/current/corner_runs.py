@@ -45,6 +45,8 @@ class HeldCurrent:
     reading_swing: float
     reading_error: float
     current_error: float
+    #: Beyond the set point, before it has settled.
+    release_overshoot: float
     faults: int
 
 
@@ -60,12 +62,13 @@ def held_current(simulation: CoilSimulation, corner: Corner, share: float, offse
     # As the converter gives it without current: rounded down.
     zero = np.floor((around.sensor.offset_V * _codes_per_V(around)) + offset_codes)
     readings = found.total[settle:].astype(float) / sampling.samples - zero
-    mean = found.mean_A[settle:] * codes_per_A
+    released, mean = np.split(found.mean_A * codes_per_A, [settle])
     return HeldCurrent(
         mean_swing=float(np.ptp(mean)),
         reading_swing=float(np.ptp(readings)),
         reading_error=float(abs(readings.mean() - asked)),
         current_error=float(abs(mean.mean() - asked)),
+        release_overshoot=max(float(released.max() - asked), 0.0),
         faults=int(found.faults[-1]),
     )
 
@@ -136,6 +139,7 @@ def run_corner(simulation: CoilSimulation, corner: Corner) -> CornerRun:
         limit_cycle_codes=max((max(each.mean_swing, each.reading_swing) for each in held), default=0.0),
         steady_error_codes=max((each.reading_error for each in held), default=0.0),
         current_error_codes=max((each.current_error for each in held), default=0.0),
+        release_overshoot_codes=max((each.release_overshoot for each in held), default=0.0),
         rise_s=rise_s,
         least_rise_s=least_s,
         overshoot=overshoot,

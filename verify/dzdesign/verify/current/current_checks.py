@@ -39,6 +39,8 @@ STATES = 10_000_000
 FEW_STATES = BLOCK
 #: Least phase margin; largest limit cycle and steady error, codes of the converter; largest overshoot.
 LEAST_PHASE_DEG, MOST_SWING_CODES, MOST_ERROR_CODES, MOST_OVERSHOOT = 45.0, 2.0, 1.0, 0.10
+#: Largest current beyond a set point that comes from zero, codes: the valve stays shut as the drive is released.
+MOST_RELEASE_CODES = 1.0
 #: How far what is found may lie from what compensator.json says of the same.
 SAME_DEG, SAME_GAIN, SAME_OVERSHOOT = 0.1, 0.02, 0.002
 #: Chance of which a wrong state among those that are drawn would be missed.
@@ -180,12 +182,14 @@ def _settles_check(result: CurrentLoopResult, drive: CurrentDrive, around: CoilL
     swing = max(result.corners, key=lambda corner: corner.limit_cycle_codes)
     error = max(result.corners, key=lambda corner: corner.steady_error_codes)
     current = max(corner.current_error_codes for corner in result.corners)
+    released = max(result.corners, key=lambda corner: corner.release_overshoot_codes)
     tried = len(result.corners) * len(result.shares) - result.not_carried
     text = (
         f"{tried} set points of {result.seconds:g} s each, without dither: limit cycle up to "
         f"{swing.limit_cycle_codes:.2f} codes (at {_at(swing)}; allowed: {MOST_SWING_CODES:g}), steady error up to "
         f"{error.steady_error_codes:.2f} codes (at {_at(error)}; allowed: {MOST_ERROR_CODES:g}), of the current itself "
-        f"{current:.2f}"
+        f"{current:.2f}; on its way there from zero the current is up to {released.release_overshoot_codes:.2f} codes "
+        f"beyond (at {_at(released)}; allowed: {MOST_RELEASE_CODES:g})"
     )
     if result.not_carried:
         text += f"; {result.not_carried} set points lie beyond what the supply can drive, and were not tried"
@@ -207,6 +211,7 @@ def _settles_check(result: CurrentLoopResult, drive: CurrentDrive, around: CoilL
         text += f"; faults {faults[0].faults:#x} of a circuit without a fault at {_at(faults[0])}"
     settles = not faults and max(error.steady_error_codes, result.offset_error_codes) <= MOST_ERROR_CODES
     settles &= kept * around.codes_per_A * around.circuit.rated_A / around.loop.full_counts <= MOST_ERROR_CODES
+    settles = settles and released.release_overshoot_codes <= MOST_RELEASE_CODES
     return CURRENT_SETTLES.check(holds=settles and swing.limit_cycle_codes <= MOST_SWING_CODES and tried > 0, text=text)
 
 
