@@ -176,7 +176,7 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
     """Print the law, the certificate and what the choices cost."""
     from dzdesign.derivation.law import law
-    from dzdesign.design.costs import hidden_failures, lines_of_tests
+    from dzdesign.design.costs import design_warnings, lines_of_tests
     from dzdesign.design.signal_descriptions import signals_in_words
     from dzdesign.design.signals import SIDE_NAMES
     from dzdesign.terminal.budget_table import print_budgets
@@ -209,10 +209,10 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         ]
     if compensator.current_drive is not None:
         lines += compensator.current_drive.in_words(units)
-    hidden = hidden_failures(compensator)
-    elsewhere = {*hidden, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
+    warnings = design_warnings(compensator)
+    elsewhere = {*warnings, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
     console = console or new_console()
-    for line in (*(f"warning: {line}" for line in hidden), *lines):
+    for line in (*(f"warning: {line}" for line in warnings), *lines):
         put_line(console, line)
     print_costs_at_tests(compensator, console)
     if compensator.machine is not None:
