@@ -84,7 +84,7 @@ def test_c_and_readme_say_what_is_certified(example_valve, machine, target):
     bare, declared = designed(example_valve, {}, target), designed(example_valve, DECLARED, target)
     for compensator, of, said in (
         (bare, "Certificate of the recording: ", "No machine was declared"),
-        (declared, "Certificate of the recording and the declared machine: ", "supply (declared)"),
+        (declared, "Certificate of the recording and the declared machine: ", "supply (default)"),
     ):
         files = generate(compensator, target, to_json_bytes(compensator)).files
         header = " ".join(files["core/dz_comp.h"].replace("\n *", " ").split())
