@@ -534,7 +534,7 @@ def test_prose_finds_symbols_and_references_and_leaves_words_alone():
 
 def test_prose_survives_the_way_to_plain_text():
     for statement in STATEMENTS:
-        for sentence in (statement.title, statement.note, *(ground.where for ground in statement.grounds)):
+        for sentence in (statement.title, statement.note, *(setting.words for setting in statement.scope.settings)):
             assert str(prose.parse_prose(sentence, BY_NUMBER)) == sentence
 
 

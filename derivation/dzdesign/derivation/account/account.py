@@ -9,6 +9,7 @@ from dzdesign.derivation.account.identifiability import IDENTIFIABILITY
 from dzdesign.derivation.account.implementation import CODES, IMPLEMENTATION
 from dzdesign.derivation.account.meter_floor import METER_FLOOR
 from dzdesign.derivation.account.proof import Verdict, prove
+from dzdesign.derivation.account.referee.referee import hear
 from dzdesign.derivation.account.statement import Statement
 from dzdesign.derivation.account.target_flow import FULL_COMMAND, TARGET, TIES
 from dzdesign.derivation.account.transfer import SIMULATION_MODEL, TRANSFER_FUNCTION
@@ -45,4 +46,4 @@ def verify_statements(statements: Sequence[Statement] = STATEMENTS) -> tuple[Ver
     >>> all(verdict.as_expected for verdict in verify_statements())
     True
     """
-    return prove(statements)
+    return prove(statements, hear)

@@ -3,6 +3,7 @@
 import sympy
 
 from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND, VALVES
+from dzdesign.derivation.account.scope import FIXED_OPENING, scope
 from dzdesign.derivation.account.statement import Condition, Kind, Outcome, Value
 from dzdesign.derivation.symbols import *
 
@@ -27,6 +28,7 @@ FLOW_OVER_PRESSURE = (
         "Eqs. (8) and (15): the flow gain grows with the root of the pressure drop",
         K_1,
         K_0 * sympy.sqrt(dP1) / sympy.sqrt(dP0),
+        scope=scope(FIXED_OPENING),
         grounds=("(15)", "gamma_1", "(8)", "gamma_0"),
         eliminate=(gamma_1, K_0, gamma_0),
         values=(

@@ -4,6 +4,7 @@ import sympy
 
 from dzdesign.derivation.account.equations import ORIFICE
 from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND
+from dzdesign.derivation.account.scope import BARE, CONSTANT_THRESHOLD, FREE_OPENING, scope
 from dzdesign.derivation.account.statement import Ground, Kind, Value
 from dzdesign.derivation.symbols import *
 
@@ -15,9 +16,17 @@ METER_FLOOR = (
         u_seen,
         u_min + Q_floor / s_flow,
         u_min + Q_floor * k / ORIFICE,
-        grounds=(Ground("straight part", ((Q, Q_floor), (u_O, u_seen)), "at the meter's floor"), "S"),
+        grounds=(Ground("straight part", ((Q, Q_floor), (u_O, u_seen))), "S"),
         eliminate=(s_flow,),
         note="Above the threshold, and the more so the lower the pressure drop.",
+    ),
+    Kind.ASSUMPTION(
+        "constant threshold",
+        "a threshold that does not depend on the pressure drop",
+        u_min1,
+        u_min0,
+        scope=CONSTANT_THRESHOLD,
+        note="Against Eq. (4), to see what the meter alone does.",
     ),
     Kind.DEFINITION("fall", "fall of the threshold as the meter shows it", fall, u_seen0 - u_seen1),
     Kind.THEOREM(
@@ -25,13 +34,15 @@ METER_FLOOR = (
         "a constant threshold seems to fall",
         fall,
         Q_floor * k / gamma_0 * (1 - sympy.sqrt(dP0) / sympy.sqrt(dP1)),
+        scope=CONSTANT_THRESHOLD,
         grounds=(
             "fall",
-            Ground("T9a", ((u_seen, u_seen0), (dP, dP0)), "at dP0"),
-            Ground("T9a", ((u_seen, u_seen1), (dP, dP1)), "at dP1, the same u_min"),
+            Ground("T9a", ((u_seen, u_seen0), (dP, dP0), (u_min, u_min0))),
+            Ground("T9a", ((u_seen, u_seen1), (dP, dP1), (u_min, u_min1))),
             "gamma_0",
+            "constant threshold",
         ),
-        eliminate=(u_seen0, u_seen1, gamma_0),
+        eliminate=(u_seen0, u_seen1, u_min1, gamma_0),
         positive_if=sympy.sqrt(dP1) > sympy.sqrt(dP0),
         values=tuple(
             Value(
@@ -51,16 +62,17 @@ METER_FLOOR = (
         "the same with the slopes that were measured",
         fall,
         Q_floor * (1 / s_flow0 - 1 / s_flow1),
+        scope=CONSTANT_THRESHOLD,
         grounds=(
             "fall",
-            Ground("straight part", ((Q, Q_floor), (u_O, u_seen0), (s_flow, s_flow0)), "at dP0 and the meter's floor"),
+            Ground("straight part", ((Q, Q_floor), (u_O, u_seen0), (s_flow, s_flow0), (u_min, u_min0))),
             Ground(
                 "straight part",
-                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1)),
-                "at dP1 and the meter's floor, the same u_min",
+                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
             ),
+            "constant threshold",
         ),
-        eliminate=(u_seen0, u_seen1),
+        eliminate=(u_seen0, u_seen1, u_min1),
         values=tuple(
             Value(
                 f"in per cent of u_max, {valve.name}",
@@ -77,15 +89,13 @@ METER_FLOOR = (
         "flow per command at dP1 from the two ends of the straight part",
         s_flow1,
         (Q_max1 - Q_floor) / (u_max - u_seen1),
+        scope=scope(FREE_OPENING),
         provided=(sympy.Ne(u_max, u_seen1),),
         grounds=(
-            Ground(
-                "straight part", ((Q, Q_max1), (u_O, u_max), (s_flow, s_flow1), (u_min, u_min1)), "at dP1, full command"
-            ),
+            Ground("straight part", ((Q, Q_max1), (u_O, u_max), (s_flow, s_flow1), (u_min, u_min1))),
             Ground(
                 "straight part",
                 ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-                "at dP1, where the meter starts",
             ),
         ),
         eliminate=(u_min1,),
@@ -95,16 +105,15 @@ METER_FLOOR = (
         "flow at zero command without beta, if the thresholds are the first flow seen",
         Q,
         Q_floor + (Q_max1 - Q_floor) * (u_seen0 - u_seen1) / (u_max - u_seen1),
+        scope=scope(BARE, FREE_OPENING, sympy.Eq(u_i, u_seen0), sympy.Eq(dP, dP1), u_min1 <= u_seen0),
         grounds=(
             Ground(
                 "straight part",
                 ((u_O, u_seen0), (s_flow, s_flow1), (u_min, u_min1)),
-                "at dP1, where the offset is u_seen0",
             ),
             Ground(
                 "straight part",
                 ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-                "at dP1, where the meter starts",
             ),
             "slope at dP1",
         ),

@@ -20,6 +20,7 @@ from dzdesign.core.artefact_types import THIS_TOOL, Artefact
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.proof import Verdict, judge
+from dzdesign.derivation.account.scope import EVERYWHERE
 from dzdesign.derivation.account.statement import Condition, Statement
 from dzdesign.derivation.symbols import QUANTITIES, Name, u_max, u_min
 
@@ -157,7 +158,7 @@ def _narrowed(statement: Statement) -> Iterator[tuple[Statement, str]]:
     for index, provision in enumerate(statement.provided):
         yield replace(statement, provided=_without(statement.provided, index)), f"without {provision}"
     if statement.scope:
-        yield replace(statement, scope=""), f"without its scope, {statement.scope}"
+        yield replace(statement, scope=EVERYWHERE), f"without its scope, {statement.scope}"
 
 
 def _mutated_conditions(

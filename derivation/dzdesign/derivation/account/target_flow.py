@@ -3,6 +3,15 @@
 import sympy
 
 from dzdesign.derivation.account.published import FIRST, SECOND, VALVES
+from dzdesign.derivation.account.scope import (
+    AT_FULL_COMMAND,
+    BEFORE_STOP,
+    FIXED_OPENING,
+    LAW_AT_REFERENCE,
+    LAW_OFF_REFERENCE,
+    TARGET_OFF_REFERENCE,
+    scope,
+)
 from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
@@ -25,15 +34,15 @@ def _flow(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> t
                 (u_min, threshold),
                 (u_max, threshold + u_i_prime + headroom),
             ),
-            f"at dP = {pressure}, beyond the threshold",
         ),
         Ground("(11)"),
-        Ground("Fig. 3, command", ((u_min0, threshold),), f"at dP = {pressure}"),
+        Ground("Fig. 3, command", ((u_min0, threshold),)),
         Ground(law_number),
     )
 
 
-_BEYOND = "0 <= u_i <= u_max, up to the spool's stop"
+_PAPER_LAW = LAW_OFF_REFERENCE & scope(FIXED_OPENING) & BEFORE_STOP
+_TARGET_LAW = TARGET_OFF_REFERENCE & scope(FIXED_OPENING)
 _AT_DP1 = (Ground("(5)"), Ground("gamma_1"), Ground("(15)"), Ground("(16)"))
 _UNKNOWN_AT_DP1 = (x, u_i_prime, u_O, u_min1, gamma_1, K_1, Q_O_prime)
 
@@ -44,7 +53,7 @@ TARGET = (
         "at the reference the law (14) gives the wanted flow (9)",
         Q,
         Q_O,
-        scope=_BEYOND,
+        scope=LAW_AT_REFERENCE,
         grounds=(*_flow("(14)", u_min0, dP0), *(Ground(number) for number in ("(9)", "(8)", "gamma_0"))),
         eliminate=(x, u_i_prime, u_O, Q_O, K_0, gamma_0),
     ),
@@ -54,7 +63,7 @@ TARGET = (
         Q,
         Q_O_prime + gamma_1 * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
         Q_O_prime * (beta + (1 - beta) * u_max / (k * x_max)),
-        scope=_BEYOND,
+        scope=_PAPER_LAW,
         grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
         values=tuple(
@@ -73,7 +82,7 @@ TARGET = (
         "the law (18) meets the target (16)",
         Q,
         Q_O_prime,
-        scope=_BEYOND,
+        scope=_PAPER_LAW,
         grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
         condition=Condition(
@@ -90,7 +99,7 @@ TARGET = (
         "the law `target` meets the target (16)",
         Q,
         Q_O_prime,
-        scope=_BEYOND,
+        scope=_TARGET_LAW,
         grounds=(*_flow("L3", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
     ),
@@ -100,7 +109,8 @@ TARGET = (
         "drive that the law `target` leaves unused at full command",
         drive_left,
         u_max - k * x_max - beta * u_min0,
-        grounds=("drive left", Ground("L3", ((u_i, u_max),), "at u_i = u_max")),
+        scope=TARGET_OFF_REFERENCE & AT_FULL_COMMAND,
+        grounds=("drive left", Ground("L3", ((u_i, u_max),))),
         eliminate=(u_O,),
         values=tuple(Value(f"at 5 MPa, {valve.name}", valve.at(), "V") for valve in (FIRST, SECOND)),
         note="(1 - beta) u_min0 where k x_max = u_max - u_min0: the target asks for x_max and not for more, though at "
@@ -111,11 +121,12 @@ TARGET = (
         "compensation signal that meets the target (16), what (6) should read",
         u_no,
         u_0 - (1 - beta) * u_min0,
+        scope=_TARGET_LAW,
         grounds=(
-            Ground("u_O", ((u_0, u_no),), "with u_no for u_0"),
-            Ground("Fig. 3, command", ((u_min0, u_min1),), "at dP = dP1"),
+            Ground("u_O", ((u_0, u_no),)),
+            Ground("Fig. 3, command", ((u_min0, u_min1),)),
             "(11)",
-            Ground("(10)", ((Q_O, Q_O_prime), (dP0, dP1)), "at dP = dP1"),
+            Ground("(10)", ((Q_O, Q_O_prime), (dP0, dP1))),
             "(16)",
             "(15)",
             "gamma_1",
@@ -134,13 +145,15 @@ FULL_COMMAND = (
         "output of the law (18) at full command",
         u_O,
         u_max + beta * (k * x_max + u_min0 - u_max),
-        grounds=(Ground("(18)", ((u_i, u_max),), "at u_i = u_max"),),
+        scope=LAW_OFF_REFERENCE & AT_FULL_COMMAND,
+        grounds=(Ground("(18)", ((u_i, u_max),)),),
     ),
     Kind.THEOREM(
         "T2b",
         "full command gives full drive at every pressure drop",
         u_O,
         u_max,
+        scope=LAW_OFF_REFERENCE & AT_FULL_COMMAND,
         grounds=("T2a",),
         condition=Condition(
             any_of=((sympy.Eq(k * x_max, u_max - u_min0),),),

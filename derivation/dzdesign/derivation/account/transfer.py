@@ -3,6 +3,7 @@
 import sympy
 
 from dzdesign.derivation.account.equations import ORIFICE
+from dzdesign.derivation.account.scope import BARE, PLANT, scope
 from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement
 from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
 from dzdesign.derivation.symbols import *
@@ -23,7 +24,15 @@ _TITLES = {
 def _premise(number: str) -> Statement:
     title, note = _TITLES[number]
     equation = PLANT_EQUATIONS[number]
-    return Kind.PREMISE(number, title, equation.lhs, equation.rhs, see=("T6d",) if number == "(24)" else (), note=note)
+    return Kind.PREMISE(
+        number,
+        title,
+        equation.lhs,
+        equation.rhs,
+        scope=scope(PLANT),
+        see=("T6d",) if number == "(24)" else (),
+        note=note,
+    )
 
 
 def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
@@ -62,7 +71,7 @@ def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
     terms = sympy.Poly(equation.lhs - equation.rhs, *signals).monoms()
     if any(sum(powers) != 1 for powers in terms):
         raise ValueError(f"{number} is not linear in {signals}")
-    return Ground(number, LAPLACE, where)
+    return Ground(number, LAPLACE)
 
 
 #: Section 2.1.
@@ -74,6 +83,7 @@ SIMULATION_MODEL = (
         U_e,
         K_a * (U_i - K_fi * I_s),
         (R_c + r_p) * I_s + I_s * L_c * s,
+        scope=scope(PLANT),
         grounds=(laplace("(19)"), laplace("(21)"), laplace("(20)")),
         eliminate=(U_if, I_s),
         condition=Condition(
@@ -82,13 +92,14 @@ SIMULATION_MODEL = (
         expected=Outcome.FOLLOWS_IF,
         note="Printed without its middle, U_e(s).",
     ),
-    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, grounds=(laplace("(22)"),)),
+    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, scope=scope(PLANT), grounds=(laplace("(22)"),)),
     Kind.PAPER(
         "(27)",
         "motion, transformed",
         F_e,
         K_i * I_s,
         (m_e * s**2 + B_e * s + K_et) * X_e + F_eL,
+        scope=scope(PLANT),
         grounds=(laplace("(23)"), "(26)"),
         eliminate=(I_s,),
         condition=Condition(
@@ -105,11 +116,11 @@ SIMULATION_MODEL = (
         "flow, transformed",
         Q_s,
         C_d * W * X_e * sympy.sqrt(2 * dP / rho),
+        scope=scope(PLANT),
         grounds=(
             Ground(
                 "(24)",
                 ((Q, Q_s), (x_e, X_e.func(s + a))),
-                "transformed, with dP falling as exp(-2 a t), so that x_e exp(-a t) becomes X_e(s + a)",
             ),
         ),
         condition=Condition(
@@ -136,22 +147,24 @@ TRANSFER_FUNCTION = (
         I_s,
         K_a * U_i / (_RESISTANCE + L_c * s),
         K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s),
-        grounds=(Ground("(25)", member=0, where="left side"), Ground("(25)", member=1, where="right side")),
+        scope=scope(PLANT),
+        grounds=(Ground("(25)", member=0), Ground("(25)", member=1)),
         eliminate=(U_e,),
         expected=Outcome.FOLLOWS_IF,
         note="Time constant L_c / (R_c + r_p + K_a K_fi): the feedback makes the coil faster by the factor "
         "1 + K_a K_fi / (R_c + r_p), and makes the current depend less on the coil's temperature by the same factor.",
     ),
-    Kind.DEFINITION("transfer function", "transfer function from command to flow", G, Q_s / U_i),
+    Kind.DEFINITION("transfer function", "transfer function from command to flow", G, Q_s / U_i, scope=scope(PLANT)),
     Kind.THEOREM(
         "T6b",
         "transfer function of Eqs. (19)-(24) without load force",
         G,
         ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
+        scope=scope(PLANT, sympy.Eq(F_eL, 0)),
         grounds=(
             "transfer function",
             "(28)",
-            Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),), where="right side, F_eL = 0"),
+            Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),)),
             "(26)",
             "T6a",
         ),
@@ -164,19 +177,22 @@ TRANSFER_FUNCTION = (
         "static gain from command to flow",
         G_0,
         ORIFICE * K_i * K_a / (_RESISTANCE * K_et),
-        grounds=(Ground("T6b", ((G, G_0), (s, sympy.S.Zero)), "at s = 0"),),
+        scope=scope(PLANT),
+        grounds=(Ground("T6b", ((G, G_0), (s, sympy.S.Zero))),),
         expected=Outcome.FOLLOWS_IF,
         note="By the final value theorem, which the stability of T6b allows.",
     ),
-    Kind.DEFINITION("overlap", "opening of the edge: travel beyond the overlap", x, x_e - x_ov),
+    Kind.DEFINITION(
+        "overlap", "opening of the edge: travel beyond the overlap", x, x_e - x_ov, scope=scope(u_min <= u_O)
+    ),
     Kind.THEOREM(
         "T6d",
         "Eq. (24) is the dead-zone model (1) beyond the threshold",
         Q,
         ORIFICE * x_e,
-        scope="a command from the threshold to full command",
+        scope=scope(BARE, u_min <= u_i),
         grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)), "beyond the threshold"),
+            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
             "overlap",
         ),
         eliminate=(x,),
@@ -196,9 +212,9 @@ TRANSFER_FUNCTION = (
         "flow across an edge with overlap, opened",
         Q,
         ORIFICE * (x_e - x_ov),
-        scope="a command from the threshold to full command",
+        scope=scope(BARE, u_min <= u_i),
         grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)), "beyond the threshold"),
+            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
             "overlap",
         ),
         eliminate=(x,),

@@ -1,5 +1,6 @@
 """The law that meets the paper's target, Eq. (16): only the threshold is corrected, not the gain."""
 
+from dzdesign.derivation.account.scope import TARGET_OFF_REFERENCE
 from dzdesign.derivation.account.statement import Kind
 from dzdesign.derivation.law import Law
 from dzdesign.derivation.symbols import beta, k, u_i, u_max, u_min0, u_O, x_max
@@ -17,5 +18,7 @@ LAW = Law(
     output=_OUTPUT,
     note=_NOTE,
     stated_as="T1d",
-    statements=(Kind.CHOICE("L3", "the law `target`", u_O, _OUTPUT, see=("T1d", "T1e"), note=_NOTE),),
+    statements=(
+        Kind.CHOICE("L3", "the law `target`", u_O, _OUTPUT, scope=TARGET_OFF_REFERENCE, see=("T1d", "T1e"), note=_NOTE),
+    ),
 )

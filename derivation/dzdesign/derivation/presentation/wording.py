@@ -75,18 +75,18 @@ def _refer_to_all(numbers: tuple[str, ...], book: Mapping[str, Verdict]) -> Word
 
 
 def _ground(ground: Ground, book: Mapping[str, Verdict]) -> Words:
-    where = (" ", parse_prose(ground.where, book)) if ground.where else ()
-    return Words(refer(book[ground.number].statement), *where)
+    parts = (one if isinstance(one, str) else _formula(one) for one in ground.qualified())
+    return Words.join((refer(book[ground.number].statement), *parts), " ")
+
+
+def _formula(comparison: sympy.Basic) -> Formula:
+    """Return a formula; an equation as its two sides."""
+    return Formula(*comparison.args) if isinstance(comparison, sympy.Eq) else Formula(comparison)
 
 
 def _premise(ground: Ground, book: Mapping[str, Verdict]) -> Premise:
     """Refer to a ground, with what replaces its symbols."""
-    words = _ground(ground, book)
-    replaced = tuple((name, value) for name, value in _used(ground, book) if f"{name} = {value}" not in ground.where)
-    if replaced and not ground.where.startswith("with "):
-        made = Words.join(Words(Formula(value), " for ", Formula(name)) for name, value in replaced)
-        words = Words(words, " (", made, ")")
-    return Premise(number=ground.number, at=tuple(Formula(*pair) for pair in ground.at), words=words)
+    return Premise(number=ground.number, at=tuple(Formula(*pair) for pair in ground.at), words=_ground(ground, book))
 
 
 def _used(ground: Ground, book: Mapping[str, Verdict]) -> Replacements:
@@ -115,10 +115,11 @@ def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]
 def _scope(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]:
     """Say where a statement is proved, if not everywhere."""
     statement = verdict.statement
-    limits: list[Part] = [parse_prose(statement.scope, book)] if statement.scope else []
-    limits += map(Formula, statement.provided)
+    limits: list[Part] = [parse_prose(setting.words, book) for setting in statement.scope.settings]
+    limits += map(_formula, (*statement.scope.comparisons, *statement.provided))
     if limits:
-        yield Words("Proved for ", Words.join(limits, " and "), ".")
+        given = "Stated" if statement.kind.is_given else "Proved"
+        yield Words(f"{given} for ", Words.join(limits, " and "), ".")
     if verdict.limited_by:
         yield Words("As far as is proved of ", _refer_to_all(verdict.limited_by, book), ".")
 
