@@ -390,6 +390,9 @@ def figure(number, label):
     [
         ("T1b", "first valve", 1.048, 3),
         ("T1b", "second valve", 1.018, 3),
+        ("T2e", "first valve", 4.55, 2),
+        ("T2e", "simulation", 3.7, 1),
+        ("T2e", "second valve", 1.7, 1),
         ("T3b", "simulation", 0.94, 2),
         ("T3b", "first valve", 1.12, 2),
         ("T5c", "without", 20, 1),
@@ -451,6 +454,21 @@ def test_theorem_1_on_a_plain_valve(valve):
         ratio = valve.flow(by_paper, u_min1, valve.dP1) / target
         assert ratio == pytest.approx(evaluated(factor, valve.symbols()), rel=1e-12)
         assert valve.flow(by_target, u_min1, valve.dP1) == pytest.approx(target, rel=1e-12)
+
+
+def test_theorem_2_on_a_plain_valve(valve):
+    """Full command is the limit: the paper's law is exact, the law `target` falls short, at every command."""
+    valve.x_max = (valve.u_max - valve.u_min0) / valve.k
+    kappa, u_min1 = valve.k * valve.x_max / valve.u_max, valve.beta * valve.u_min0
+    largest = valve.flow(valve.u_max, u_min1, valve.dP1)
+    loss = BY_NUMBER["T2e"].values[0].of
+    for u_i in (0.1, 3.0, 10.0):
+        by_paper = (valve.beta * kappa - valve.beta + 1) * u_i + valve.beta * valve.u_min0
+        by_target = kappa * u_i + valve.beta * valve.u_min0
+        line = largest * u_i / valve.u_max
+        assert valve.flow(by_paper, u_min1, valve.dP1) == pytest.approx(line, rel=1e-12)
+        lost = 1 - valve.flow(by_target, u_min1, valve.dP1) / line
+        assert lost == pytest.approx(evaluated(loss, valve.symbols()), rel=1e-9)
 
 
 def test_theorem_3_on_a_plain_valve(valve):

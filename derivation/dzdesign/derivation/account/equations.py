@@ -88,9 +88,10 @@ APPROACH = (
         u_no,
         beta * u_0,
         scope=LAW_OFF_REFERENCE,
-        see=("T1c", "(6c)"),
+        see=("T1c", "(6c)", "T2d"),
         corrected_by="(6c)",
-        note="The paper's choice. It scales the whole compensation signal; the target asks for less: (6c).",
+        note="The paper's choice. It scales the whole compensation signal. Where a stop fixes x_max the target (16) "
+        "asks for less: (6c). Where full command is the limit it is exact: T2d.",
     ),
     Kind.PREMISE(
         "(7)",

@@ -1,4 +1,4 @@
-"""What ties the laws to the paper's equations; theorems 1 and 2: which flow they give, and full command."""
+"""What ties the laws to the paper's equations, and theorem 1: which flow they give."""
 
 import sympy
 
@@ -23,7 +23,7 @@ _DRIVE_LEFT_OVER = "with k x_max = u_max - u_min0, the command left above the th
 TIES = tuple(statement for name in LAW_NAMES for statement in law(name).statements)
 
 
-def _flow(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> tuple[Ground, ...]:
+def flow_under(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> tuple[Ground, ...]:
     """What gives the valve's flow under a law, beyond the threshold at one pressure drop."""
     return (
         Ground(
@@ -54,7 +54,7 @@ TARGET = (
         Q,
         Q_O,
         scope=LAW_AT_REFERENCE,
-        grounds=(*_flow("(14)", u_min0, dP0), *(Ground(number) for number in ("(9)", "(8)", "gamma_0"))),
+        grounds=(*flow_under("(14)", u_min0, dP0), *(Ground(number) for number in ("(9)", "(8)", "gamma_0"))),
         eliminate=(x, u_i_prime, u_O, Q_O, K_0, gamma_0),
     ),
     Kind.THEOREM(
@@ -64,7 +64,7 @@ TARGET = (
         Q_O_prime + gamma_1 * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
         Q_O_prime * (beta + (1 - beta) * u_max / (k * x_max)),
         scope=_PAPER_LAW,
-        grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
+        grounds=(*flow_under("(18)", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
         values=tuple(
             Value(
@@ -83,7 +83,7 @@ TARGET = (
         Q,
         Q_O_prime,
         scope=_PAPER_LAW,
-        grounds=(*_flow("(18)", u_min1, dP1), *_AT_DP1),
+        grounds=(*flow_under("(18)", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
         condition=Condition(
             any_of=((sympy.Eq(beta, 1),), (sympy.Eq(k * x_max, u_max),)),
@@ -93,6 +93,9 @@ TARGET = (
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="T1d",
+        see=("T2d",),
+        note="Where a stop fixes x_max. Where full command is the limit it follows, for then the target ends at the "
+        "largest flow that full command gives: T2d.",
     ),
     Kind.THEOREM(
         "T1d",
@@ -100,7 +103,7 @@ TARGET = (
         Q,
         Q_O_prime,
         scope=_TARGET_LAW,
-        grounds=(*_flow("L3", u_min1, dP1), *_AT_DP1),
+        grounds=(*flow_under("L3", u_min1, dP1), *_AT_DP1),
         eliminate=_UNKNOWN_AT_DP1,
     ),
     Kind.DEFINITION("drive left", "drive that is not used", drive_left, u_max - u_O),
@@ -118,7 +121,7 @@ TARGET = (
     ),
     Kind.CORRECTED(
         "(6c)",
-        "compensation signal that meets the target (16), what (6) should read",
+        "compensation signal that meets the target (16) where a stop fixes x_max, what (6) should read",
         u_no,
         u_0 - (1 - beta) * u_min0,
         scope=_TARGET_LAW,
@@ -134,34 +137,8 @@ TARGET = (
             "(13)",
         ),
         eliminate=(u_O, u_i_prime, x, Q_O_prime, K_1, gamma_1, u_min1, u_0),
-        note="Only the threshold is corrected, not the gain: this is the law `target`.",
-    ),
-)
-
-#: Theorem 2: full command.
-FULL_COMMAND = (
-    Kind.THEOREM(
-        "T2a",
-        "output of the law (18) at full command",
-        u_O,
-        u_max + beta * (k * x_max + u_min0 - u_max),
-        scope=LAW_OFF_REFERENCE & AT_FULL_COMMAND,
-        grounds=(Ground("(18)", ((u_i, u_max),)),),
-    ),
-    Kind.THEOREM(
-        "T2b",
-        "full command gives full drive at every pressure drop",
-        u_O,
-        u_max,
-        scope=LAW_OFF_REFERENCE & AT_FULL_COMMAND,
-        grounds=("T2a",),
-        condition=Condition(
-            any_of=((sympy.Eq(k * x_max, u_max - u_min0),),),
-            for_all=(beta,),
-            discrepancy=beta * (k * x_max + u_min0 - u_max),
-        ),
-        expected=Outcome.FOLLOWS_IF,
-        note="With less travel, as where the spool meets its stop at 8-8.5 V (section 4.2), full command asks for less "
-        "than full drive; with more, for drive that is not there.",
+        see=("T2d", "T2e"),
+        note="Only the threshold is corrected, not the gain: this is the law `target`. One of two readings: where full "
+        "command is the limit, (6) itself meets the target (T2d) and this one loses flow (T2e).",
     ),
 )

@@ -4,10 +4,8 @@ import sympy
 
 from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION
 from dzdesign.derivation.account.scope import (
-    AT_FULL_COMMAND,
     AT_ZERO_COMMAND,
     BARE,
-    EDGE,
     FREE_BETA,
     FREE_OPENING,
     LAW_OFF_REFERENCE,
@@ -28,14 +26,6 @@ _THREE_CASES = (
 
 #: Theorem 3: zero command.
 ZERO_COMMAND = (
-    Kind.ASSUMPTION(
-        "opening",
-        "opening on both sides of the threshold",
-        x,
-        sympy.Piecewise(((u_O - u_min) / k, u_min <= u_O), (0, u_O < u_min)),
-        scope=EDGE,
-        note="Eq. (11) with Fig. 3 beyond the threshold; closed before it, as Eq. (1) says.",
-    ),
     Kind.THEOREM(
         "T3a",
         "flow at zero command",
@@ -54,21 +44,6 @@ ZERO_COMMAND = (
         cases=_THREE_CASES,
         positive_if=u_min1 < _OFFSET,
         note="So zero command passes no flow exactly if beta u_min0 <= u_min(dP). Both laws have this offset.",
-    ),
-    Kind.THEOREM(
-        "largest flow",
-        "largest flow at dP1 without compensator",
-        Q_max1,
-        gamma_1 * (u_max - u_min1) / k,
-        scope=scope(BARE, FREE_OPENING, sympy.Eq(dP, dP1), u_min1 <= u_max) & AT_FULL_COMMAND,
-        grounds=(
-            Ground("(1)", ((Q, Q_max1), (dP, dP1), (u_min, u_min1), (u_i, u_max))),
-            Ground("opening", ((u_O, u_max), (u_min, u_min1))),
-            "gamma_1",
-        ),
-        eliminate=(x, gamma_1),
-        cases=(Case(((u_max, u_min1 + headroom),), ""),),
-        note="As long as the spool has not met its stop.",
     ),
     Kind.THEOREM(
         "T3b",

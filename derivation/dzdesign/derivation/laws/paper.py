@@ -15,8 +15,8 @@ LAW = Law(
     output=_OUTPUT,
     rises_if=beta * (1 - k * x_max / u_max) < 1,
     note="Eq. (18); Eq. (14) is its case beta = 1, which the selector (7) holds for dP <= dP0. "
-    "Off the reference its flow is not the target (16), unless beta = 1 or k x_max = u_max: "
-    "it exceeds the target by gamma_1 (1 - beta) (1 - k x_max/u_max) u_i / k.",
+    "Off the reference its flow is the target (16) exactly where full command is the limit (T2d). Where a stop fixes "
+    "x_max it exceeds the target by gamma_1 (1 - beta) (1 - k x_max/u_max) u_i / k (T1b).",
     stated_as="(18)",
     statements=(
         Kind.LAW("L1", "the law `paper` is Eq. (18)", u_O, _OUTPUT, scope=LAW_OFF_REFERENCE, grounds=("(18)",)),

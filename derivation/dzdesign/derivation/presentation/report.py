@@ -27,6 +27,11 @@ _FORMATS: dict[str, Callable[[DerivationReport], str]] = {
     "html": lambda report: write(HtmlWriter, report),
 }
 FORMATS = tuple(_FORMATS)
+#: Of (6), which is given and yet corrected.
+_CHOICE = (
+    "the paper's choice. Where a stop fixes x_max, it does not meet the target (16); where full command is the limit, "
+    "it meets it exactly, and the correction loses flow: T2d, T2e."
+)
 _COUNTED = {
     Outcome.GIVEN: "taken as given",
     Outcome.FOLLOWS: "follow",
@@ -155,7 +160,7 @@ def _is_wrong(entry: Entry) -> bool:
 
 
 def _fault(entry: Entry) -> Words:
-    words = _judged(entry, otherwise="the paper's choice; it does not meet the target (16).")
+    words = _judged(entry, otherwise=_CHOICE)
     for line in entry.corrections:
         words = Words(words, " ", line.words, *((" ", line.formula) if line.formula else ()))
     return words
