@@ -14,7 +14,7 @@ from dzdesign.derivation.account import identity
 from dzdesign.derivation.account import symbol_units as units
 from dzdesign.derivation.account.account import SECTIONS, STATEMENTS, verify_statements
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
-from dzdesign.derivation.account.mutation import score_mutations
+from dzdesign.derivation.account.mutation import WAYS, score_mutations
 from dzdesign.derivation.account.proof import judge, prove
 from dzdesign.derivation.account.published import FIRST
 from dzdesign.derivation.account.scope import scope
@@ -106,12 +106,17 @@ def test_a_derivation_can_be_read_to_its_end(statement, verdicts):
 @pytest.mark.slow
 def test_every_change_of_meaning_is_caught(verdicts):
     scores = score_mutations(list(verdicts.values())).statements
-    assert [score.number for score in scores] == [statement.number for statement in STATEMENTS]
-    assert {score.number: score.survivors for score in scores if score.survivors} == {}
-    assert all(score.mutants for score in scores)
-    assert sum(score.mutants for score in scores) > 2500
+    assert {(score.changed, score.number): score.survivors for score in scores if score.survivors} == {}
+    assert {score.changed for score in scores} == set(WAYS)
+    formulas = [score for score in scores if score.changed == "formulas"]
+    assert [score.number for score in formulas] == [statement.number for statement in STATEMENTS]
+    assert all(score.mutants for score in formulas)
     # Only comparisons can be changed without a change of meaning.
-    assert {score.number for score in scores if score.equivalent} <= {"(1)", "(7)", "opening", "T3a", "valve", "T8c"}
+    same = {score.number for score in formulas if score.equivalent}
+    assert same <= {"(1)", "(7)", "opening", "T3a", "valve", "T8c"}
+    least = {"formulas": 3000, "scopes": 80, "grounds": 400, "kinds": 600, "published numbers": 1000}
+    tried = {way: sum(score.mutants for score in scores if score.changed == way) for way in WAYS}
+    assert all(tried[way] >= count for way, count in least.items())
 
 
 @pytest.mark.parametrize("statement", [e for e in DERIVED if len(e.grounds) > 1], ids=number_of)

@@ -159,14 +159,6 @@ AT_REFERENCE = (
         see=("T2b", "T8a"),
         note="The paper calls it approximately linear; it holds up to the spool's stop.",
     ),
-    Kind.ASSUMPTION(
-        "Fig. 3, command",
-        "command at which the valve passes the wanted flow",
-        u_O,
-        u_i_prime + u_min0,
-        scope=scope(sympy.Eq(dP, dP0), u_min0 <= u_O),
-        note="Read off the figure: u_i' is the part of the command that opens the edge.",
-    ),
     Kind.DEFINITION(
         "u_O",
         "output of the compensator: compensation signal plus input",
@@ -174,6 +166,14 @@ AT_REFERENCE = (
         u_0 + u_i,
         scope=UP_TO_REFERENCE,
         note="Eqs. (14) and (18) print u_0 on both sides; the left one is the output u_O.",
+    ),
+    Kind.ASSUMPTION(
+        "Fig. 3, command",
+        "command at which the valve passes the wanted flow",
+        u_O,
+        u_i_prime + u_min0,
+        scope=scope(sympy.Eq(dP, dP0), u_min0 <= u_O),
+        note="Read off the figure: u_i' is the part of the command that opens the edge.",
     ),
     Kind.PAPER(
         "(12)",

@@ -14,7 +14,7 @@ _REGIMES = (
 )
 #: Theorem 8: what can be identified from flow.
 IDENTIFIABILITY = (
-    Kind.DEFINITION(
+    Kind.ASSUMPTION(
         "valve",
         "flow of a valve with a threshold and a stop",
         Q,
@@ -82,7 +82,7 @@ IDENTIFIABILITY = (
         scope=BEYOND_THRESHOLD,
         grounds=(
             Ground("(1)", ((u_i, u_min + y), (u_max, u_min + y + headroom))),
-            Ground("opening", ((u_O, u_min + y),)),
+            "opening",
             "S",
         ),
         eliminate=(x, s_flow),

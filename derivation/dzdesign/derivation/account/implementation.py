@@ -3,7 +3,17 @@
 import sympy
 
 from dzdesign.derivation import scaling
-from dzdesign.derivation.account.published import DUTY_COMMAND_V, DUTY_WITH_PERCENT, DUTY_WITHOUT_PERCENT, FIRST, SECOND
+from dzdesign.derivation.account.published import (
+    COUNTS_PER_PIN_VOLT,
+    DUTY_COMMAND_V,
+    DUTY_WITH_PERCENT,
+    DUTY_WITHOUT_PERCENT,
+    FIRST,
+    LARGEST_CODE,
+    PIN_V,
+    SECOND,
+    U_MAX_V,
+)
 from dzdesign.derivation.account.scope import (
     CODES_AT_PIN,
     CODES_OF_COMMAND,
@@ -20,7 +30,11 @@ _IN_COUNTS = scaling.law_in_counts(law("paper"))
 _SHARES = {kappa: k * x_max / u_max, scaling.mu: u_min0 / u_max}
 _PER_VOLT = n_adc / u_max  # counts per volt of command, what Eqs. (30) and (31) need where they have 1365
 _REST = k * x_max / u_max - 1
-_CONVERTER = ((n_adc, sympy.Integer(4095)), (V_adc, sympy.Integer(3)), (n_V, sympy.Integer(1365)))
+_CONVERTER = (
+    (n_adc, sympy.Integer(LARGEST_CODE)),
+    (V_adc, sympy.Integer(PIN_V)),
+    (n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),
+)
 _UP_TO_REFERENCE = Case(((dP1, dP0 - below),), "dP <= dP0")
 _ABOVE_REFERENCE = Case(((dP1, dP0 + above),), "dP > dP0")
 
@@ -58,7 +72,7 @@ IMPLEMENTATION = (
         condition=Condition(
             any_of=((sympy.Eq(u_max, V_adc),),),
             for_all=(u_i,),
-            ruled_out_by=((u_max, sympy.Integer(10)), (V_adc, sympy.Integer(3))),
+            ruled_out_by=((u_max, sympy.Integer(U_MAX_V)), (V_adc, sympy.Integer(PIN_V))),
             discrepancy=n_adc * u_i * (1 / u_max - 1 / V_adc),
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
@@ -66,7 +80,7 @@ IMPLEMENTATION = (
         values=(
             Value(
                 "code of 10 V by (29)",
-                (*_CONVERTER, (u_i, sympy.Integer(10))),
+                (*_CONVERTER, (u_i, sympy.Integer(U_MAX_V))),
                 "counts",
                 remark="14 bits. A 12-bit converter stands at 4095 from 3 V on: 70 % of the command would be lost.",
             ),
@@ -106,7 +120,9 @@ IMPLEMENTATION = (
         grounds=("code of u_0", "(13)"),
         eliminate=(u_0,),
         condition=Condition(
-            any_of=((sympy.Eq(n_V, 1),),), ruled_out_by=((n_V, sympy.Integer(1365)),), discrepancy=(n_V - 1) * u_min0
+            any_of=((sympy.Eq(n_V, 1),),),
+            ruled_out_by=((n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),),
+            discrepancy=(n_V - 1) * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="(30c)",
@@ -139,7 +155,7 @@ IMPLEMENTATION = (
         eliminate=(u_no,),
         condition=Condition(
             any_of=((sympy.Eq(n_V, 1),),),
-            ruled_out_by=((n_V, sympy.Integer(1365)),),
+            ruled_out_by=((n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),),
             discrepancy=(n_V - 1) * beta * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,

@@ -3,10 +3,18 @@
 import sympy
 
 from dzdesign.derivation.account.equations import ORIFICE
-from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND
+from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND, PublishedValve
 from dzdesign.derivation.account.scope import BARE, CONSTANT_THRESHOLD, FREE_OPENING, scope
 from dzdesign.derivation.account.statement import Ground, Kind, Value
 from dzdesign.derivation.symbols import *
+
+_FIRST = dict(FIRST.at())
+
+
+def _fall_percent(valve: PublishedValve) -> str:
+    """Fall of the threshold that the paper reads."""
+    return f"{float(sympy.Rational(valve.dead_zone0_percent) - sympy.Rational(valve.dead_zone1_percent)):.1f}"
+
 
 #: Theorem 9: a meter that shows nothing below its floor.
 METER_FLOOR = (
@@ -50,9 +58,9 @@ METER_FLOOR = (
                 of=Q_floor * (u_max - u_min0) / Q_max0 * (1 - sympy.sqrt(dP0 / dP1)) / u_max,
                 at=valve.at(),
                 unit="%",
-                remark=f"the paper reads a fall of {fall_percent} %" + assumed,
+                remark=f"the paper reads a fall of {_fall_percent(valve)} %" + assumed,
             )
-            for valve, fall_percent, assumed in ((FIRST, "2.2", ""), (SECOND, "1.0", f"; {DROP_ASSUMED}"))
+            for valve, assumed in ((FIRST, ""), (SECOND, f"; {DROP_ASSUMED}"))
         ),
         note="The numbers: the printed thresholds taken for the true ones, a floor of 0.6 L/min, and flow that grows "
         "with the root of the pressure drop.",
@@ -79,9 +87,9 @@ METER_FLOOR = (
                 of=Q_floor * ((u_max - u_min0) / Q_max0 - (u_max - u_min1) / Q_max1) / u_max,
                 at=valve.at(),
                 unit="%",
-                remark=f"of the {fall_percent} % that the paper reads",
+                remark=f"of the {_fall_percent(valve)} % that the paper reads",
             )
-            for valve, fall_percent in ((FIRST, "2.2"), (SECOND, "1.0"))
+            for valve in (FIRST, SECOND)
         ),
     ),
     Kind.THEOREM(
@@ -121,7 +129,7 @@ METER_FLOOR = (
         values=(
             Value(
                 "first valve",
-                (*FIRST.at(), (u_seen0, sympy.Rational("5.39")), (u_seen1, sympy.Rational("5.17"))),
+                (*FIRST.at(), (u_seen0, u_min0.subs(_FIRST)), (u_seen1, u_min1.subs(_FIRST))),
                 "L/min",
                 published=FIRST.zero_flow_without_beta,
                 remark="6 % above what was measured, where the model without the floor (T3b) is 30 % below",

@@ -110,7 +110,7 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
     for statement in statements:
         if statement.number in earlier:
             raise RequirementError(f"{statement.number} is stated twice")
-        _check_grounds(statement, earlier, order)
+        check_grounds(statement, earlier, order)
         verdict = _with_units(judge(statement, earlier, verdicts))
         earlier[statement.number] = statement
         verdicts[statement.number] = (
@@ -119,7 +119,8 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
     return tuple(verdicts.values())
 
 
-def _check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
+def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
+    """Raise `RequirementError` if a statement rests on itself, a later one, an unknown one, or a copy of itself."""
     for ground in statement.grounds:
         if ground.number == statement.number:
             raise RequirementError(f"{statement.number} is its own premise")
@@ -148,7 +149,7 @@ def overrule(verdict: Verdict, objection: str) -> Verdict:
     """Return a verdict after the referee; with an objection the statement does not follow."""
     if not objection:
         return verdict
-    words = f"refuted by numbers: {objection}"
+    words = f"does not follow: {objection}"
     return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False, objection=objection)
 
 

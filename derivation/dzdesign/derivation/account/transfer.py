@@ -3,7 +3,8 @@
 import sympy
 
 from dzdesign.derivation.account.equations import ORIFICE
-from dzdesign.derivation.account.scope import BARE, PLANT, scope
+from dzdesign.derivation.account.published import SIMULATION
+from dzdesign.derivation.account.scope import BARE, EVERYWHERE, PLANT, scope
 from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement
 from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
 from dzdesign.derivation.symbols import *
@@ -24,15 +25,9 @@ _TITLES = {
 def _premise(number: str) -> Statement:
     title, note = _TITLES[number]
     equation = PLANT_EQUATIONS[number]
-    return Kind.PREMISE(
-        number,
-        title,
-        equation.lhs,
-        equation.rhs,
-        scope=scope(PLANT),
-        see=("T6d",) if number == "(24)" else (),
-        note=note,
-    )
+    # Beyond the simulation model a valve has a dead zone, which (24) has not.
+    where, see = (scope(PLANT), ("T6d",)) if number == "(24)" else (EVERYWHERE, ())
+    return Kind.PREMISE(number, title, equation.lhs, equation.rhs, scope=where, see=see, note=note)
 
 
 def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
@@ -83,7 +78,6 @@ SIMULATION_MODEL = (
         U_e,
         K_a * (U_i - K_fi * I_s),
         (R_c + r_p) * I_s + I_s * L_c * s,
-        scope=scope(PLANT),
         grounds=(laplace("(19)"), laplace("(21)"), laplace("(20)")),
         eliminate=(U_if, I_s),
         condition=Condition(
@@ -92,14 +86,13 @@ SIMULATION_MODEL = (
         expected=Outcome.FOLLOWS_IF,
         note="Printed without its middle, U_e(s).",
     ),
-    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, scope=scope(PLANT), grounds=(laplace("(22)"),)),
+    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, grounds=(laplace("(22)"),)),
     Kind.PAPER(
         "(27)",
         "motion, transformed",
         F_e,
         K_i * I_s,
         (m_e * s**2 + B_e * s + K_et) * X_e + F_eL,
-        scope=scope(PLANT),
         grounds=(laplace("(23)"), "(26)"),
         eliminate=(I_s,),
         condition=Condition(
@@ -116,7 +109,6 @@ SIMULATION_MODEL = (
         "flow, transformed",
         Q_s,
         C_d * W * X_e * sympy.sqrt(2 * dP / rho),
-        scope=scope(PLANT),
         grounds=(
             Ground(
                 "(24)",
@@ -137,6 +129,8 @@ SIMULATION_MODEL = (
     ),
 )
 
+#: Section 2.2: the share of the simulated spool's travel that is dead.
+_OVERLAP_MM = sympy.Rational(SIMULATION.stroke0_mm) * sympy.Rational(SIMULATION.displacement_dead_zone0_percent) / 100
 _RESISTANCE = R_c + r_p + K_a * K_fi
 
 #: Theorem 6.
@@ -147,20 +141,19 @@ TRANSFER_FUNCTION = (
         I_s,
         K_a * U_i / (_RESISTANCE + L_c * s),
         K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s),
-        scope=scope(PLANT),
         grounds=(Ground("(25)", member=0), Ground("(25)", member=1)),
         eliminate=(U_e,),
         expected=Outcome.FOLLOWS_IF,
         note="Time constant L_c / (R_c + r_p + K_a K_fi): the feedback makes the coil faster by the factor "
         "1 + K_a K_fi / (R_c + r_p), and makes the current depend less on the coil's temperature by the same factor.",
     ),
-    Kind.DEFINITION("transfer function", "transfer function from command to flow", G, Q_s / U_i, scope=scope(PLANT)),
+    Kind.DEFINITION("transfer function", "transfer function from command to flow", G, Q_s / U_i),
     Kind.THEOREM(
         "T6b",
         "transfer function of Eqs. (19)-(24) without load force",
         G,
         ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
-        scope=scope(PLANT, sympy.Eq(F_eL, 0)),
+        scope=scope(sympy.Eq(F_eL, 0)),
         grounds=(
             "transfer function",
             "(28)",
@@ -177,7 +170,6 @@ TRANSFER_FUNCTION = (
         "static gain from command to flow",
         G_0,
         ORIFICE * K_i * K_a / (_RESISTANCE * K_et),
-        scope=scope(PLANT),
         grounds=(Ground("T6b", ((G, G_0), (s, sympy.S.Zero))),),
         expected=Outcome.FOLLOWS_IF,
         note="By the final value theorem, which the stability of T6b allows.",
@@ -199,7 +191,7 @@ TRANSFER_FUNCTION = (
         # Section 2.2: the simulated spool's dead zone is 54 % of its 1.8 mm.
         condition=Condition(
             any_of=((sympy.Eq(x_ov, 0),),),
-            ruled_out_by=((x_ov, sympy.Rational(972, 10**6)),),
+            ruled_out_by=((x_ov, _OVERLAP_MM / 1000),),
             discrepancy=-ORIFICE * x_ov,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,

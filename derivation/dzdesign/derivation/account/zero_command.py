@@ -176,7 +176,7 @@ SHAPE = (
         Q,
         sympy.S.Zero,
         scope=scope(BARE, -u_min < u_i, u_i < u_min),
-        grounds=(Ground("(1)", ((u_max, u_min + headroom),)),),
+        grounds=("(1)",),
         cases=(
             Case(((u_i, y), (u_min, y + guard)), "0 <= u_i < u_min"),
             Case(((u_i, -y), (u_min, y + guard)), "-u_min < u_i <= 0"),

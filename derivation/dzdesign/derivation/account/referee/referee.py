@@ -23,7 +23,7 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
         return f"no valve is ever in its scope ({statement.scope or 'everywhere'})"
     tried, is_refuted = False, False
     for place in places:
-        objection = _ground_objection(statement, statements, place) if verdict.holds else ""
+        objection = _ground_objection(statement, statements, place)
         if objection:
             return objection
         try:
