@@ -11,10 +11,11 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanTrue
 
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.derivation.account.scope import scope, under_law
 from dzdesign.derivation.account.statement import Kind, Statement
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.lowering import lower
-from dzdesign.derivation.symbols import beta, k, kappa, u_i, u_max, u_min0, u_O, x_max
+from dzdesign.derivation.symbols import beta, dP, dP1, k, kappa, u_i, u_max, u_min0, u_O, x_max
 
 _LAW_SYMBOLS = {u_i, beta, k, x_max, u_max, u_min0}
 
@@ -51,7 +52,13 @@ class Law:
         if not self.statements:
             title = f"the law `{self.name}`"
             stated = Statement(
-                number=self.name, title=title, kind=Kind.CHOICE, symbol=u_O, members=(self.output,), note=self.note
+                number=self.name,
+                title=title,
+                kind=Kind.CHOICE,
+                symbol=u_O,
+                members=(self.output,),
+                scope=scope(under_law(self.name), sympy.Eq(dP, dP1)),
+                note=self.note,
             )
             object.__setattr__(self, "statements", (stated,))
         object.__setattr__(self, "stated_as", self.stated_as or self.statements[-1].number)

@@ -95,6 +95,7 @@ Q_max0 = _positive("Q_max0", _FLOW, "largest flow at dP0")
 Q_max1 = _positive("Q_max1", _FLOW, "largest flow at dP1")
 Q_floor = _positive("Q_floor", _FLOW, "least flow that the meter shows")
 Q = _real("Q", _FLOW, "flow")
+Q_w = _real("Q_w", _FLOW, "wanted flow at the present pressure drop")
 Q_O = _real("Q_O", _FLOW, "wanted flow at the reference")
 Q_O_prime = _real("Q_O'", _FLOW, "wanted flow off the reference")
 Q_neg = _real("Q_neg", _FLOW, "flow at the opposite command", latex="Q_{-}")
@@ -195,3 +196,14 @@ n_pwm = _varying("n_O", "code", "code of the output")
 n_i = _varying("n_i", "code", "code of the command (Eq. 29)")
 n_0 = _varying("n_0", "code", "code of the compensation signal at the reference")
 n_no = _varying("n_no", "code", "code of the compensation signal off the reference")
+
+#: What depends on the pressure drop: its name at the present one, at dP0 and at dP1.
+AT_PRESSURE_DROPS: dict[Name, tuple[Name, Name]] = {
+    dP: (dP0, dP1),
+    u_min: (u_min0, u_min1),
+    u_seen: (u_seen0, u_seen1),
+    K_e: (K_0, K_1),
+    Q_max: (Q_max0, Q_max1),
+    Q_w: (Q_O, Q_O_prime),
+    s_flow: (s_flow0, s_flow1),
+}

@@ -7,6 +7,7 @@ from typing import Annotated
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.core.input_files import read_bytes
 from dzdesign.core.options import AnyPath, Option, Texts, texts_of
 from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import stage_progress
@@ -22,8 +23,10 @@ class Arguments:
     """Format: text, json, latex or html."""
     equation: Annotated[Texts, Option("N")] = ()
     """Number of an equation, such as 18 or T3b: print this one and what it rests on. Repeatable."""
+    paper: Annotated[AnyPath | None, Option("FILE")] = None
+    """The paper as plain text: look each of its numbers up where it stands (default: by digests of the passages)."""
     mutate: Annotated[bool, Option()] = False
-    """Instead, make every equation wrong, and count what is caught."""
+    """Instead, make every statement and every published number wrong, and count what is caught."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default: standard output)."""
 
@@ -31,6 +34,7 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Re-derive the paper's equations; 1 if one of those printed is not found as a correct account finds it."""
     from dzdesign.derivation.account.account import STATEMENTS, verify_statements
+    from dzdesign.derivation.account.passages import find_transcription_faults
     from dzdesign.derivation.presentation.report import check_format, closure, render
 
     check_format(arguments.format)
@@ -43,22 +47,34 @@ def run(arguments: Arguments, json: bool) -> int:
     chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
     with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
-    text = render(verdicts, "json" if json else arguments.format, chosen)
+        misprints = find_transcription_faults(paper=_text_of(arguments.paper))
+    text = render(verdicts, "json" if json else arguments.format, chosen, misprints)
     if arguments.output:
         write_file(Path(arguments.output), text)
     else:
         print(text, end="")
     wrong = (verdict for verdict in verdicts if not verdict.as_expected)
-    return 1 if any(chosen is None or verdict.number in chosen for verdict in wrong) else 0
+    return 1 if misprints or any(chosen is None or verdict.number in chosen for verdict in wrong) else 0
+
+
+def _text_of(paper: AnyPath | None) -> str | None:
+    if paper is None:
+        return None
+    try:
+        return read_bytes(Path(paper), "the paper").decode()
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{paper}: the paper is expected as plain text in UTF-8 ({error}); export it as text"
+        ) from error
 
 
 def _run_mutations(arguments: Arguments, json: bool) -> int:
-    """Count the wrong equations that the account catches; 1 if one of them is not caught."""
+    """Count the wrong statements and numbers that the account catches; 1 if one of them is not caught."""
     from dzdesign.derivation.account.account import verify_statements
     from dzdesign.derivation.account.mutation import score_mutations
     from dzdesign.terminal.tables import print_mutations
 
-    with stage_progress("making every equation wrong in every small way"):
+    with stage_progress("making every statement wrong in every small way"):
         found = score_mutations(verify_statements())
     if arguments.output:
         write_file(Path(arguments.output), to_json_bytes(found))

@@ -40,10 +40,10 @@ def words_made_once():
     """Compose the words for the same verdicts once: a report takes seconds to derive its steps, none to write."""
     made, compose = {}, report.compose
 
-    def compose_once(verdicts, shown):
-        key = id(verdicts), tuple(shown)
+    def compose_once(verdicts, shown, misprints=()):
+        key = id(verdicts), tuple(shown), tuple(misprints)
         if key not in made:
-            made[key] = verdicts, compose(verdicts, shown)  # held, so that no other object gets its id
+            made[key] = verdicts, compose(verdicts, shown, misprints)  # held, so that no other object gets its id
         return made[key][1]
 
     with pytest.MonkeyPatch.context() as patch:
@@ -534,7 +534,7 @@ def test_prose_finds_symbols_and_references_and_leaves_words_alone():
 
 def test_prose_survives_the_way_to_plain_text():
     for statement in STATEMENTS:
-        for sentence in (statement.title, statement.note, *(ground.where for ground in statement.grounds)):
+        for sentence in (statement.title, statement.note, *(setting.words for setting in statement.scope.settings)):
             assert str(prose.parse_prose(sentence, BY_NUMBER)) == sentence
 
 

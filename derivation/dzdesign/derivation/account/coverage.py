@@ -24,7 +24,10 @@ def is_exhaustive(cases: tuple[Case, ...], within: Boolean) -> bool:
     claims = [_claim(case) for case in cases]
     if None in claims:
         return False
-    meant = within.replace(
+    # An equation narrows what is meant; without it the cases have to cover more.
+    meant = sympy.And(
+        *(one for one in sympy.And.make_args(within) if not isinstance(one, sympy.Eq | sympy.Ne))
+    ).replace(
         lambda part: isinstance(part, Relational),
         lambda part: _is_above(part.gts - part.lts, isinstance(part, sympy.StrictGreaterThan | sympy.StrictLessThan)),
     )

@@ -2,6 +2,16 @@
 
 import sympy
 
+from dzdesign.derivation.account.scope import (
+    BARE,
+    BEFORE_STOP,
+    FIXED_OPENING,
+    LAW_AT_REFERENCE,
+    LAW_OFF_REFERENCE,
+    UP_TO_REFERENCE,
+    scope,
+    under_law,
+)
 from dzdesign.derivation.account.statement import Ground, Kind
 from dzdesign.derivation.symbols import *
 
@@ -22,6 +32,7 @@ APPROACH = (
             (0, sympy.And(-u_min < u_i, u_i < u_min)),
             (ORIFICE * x, sympy.And(u_min <= u_i, u_i <= u_max)),
         ),
+        scope=scope(BARE),
         see=("T6d",),
         note="x is the opening of the edge, not the travel of the spool: x = 0 at the threshold. u_i is the valve's "
         "input; behind a compensator that is its output u_O.",
@@ -29,26 +40,25 @@ APPROACH = (
     Kind.ASSUMPTION(
         "Fig. 3, line",
         "target line through (0, 0) and (u_max, Q_max)",
-        Q_O,
+        Q_w,
         Q_max / u_max * u_i,
         see=("T7d",),
         note="Read off the figure and the text below Eq. (1); the abstract ends the line elsewhere.",
     ),
-    Kind.DEFINITION("K_e", "output flow gain: flow per command", K_e, Q_O / u_i, note="The words below Eq. (2)."),
+    Kind.DEFINITION("K_e", "output flow gain: flow per command", K_e, Q_w / u_i, note="The words below Eq. (2)."),
     Kind.PAPER(
-        "(2)", "flow gain of the target line", K_e, Q_max / u_max, grounds=("K_e", "Fig. 3, line"), eliminate=(Q_O,)
+        "(2)", "flow gain of the target line", K_e, Q_max / u_max, grounds=("K_e", "Fig. 3, line"), eliminate=(Q_w,)
     ),
     Kind.PAPER(
         "Q_max",
         "maximum flow (text below Eq. 2)",
         Q_max,
         ORIFICE * x_max,
-        scope="full command at or above the threshold",
+        scope=scope(FIXED_OPENING),
         grounds=(
             Ground(
                 "(1)",
                 ((Q, Q_max), (x, x_max), (u_max, u_min + headroom), (u_i, u_min + headroom)),
-                "at full command, x = x_max",
             ),
         ),
     ),
@@ -57,6 +67,7 @@ APPROACH = (
         "flow gain by the orifice equation",
         K_e,
         ORIFICE * x_max / u_max,
+        scope=scope(FIXED_OPENING),
         grounds=("(2)", "Q_max"),
         eliminate=(Q_max,),
         see=("T7b",),
@@ -76,15 +87,18 @@ APPROACH = (
         "compensation above the reference",
         u_no,
         beta * u_0,
-        see=("T1c", "(6c)"),
+        scope=LAW_OFF_REFERENCE,
+        see=("T1c", "(6c)", "T2d"),
         corrected_by="(6c)",
-        note="The paper's choice. It scales the whole compensation signal; the target asks for less: (6c).",
+        note="The paper's choice. It scales the whole compensation signal. Where a stop fixes x_max the target (16) "
+        "asks for less: (6c). Where full command is the limit it is exact: T2d.",
     ),
     Kind.PREMISE(
         "(7)",
         "selector",
         u_no,
         sympy.Piecewise((beta * u_0, dP1 > dP0), (u_0, dP1 <= dP0)),
+        scope=scope(under_law("paper"), sympy.Eq(dP, dP1)),
         see=("T4b", "T4c"),
         note="Contains (6).",
     ),
@@ -101,7 +115,7 @@ AT_REFERENCE = (
         K_0,
         C_d * W * x_max * sympy.sqrt(2 * dP0 / rho) / u_max,
         gamma_0 * x_max / u_max,
-        grounds=(Ground("(3)", ((K_e, K_0), (dP, dP0)), "at dP = dP0"), "gamma_0"),
+        grounds=(Ground("(3)", ((K_e, K_0), (dP, dP0))), "gamma_0"),
         eliminate=(gamma_0,),
         note="x_max does not depend on dP (Assumption 3).",
     ),
@@ -110,8 +124,11 @@ AT_REFERENCE = (
         "wanted flow at the reference",
         Q_O,
         K_0 * u_i,
-        grounds=("Fig. 3, line", Ground("(2)", ((K_e, K_0),), "at dP = dP0")),
-        eliminate=(Q_max,),
+        grounds=(
+            Ground("Fig. 3, line", ((Q_w, Q_O), (Q_max, Q_max0))),
+            Ground("(2)", ((K_e, K_0), (Q_max, Q_max0))),
+        ),
+        eliminate=(Q_max0,),
         see=("T1a",),
     ),
     Kind.PAPER(
@@ -119,7 +136,7 @@ AT_REFERENCE = (
         "opening that passes the wanted flow",
         x,
         Q_O / (C_d * W * sympy.sqrt(2 * dP0 / rho)),
-        scope="a command at or beyond the threshold",
+        scope=LAW_AT_REFERENCE,
         grounds=(
             Ground(
                 "(1)",
@@ -130,7 +147,6 @@ AT_REFERENCE = (
                     (u_min, u_min0),
                     (u_max, u_min0 + u_i_prime + headroom),
                 ),
-                "at dP = dP0, beyond the threshold",
             ),
         ),
     ),
@@ -139,28 +155,32 @@ AT_REFERENCE = (
         "opening in proportion to the command beyond the threshold",
         u_i_prime,
         k * x,
+        scope=BEFORE_STOP & scope(-u_min - k * x_max <= u_O),
         see=("T2b", "T8a"),
         note="The paper calls it approximately linear; it holds up to the spool's stop.",
-    ),
-    Kind.ASSUMPTION(
-        "Fig. 3, command",
-        "command at which the valve passes the wanted flow",
-        u_O,
-        u_i_prime + u_min0,
-        note="Read off the figure: u_i' is the part of the command that opens the edge.",
     ),
     Kind.DEFINITION(
         "u_O",
         "output of the compensator: compensation signal plus input",
         u_O,
         u_0 + u_i,
+        scope=UP_TO_REFERENCE,
         note="Eqs. (14) and (18) print u_0 on both sides; the left one is the output u_O.",
+    ),
+    Kind.ASSUMPTION(
+        "Fig. 3, command",
+        "command at which the valve passes the wanted flow",
+        u_O,
+        u_i_prime + u_min0,
+        scope=scope(sympy.Eq(dP, dP0), u_min0 <= u_O),
+        note="Read off the figure: u_i' is the part of the command that opens the edge.",
     ),
     Kind.PAPER(
         "(12)",
         "compensation signal in Fig. 3",
         u_0,
         u_i_prime + u_min0 - u_i,
+        scope=LAW_AT_REFERENCE,
         grounds=("Fig. 3, command", "u_O"),
         eliminate=(u_O,),
     ),
@@ -169,6 +189,7 @@ AT_REFERENCE = (
         "compensation signal at the reference",
         u_0,
         (k * x_max / u_max - 1) * u_i + u_min0,
+        scope=LAW_AT_REFERENCE,
         grounds=("(12)", "(11)", "(10)", "(9)", "(8)", "gamma_0"),
         eliminate=(u_i_prime, x, Q_O, K_0, gamma_0),
     ),
@@ -178,6 +199,7 @@ AT_REFERENCE = (
         u_O,
         u_0 + u_i,
         k * x_max / u_max * u_i + u_min0,
+        scope=UP_TO_REFERENCE,
         grounds=("u_O", "(13)"),
         eliminate=(u_0,),
         see=("T1a", "T2b"),
@@ -196,7 +218,8 @@ OFF_REFERENCE = (
         K_1,
         C_d * W * x_max * sympy.sqrt(2 * dP1 / rho) / u_max,
         gamma_1 * x_max / u_max,
-        grounds=(Ground("(3)", ((K_e, K_1), (dP, dP1)), "at dP = dP1"), "gamma_1"),
+        scope=scope(FIXED_OPENING),
+        grounds=(Ground("(3)", ((K_e, K_1), (dP, dP1))), "gamma_1"),
         eliminate=(gamma_1,),
         see=("T7a", "T7c"),
         note="The published largest flows grow far more slowly with dP: T7a.",
@@ -207,10 +230,10 @@ OFF_REFERENCE = (
         Q_O_prime,
         K_1 * u_i,
         grounds=(
-            Ground("Fig. 3, line", ((Q_O, Q_O_prime),), "at dP = dP1"),
-            Ground("(2)", ((K_e, K_1),), "at dP = dP1"),
+            Ground("Fig. 3, line", ((Q_w, Q_O_prime), (Q_max, Q_max1))),
+            Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
         ),
-        eliminate=(Q_max,),
+        eliminate=(Q_max1,),
         see=("T1c", "T1d"),
         note="As a target. Fig. 3 draws the line at the reference; (16) takes it to hold at dP1 too. As a claim about "
         "the valve under Eq. (18) it does not follow: T1c.",
@@ -221,6 +244,7 @@ OFF_REFERENCE = (
         u_no,
         beta * u_0,
         beta * (k * x_max / u_max - 1) * u_i + beta * u_min0,
+        scope=LAW_OFF_REFERENCE,
         grounds=("(6)", "(13)"),
         eliminate=(u_0,),
     ),
@@ -230,7 +254,8 @@ OFF_REFERENCE = (
         u_O,
         u_no + u_i,
         (beta * k * x_max / u_max - beta + 1) * u_i + beta * u_min0,
-        grounds=(Ground("u_O", ((u_0, u_no),), "with u_no for u_0"), "(17)"),
+        scope=LAW_OFF_REFERENCE,
+        grounds=(Ground("u_O", ((u_0, u_no),)), "(17)"),
         eliminate=(u_no,),
         see=("T1b", "T1c", "T3a", "T4a"),
         note="Printed with u_0 on the left, which is the output u_O.",

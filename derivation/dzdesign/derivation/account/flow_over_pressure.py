@@ -2,9 +2,28 @@
 
 import sympy
 
-from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND, VALVES
+from dzdesign.derivation.account.published import (
+    DP0_MPA,
+    DP1_MPA,
+    DROP_ASSUMED,
+    FIRST,
+    SECOND,
+    SIMULATION,
+    U_MAX_V,
+    VALVES,
+)
+from dzdesign.derivation.account.scope import FIXED_OPENING, scope
 from dzdesign.derivation.account.statement import Condition, Kind, Outcome, Value
 from dzdesign.derivation.symbols import *
+
+_DROPS = sympy.Rational(DP1_MPA, DP0_MPA)
+#: Opening of the simulated spool beyond its dead zone, at dP1 over at dP0.
+_OPENING_RATIO = (
+    sympy.Rational(SIMULATION.stroke1_mm)
+    * (100 - sympy.Rational(SIMULATION.displacement_dead_zone1_percent))
+    / sympy.Rational(SIMULATION.stroke0_mm)
+    / (100 - sympy.Rational(SIMULATION.displacement_dead_zone0_percent))
+)
 
 #: Theorem 7: flow over pressure drop.
 FLOW_OVER_PRESSURE = (
@@ -27,6 +46,7 @@ FLOW_OVER_PRESSURE = (
         "Eqs. (8) and (15): the flow gain grows with the root of the pressure drop",
         K_1,
         K_0 * sympy.sqrt(dP1) / sympy.sqrt(dP0),
+        scope=scope(FIXED_OPENING),
         grounds=("(15)", "gamma_1", "(8)", "gamma_0"),
         eliminate=(gamma_1, K_0, gamma_0),
         values=(
@@ -38,7 +58,7 @@ FLOW_OVER_PRESSURE = (
             Value(
                 "K_1/K_0 by Eq. (15) and the simulated openings",
                 # Section 2.2: 1.8 mm with 54 % dead at 1 MPa; 0.1 mm less with 1 % more dead at 5 MPa.
-                of=sympy.sqrt(dP1 / dP0) * sympy.Rational(17 * 45, 18 * 46),
+                of=sympy.sqrt(dP1 / dP0) * _OPENING_RATIO,
                 at=FIRST.at(),
                 unit="1",
                 remark="The spool opens less at 5 MPa, which explains a part; Assumption 3 is then off by 8 %.",
@@ -53,9 +73,11 @@ FLOW_OVER_PRESSURE = (
         grounds=("exponent",),
         condition=Condition(
             any_of=((sympy.Eq(n, sympy.Rational(1, 2)),),),
-            witness=((dP0, sympy.S.One), (dP1, sympy.Integer(5))),
+            witness=((dP0, sympy.S.One), (dP1, _DROPS)),
             discrepancy=Q_max0 * ((dP1 / dP0) ** n - sympy.sqrt(dP1 / dP0)),
-            ruled_out_by=((n, sympy.log(sympy.Rational("24.6") / sympy.Rational("15.1")) / sympy.log(5)),),
+            ruled_out_by=(
+                (n, sympy.log(sympy.Rational(FIRST.flow1) / sympy.Rational(FIRST.flow0)) / sympy.log(_DROPS)),
+            ),
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         values=(
@@ -78,7 +100,7 @@ FLOW_OVER_PRESSURE = (
         grounds=("(2)",),
         condition=Condition(
             any_of=((sympy.Eq(u_max, dP0),),),
-            ruled_out_by=((u_max, sympy.Integer(10)), (dP0, sympy.Integer(1))),
+            ruled_out_by=((u_max, sympy.Integer(U_MAX_V)), (dP0, sympy.Integer(DP0_MPA))),
             discrepancy=Q_max * (1 / u_max - 1 / dP0),
             words="(quantities of two units)",
         ),

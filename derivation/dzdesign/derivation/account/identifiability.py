@@ -3,6 +3,7 @@
 import sympy
 
 from dzdesign.derivation.account.equations import ORIFICE
+from dzdesign.derivation.account.scope import BEYOND_THRESHOLD, FIXED_OPENING, FULL_STROKE, scope
 from dzdesign.derivation.account.statement import Case, Ground, Kind
 from dzdesign.derivation.symbols import *
 
@@ -13,7 +14,7 @@ _REGIMES = (
 )
 #: Theorem 8: what can be identified from flow.
 IDENTIFIABILITY = (
-    Kind.DEFINITION(
+    Kind.ASSUMPTION(
         "valve",
         "flow of a valve with a threshold and a stop",
         Q,
@@ -22,6 +23,7 @@ IDENTIFIABILITY = (
             (ORIFICE * (u_O - u_min) / k, u_O < u_min + k * x_max),
             (ORIFICE * x_max, u_min + k * x_max <= u_O),
         ),
+        scope=FULL_STROKE,
         note="Eqs. (1) and (11) up to the stop, for positive commands.",
     ),
     Kind.THEOREM(
@@ -29,12 +31,12 @@ IDENTIFIABILITY = (
         "the flow is the same for C_d lambda, k lambda and x_max / lambda",
         Q_scaled,
         Q,
+        scope=FULL_STROKE,
         grounds=(
             "valve",
             Ground(
                 "valve",
                 ((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale)),
-                "with C_d lambda, k lambda, x_max / lambda",
             ),
         ),
         eliminate=(Q,),
@@ -47,10 +49,11 @@ IDENTIFIABILITY = (
         "the sensitivity to C_d is a combination of those to k and x_max",
         dQ_dC_d,
         (x_max * dQ_dx_max - k * dQ_dk) / C_d,
+        scope=FULL_STROKE & scope(sympy.Ne(u_O, u_min + k * x_max)),
         grounds=(
-            Ground("valve", derivative=(C_d, dQ_dC_d), where="differentiated by C_d"),
-            Ground("valve", derivative=(k, dQ_dk), where="differentiated by k"),
-            Ground("valve", derivative=(x_max, dQ_dx_max), where="differentiated by x_max"),
+            Ground("valve", derivative=(C_d, dQ_dC_d)),
+            Ground("valve", derivative=(k, dQ_dk)),
+            Ground("valve", derivative=(x_max, dQ_dx_max)),
         ),
         eliminate=(dQ_dk, dQ_dx_max),
         cases=_REGIMES,
@@ -66,6 +69,7 @@ IDENTIFIABILITY = (
         sympy.Piecewise(
             (0, u_O < u_min), (s_flow * (u_O - u_min), u_O < u_min + q_x), (s_flow * q_x, u_min + q_x <= u_O)
         ),
+        scope=FULL_STROKE,
         grounds=("valve", "S", "travel"),
         eliminate=(s_flow, q_x),
         cases=_REGIMES,
@@ -75,11 +79,10 @@ IDENTIFIABILITY = (
         "flow beyond the threshold",
         Q,
         s_flow * (u_O - u_min),
-        scope="u_O at or beyond the threshold, and the spool has not met its stop",
-        within=u_min <= u_O,
+        scope=BEYOND_THRESHOLD,
         grounds=(
-            Ground("(1)", ((u_i, u_min + y), (u_max, u_min + y + headroom)), "at u_O = u_min + y"),
-            Ground("opening", ((u_O, u_min + y),), "at u_O = u_min + y"),
+            Ground("(1)", ((u_i, u_min + y), (u_max, u_min + y + headroom))),
+            "opening",
             "S",
         ),
         eliminate=(x, s_flow),
@@ -92,8 +95,8 @@ IDENTIFIABILITY = (
         (Q_2 - Q_1) / (u_2 - u_1),
         provided=(sympy.Ne(u_1, u_2),),
         grounds=(
-            Ground("straight part", ((Q, Q_2), (u_O, u_2)), "at u_2"),
-            Ground("straight part", ((Q, Q_1), (u_O, u_1)), "at u_1"),
+            Ground("straight part", ((Q, Q_2), (u_O, u_2))),
+            Ground("straight part", ((Q, Q_1), (u_O, u_1))),
         ),
         eliminate=(u_min,),
         note="With T8e and T8f: these three are determined, and by T8b nothing else is.",
@@ -104,7 +107,7 @@ IDENTIFIABILITY = (
         u_min,
         u_1 - Q_1 / s_flow,
         u_1 - Q_1 * (u_2 - u_1) / (Q_2 - Q_1),
-        grounds=(Ground("straight part", ((Q, Q_1), (u_O, u_1)), "at u_1"), "T8d"),
+        grounds=(Ground("straight part", ((Q, Q_1), (u_O, u_1))), "T8d"),
         eliminate=(s_flow,),
     ),
     Kind.THEOREM(
@@ -112,8 +115,8 @@ IDENTIFIABILITY = (
         "k x_max from a sample at the stop",
         q_x,
         Q_max / s_flow,
-        scope="a command at or beyond the stop",
-        grounds=(Ground("T8c", ((Q, Q_max), (u_O, u_min + q_x + headroom)), "at the stop"),),
+        scope=scope(FIXED_OPENING),
+        grounds=(Ground("T8c", ((Q, Q_max), (u_O, u_min + q_x + headroom))),),
         note="Without such a sample k x_max is only known to be larger than the largest command beyond the threshold. "
         "Where x_max is known otherwise, k = (k x_max) / x_max.",
     ),

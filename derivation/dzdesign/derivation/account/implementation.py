@@ -3,7 +3,25 @@
 import sympy
 
 from dzdesign.derivation import scaling
-from dzdesign.derivation.account.published import DUTY_COMMAND_V, DUTY_WITH_PERCENT, DUTY_WITHOUT_PERCENT, FIRST, SECOND
+from dzdesign.derivation.account.published import (
+    COUNTS_PER_PIN_VOLT,
+    DUTY_COMMAND_V,
+    DUTY_WITH_PERCENT,
+    DUTY_WITHOUT_PERCENT,
+    FIRST,
+    LARGEST_CODE,
+    PIN_V,
+    SECOND,
+    U_MAX_V,
+)
+from dzdesign.derivation.account.scope import (
+    CODES_AT_PIN,
+    CODES_OF_COMMAND,
+    LAW_OFF_REFERENCE,
+    UP_TO_REFERENCE,
+    scope,
+    under_law,
+)
 from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *
@@ -12,7 +30,11 @@ _IN_COUNTS = scaling.law_in_counts(law("paper"))
 _SHARES = {kappa: k * x_max / u_max, scaling.mu: u_min0 / u_max}
 _PER_VOLT = n_adc / u_max  # counts per volt of command, what Eqs. (30) and (31) need where they have 1365
 _REST = k * x_max / u_max - 1
-_CONVERTER = ((n_adc, sympy.Integer(4095)), (V_adc, sympy.Integer(3)), (n_V, sympy.Integer(1365)))
+_CONVERTER = (
+    (n_adc, sympy.Integer(LARGEST_CODE)),
+    (V_adc, sympy.Integer(PIN_V)),
+    (n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),
+)
 _UP_TO_REFERENCE = Case(((dP1, dP0 - below),), "dP <= dP0")
 _ABOVE_REFERENCE = Case(((dP1, dP0 + above),), "dP > dP0")
 
@@ -50,7 +72,7 @@ IMPLEMENTATION = (
         condition=Condition(
             any_of=((sympy.Eq(u_max, V_adc),),),
             for_all=(u_i,),
-            ruled_out_by=((u_max, sympy.Integer(10)), (V_adc, sympy.Integer(3))),
+            ruled_out_by=((u_max, sympy.Integer(U_MAX_V)), (V_adc, sympy.Integer(PIN_V))),
             discrepancy=n_adc * u_i * (1 / u_max - 1 / V_adc),
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
@@ -58,7 +80,7 @@ IMPLEMENTATION = (
         values=(
             Value(
                 "code of 10 V by (29)",
-                (*_CONVERTER, (u_i, sympy.Integer(10))),
+                (*_CONVERTER, (u_i, sympy.Integer(U_MAX_V))),
                 "counts",
                 remark="14 bits. A 12-bit converter stands at 4095 from 3 V on: 70 % of the command would be lost.",
             ),
@@ -79,18 +101,28 @@ IMPLEMENTATION = (
         "compensation signal at 1365 counts per volt",
         n_0,
         n_V * u_0,
+        scope=scope(CODES_AT_PIN),
         note="What Eq. (30) sets out to compute: all of u_0 in the scale of its first term.",
     ),
-    Kind.ASSUMPTION("code of u_no", "compensation signal off the reference at 1365 counts per volt", n_no, n_V * u_no),
+    Kind.ASSUMPTION(
+        "code of u_no",
+        "compensation signal off the reference at 1365 counts per volt",
+        n_no,
+        n_V * u_no,
+        scope=scope(CODES_AT_PIN) & LAW_OFF_REFERENCE,
+    ),
     Kind.PAPER(
         "(30)",
         "code of the compensation signal at the reference",
         n_0,
         n_V * _REST * u_i + u_min0,
+        scope=scope(CODES_AT_PIN),
         grounds=("code of u_0", "(13)"),
         eliminate=(u_0,),
         condition=Condition(
-            any_of=((sympy.Eq(n_V, 1),),), ruled_out_by=((n_V, sympy.Integer(1365)),), discrepancy=(n_V - 1) * u_min0
+            any_of=((sympy.Eq(n_V, 1),),),
+            ruled_out_by=((n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),),
+            discrepancy=(n_V - 1) * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="(30c)",
@@ -118,11 +150,12 @@ IMPLEMENTATION = (
         "code of the compensation signal off the reference",
         n_no,
         n_V * beta * _REST * u_i + beta * u_min0,
+        scope=scope(CODES_AT_PIN) & LAW_OFF_REFERENCE,
         grounds=("code of u_no", "(17)"),
         eliminate=(u_no,),
         condition=Condition(
             any_of=((sympy.Eq(n_V, 1),),),
-            ruled_out_by=((n_V, sympy.Integer(1365)),),
+            ruled_out_by=((n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),),
             discrepancy=(n_V - 1) * beta * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
@@ -134,10 +167,15 @@ IMPLEMENTATION = (
         "compensation signal in the counts of the command",
         n_0,
         _PER_VOLT * u_0,
+        scope=scope(CODES_OF_COMMAND),
         note="So that the sum of codes in Eq. (32) is the code of the sum.",
     ),
     Kind.CHOICE(
-        "scale of u_no", "compensation signal off the reference in the counts of the command", n_no, _PER_VOLT * u_no
+        "scale of u_no",
+        "compensation signal off the reference in the counts of the command",
+        n_no,
+        _PER_VOLT * u_no,
+        scope=scope(CODES_OF_COMMAND) & LAW_OFF_REFERENCE,
     ),
     Kind.CORRECTED(
         "(30c)",
@@ -145,6 +183,7 @@ IMPLEMENTATION = (
         n_0,
         _PER_VOLT * (_REST * u_i + u_min0),
         _REST * n_i + _PER_VOLT * u_min0,
+        scope=scope(CODES_OF_COMMAND),
         grounds=("scale of u_0", "(13)", "(29c)"),
         eliminate=(u_0, n_i),
         values=(
@@ -157,6 +196,7 @@ IMPLEMENTATION = (
         n_no,
         _PER_VOLT * beta * (_REST * u_i + u_min0),
         beta * _REST * n_i + _PER_VOLT * beta * u_min0,
+        scope=scope(CODES_OF_COMMAND) & LAW_OFF_REFERENCE,
         grounds=("scale of u_no", "(17)", "(29c)"),
         eliminate=(u_no, n_i),
     ),
@@ -165,7 +205,8 @@ IMPLEMENTATION = (
         "output from the codes",
         u_O,
         _by_selector(K_c * (n_i + n_0), K_c * (n_i + n_no)),
-        grounds=(Ground("u_O", ((u_0, u_no),), "with u_no for u_0"), "(7)", "(13)", "(29c)", "(30c)", "(31c)"),
+        scope=scope(CODES_OF_COMMAND, under_law("paper"), sympy.Eq(dP, dP1)),
+        grounds=(Ground("u_O", ((u_0, u_no),)), "(7)", "(13)", "(29c)", "(30c)", "(31c)"),
         eliminate=(u_no, u_0, n_i, n_0, n_no),
         cases=(_UP_TO_REFERENCE, _ABOVE_REFERENCE),
         condition=Condition(
@@ -188,6 +229,7 @@ CODES = (
         "Eq. (32) with Eqs. (29) and (30) as printed gives the law (14)",
         u_O,
         K_c * (n_adc * u_i / V_adc + n_V * _REST * u_i + u_min0),
+        scope=UP_TO_REFERENCE,
         grounds=("(14)", "1365"),
         eliminate=(n_V,),
         condition=Condition(
@@ -208,6 +250,7 @@ CODES = (
         n_pwm,
         n_full / n_adc * (beta * _REST + 1) * n_i + n_full * beta * u_min0 / u_max,
         _IN_COUNTS.slope.subs(_SHARES) * n_i + _IN_COUNTS.start.subs(_SHARES),
+        scope=LAW_OFF_REFERENCE,
         grounds=("PWM", "(18)", "L4"),
         eliminate=(u_O, u_i),
         note="What the firmware computes, rounded to the nearest count.",
@@ -218,6 +261,7 @@ CODES = (
         "duty cycle with compensation at the reference",
         duty,
         (k * x_max / u_max * u_i + u_min0) / u_max,
+        scope=UP_TO_REFERENCE,
         grounds=("duty", "(14)"),
         eliminate=(u_O,),
         values=(

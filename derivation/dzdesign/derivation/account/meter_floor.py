@@ -3,9 +3,18 @@
 import sympy
 
 from dzdesign.derivation.account.equations import ORIFICE
-from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND
+from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND, PublishedValve
+from dzdesign.derivation.account.scope import BARE, CONSTANT_THRESHOLD, FREE_OPENING, scope
 from dzdesign.derivation.account.statement import Ground, Kind, Value
 from dzdesign.derivation.symbols import *
+
+_FIRST = dict(FIRST.at())
+
+
+def _fall_percent(valve: PublishedValve) -> str:
+    """Fall of the threshold that the paper reads."""
+    return f"{float(sympy.Rational(valve.dead_zone0_percent) - sympy.Rational(valve.dead_zone1_percent)):.1f}"
+
 
 #: Theorem 9: a meter that shows nothing below its floor.
 METER_FLOOR = (
@@ -15,9 +24,17 @@ METER_FLOOR = (
         u_seen,
         u_min + Q_floor / s_flow,
         u_min + Q_floor * k / ORIFICE,
-        grounds=(Ground("straight part", ((Q, Q_floor), (u_O, u_seen)), "at the meter's floor"), "S"),
+        grounds=(Ground("straight part", ((Q, Q_floor), (u_O, u_seen))), "S"),
         eliminate=(s_flow,),
         note="Above the threshold, and the more so the lower the pressure drop.",
+    ),
+    Kind.ASSUMPTION(
+        "constant threshold",
+        "a threshold that does not depend on the pressure drop",
+        u_min1,
+        u_min0,
+        scope=CONSTANT_THRESHOLD,
+        note="Against Eq. (4), to see what the meter alone does.",
     ),
     Kind.DEFINITION("fall", "fall of the threshold as the meter shows it", fall, u_seen0 - u_seen1),
     Kind.THEOREM(
@@ -25,13 +42,15 @@ METER_FLOOR = (
         "a constant threshold seems to fall",
         fall,
         Q_floor * k / gamma_0 * (1 - sympy.sqrt(dP0) / sympy.sqrt(dP1)),
+        scope=CONSTANT_THRESHOLD,
         grounds=(
             "fall",
-            Ground("T9a", ((u_seen, u_seen0), (dP, dP0)), "at dP0"),
-            Ground("T9a", ((u_seen, u_seen1), (dP, dP1)), "at dP1, the same u_min"),
+            Ground("T9a", ((u_seen, u_seen0), (dP, dP0), (u_min, u_min0))),
+            Ground("T9a", ((u_seen, u_seen1), (dP, dP1), (u_min, u_min1))),
             "gamma_0",
+            "constant threshold",
         ),
-        eliminate=(u_seen0, u_seen1, gamma_0),
+        eliminate=(u_seen0, u_seen1, u_min1, gamma_0),
         positive_if=sympy.sqrt(dP1) > sympy.sqrt(dP0),
         values=tuple(
             Value(
@@ -39,9 +58,9 @@ METER_FLOOR = (
                 of=Q_floor * (u_max - u_min0) / Q_max0 * (1 - sympy.sqrt(dP0 / dP1)) / u_max,
                 at=valve.at(),
                 unit="%",
-                remark=f"the paper reads a fall of {fall_percent} %" + assumed,
+                remark=f"the paper reads a fall of {_fall_percent(valve)} %" + assumed,
             )
-            for valve, fall_percent, assumed in ((FIRST, "2.2", ""), (SECOND, "1.0", f"; {DROP_ASSUMED}"))
+            for valve, assumed in ((FIRST, ""), (SECOND, f"; {DROP_ASSUMED}"))
         ),
         note="The numbers: the printed thresholds taken for the true ones, a floor of 0.6 L/min, and flow that grows "
         "with the root of the pressure drop.",
@@ -51,25 +70,26 @@ METER_FLOOR = (
         "the same with the slopes that were measured",
         fall,
         Q_floor * (1 / s_flow0 - 1 / s_flow1),
+        scope=CONSTANT_THRESHOLD,
         grounds=(
             "fall",
-            Ground("straight part", ((Q, Q_floor), (u_O, u_seen0), (s_flow, s_flow0)), "at dP0 and the meter's floor"),
+            Ground("straight part", ((Q, Q_floor), (u_O, u_seen0), (s_flow, s_flow0), (u_min, u_min0))),
             Ground(
                 "straight part",
-                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1)),
-                "at dP1 and the meter's floor, the same u_min",
+                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
             ),
+            "constant threshold",
         ),
-        eliminate=(u_seen0, u_seen1),
+        eliminate=(u_seen0, u_seen1, u_min1),
         values=tuple(
             Value(
                 f"in per cent of u_max, {valve.name}",
                 of=Q_floor * ((u_max - u_min0) / Q_max0 - (u_max - u_min1) / Q_max1) / u_max,
                 at=valve.at(),
                 unit="%",
-                remark=f"of the {fall_percent} % that the paper reads",
+                remark=f"of the {_fall_percent(valve)} % that the paper reads",
             )
-            for valve, fall_percent in ((FIRST, "2.2"), (SECOND, "1.0"))
+            for valve in (FIRST, SECOND)
         ),
     ),
     Kind.THEOREM(
@@ -77,15 +97,13 @@ METER_FLOOR = (
         "flow per command at dP1 from the two ends of the straight part",
         s_flow1,
         (Q_max1 - Q_floor) / (u_max - u_seen1),
+        scope=scope(FREE_OPENING),
         provided=(sympy.Ne(u_max, u_seen1),),
         grounds=(
-            Ground(
-                "straight part", ((Q, Q_max1), (u_O, u_max), (s_flow, s_flow1), (u_min, u_min1)), "at dP1, full command"
-            ),
+            Ground("straight part", ((Q, Q_max1), (u_O, u_max), (s_flow, s_flow1), (u_min, u_min1))),
             Ground(
                 "straight part",
                 ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-                "at dP1, where the meter starts",
             ),
         ),
         eliminate=(u_min1,),
@@ -95,16 +113,15 @@ METER_FLOOR = (
         "flow at zero command without beta, if the thresholds are the first flow seen",
         Q,
         Q_floor + (Q_max1 - Q_floor) * (u_seen0 - u_seen1) / (u_max - u_seen1),
+        scope=scope(BARE, FREE_OPENING, sympy.Eq(u_i, u_seen0), sympy.Eq(dP, dP1), u_min1 <= u_seen0),
         grounds=(
             Ground(
                 "straight part",
                 ((u_O, u_seen0), (s_flow, s_flow1), (u_min, u_min1)),
-                "at dP1, where the offset is u_seen0",
             ),
             Ground(
                 "straight part",
                 ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-                "at dP1, where the meter starts",
             ),
             "slope at dP1",
         ),
@@ -112,7 +129,7 @@ METER_FLOOR = (
         values=(
             Value(
                 "first valve",
-                (*FIRST.at(), (u_seen0, sympy.Rational("5.39")), (u_seen1, sympy.Rational("5.17"))),
+                (*FIRST.at(), (u_seen0, u_min0.subs(_FIRST)), (u_seen1, u_min1.subs(_FIRST))),
                 "L/min",
                 published=FIRST.zero_flow_without_beta,
                 remark="6 % above what was measured, where the model without the floor (T3b) is 30 % below",

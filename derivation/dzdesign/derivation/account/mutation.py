@@ -1,104 +1,174 @@
-"""How sharp the account is: change every statement in every small way, and count the changes that a verdict shows.
+"""How sharp the account is: change every statement in every small way, and count the changes that show.
 
-A changed premise must turn a verdict of a statement that rests on it; a changed result, condition or sign claim must
-turn its own. The units are not asked, so that the logic is measured by itself. A change that leaves the meaning as it
-is (``<`` for ``<=`` where both give the same) is no mutant: it is compared with the original first.
+What is changed: formulas, conditions and sign claims; scopes and cases; grounds and the values at which they are taken;
+kinds; and the numbers that the paper prints. A changed premise must turn a verdict of a statement that rests on it, or
+be refuted by numbers; a changed result must turn its own. The units are not asked, so that the logic is measured by
+itself. A change that leaves the meaning as it is (``<`` for ``<=`` where both give the same) is no mutant: it is
+compared with the original first.
 """
 
-import math
-import random
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal, TypeVar
 
-import sympy
 from msgspec import Meta
-from sympy.core.function import AppliedUndef
-from sympy.core.relational import Relational
 
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact
 from dzdesign.core.errors import RequirementError
-from dzdesign.derivation.account.identity import agree
-from dzdesign.derivation.account.proof import Verdict, judge
-from dzdesign.derivation.account.statement import Condition, Statement
-from dzdesign.derivation.symbols import QUANTITIES, Name, u_max, u_min
+from dzdesign.derivation.account.ground_mutants import ground_mutants, kind_mutants
+from dzdesign.derivation.account.ledger import find_kind_fault, names_in
+from dzdesign.derivation.account.mutants import formula_mutants, names_of, scope_mutants, unit_of
+from dzdesign.derivation.account.passages import find_transcription_faults
+from dzdesign.derivation.account.proof import Verdict, check_grounds, judge
+from dzdesign.derivation.account.published import transcribed
+from dzdesign.derivation.account.referee.referee import hear
+from dzdesign.derivation.account.statement import Statement
+from dzdesign.derivation.symbols import Name
 
-_FOREIGN = sympy.Symbol("foreign", positive=True)
-_SAMPLES, _SEED = 2000, 20261121
+_Mutant = TypeVar("_Mutant")
+#: Of what is changed.
+WAYS = ("formulas", "scopes", "grounds", "kinds", "published numbers")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatementMutants:
-    """Mutants of one statement."""
+    """Mutants of one statement in one way."""
 
-    number: Annotated[str, Meta(description="The statement.")]
+    number: Annotated[str, Meta(description="The statement, or the name of a number that the paper prints.")]
+    changed: Annotated[str, Meta(description="What of it was changed.")]
     mutants: Annotated[int, Meta(description="Changes of its meaning that were tried.")]
-    caught: Annotated[int, Meta(description="Those of them that a verdict shows.")]
-    survivors: Annotated[tuple[str, ...], Meta(description="Those that none shows.")]
+    caught: Annotated[int, Meta(description="Those of them that show.")]
+    survivors: Annotated[tuple[str, ...], Meta(description="Those that do not.")]
     equivalent: Annotated[tuple[str, ...], Meta(description="Changes that leave its meaning, so that none can.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AccountMutants(Artefact):
-    """How many wrong equations the account catches."""
+    """How many wrong statements the account catches."""
 
     FILE_NAME: ClassVar[str] = "mutants.json"
     schema: Annotated[Literal["dzdesign.mutation/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.mutation/1"
     )
-    mutants: Annotated[int, Meta(description="Wrong equations.")]
-    caught: Annotated[int, Meta(description="Those that a verdict shows.")]
-    statements: Annotated[tuple[StatementMutants, ...], Meta(description="In the order of the account.")]
+    mutants: Annotated[int, Meta(description="Wrong statements and numbers.")]
+    caught: Annotated[int, Meta(description="Those that show.")]
+    statements: Annotated[
+        tuple[StatementMutants, ...], Meta(description="By what was changed, in the account's order.")
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Account:
+    """A proved account, by number."""
+
+    statements: Mapping[str, Statement]
+    verdicts: Mapping[str, Verdict]
+
+    def shows(self, statement: Statement, mutant: Statement) -> bool:
+        """Whether a statement's verdict turns if a mutant stands in the account."""
+        statements = {**self.statements, mutant.number: mutant}
+        try:
+            if statement.grounds:
+                check_grounds(statement, _before(statement, statements), list(statements))
+            return not judge(statement, statements, self.verdicts).as_expected
+        except RequirementError:
+            return True
+
+    def is_refuted(self, mutant: Statement) -> bool:
+        """Whether numbers speak against a mutant."""
+        statements = {**self.statements, mutant.number: mutant}
+        return bool(hear(judge(mutant, statements, self.verdicts), statements))
 
 
 def score_mutations(verdicts: Sequence[Verdict]) -> AccountMutants:
-    """Mutate every statement of a proved account and see which mutants are caught."""
-    statements = {verdict.number: verdict.statement for verdict in verdicts}
-    found = {verdict.number: verdict for verdict in verdicts}
-    scores = tuple(_score(statement, statements, found) for statement in statements.values())
+    """Mutate every statement of a proved account, and every number transcribed, and see which mutants are caught."""
+    account = _Account(
+        statements={verdict.number: verdict.statement for verdict in verdicts},
+        verdicts={verdict.number: verdict for verdict in verdicts},
+    )
+    ways: tuple[Callable[[Statement, _Account], StatementMutants], ...] = (_formulas, _scopes, _grounds, _kinds)
+    scores = [way(statement, account) for way in ways for statement in account.statements.values()]
+    scores += [_of_number(name) for name in transcribed()]
     return AccountMutants(
         tool=THIS_TOOL,
         made_from=(),
         mutants=sum(score.mutants for score in scores),
         caught=sum(score.caught for score in scores),
-        statements=scores,
+        statements=tuple(score for score in scores if score.mutants or score.equivalent),
+    )
+
+
+def _formulas(statement: Statement, account: _Account) -> StatementMutants:
+    users = [
+        user
+        for user in account.statements.values()
+        if statement.number in {ground.number for ground in user.grounds} and not statement.grounds
+    ]
+    users.sort(key=lambda user: len(user.grounds) * max(1, len(user.cases)))  # the quick ones first
+    neighbours = _neighbours((statement, *users), account.statements)
+    judged = users if statement.kind.is_given else [statement]
+
+    def is_caught(mutant: Statement) -> bool:
+        found = (account.shows(mutant if user is statement else user, mutant) for user in judged)
+        return any(found) or account.is_refuted(mutant)
+
+    return _score(statement.number, "formulas", formula_mutants(statement, neighbours), is_caught)
+
+
+def _scopes(statement: Statement, account: _Account) -> StatementMutants:
+    return _score(statement.number, "scopes", scope_mutants(statement), lambda one: _is_caught(one, account))
+
+
+def _grounds(statement: Statement, account: _Account) -> StatementMutants:
+    mutants = ground_mutants(statement, account.statements)
+    return _score(statement.number, "grounds", mutants, lambda one: _is_caught(one, account))
+
+
+def _kinds(statement: Statement, account: _Account) -> StatementMutants:
+    known = {name for one in _before(statement, account.statements).values() for name in names_in(one)}
+    return _score(statement.number, "kinds", kind_mutants(statement), lambda one: bool(find_kind_fault(one, known)))
+
+
+def _is_caught(mutant: Statement, account: _Account) -> bool:
+    return account.shows(mutant, mutant) or account.is_refuted(mutant)
+
+
+def _of_number(name: str) -> StatementMutants:
+    """Change the last digit of a number, shift its point, and put another one in its place."""
+    printed = transcribed()
+    number = printed[name]
+    digits = {f"{number[:-1]}{(int(number[-1]) + step) % 10}" for step in (1, 9)}
+    wrong = (digits | {f"{number}0", *printed.values()}) - {number}
+    mutants = [(one, f"{one} for {number}") for one in sorted(wrong)]
+    return _score(
+        name, "published numbers", mutants, lambda one: bool(find_transcription_faults({**printed, name: one}))
     )
 
 
 def _score(
-    statement: Statement, statements: Mapping[str, Statement], verdicts: Mapping[str, Verdict]
+    number: str, changed: str, mutants: Iterable[tuple[_Mutant | None, str]], is_caught: Callable[[_Mutant], bool]
 ) -> StatementMutants:
-    users = [
-        user
-        for user in statements.values()
-        if statement.number in {ground.number for ground in user.grounds} and not statement.grounds
-    ]
-    users.sort(key=lambda user: len(user.grounds) * max(1, len(user.cases)))  # the quick ones first
-    neighbours = _neighbours((statement, *users), statements)
-    mutants = 0
-    equivalent, survivors = [], []
-    for mutant, text in _mutants(statement, neighbours):
+    tried, equivalent, survivors = 0, [], []
+    for mutant, text in mutants:
         if mutant is None:
             equivalent.append(text)
             continue
-        mutants += 1
-        judged = users if statement.kind.is_given else (mutant,)
-        if not any(_shows(user, {**statements, mutant.number: mutant}, verdicts) for user in judged):
+        tried += 1
+        if not is_caught(mutant):
             survivors.append(text)
     return StatementMutants(
-        number=statement.number,
-        mutants=mutants,
-        caught=mutants - len(survivors),
+        number=number,
+        changed=changed,
+        mutants=tried,
+        caught=tried - len(survivors),
         survivors=tuple(survivors),
         equivalent=tuple(equivalent),
     )
 
 
-def _shows(statement: Statement, statements: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> bool:
-    try:
-        return not judge(statement, statements, verdicts).as_expected
-    except RequirementError:
-        return True
+def _before(statement: Statement, statements: Mapping[str, Statement]) -> dict[str, Statement]:
+    order = list(statements)
+    return {number: statements[number] for number in order[: order.index(statement.number)]}
 
 
 def _neighbours(users: Sequence[Statement], statements: Mapping[str, Statement]) -> dict[str, list[Name]]:
@@ -108,141 +178,9 @@ def _neighbours(users: Sequence[Statement], statements: Mapping[str, Statement])
         for user in users
         for statement in (user, *(statements[ground.number] for ground in user.grounds))
         for expression in (statement.symbol, *statement.members)
-        for name in _names(expression)
+        for name in names_of(expression)
     }
     by_unit: dict[str, list[Name]] = {}
     for name in sorted(near, key=str):
-        by_unit.setdefault(_unit(name), []).append(name)
+        by_unit.setdefault(unit_of(name), []).append(name)
     return by_unit
-
-
-def _unit(name: Name) -> str:
-    return QUANTITIES[name].unit if name in QUANTITIES else ""
-
-
-def _names(expression: sympy.Expr) -> set[Name]:
-    return set(expression.atoms(AppliedUndef) | expression.free_symbols)
-
-
-def _mutants(statement: Statement, neighbours: Mapping[str, list[Name]]) -> Iterator[tuple[Statement | None, str]]:
-    """Yield mutated statements with their text, or None for a change that leaves the meaning."""
-    for index, member in enumerate(statement.members):
-        # A statement used as a ground gives its last member only; of a given one the others say nothing.
-        for wrong in _mutated(member, neighbours):
-            text = f"{statement.symbol} = {sympy.sstr(wrong)}"
-            if wrong.has(statement.symbol):
-                continue
-            if _equivalent(member, wrong):
-                yield None, text
-                continue
-            yield replace(statement, members=_with(statement.members, index, wrong)), text
-    yield from _narrowed(statement)
-    if statement.condition is not None:
-        yield from _mutated_conditions(statement, statement.condition, neighbours)
-    if isinstance(statement.positive_if, Relational):
-        for side, other in ((statement.positive_if.lhs, 0), (statement.positive_if.rhs, 1)):
-            for wrong in _mutated(side, neighbours):
-                sides = (wrong, statement.positive_if.rhs) if other == 0 else (statement.positive_if.lhs, wrong)
-                claim = statement.positive_if.func(*sides)
-                if not _equivalent(side, wrong):
-                    yield replace(statement, positive_if=claim), f"{statement.symbol} > 0 exactly if {claim}"
-
-
-def _narrowed(statement: Statement) -> Iterator[tuple[Statement, str]]:
-    """Leave out a case, or what the derivation is said to hold for."""
-    for index, case in enumerate(statement.cases):
-        others = _without(statement.cases, index)
-        if others:
-            yield replace(statement, cases=others), f"without the case {case.where}"
-    for index, provision in enumerate(statement.provided):
-        yield replace(statement, provided=_without(statement.provided, index)), f"without {provision}"
-    if statement.scope:
-        yield replace(statement, scope=""), f"without its scope, {statement.scope}"
-
-
-def _mutated_conditions(
-    statement: Statement, condition: Condition, neighbours: Mapping[str, list[Name]]
-) -> Iterator[tuple[Statement, str]]:
-    for row, alternative in enumerate(condition.any_of):
-        others = _without(condition.any_of, row)
-        if others:
-            yield replace(statement, condition=replace(condition, any_of=others)), f"without condition {alternative}"
-        for column, equation in enumerate(alternative):
-            for wrong in _mutated(equation.rhs, neighbours):
-                wrong_equation = sympy.Eq(equation.lhs, wrong)
-                if _equivalent(equation.rhs, wrong) or not isinstance(wrong_equation, sympy.Eq):
-                    continue
-                changed = _with(condition.any_of, row, _with(alternative, column, wrong_equation))
-                mutant = replace(condition, any_of=changed)
-                yield replace(statement, condition=mutant), f"follows if {wrong_equation}"
-
-
-def _with(items: tuple[Any, ...], index: int, item: object) -> tuple[Any, ...]:
-    return (*items[:index], item, *items[index + 1 :])
-
-
-def _without(items: tuple[Any, ...], index: int) -> tuple[Any, ...]:
-    return (*items[:index], *items[index + 1 :])
-
-
-def _mutated(expression: sympy.Expr, neighbours: Mapping[str, list[Name]]) -> list[sympy.Expr]:
-    """Return expressions that differ by a coefficient, a sign, a term, a factor, a power, a symbol or a comparison."""
-    wrong = [2 * expression, -expression, expression + _FOREIGN] if not expression.has(sympy.Piecewise) else []
-    wrong += _changed_inside(expression, neighbours)
-    return list(dict.fromkeys(other for other in wrong if other != expression))
-
-
-def _changed_inside(expression: sympy.Basic, neighbours: Mapping[str, list[Name]]) -> list[sympy.Basic]:
-    changed = list(_changed_here(expression, neighbours))
-    if expression.is_Symbol or isinstance(expression, AppliedUndef):
-        return changed
-    for index, argument in enumerate(expression.args):
-        for wrong in _changed_inside(argument, neighbours):
-            changed.append(expression.func(*_with(expression.args, index, wrong)))
-    return changed
-
-
-def _changed_here(part: sympy.Basic, neighbours: Mapping[str, list[Name]]) -> Iterator[sympy.Basic]:
-    if part.is_Symbol or isinstance(part, AppliedUndef):
-        unit = _unit(part)
-        yield _FOREIGN
-        yield from (other for other in neighbours.get(unit, ()) if other != part)
-    elif part.is_Add:
-        yield from (part - term for term in part.args)
-        yield from (part - 2 * term for term in part.args)
-    elif part.is_Mul:
-        yield from (part / factor for factor in part.args)
-    elif part.is_Pow:
-        yield part.base ** (part.exp + 1)
-        yield part.base ** (-part.exp)
-    elif part.is_Integer and part not in (-1, 0):
-        yield part + 1
-    elif isinstance(part, Relational):
-        yield part.negated
-        yield {">": sympy.Ge, "<": sympy.Le, ">=": sympy.Gt, "<=": sympy.Lt}[part.rel_op](part.lhs, part.rhs)
-
-
-def _equivalent(original: sympy.Expr, mutant: sympy.Expr) -> bool:
-    if not original.has(sympy.Piecewise):
-        return not mutant.has(sympy.nan, sympy.zoo) and agree(original, mutant)
-    return _same_at_samples(original, mutant)
-
-
-def _same_at_samples(original: sympy.Expr, mutant: sympy.Expr) -> bool:
-    """Compare piecewise expressions at many points; small integers put enough of them on the boundaries."""
-    names = sorted(_names(original) | _names(mutant), key=str)
-    left, right = (sympy.lambdify(names, side, modules="math") for side in (original, mutant))
-    draw = random.Random(_SEED)
-    for _ in range(_SAMPLES):
-        point = [draw.randint(1, 3) if name.is_positive else draw.randint(-9, 9) for name in names]
-        values = dict(zip(names, point, strict=True))
-        if values.get(u_min, 0) > values.get(u_max, math.inf):
-            continue  # a threshold above full command: no valve
-        try:
-            expected, found = left(*point), right(*point)
-        except (ZeroDivisionError, ValueError):  # outside the domain of the formula
-            continue
-        # Where no branch of the original holds, a point is outside its domain and says nothing.
-        if expected is not None and (found is None or not math.isclose(expected, found, rel_tol=1e-12)):
-            return False
-    return True

@@ -4,9 +4,10 @@ A premise has no grounds and is taken as given; anything else follows if its gro
 of its members exactly. Where they do not, the difference is factored: it says on which condition they would.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import sympy
@@ -16,6 +17,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.conditions import Finding, judge_condition
 from dzdesign.derivation.account.coverage import branch_conditions, is_exhaustive, meets_all_branches
 from dzdesign.derivation.account.identity import agree
+from dzdesign.derivation.account.renaming import find_renaming_fault
 from dzdesign.derivation.account.solving import solve_relations
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
 from dzdesign.derivation.account.steps import Relation, Step, derive_in_steps
@@ -68,6 +70,8 @@ class Verdict:
     limited_by: tuple[str, ...] = ()
     #: What is wrong with its units; empty where they are right.
     unit_error: str = ""
+    #: What numbers say against it, which no proof can outweigh; empty where they agree.
+    objection: str = ""
 
     @property
     def number(self) -> str:
@@ -85,8 +89,14 @@ class Verdict:
         return next((sympy.factor(value) for value in differences if value != 0), None)
 
 
-def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
+#: Tries a statement that was judged, of an account given by number, on numbers; returns what they say against it.
+Hear = Callable[[Verdict, Mapping[str, Statement]], str]
+
+
+def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Verdict, ...]:
     """Judge each statement from its grounds, in order; it holds only if everything it rests on holds.
+
+    What `hear` objects to does not follow, whatever its proof.
 
     Raises
     ------
@@ -100,13 +110,17 @@ def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
     for statement in statements:
         if statement.number in earlier:
             raise RequirementError(f"{statement.number} is stated twice")
-        _check_grounds(statement, earlier, order)
-        verdicts[statement.number] = _with_units(judge(statement, earlier, verdicts))
+        check_grounds(statement, earlier, order)
+        verdict = _with_units(judge(statement, earlier, verdicts))
         earlier[statement.number] = statement
+        verdicts[statement.number] = (
+            verdict if hear is None or not verdict.as_expected else overrule(verdict, hear(verdict, earlier))
+        )
     return tuple(verdicts.values())
 
 
-def _check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
+def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
+    """Raise `RequirementError` if a statement rests on itself, a later one, an unknown one, or a copy of itself."""
     for ground in statement.grounds:
         if ground.number == statement.number:
             raise RequirementError(f"{statement.number} is its own premise")
@@ -131,6 +145,14 @@ def _with_units(verdict: Verdict) -> Verdict:
     return replace(verdict, unit_error=error, as_expected=expected)
 
 
+def overrule(verdict: Verdict, objection: str) -> Verdict:
+    """Return a verdict after the referee; with an objection the statement does not follow."""
+    if not objection:
+        return verdict
+    words = f"does not follow: {objection}"
+    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False, objection=objection)
+
+
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:
     """Judge one statement by its logic alone, from the earlier ones and their verdicts, both by number."""
 
@@ -140,7 +162,8 @@ def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapp
 
     if statement.kind.is_given:
         return verdict(Outcome.GIVEN, statement.kind.value)
-    proofs = _proofs(statement, earlier)
+    faults = (find_renaming_fault(statement, earlier[one.number], one) for one in statement.grounds)
+    proofs = next(filter(None, faults), "") or _proofs(statement, earlier)
     if isinstance(proofs, str):
         return verdict(Outcome.DOES_NOT_FOLLOW, f"does not follow: {proofs}", flawed=True)
     differences = [value for proof in proofs for value in proof.discrepancies if value != 0]
@@ -155,7 +178,7 @@ def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapp
         outcome, words = Outcome.FOLLOWS_IF, f"follows on the condition of {', '.join(inherited)}"
     elif inherited and outcome is Outcome.FOLLOWS_IF:
         words += f", and on the condition of {', '.join(inherited)}"
-    limits = tuple(dict.fromkeys(n for ground in statement.grounds for n in _limits(verdicts[ground.number])))
+    limits = tuple(dict.fromkeys(n for one in statement.grounds for n in _limits(verdicts[one.number], statement)))
     return verdict(
         outcome,
         words,
@@ -167,9 +190,11 @@ def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapp
     )
 
 
-def _limits(verdict: Verdict) -> tuple[str, ...]:
-    itself = (verdict.number,) if verdict.statement.scope or verdict.statement.provided else ()
-    return itself + verdict.limited_by
+def _limits(verdict: Verdict, user: Statement) -> tuple[str, ...]:
+    """Return which of a ground and its grounds is proved on a part that the user's scope does not say."""
+    ground = verdict.statement
+    is_said = ground.kind.is_given or (user.scope.implies(ground.scope) and not ground.provided)
+    return (() if is_said else (verdict.number,)) + verdict.limited_by
 
 
 def _conditional(verdict: Verdict) -> tuple[str, ...]:
@@ -211,7 +236,7 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
     needed: set[sympy.Ne] = set()
     for case in statement.cases_to_prove:
         replacements = dict(case.at)
-        relations = tuple(_relation(earlier[ground.number], ground, replacements) for ground in statement.grounds)
+        relations = tuple(relation_of(earlier[ground.number], ground, replacements) for ground in statement.grounds)
         provided = tuple(provision.xreplace(replacements) for provision in statement.provided)
         found = solve_relations(relations, (statement.symbol, *statement.eliminate), provided)
         if isinstance(found, str):
@@ -244,11 +269,10 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
     unneeded = [sympy.sstr(provision) for provision in statement.provided if provision not in needed]
     if unneeded:
         return f"the derivation does not need {', '.join(unneeded)}"
-    if not is_exhaustive(statement.cases, statement.within):
+    if not is_exhaustive(statement.cases, statement.scope.where):
         return "the cases leave something out"
-    limited = statement.within != sympy.true or not meets_all_branches(statement, earlier)
-    if limited != bool(statement.scope):
-        return "it does not say where it is proved" if limited else "it is proved everywhere, and says where"
+    if not statement.scope and not meets_all_branches(statement, earlier):
+        return "it does not say where it is proved"
     return tuple(proofs)
 
 
@@ -268,7 +292,10 @@ def _branch(
     return None
 
 
-def _relation(statement: Statement, ground: Ground, case: Mapping[Name, sympy.Expr]) -> Relation:
+def relation_of(
+    statement: Statement, ground: Ground, case: Mapping[Name, sympy.Expr] = MappingProxyType({})
+) -> Relation:
+    """Return a statement as a ground takes it, in a case of the statement that rests on it."""
     name, value = statement.symbol, statement.members[ground.member]
     if ground.derivative is not None:
         by, name = ground.derivative

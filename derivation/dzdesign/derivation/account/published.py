@@ -1,6 +1,6 @@
 """The numbers that the paper prints, once: exact, as printed, with where they stand."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import sympy
 
@@ -10,15 +10,19 @@ from dzdesign.derivation.symbols import *
 U_MAX_V = 10
 DP0_MPA, DP1_MPA = 1, 5  # section 2.1: the reference, and off it
 RAMP_S = 100  # sections 2.2 and 4.1: from zero to full command
-METER_FLOOR_L_MIN = sympy.Rational(6, 10)  # section 4.1, as are the next three
-#: Accuracy of the flow meter: 0.5 % of its range of 150 L/min.
-METER_ACCURACY_L_MIN = sympy.Rational(75, 100)
+METER_FLOOR_L_MIN = sympy.Rational("0.6")  # section 4.1, as are the next four
+METER_RANGE_L_MIN = "150"
+METER_ACCURACY_PERCENT = "0.5"
+#: Accuracy of the flow meter, of its range.
+METER_ACCURACY_L_MIN = sympy.Rational(METER_RANGE_L_MIN) * sympy.Rational(METER_ACCURACY_PERCENT) / 100
 RECORDS_HZ = 100
 #: "About", of the first valve at 5 MPa.
 ABOUT_LARGEST_L_MIN = "27"
 #: Section 3: duty cycles at a command of 2 V without (Fig. 12) and with the compensator (Fig. 13), per cent.
 DUTY_COMMAND_V = 2
 DUTY_WITHOUT_PERCENT, DUTY_WITH_PERCENT = "20", "55"
+#: Eqs. (29)-(31): largest code of the converter, full scale at its pin, counts per volt there.
+LARGEST_CODE, PIN_V, COUNTS_PER_PIN_VOLT = "4095", "3", "1365"
 #: Section 4.2: commands from which on the first valve's curves with compensator are flat, V.
 SATURATED_FROM_V = ("8", "8.5")
 #: Section 4.3: change of the dead zone with the oil's temperature, over 1000; which temperatures, the text leaves open.
@@ -117,3 +121,42 @@ SECOND = PublishedValve(
     residual_percent="1",
 )
 VALVES = (SIMULATION, FIRST, SECOND)
+
+
+def transcribed() -> dict[str, str]:
+    """Return every number of this module as the paper prints it, by what it is and where it stands."""
+    numbers = {
+        "full command": str(U_MAX_V),
+        "dP0": str(DP0_MPA),
+        "dP1": str(DP1_MPA),
+        "duration of the ramp": str(RAMP_S),
+        "meter's floor": str(METER_FLOOR_L_MIN.evalf(2)).rstrip("0"),
+        "meter's range": METER_RANGE_L_MIN,
+        "meter's accuracy": METER_ACCURACY_PERCENT,
+        "rate of the records": str(RECORDS_HZ),
+        "largest flow, about": ABOUT_LARGEST_L_MIN,
+        "command of the duty cycles": str(DUTY_COMMAND_V),
+        "duty cycle without": DUTY_WITHOUT_PERCENT,
+        "duty cycle with": DUTY_WITH_PERCENT,
+        "largest code": LARGEST_CODE,
+        "volts at the pin": PIN_V,
+        "counts per volt, (30)": COUNTS_PER_PIN_VOLT,
+        "counts per volt, (31)": COUNTS_PER_PIN_VOLT,
+        "flat from": SATURATED_FROM_V[0],
+        "flat from, at most": SATURATED_FROM_V[1],
+        "change with temperature": TEMPERATURE_CHANGE_PER_MILLE,
+    }
+    for valve in VALVES:
+        for field in fields(valve):
+            value = getattr(valve, field.name)
+            if value and field.name not in ("name", "where"):
+                numbers[f"{valve.name}, {field.name}"] = value
+    # The paper prints these two as changes from dP0.
+    for change, first, second in (
+        ("stroke", "stroke0_mm", "stroke1_mm"),
+        ("displacement dead zone", "displacement_dead_zone0_percent", "displacement_dead_zone1_percent"),
+    ):
+        before, after = (sympy.Rational(numbers[f"simulation, {name}"]) for name in (first, second))
+        numbers[f"simulation, change of {change}"] = str(float(abs(after - before))).removesuffix(".0")
+        del numbers[f"simulation, {second}"]
+    return numbers

@@ -6,9 +6,10 @@ from enum import StrEnum
 from typing import Any
 
 import sympy
-from sympy.logic.boolalg import Boolean
+from sympy.core.function import AppliedUndef
 
-from dzdesign.derivation.symbols import Name
+from dzdesign.derivation.account.scope import EVERYWHERE, Scope
+from dzdesign.derivation.symbols import AT_PRESSURE_DROPS, Name, dP, f, headroom
 
 Replacements = tuple[tuple[Name, sympy.Expr], ...]
 
@@ -64,8 +65,6 @@ class Ground:
     #: What replaces its symbols, all at once: ``((dP, dP0),)`` takes it at the reference pressure drop. Values whose
     #: signs SymPy knows also decide between the cases of a piecewise statement.
     at: Replacements = ()
-    #: The same in words.
-    where: str = ""
     _: KW_ONLY
     #: Which of its right-hand sides is used: the last, unless said otherwise.
     member: int = -1
@@ -74,7 +73,39 @@ class Ground:
     derivative: tuple[sympy.Symbol, Name] | None = None
 
     def __str__(self) -> str:
-        return f"{self.number} {self.where}" if self.where else self.number
+        words = (part if isinstance(part, str) else sympy.sstr(part) for part in self.qualified())
+        return " ".join([self.number, *words])
+
+    def qualified(self) -> tuple[str | sympy.Basic, ...]:
+        """Say at which values it is used, from the values themselves: words and formulas in a row."""
+        parts: list[str | sympy.Basic] = []
+        if self.member >= 0:
+            parts.append(f"right-hand side {self.member + 1}")
+        if self.derivative is not None:
+            parts += ["differentiated by", self.derivative[0]]
+        if any(value.has(AppliedUndef) and not value.has(f) for _, value in self.at):
+            return (*parts, "under the Laplace transform")
+        index = pressure_index(self.at)
+        if index is not None:
+            parts += ["at", sympy.Eq(dP, AT_PRESSURE_DROPS[dP][index])]
+        for name, value in self.at:
+            if name == value or (index is not None and AT_PRESSURE_DROPS.get(name, (None, None))[index] == value):
+                continue
+            # A distance of its own only says which case it is.
+            limit = sympy.Le(value - headroom, name) if value.has(headroom) else None
+            parts += ["for", limit] if limit is not None else ["with", value, "for", name]
+        return tuple(parts)
+
+
+def pressure_index(at: Replacements) -> int | None:
+    """Return at which of the two pressure drops replacements take what depends on it: 0, 1, or None at none."""
+    found = {
+        index
+        for name, value in at
+        for index in (0, 1)
+        if name in AT_PRESSURE_DROPS and value == AT_PRESSURE_DROPS[name][index]
+    }
+    return found.pop() if len(found) == 1 else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,10 +207,8 @@ class Statement:
     condition: Condition | None = None
     #: The claim that the left-hand side is positive exactly if this holds.
     positive_if: sympy.core.relational.Relational | None = None
-    #: Where it is proved, in words, if its cases and the branches of its grounds do not cover everything.
-    scope: str = ""
-    #: The comparisons that limit the cases, if the scope does: together with them the cases leave nothing out.
-    within: Boolean = sympy.true
+    #: Where it is meant to hold. Its cases must cover all of that, and the referee (`referee/`) tries it only there.
+    scope: Scope = EVERYWHERE
     #: What must differ for the derivation, which divides by the difference.
     provided: tuple[sympy.Ne, ...] = ()
     #: What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.

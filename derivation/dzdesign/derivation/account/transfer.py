@@ -3,6 +3,8 @@
 import sympy
 
 from dzdesign.derivation.account.equations import ORIFICE
+from dzdesign.derivation.account.published import SIMULATION
+from dzdesign.derivation.account.scope import BARE, EVERYWHERE, PLANT, scope
 from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement
 from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
 from dzdesign.derivation.symbols import *
@@ -23,7 +25,9 @@ _TITLES = {
 def _premise(number: str) -> Statement:
     title, note = _TITLES[number]
     equation = PLANT_EQUATIONS[number]
-    return Kind.PREMISE(number, title, equation.lhs, equation.rhs, see=("T6d",) if number == "(24)" else (), note=note)
+    # Beyond the simulation model a valve has a dead zone, which (24) has not.
+    where, see = (scope(PLANT), ("T6d",)) if number == "(24)" else (EVERYWHERE, ())
+    return Kind.PREMISE(number, title, equation.lhs, equation.rhs, scope=where, see=see, note=note)
 
 
 def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
@@ -62,7 +66,7 @@ def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
     terms = sympy.Poly(equation.lhs - equation.rhs, *signals).monoms()
     if any(sum(powers) != 1 for powers in terms):
         raise ValueError(f"{number} is not linear in {signals}")
-    return Ground(number, LAPLACE, where)
+    return Ground(number, LAPLACE)
 
 
 #: Section 2.1.
@@ -109,7 +113,6 @@ SIMULATION_MODEL = (
             Ground(
                 "(24)",
                 ((Q, Q_s), (x_e, X_e.func(s + a))),
-                "transformed, with dP falling as exp(-2 a t), so that x_e exp(-a t) becomes X_e(s + a)",
             ),
         ),
         condition=Condition(
@@ -126,6 +129,8 @@ SIMULATION_MODEL = (
     ),
 )
 
+#: Section 2.2: the share of the simulated spool's travel that is dead.
+_OVERLAP_MM = sympy.Rational(SIMULATION.stroke0_mm) * sympy.Rational(SIMULATION.displacement_dead_zone0_percent) / 100
 _RESISTANCE = R_c + r_p + K_a * K_fi
 
 #: Theorem 6.
@@ -136,7 +141,7 @@ TRANSFER_FUNCTION = (
         I_s,
         K_a * U_i / (_RESISTANCE + L_c * s),
         K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s),
-        grounds=(Ground("(25)", member=0, where="left side"), Ground("(25)", member=1, where="right side")),
+        grounds=(Ground("(25)", member=0), Ground("(25)", member=1)),
         eliminate=(U_e,),
         expected=Outcome.FOLLOWS_IF,
         note="Time constant L_c / (R_c + r_p + K_a K_fi): the feedback makes the coil faster by the factor "
@@ -148,10 +153,11 @@ TRANSFER_FUNCTION = (
         "transfer function of Eqs. (19)-(24) without load force",
         G,
         ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
+        scope=scope(sympy.Eq(F_eL, 0)),
         grounds=(
             "transfer function",
             "(28)",
-            Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),), where="right side, F_eL = 0"),
+            Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),)),
             "(26)",
             "T6a",
         ),
@@ -164,26 +170,28 @@ TRANSFER_FUNCTION = (
         "static gain from command to flow",
         G_0,
         ORIFICE * K_i * K_a / (_RESISTANCE * K_et),
-        grounds=(Ground("T6b", ((G, G_0), (s, sympy.S.Zero)), "at s = 0"),),
+        grounds=(Ground("T6b", ((G, G_0), (s, sympy.S.Zero))),),
         expected=Outcome.FOLLOWS_IF,
         note="By the final value theorem, which the stability of T6b allows.",
     ),
-    Kind.DEFINITION("overlap", "opening of the edge: travel beyond the overlap", x, x_e - x_ov),
+    Kind.DEFINITION(
+        "overlap", "opening of the edge: travel beyond the overlap", x, x_e - x_ov, scope=scope(u_min <= u_O)
+    ),
     Kind.THEOREM(
         "T6d",
         "Eq. (24) is the dead-zone model (1) beyond the threshold",
         Q,
         ORIFICE * x_e,
-        scope="a command from the threshold to full command",
+        scope=scope(BARE, u_min <= u_i),
         grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)), "beyond the threshold"),
+            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
             "overlap",
         ),
         eliminate=(x,),
         # Section 2.2: the simulated spool's dead zone is 54 % of its 1.8 mm.
         condition=Condition(
             any_of=((sympy.Eq(x_ov, 0),),),
-            ruled_out_by=((x_ov, sympy.Rational(972, 10**6)),),
+            ruled_out_by=((x_ov, _OVERLAP_MM / 1000),),
             discrepancy=-ORIFICE * x_ov,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
@@ -196,9 +204,9 @@ TRANSFER_FUNCTION = (
         "flow across an edge with overlap, opened",
         Q,
         ORIFICE * (x_e - x_ov),
-        scope="a command from the threshold to full command",
+        scope=scope(BARE, u_min <= u_i),
         grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)), "beyond the threshold"),
+            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
             "overlap",
         ),
         eliminate=(x,),

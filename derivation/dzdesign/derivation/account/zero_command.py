@@ -3,6 +3,15 @@
 import sympy
 
 from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION
+from dzdesign.derivation.account.scope import (
+    AT_ZERO_COMMAND,
+    BARE,
+    FREE_BETA,
+    FREE_OPENING,
+    LAW_OFF_REFERENCE,
+    UP_TO_REFERENCE,
+    scope,
+)
 from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *
@@ -17,26 +26,18 @@ _THREE_CASES = (
 
 #: Theorem 3: zero command.
 ZERO_COMMAND = (
-    Kind.ASSUMPTION(
-        "opening",
-        "opening on both sides of the threshold",
-        x,
-        sympy.Piecewise(((u_O - u_min) / k, u_min <= u_O), (0, u_O < u_min)),
-        note="Eq. (11) with Fig. 3 beyond the threshold; closed before it, as Eq. (1) says.",
-    ),
     Kind.THEOREM(
         "T3a",
         "flow at zero command",
         Q,
         sympy.Piecewise((0, u_min1 > _OFFSET), (gamma_1 * (_OFFSET - u_min1) / k, u_min1 <= _OFFSET)),
-        scope="beta u_min0 <= u_max",
+        scope=scope(FREE_BETA, beta * u_min0 <= u_max) & AT_ZERO_COMMAND,
         grounds=(
             Ground(
                 "(1)",
                 ((dP, dP1), (u_i, _OFFSET), (u_min, u_min1), (u_max, _OFFSET + headroom)),
-                "at dP = dP1 and the law's output for u_i = 0, beta u_min0 (L1)",
             ),
-            Ground("opening", ((u_O, _OFFSET), (u_min, u_min1)), "at the same command"),
+            Ground("opening", ((u_O, _OFFSET), (u_min, u_min1))),
             "gamma_1",
         ),
         eliminate=(x, gamma_1),
@@ -45,31 +46,14 @@ ZERO_COMMAND = (
         note="So zero command passes no flow exactly if beta u_min0 <= u_min(dP). Both laws have this offset.",
     ),
     Kind.THEOREM(
-        "largest flow",
-        "largest flow at dP1 without compensator",
-        Q_max1,
-        gamma_1 * (u_max - u_min1) / k,
-        scope="u_min1 <= u_max, and the spool has not met its stop",
-        within=u_min1 <= u_max,
-        grounds=(
-            Ground("(1)", ((Q, Q_max1), (dP, dP1), (u_min, u_min1), (u_i, u_max)), "at dP = dP1, full command"),
-            Ground("opening", ((u_O, u_max), (u_min, u_min1)), "at full command"),
-            "gamma_1",
-        ),
-        eliminate=(x, gamma_1),
-        cases=(Case(((u_max, u_min1 + headroom),), ""),),
-        note="As long as the spool has not met its stop.",
-    ),
-    Kind.THEOREM(
         "T3b",
         "flow at zero command without beta, for a threshold lower than at the reference",
         Q,
         gamma_1 * (u_min0 - u_min1) / k,
         Q_max1 * (u_min0 - u_min1) / (u_max - u_min1),
         provided=(sympy.Ne(u_max, u_min1),),
-        scope="u_min1 < u_min0, a threshold lower than at the reference",
-        within=u_min1 < u_min0,
-        grounds=(Ground("T3a", ((beta, sympy.S.One),), "at beta = 1"), "largest flow"),
+        scope=scope(FREE_BETA, FREE_OPENING, sympy.Eq(beta, 1), u_min1 < u_min0) & AT_ZERO_COMMAND,
+        grounds=(Ground("T3a", ((beta, sympy.S.One),)), "largest flow"),
         eliminate=(gamma_1,),
         cases=(Case(((u_min1, u_min0 - excess),), "threshold lower than at the reference"),),
         see=("T9d",),
@@ -99,8 +83,8 @@ ZERO_COMMAND = (
         f(dP1) / f(dP0),
         grounds=(
             "(5)",
-            Ground("(4)", ((u_min, u_min0), (dP, dP0)), "at dP = dP0"),
-            Ground("(4)", ((u_min, u_min1), (dP, dP1)), "at dP = dP1"),
+            Ground("(4)", ((u_min, u_min0), (dP, dP0))),
+            Ground("(4)", ((u_min, u_min1), (dP, dP1))),
         ),
         eliminate=(u_min0, u_min1),
     ),
@@ -109,10 +93,11 @@ ZERO_COMMAND = (
         "with beta by Eq. (5), zero command stands at the threshold of the present pressure drop",
         u_O,
         f(dP1),
+        scope=LAW_OFF_REFERENCE & AT_ZERO_COMMAND,
         grounds=(
-            Ground("(18)", ((u_i, sympy.S.Zero),), "at u_i = 0"),
+            Ground("(18)", ((u_i, sympy.S.Zero),)),
             "beta(dP)",
-            Ground("(4)", ((u_min, u_min0), (dP, dP0)), "at dP = dP0"),
+            Ground("(4)", ((u_min, u_min0), (dP, dP0))),
         ),
         eliminate=(beta, u_min0),
         note="Nothing is left for an error of the threshold: a design needs a guard.",
@@ -126,7 +111,7 @@ SHAPE = (
         "slope of the law (18)",
         slope,
         1 - beta * (1 - k * x_max / u_max),
-        grounds=(Ground("(18)", derivative=(u_i, slope), where="differentiated by u_i"),),
+        grounds=(Ground("(18)", derivative=(u_i, slope)),),
         positive_if=beta * (1 - k * x_max / u_max) < 1,
         note="Holds for every beta <= 1. The law `target` always rises.",
     ),
@@ -136,11 +121,11 @@ SHAPE = (
         "the selector (7) is continuous at dP0",
         jump,
         sympy.S.Zero,
-        scope="dP1 just above dP0",
+        scope=scope(FREE_BETA, dP0 < dP1),
         grounds=(
             "jump",
-            Ground("L2", ((u_O, u_above), (dP1, dP0 + above)), "just above dP0"),
-            Ground("(14)", ((u_O, u_below),), "at dP0"),
+            Ground("L2", ((u_O, u_above), (dP1, dP0 + above))),
+            Ground("(14)", ((u_O, u_below),)),
         ),
         eliminate=(u_above, u_below),
         condition=Condition(
@@ -157,7 +142,8 @@ SHAPE = (
         "dead zone that is left below the reference",
         u_dz,
         (u_min - u_min0) * u_max / (k * x_max),
-        grounds=(Ground("(14)", ((u_O, u_min), (u_i, u_dz)), "where its output reaches the threshold, dP <= dP0"),),
+        scope=UP_TO_REFERENCE,
+        grounds=(Ground("(14)", ((u_O, u_min), (u_i, u_dz))),),
         values=(
             Value(
                 "for a threshold 1 % of u_max above u_min0, first valve",
@@ -173,13 +159,12 @@ SHAPE = (
         "the opposite command gives the opposite flow",
         Q_neg,
         -Q,
-        scope="|u_i| from the threshold to full command",
+        scope=scope(BARE, u_min <= u_i),
         grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom)), "at u_min + u_i'"),
+            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
             Ground(
                 "(1)",
                 ((Q, Q_neg), (u_i, -u_min - u_i_prime), (u_max, u_min + u_i_prime + headroom)),
-                "at -(u_min + u_i')",
             ),
         ),
         eliminate=(Q,),
@@ -190,9 +175,8 @@ SHAPE = (
         "no flow inside the dead zone, on either side",
         Q,
         sympy.S.Zero,
-        scope="|u_i| below the threshold",
-        within=(-u_min < u_i) & (u_i < u_min),
-        grounds=(Ground("(1)", ((u_max, u_min + headroom),)),),
+        scope=scope(BARE, -u_min < u_i, u_i < u_min),
+        grounds=("(1)",),
         cases=(
             Case(((u_i, y), (u_min, y + guard)), "0 <= u_i < u_min"),
             Case(((u_i, -y), (u_min, y + guard)), "-u_min < u_i <= 0"),

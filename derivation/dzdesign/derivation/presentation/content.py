@@ -73,6 +73,7 @@ class Entry:
     holds: Annotated[bool, Meta(description="Whether other statements may rest on it.")]
     verdict: Annotated[str, Meta(description="What was found, in words.")]
     judgement: Annotated[Words, Meta(description="The same in sentences; empty: the outcome says it all.")]
+    rearranges: Annotated[bool, Meta(description="Whether it only rearranges a definition or one premise.")]
     any_of: Annotated[tuple[tuple[Formula, ...], ...], Meta(description="Alternative conditions on which it follows.")]
     ruled_out_by: Annotated[tuple[Formula, ...], Meta(description="Published values at which none of these holds.")]
     necessary: Annotated[bool | None, Meta(description="Whether that is proved necessary; null: no condition.")]

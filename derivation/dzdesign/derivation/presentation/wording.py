@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 import sympy
 
 from dzdesign.derivation.account.proof import CaseProof, Verdict
+from dzdesign.derivation.account.rearrangement import is_rearrangement
 from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Replacements, Statement, Value
 from dzdesign.derivation.account.steps import Relation, Step
 from dzdesign.derivation.presentation.content import Derivation, Entry, Figure, Line, Premise
@@ -39,6 +40,7 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         holds=verdict.holds,
         verdict=verdict.words,
         judgement=Words.join(_sentences(verdict, book), " "),
+        rearranges=is_rearrangement(verdict, book),
         any_of=tuple(tuple(map(Formula, alternative)) for alternative in condition.any_of) if condition else (),
         ruled_out_by=tuple(Formula(*pair) for pair in condition.ruled_out_by) if condition else (),
         necessary=verdict.necessary,
@@ -75,18 +77,18 @@ def _refer_to_all(numbers: tuple[str, ...], book: Mapping[str, Verdict]) -> Word
 
 
 def _ground(ground: Ground, book: Mapping[str, Verdict]) -> Words:
-    where = (" ", parse_prose(ground.where, book)) if ground.where else ()
-    return Words(refer(book[ground.number].statement), *where)
+    parts = (one if isinstance(one, str) else _formula(one) for one in ground.qualified())
+    return Words.join((refer(book[ground.number].statement), *parts), " ")
+
+
+def _formula(comparison: sympy.Basic) -> Formula:
+    """Return a formula; an equation as its two sides."""
+    return Formula(*comparison.args) if isinstance(comparison, sympy.Eq) else Formula(comparison)
 
 
 def _premise(ground: Ground, book: Mapping[str, Verdict]) -> Premise:
     """Refer to a ground, with what replaces its symbols."""
-    words = _ground(ground, book)
-    replaced = tuple((name, value) for name, value in _used(ground, book) if f"{name} = {value}" not in ground.where)
-    if replaced and not ground.where.startswith("with "):
-        made = Words.join(Words(Formula(value), " for ", Formula(name)) for name, value in replaced)
-        words = Words(words, " (", made, ")")
-    return Premise(number=ground.number, at=tuple(Formula(*pair) for pair in ground.at), words=words)
+    return Premise(number=ground.number, at=tuple(Formula(*pair) for pair in ground.at), words=_ground(ground, book))
 
 
 def _used(ground: Ground, book: Mapping[str, Verdict]) -> Replacements:
@@ -115,10 +117,11 @@ def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]
 def _scope(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]:
     """Say where a statement is proved, if not everywhere."""
     statement = verdict.statement
-    limits: list[Part] = [parse_prose(statement.scope, book)] if statement.scope else []
-    limits += map(Formula, statement.provided)
+    limits: list[Part] = [parse_prose(setting.words, book) for setting in statement.scope.settings]
+    limits += map(_formula, (*statement.scope.comparisons, *statement.provided))
     if limits:
-        yield Words("Proved for ", Words.join(limits, " and "), ".")
+        given = "Stated" if statement.kind.is_given else "Proved"
+        yield Words(f"{given} for ", Words.join(limits, " and "), ".")
     if verdict.limited_by:
         yield Words("As far as is proved of ", _refer_to_all(verdict.limited_by, book), ".")
 

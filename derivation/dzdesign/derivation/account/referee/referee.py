@@ -1,0 +1,92 @@
+"""Tries a statement on every valve and in every situation in which it is meant to hold.
+
+A statement that is proved must be true there, and so must each ground, taken as the statement takes it: then a proof
+can't join what never holds together. One that follows on a condition must be true where that holds, false somewhere
+else; one that does not follow must be false somewhere.
+"""
+
+from collections.abc import Mapping
+
+import sympy
+
+from dzdesign.derivation.account.proof import Verdict, relation_of
+from dzdesign.derivation.account.referee.evaluation import NoNumberError, agree, evaluate, holds
+from dzdesign.derivation.account.referee.situations import Situation, situations
+from dzdesign.derivation.account.statement import Statement
+
+
+def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
+    """Try a judged statement of an account, given by number; return what the numbers say against it, if anything."""
+    statement = verdict.statement
+    places = [one for one in situations() if _admits(statement, one) and _conditions_hold(verdict, statements, one)]
+    if not places:
+        return f"no valve is ever in its scope ({statement.scope or 'everywhere'})"
+    tried, is_refuted = False, False
+    for place in places:
+        objection = _ground_objection(statement, statements, place)
+        if objection:
+            return objection
+        try:
+            wrong = _difference(statement, place)
+            meets = _meets(statement, place)
+        except NoNumberError:
+            continue
+        tried = True
+        if wrong and verdict.holds and meets:
+            return f"{wrong}: {place.words}"
+        is_refuted = is_refuted or bool(wrong)
+    if not tried:
+        return f"no situation of its scope ({statement.scope or 'everywhere'}) has numbers for its symbols"
+    if not is_refuted and (statement.condition is not None or not verdict.holds):
+        return "it is true of every valve, also where it should not follow"
+    return ""
+
+
+def _admits(statement: Statement, place: Situation) -> bool:
+    try:
+        return (
+            statement.scope.admits(place.settings)
+            and holds(statement.scope.where, place)
+            and all(holds(provision, place) for provision in statement.provided)
+        )
+    except NoNumberError:
+        return False
+
+
+def _conditions_hold(verdict: Verdict, statements: Mapping[str, Statement], place: Situation) -> bool:
+    """Whether the conditions hold on which the grounds follow, and theirs."""
+    try:
+        return all(_meets(statements[number], place) for number in verdict.inherited)
+    except NoNumberError:
+        return False
+
+
+def _meets(statement: Statement, place: Situation) -> bool:
+    condition = statement.condition
+    if condition is None:
+        return True
+    return any(all(holds(equation, place) for equation in alternative) for alternative in condition.any_of)
+
+
+def _ground_objection(statement: Statement, statements: Mapping[str, Statement], place: Situation) -> str:
+    for ground in statement.grounds:
+        relation = relation_of(statements[ground.number], ground)
+        try:
+            left, right = evaluate(relation.left, place), evaluate(relation.right, place)
+        except NoNumberError:
+            continue
+        if not agree(left, right):
+            return f"its ground {ground} does not hold in its scope ({left:.6g}, {right:.6g}): {place.words}"
+    return ""
+
+
+def _difference(statement: Statement, place: Situation) -> str:
+    """Say which member differs from the symbol; nothing if none does."""
+    left = evaluate(statement.symbol, place)
+    for member in statement.members:
+        right = evaluate(member, place)
+        if not agree(left, right):
+            return f"{sympy.sstr(statement.symbol)} is {left:.6g} and not {right:.6g}"
+    if statement.positive_if is not None and (left > 1e-9) != holds(statement.positive_if, place):
+        return f"{sympy.sstr(statement.symbol)} is {left:.6g}, but {statement.positive_if} says otherwise"
+    return ""

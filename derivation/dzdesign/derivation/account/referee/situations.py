@@ -1,0 +1,253 @@
+"""The situations in which statements are tried: a valve, a pressure drop, what drives it, a command; and every symbol's
+number there.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import sympy
+
+from dzdesign.derivation import symbols as s
+from dzdesign.derivation.account.referee.plain_plant import PLANTS, PlainPlant
+from dzdesign.derivation.account.referee.valve import VALVES, PlainValve
+from dzdesign.derivation.account.scope import (
+    BARE,
+    CODES_AT_PIN,
+    CODES_OF_COMMAND,
+    FIXED_OPENING,
+    FREE_BETA,
+    FREE_OPENING,
+    PLANT,
+    Setting,
+    under_law,
+)
+from dzdesign.derivation.law import law
+from dzdesign.derivation.laws import LAW_NAMES
+
+_N_ADC, _V_ADC, _N_FULL, _SCALE = 4096.0, 3.0, 1024.0, 1.5
+_STEP = 1e-5  # of a difference quotient
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Situation:
+    """What is set up, and the numbers there."""
+
+    words: str
+    settings: frozenset[Setting]
+    numbers: Mapping[s.Name, float]
+    #: Of functions, such as f(dP) and X_e(s).
+    functions: Mapping[sympy.core.function.UndefinedFunction, Callable[[float], float]]
+
+
+@cache
+def situations() -> tuple[Situation, ...]:
+    """Return all of them."""
+    found = [one for valve in VALVES for one in _of_valve(valve)]
+    return (*found, *(_of_plant(valve, plant, dP) for valve in VALVES for plant in PLANTS for dP in _drops(valve)))
+
+
+def _drops(valve: PlainValve) -> tuple[float, ...]:
+    """The two pressure drops, one below both and one above."""
+    return valve.dP0, valve.dP1, 0.5 * min(valve.dP0, valve.dP1), 2 * max(valve.dP0, valve.dP1)
+
+
+def _of_valve(valve: PlainValve) -> Iterator[Situation]:
+    top = valve.u_max
+    seen0 = valve.command_for(valve.Q_floor, valve.dP0)
+    for dP in _drops(valve):
+        beta = valve.threshold(valve.dP1) / valve.threshold(valve.dP0)
+        for u_i in (0.0, 1.5, seen0, 6.25, top, -1.5, -6.25, -top):
+            yield _situation(valve, dP, u_i, BARE, beta, u_i)
+        for u_i in (0.0, 0.5, 2.0, top):
+            offset = valve.threshold(dP)
+            yield _situation(valve, dP, u_i, under_law("paper"), beta, _paper_drive(valve, dP, u_i))
+            follows = valve.k * valve.x_max / valve.u_max * u_i + offset
+            yield _situation(valve, dP, u_i, under_law("target"), beta, follows)
+            for name in sorted({*LAW_NAMES} - {"paper", "target"}):
+                ratio, kappa = offset / valve.u_min0, valve.k * valve.x_max / valve.u_max
+                drive = law(name).evaluate_gain(ratio, kappa) * u_i + law(name).evaluate_offset(ratio, valve.u_min0)
+                yield _situation(valve, dP, u_i, under_law(name), beta, drive)
+            if dP == valve.dP1:
+                for free in (0.5, 1.0, 1.25):
+                    drive = u_i + free * (_reference_drive(valve, u_i) - u_i)
+                    yield _situation(valve, dP, u_i, FREE_BETA, free, drive)
+
+
+@cache
+def _reference_drive(valve: PlainValve, u_i: float) -> float:
+    """Command at which the valve passes the wanted flow at dP0: the line through the flow at full command."""
+    wanted = valve.C_d * valve.W * valve.x_max * math.sqrt(2 * valve.dP0 / valve.rho) * u_i / valve.u_max
+    return valve.command_for(wanted, valve.dP0)
+
+
+def _paper_drive(valve: PlainValve, dP: float, u_i: float) -> float:
+    """The paper's choice: the compensation signal of dP0, times the ratio of thresholds above dP0."""
+    share = valve.threshold(dP) / valve.u_min0 if dP > valve.dP0 else 1.0
+    return u_i + share * (_reference_drive(valve, u_i) - u_i)
+
+
+def _situation(valve: PlainValve, dP: float, u_i: float, drive: Setting, beta: float, u_O: float) -> Situation:
+    spool = FIXED_OPENING if valve.has_stop else FREE_OPENING
+    codes = CODES_AT_PIN if u_i == 2.0 else CODES_OF_COMMAND
+    numbers = {
+        **_constants(valve),
+        **_at_drop(valve, dP),
+        **_of_flow(valve, dP, u_i, u_O),
+        **_of_drive(valve, u_i, u_O, beta, drive, codes),
+    }
+    return Situation(
+        words=f"valve with {valve.name}, {drive.words}, dP = {dP:g}, u_i = {u_i:g}, beta = {beta:g}",
+        settings=frozenset((drive, spool, codes)),
+        numbers=numbers,
+        functions={s.f: valve.threshold},
+    )
+
+
+@cache
+def _constants(valve: PlainValve) -> dict[s.Name, float]:
+    numbers: dict[s.Name, float] = {}
+    for index, dP in ((0, valve.dP0), (1, valve.dP1)):
+        numbers |= {names[index]: value for names, value in _of_drop(valve, dP).items()}
+    per_opening = valve.C_d * valve.W / math.sqrt(valve.rho / 2)
+    return {
+        **numbers,
+        **{s.u_max: valve.u_max, s.k: valve.k, s.x_max: valve.x_max, s.Q_floor: valve.Q_floor},
+        **{s.C_d: valve.C_d, s.W: valve.W, s.rho: valve.rho, s.scale: _SCALE},
+        s.kappa: valve.k * valve.x_max / valve.u_max,
+        s.gamma_0: per_opening * math.sqrt(valve.dP0),
+        s.gamma_1: per_opening * math.sqrt(valve.dP1),
+        s.fall: numbers[s.u_seen0] - numbers[s.u_seen1],
+        s.n: math.log(numbers[s.Q_max1] / numbers[s.Q_max0]) / math.log(valve.dP1 / valve.dP0),
+        s.q_x: valve.k * valve.x_max,
+        # Distances that only decide between cases.
+        **{s.headroom: 0.5, s.guard: 0.25, s.excess: 0.25, s.above: 0.5, s.below: 0.5, s.rest: 0.5},
+        **{s.n_adc: _N_ADC, s.V_adc: _V_ADC, s.n_V: _N_ADC / _V_ADC, s.n_full: _N_FULL},
+    }
+
+
+@cache
+def _of_drop(valve: PlainValve, dP: float) -> dict[tuple[s.Name, s.Name], float]:
+    """What depends on the pressure drop, by its names at dP0 and dP1."""
+    threshold, largest = valve.threshold(dP), valve.flow(valve.u_max, dP)
+    return {
+        (s.dP0, s.dP1): dP,
+        (s.u_min0, s.u_min1): threshold,
+        (s.u_seen0, s.u_seen1): valve.command_for(valve.Q_floor, dP),
+        (s.K_0, s.K_1): largest / valve.u_max,
+        (s.Q_max0, s.Q_max1): largest,
+        (s.s_flow0, s.s_flow1): (valve.flow(threshold + 0.5, dP) - valve.flow(threshold + 0.25, dP)) / 0.25,
+    }
+
+
+@cache
+def _at_drop(valve: PlainValve, dP: float) -> dict[s.Name, float]:
+    generic = {names: name for name, names in s.AT_PRESSURE_DROPS.items()}
+    threshold = valve.threshold(dP)
+    u_1, u_2 = threshold + 0.25, threshold + 1.0
+    samples = {s.u_1: u_1, s.u_2: u_2, s.Q_1: valve.flow(u_1, dP), s.Q_2: valve.flow(u_2, dP)}
+    # A straight line in the command, from two of its points.
+    low, high = (_paper_drive(valve, dP, u) for u in (0.25, 1.25))
+    left = 0.25 + (threshold - low) / (high - low)
+    return {generic[names]: value for names, value in _of_drop(valve, dP).items()} | samples | {s.u_dz: left}
+
+
+def _of_flow(valve: PlainValve, dP: float, u_i: float, u_O: float) -> dict[s.Name, float]:
+    def flow(**changes: Any) -> float:
+        return replace(valve, **changes).flow(u_O, dP)
+
+    def sensitivity(name: str) -> float:
+        value = getattr(valve, name)
+        return (flow(**{name: value + _STEP}) - flow(**{name: value - _STEP})) / (2 * _STEP)
+
+    x, overlap = valve.opening(u_O, dP), 0.375
+    scaled = flow(C_d=_SCALE * valve.C_d, k=_SCALE * valve.k, x_max=valve.x_max / _SCALE)
+    beyond = abs(u_O) - valve.threshold(dP)
+    wanted = {
+        name: valve.flow(valve.u_max, at) / valve.u_max * u_i
+        for name, at in ((s.Q_w, dP), (s.Q_O, valve.dP0), (s.Q_O_prime, valve.dP1))
+    }
+    return {
+        **{s.u_i: u_i, s.u_O: u_O, s.Q: flow(), s.Q_neg: valve.flow(-u_O, dP), s.Q_scaled: scaled, **wanted},
+        **{s.x: x, s.x_ov: overlap, s.x_e: x + overlap if beyond >= 0 else overlap + beyond / valve.k},
+        **{s.u_i_prime: max(0.0, beyond), s.y: abs(beyond)},
+        s.dQ_dC_d: sensitivity("C_d"), s.dQ_dk: sensitivity("k"), s.dQ_dx_max: sensitivity("x_max"),
+    }  # fmt: skip
+
+
+def _of_drive(
+    valve: PlainValve, u_i: float, u_O: float, beta: float, drive: Setting, codes: Setting
+) -> dict[s.Name, float]:
+    pin = _V_ADC * u_i / valve.u_max
+    numbers = {
+        **{
+            s.beta: beta,
+            s.drive_left: valve.u_max - u_O,
+            s.duty: u_O / valve.u_max,
+            s.n_pwm: _N_FULL * u_O / valve.u_max,
+        },
+        **{s.V_pin: pin, s.n_i: _N_ADC * pin / _V_ADC, s.K_c: valve.u_max / _N_ADC * (1.0 if u_i != 0.5 else 1.25)},
+    }
+    if u_i < 0:
+        return numbers
+    signal = _reference_drive(valve, u_i) - u_i
+    numbers |= {s.u_0: signal, s.u_above: u_i + beta * signal, s.u_below: u_i + signal, s.jump: (beta - 1) * signal}
+    step = 0.25
+    slope = (_reference_drive(valve, step) - _reference_drive(valve, 0.0)) / step
+    per_volt = _N_ADC / (_V_ADC if codes == CODES_AT_PIN else valve.u_max)
+    numbers |= {s.slope: 1 + beta * (slope - 1), s.n_0: per_volt * signal}
+    if drive == BARE:
+        return numbers
+    return numbers | {s.u_no: u_O - u_i, s.n_no: per_volt * beta * signal}
+
+
+def _of_plant(valve: PlainValve, plant: PlainPlant, dP: float) -> Situation:
+    """The simulation model at one moment, and its transforms at one s."""
+    i, x_e, v, s_value = 0.75, 0.625, -0.25, 1.5
+    di_dt, dx_e_dt, dv_dt = plant.rates(i, x_e, v, plant.u_step, plant.load_step)
+    feedback = plant.K_fi * i
+    names = "K_a K_fi K_i R_c r_p L_c m_e B_e K_et i_init x_init v_init a"
+    per_opening = valve.C_d * valve.W * math.sqrt(2 * dP / valve.rho)
+
+    def current(at: float) -> float:
+        return plant.transforms(at)[0]
+
+    def travel(at: float) -> float:
+        return plant.transforms(at)[1]
+
+    def output(at: float) -> float:
+        return plant.K_a * (plant.u_step / at - plant.K_fi * current(at))
+
+    def flow(at: float) -> float:  # of a pressure drop that falls
+        return per_opening * travel(at + plant.a)
+
+    still = replace(plant, load_step=0.0, i_init=0.0, x_init=0.0, v_init=0.0)
+    numbers = {
+        **_constants(valve),
+        **_at_drop(valve, dP),
+        **{getattr(s, name): getattr(plant, name) for name in names.split()},
+        **{s.i: i, s.x_e: x_e, s.v: v, s.di_dt: di_dt, s.dx_e_dt: dx_e_dt, s.dv_dt: dv_dt},
+        **{s.u_i: plant.u_step, s.u_if: feedback, s.u_e: plant.K_a * (plant.u_step - feedback)},
+        **{s.f_e: plant.K_i * i, s.f_eL: plant.load_step, s.s: s_value, s.x_ov: 0.0, s.x: x_e, s.Q: per_opening * x_e},
+        # Long after a step the flow per command.
+        s.G_0: per_opening * still.transforms(1e-9)[1] * 1e-9 / plant.u_step,
+    }
+    functions = {
+        s.f: valve.threshold,
+        s.U_i.func: lambda at: plant.u_step / at,
+        s.U_if.func: lambda at: plant.K_fi * current(at),
+        s.U_e.func: output,
+        s.I_s.func: current,
+        s.F_e.func: lambda at: plant.K_i * current(at),
+        s.F_eL.func: lambda at: plant.load_step / at,
+        s.X_e.func: travel,
+        s.Q_s.func: flow,
+        s.G.func: lambda at: flow(at) / (plant.u_step / at),
+    }
+    spool = FIXED_OPENING if valve.has_stop else FREE_OPENING
+    words = (
+        f"valve with {valve.name}, {PLANT.words}, dP = {dP:g}, {'' if plant.load_step else 'un'}loaded, a = {plant.a:g}"
+    )
+    return Situation(words=words, settings=frozenset((PLANT, spool)), numbers=numbers, functions=functions)

@@ -1,0 +1,104 @@
+"""Where a statement is meant to hold: what is set up, and comparisons of its symbols; no free text."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import sympy
+from sympy.logic.boolalg import Boolean
+
+from dzdesign.derivation.symbols import dP, dP0, dP1, k, u_i, u_max, u_min, u_min0, u_min1, u_O, x_max
+
+
+class Setting(NamedTuple):
+    """One of the ways in which something can be set up; of one aspect just one of them is at a time."""
+
+    aspect: str
+    #: As a report says it, behind "proved for".
+    words: str
+
+
+BARE = Setting("drive", "the valve without compensator")
+FREE_BETA = Setting("drive", "the paper's law with any beta")
+#: The simulation model, Eqs. (19)-(24), which has no overlap.
+PLANT = Setting("drive", "the simulation model")
+FIXED_OPENING = Setting("spool", "a stop that fixes x_max at every pressure drop (Assumption 3)")
+FREE_OPENING = Setting("spool", "a spool that does not meet its stop")
+CODES_AT_PIN = Setting("codes", "codes at n_V counts per volt")
+CODES_OF_COMMAND = Setting("codes", "codes in the counts of the command")
+
+
+def under_law(name: str) -> Setting:
+    """Return the setting in which a law drives the valve."""
+    return Setting("drive", f"the law `{name}`")
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """Where a statement is meant to hold: in one of the settings of each aspect named, and where a comparison does."""
+
+    settings: tuple[Setting, ...] = ()
+    where: Boolean = sympy.true
+
+    def __bool__(self) -> bool:
+        return bool(self.settings) or self.where != sympy.true
+
+    def __str__(self) -> str:
+        return "; ".join([*(setting.words for setting in self.settings), *map(sympy.sstr, self.comparisons)])
+
+    @property
+    def comparisons(self) -> tuple[Boolean, ...]:
+        """The comparisons that all have to hold."""
+        if self.where == sympy.true:
+            return ()
+        return tuple(sorted(sympy.And.make_args(self.where), key=sympy.default_sort_key))
+
+    def __and__(self, other: "Scope") -> "Scope":
+        return Scope(tuple(dict.fromkeys((*self.settings, *other.settings))), sympy.And(self.where, other.where))
+
+    def implies(self, other: "Scope") -> bool:
+        """Whether all that another scope says is said here too."""
+        aspects = {setting.aspect for setting in other.settings}
+        inside = all(one in other.settings for one in self.settings if one.aspect in aspects)
+        named = aspects <= {setting.aspect for setting in self.settings}
+        return inside and named and set(other.comparisons) <= set(self.comparisons)
+
+    def admits(self, settings: frozenset[Setting]) -> bool:
+        """Whether what is set up is one of the settings named, of each aspect; any beta is meant only if named."""
+        if FREE_BETA in settings and FREE_BETA not in self.settings:
+            return False
+        named: dict[str, set[Setting]] = {}
+        for setting in self.settings:
+            named.setdefault(setting.aspect, set()).add(setting)
+        return all(choices & settings for choices in named.values())
+
+
+EVERYWHERE = Scope()
+
+
+def scope(*limits: Setting | Boolean) -> Scope:
+    """Return a scope from settings and comparisons in any order.
+
+    Examples
+    --------
+    >>> from dzdesign.derivation.symbols import dP, dP0
+    >>> str(scope(BARE, sympy.Eq(dP, dP0)))
+    'the valve without compensator; Eq(dP, dP0)'
+    """
+    settings = tuple(limit for limit in limits if isinstance(limit, Setting))
+    return Scope(settings, sympy.And(*(limit for limit in limits if not isinstance(limit, Setting))))
+
+
+_BEFORE_STOP = u_O <= u_min + k * x_max
+AT_FULL_COMMAND = scope(sympy.Eq(u_i, u_max))
+AT_ZERO_COMMAND = scope(sympy.Eq(u_i, 0))
+LAW_AT_REFERENCE = scope(under_law("paper"), sympy.Eq(dP, dP0))
+UP_TO_REFERENCE = scope(under_law("paper"), dP <= dP0)
+LAW_OFF_REFERENCE = scope(under_law("paper"), sympy.Eq(dP, dP1), dP0 < dP1)
+TARGET_OFF_REFERENCE = scope(under_law("target"), sympy.Eq(dP, dP1))
+#: Up to where the edge is shut on the other side.
+_POSITIVE = -u_min < u_O
+BEYOND_THRESHOLD = scope(u_min <= u_O, _BEFORE_STOP)
+BEFORE_STOP = scope(_BEFORE_STOP)
+EDGE = scope(_POSITIVE, _BEFORE_STOP)
+FULL_STROKE = scope(FIXED_OPENING, _POSITIVE)
+CONSTANT_THRESHOLD = scope(sympy.Eq(u_min0, u_min1))
