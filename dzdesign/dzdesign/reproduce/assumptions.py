@@ -21,7 +21,7 @@ class Oil(NamedTuple):
 
 #: A mineral oil of 46 mm²/s at 40 °C, as ISO 3448 grades it: viscosity by its usual index of 100, density falling by
 #: 0.65 kg/m³ per K.
-OILS = (Oil(30, 1.6, 1.0076), Oil(40, 1.0, 1.0), Oil(50, 0.66, 0.9924))
+OILS = (Oil(30, 1.59, 1.0076), Oil(40, 1.0, 1.0), Oil(50, 0.66, 0.9924))
 
 ASSUMPTIONS = (
     f"hysteresis: none, and beside it {HYSTERESIS_V:g} V, with the opening branch as fitted; the paper shows no "

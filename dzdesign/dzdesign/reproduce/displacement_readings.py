@@ -17,7 +17,7 @@ from dzdesign.reproduce.recovered_valves import (
     recover_simulated,
 )
 
-DISPLACEMENT, DISPLACEMENT_DEAD_ZONE = "largest displacement", "displacement's dead zone"
+DISPLACEMENT, DISPLACEMENT_DEAD_ZONE = "largest displacement", "spool's dead zone"
 
 
 def half_digits_off(reading: Reading, quantity: str, dp_MPa: float) -> float:

@@ -1,6 +1,7 @@
 """Why our numbers miss the paper's: each reason with its own figures, and the range of values that it can explain."""
 
 import math
+from collections.abc import Mapping
 from itertools import product as combinations
 
 from dzdesign.derivation.account.published import (
@@ -27,6 +28,11 @@ DROP = f"taken {DROP_ASSUMED}"
 #: By how much the closed loop may differ from the plant at rest, as a share.
 OF_THE_LOOP = 0.01
 LAW_AT_FULL_COMMAND = "Eq. (18) gives full command at full command, so the valve has the flow that it has without it"
+#: What the displacement's dead zone is a share of.
+READINGS: Mapping[Reading, str] = {
+    "overlap": "read as a share of the largest displacement, the travel that opens nothing: T6e of `dzdesign derive`",
+    "preload": "read as a share of full command, that which moves nothing",
+}
 AMPLITUDE = "the level of an output pin, which no design sets: Figs. 12 and 13 are drawn with it"
 DUTY_OF_ONE = "Fig. 13 does not name its valve: of the two rows one at most can agree"
 LOAD = (

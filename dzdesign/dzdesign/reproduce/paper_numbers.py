@@ -95,12 +95,12 @@ def _of_the_displacement() -> Iterator[PaperNumber]:
             printed, rest = printed_at(recovered.published, dp_MPa), at_rest(recovered.plant, dp_MPa)
             travel = float(rest.position_mm(U_MAX_V))
             if reading == "overlap":
-                dead, of = 100 * recovered.plant.overlap_mm / travel, "travel"
+                dead = 100 * recovered.plant.overlap_mm / travel
             else:
-                dead, of = 100 * float(rest.moves_V) / U_MAX_V, "command"
-            for quantity, suffix, unit, text, value in (
-                (DISPLACEMENT, "", "mm", printed.stroke_mm, travel),
-                (DISPLACEMENT_DEAD_ZONE, f" of {of}", "%", printed.displacement_dead_zone_percent, dead),
+                dead = 100 * float(rest.moves_V) / U_MAX_V
+            for quantity, unit, text, value in (
+                (DISPLACEMENT, "mm", printed.stroke_mm, travel),
+                (DISPLACEMENT_DEAD_ZONE, "%", printed.displacement_dead_zone_percent, dead),
             ):
                 name = f"{quantity} at {DP0_MPA} MPa"
                 fitted = dp_MPa == DP0_MPA and any(
@@ -108,9 +108,10 @@ def _of_the_displacement() -> Iterator[PaperNumber]:
                 )
                 reason = explanations.displacement(quantity, reading, dp_MPa)
                 yield row(
-                    subject, dp_MPa, f"{quantity}{suffix}, by {reading}", unit, text,
+                    subject, dp_MPa, f"{quantity} ({reading})", unit, text,
                     "fitted" if fitted else "predicted", partial(_as_it_is, value), allowed=around(text),
                     tolerance="digits", reasons={} if fitted else {DIRECT: reason},
+                    why=explanations.READINGS[reading] if quantity == DISPLACEMENT_DEAD_ZONE else "",
                 )  # fmt: skip
 
 

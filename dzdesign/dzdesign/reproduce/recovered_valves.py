@@ -256,7 +256,7 @@ def _printed_at_rest(
         printed.append(Printed(f"displacement {at}", "mm", valve.stroke0_mm, travel))
         if with_overlap:
             share, dead = valve.displacement_dead_zone0_percent, 100 * values["overlap_mm"] / travel
-            printed.append(Printed(f"displacement's dead zone {at}", "%", share, dead))
+            printed.append(Printed(f"spool's dead zone {at}", "%", share, dead))
     return printed
 
 

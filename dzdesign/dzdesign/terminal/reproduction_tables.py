@@ -73,7 +73,7 @@ def summary(reproduction: "Reproduction") -> list[str]:
 
 
 def _cells(item: "PaperNumber", letter: str) -> tuple[str, ...]:
-    """Return the cells of one printed number: ours without and with hysteresis; one that is missed is marked."""
+    """Return the cells of one number: ours without / with hysteresis where these differ; one that misses is marked."""
     ours: dict[str, list[str]] = {}
     for outcome in item.outcomes:
         text = "not compared" if outcome.value is None else f"{outcome.value:.2f}"
@@ -84,7 +84,7 @@ def _cells(item: "PaperNumber", letter: str) -> tuple[str, ...]:
         with_unit(item),
         item.kind,
         f"({letter})" if letter else "",
-        *(" / ".join(ours.get(by, ())) for by in ("valve", "paper's law", "product")),
+        *(" / ".join(dict.fromkeys(ours.get(by, ()))) for by in ("valve", "paper's law", "product")),
         verdict_of(item),
     )
 
