@@ -365,10 +365,10 @@ def test_the_plant_of_the_tests_stands_in_the_closed_loop(copied):
 def test_the_papers_numbers_are_shown_where_they_lie(copied):
     ours = Outcome(by="product", value=54.1, difference=0.2, allowed=(53.8, 54.0))
     row = PaperNumber(
-        valve="first valve", quantity="dead zone", unit="%", dp_MPa=1.0, published="53.9", in_fit=False,
+        valve="first valve", quantity="dead zone", unit="%", dp_MPa=1.0, published="53.9", kind="predicted",
         outcomes=(ours,), tolerance="0.1", why="because",
     )  # fmt: skip
-    paper = Reproduction(tool=THIS_TOOL, made_from=(), paper="10.1/x", numbers=(row,), valves=())
+    paper = Reproduction(tool=THIS_TOOL, made_from=(), paper="10.1/x", assumptions=(), numbers=(row,), valves=())
     folder = copied / "paper"
     folder.mkdir()
     content = to_json_bytes(paper)
