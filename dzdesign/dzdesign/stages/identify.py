@@ -1,14 +1,16 @@
 """`identify`: ramp tests -> ValveModel."""
 
 import datetime
-from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass, fields
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.dither import read_dithered
+from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text
-from dzdesign.stages.recording_order import in_order
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, arguments_of, paths_of
+from dzdesign.stages.recording_order import in_order, stated_order
 from dzdesign.stages.recording_parts import parts_of
 from dzdesign.stages.recordings import (
     RampArguments,
@@ -23,8 +25,12 @@ from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
     from dzdesign.identify.options import IdentifyOptions
+    from dzdesign.identify.reading.ramp_test import RampTest
     from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.identify.valve.stated_options import StatedOptions
 
+#: Arguments that are no option of the identification itself: what is read and written, and what nothing is made of.
+NOT_STATED = ("ramps", "output", "plots", "record")
 #: Of the threshold between the tests.
 PREMISES = "dzdesign.identify.constants:PREMISES"
 
@@ -127,13 +133,70 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     options, record = identify_options(arguments), record_of(arguments.record)
     check_places(ValveModel, arguments.output, arguments.plots)
     paths = expand(arguments.ramps)
-    tests = read_recordings(
-        paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
-        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows,
-    )  # fmt: skip
+    tests = _read(arguments, options, paths)
     refuse_copies(tests)
-    tests = in_order(parts_of(tests, arguments.from_, arguments.to, options.u_max), paths, arguments.order)
+    asked = None if arguments.order is None else paths_of(arguments.order)
+    tests, order = in_order(tests, paths, asked), stated_order(tests, paths, asked)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
         found = identify_sides(tests, options, record)
+    found = replace(found, model=replace(found.model, options=stated_options(arguments, order)))
     write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))
     return found.model
+
+
+def _read(
+    arguments: IdentifyArguments, options: "IdentifyOptions", paths: Paths, names: Sequence[str] = ()
+) -> "list[RampTest]":
+    """Read the recordings, those parts that are asked for."""
+    tests = read_recordings(
+        paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
+        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows, names=names,
+    )  # fmt: skip
+    return parts_of(tests, arguments.from_, arguments.to, options.u_max)
+
+
+def identify_again(options: "StatedOptions", record: Mapping[str, str], files: Mapping[str, Path]) -> "ValveModel":
+    """Identify a valve as its valve.json says that it was; `files` by the names of made_from, in that order.
+
+    Raises
+    ------
+    InputError
+        If an option or a file can't be read, or no threshold can be given; the reason.
+    """
+    from dzdesign.identify.identification import identify_sides
+    from dzdesign.identify.reading.series_order import in_stated_order
+
+    known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, "order"}
+    given: dict[str, Any] = {**options.texts, **options.tables, **options.lists}
+    order = given.pop("order", ())
+    if strange := [name for name in given if name not in known]:
+        raise InputError(f"its options name {quoted(strange[0])}, which is no option of `identify`")
+    arguments = IdentifyArguments([], **given)
+    choices = identify_options(arguments)
+    tests = _read(arguments, choices, list(files.values()), list(files))
+    if order:
+        by_name = {test.source: test for test in tests}
+        if sorted(order) != sorted(by_name):
+            raise InputError("its option order does not name each recording once")
+        stated = {test.source: test for test in in_stated_order([by_name[name] for name in order])}
+        tests = [stated[test.source] for test in tests]
+    model = identify_sides(tests, choices, record).model
+    return replace(model, options=options)
+
+
+def stated_options(arguments: IdentifyArguments, order: Sequence[str]) -> "StatedOptions":
+    """Return the options as valve.json has them: all but places and the record, those that were not given too."""
+    from dzdesign.identify.valve.stated_options import StatedOptions
+
+    texts: dict[str, str] = {}
+    tables: dict[str, Mapping[str, str]] = {}
+    lists: dict[str, tuple[str, ...]] = {"order": tuple(order)} if order else {}
+    for argument in arguments_of(IdentifyArguments):
+        value = None if argument.name in (*NOT_STATED, "order") else getattr(arguments, argument.name)
+        if isinstance(value, Mapping):
+            tables[argument.name] = {str(key): str(text) for key, text in value.items()}
+        elif isinstance(value, list | tuple):
+            lists[argument.name] = tuple(map(str, value))
+        elif value is not None:
+            texts[argument.name] = str(value)
+    return StatedOptions(texts=texts, tables=tables, lists=lists)

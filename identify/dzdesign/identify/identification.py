@@ -68,7 +68,7 @@ def identify_sides(
     tests = [without_dither(test, dither, options.u_max) for test in tests]
     sides, warnings = _each_side(tests, options, units)
     lag = next(iter(sides.values())).described.lag
-    files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
+    files = dict.fromkeys((test.source, test.sha256) for test in tests)
     model = ValveModel(
         tool=THIS_TOOL,
         made_from=tuple(SourceFile(source=source, sha256=digest) for source, digest in files),

@@ -52,7 +52,10 @@ def _verdict(chain: Chain) -> Headline:
         reasons = tuple(f"{check.name}: {check.text}" for check in others)
         text = "THE EVIDENCE CONTRADICTS ITSELF: what it says to hold does not follow from its figures"
         return Headline(kind="bad", text=text, reasons=reasons)
-    return _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
+    judged = _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
+    if judged.kind == "good" and evidence.reservation:
+        return replace(judged, text=f"{judged.text}; {evidence.reservation}")
+    return judged
 
 
 def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headline:
