@@ -131,7 +131,7 @@ def _are_near(stated: object, follows: object) -> bool:
 
 def _options_in_words(valve: "ValveModel") -> str:
     """Name the options that are not the default: recordings read otherwise give another valve just as faithfully."""
-    default = stated_options(IdentifyArguments([]), ())
+    default = stated_options(IdentifyArguments([]))
     stated = valve.options or default
     other = [f"{name} = {text}" for name, text in stated.texts.items() if default.texts.get(name) != text]
     other += [f"{name} = {dict(table)}" for name, table in stated.tables.items()]

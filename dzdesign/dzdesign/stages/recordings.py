@@ -36,6 +36,7 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.core.artefact_types import Artefact
+    from dzdesign.identify.reading.low_flow_table import LowFlowTable
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
@@ -202,7 +203,7 @@ def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
             )
 
 
-def refuse_copies(tests: list["RampTest"]) -> None:
+def refuse_copies(tests: Sequence["RampTest | LowFlowTable"]) -> None:
     """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty."""
     known: dict[str, str] = {}
     for test in tests:

@@ -189,7 +189,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         "the certified offset, half a count kept for the rounding"
         + (f"; {units.text(least, '.3f mV')} of the C's compare values under the threshold's bound" if inputs else "")
         + (
-            f". Flow below {units.text(worst.level_L_min, '.2f L/min')} counts as none"
+            f". F{at_zero.none_in_words(worst.guard, units)[1:]}"
             if worst.zero_flow_L_min is None
             else f"; {at_zero.zero_flow_in_words(units)}"
         )

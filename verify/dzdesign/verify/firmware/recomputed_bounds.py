@@ -6,7 +6,7 @@ one between its two ends. What the thresholds themselves are worth, only the ram
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.bound_errors import BoundErrors
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
 from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.verify.firmware.stated_basis import ROUNDING_V, ROUNDINGS, about_basis, about_errors
 from dzdesign.verify.requirements import BOUNDS, Check
 
 #: Degrees of freedom of the noise's standard errors, and the least share of it in a variance that counts in others'.
@@ -25,14 +26,10 @@ OF_PREMISE = {"monotone": 0.0, "smooth": 0.25, "line": 0.5}
 ABOVE = 0.125
 #: Beyond so many degrees of freedom Student's law is the normal one.
 MOST_DEGREES = 1e6
-#: A drift that flattens out departs from a straight one by at most this share of itself.
-UNEVEN = 0.4
 #: Errors below this share of full command weigh alike in a line.
 FINEST = 1e-5
 #: Points of a line's path, and how far beyond the last test the path goes, over its pressure drop and in MPa.
 POINTS, FURTHEST, FURTHEST_MPA = 101, 1.05 * 1.1**28, 1e3
-#: What a number of valve.json may be off by, V. A quantile's error counts so many roundings of a standard error.
-ROUNDING_V, ROUNDINGS = 1e-7, 4.0
 
 
 def bounds_follow(compensator: Compensator) -> Check:
@@ -42,10 +39,10 @@ def bounds_follow(compensator: Compensator) -> Check:
     count, largest = 0, 0.0
     for name, side in valve.sides.items():
         place = f"sides.{name}.certified"
-        faults += [f"sides.{name}.certificate.{text}" for text in _about_basis(side)]
+        faults += [f"sides.{name}.certificate.{text}" for text in about_basis(side)]
         for guard, curve in side.certified.items():
             again = RecomputedBounds.of(curve, side, valve.u_max_V)
-            faults += [f"{place}.{guard}.errors.{text}" for text in _about_errors(curve)]
+            faults += [f"{place}.{guard}.errors.{text}" for text in about_errors(curve)]
             for key, stated, found, quantile in (
                 ("u_lower_V", curve.u_lower_V, again.lower, again.most),
                 ("above.band_V", curve.above.band_V if curve.above else (), again.band, again.most_above),
@@ -194,37 +191,6 @@ class _Errors:
         whole = noise.sum(axis=1) if state is None else np.array([row @ self.of_means @ row for row in path])
         share = np.linalg.norm(noise, axis=1) / np.maximum(whole, np.finfo(float).tiny)
         return float(OF_NOISE / np.max(np.maximum(share, LEAST_SHARE)) ** 2)
-
-
-def _about_basis(side: SideModel) -> Iterator[str]:
-    """Yield what the bounds are said to rest on and is not what those of the guarded curve were made of."""
-    stated, errors = side.certificate.repeatability, side.curve.errors
-    for key, one, other in (
-        ("sd_V", stated.sd_V, errors.ramp_sd_V),
-        ("degrees_of_freedom", stated.degrees_of_freedom, errors.degrees_of_freedom),
-        ("drift_V", stated.drift_V, errors.drift_V),
-    ):
-        if (one is None) != (other is None) or abs((one or 0.0) - (other or 0.0)) > ROUNDING_V:
-            yield f"repeatability.{key} is {one}, but {other} in the errors of its {side.certificate.guard} curve"
-    level = max(test.noise_level_L_min for test in side.tests)
-    if abs(side.certificate.level_L_min - level) > ROUNDING_V:
-        yield f"level_L_min is {side.certificate.level_L_min}, but {level} is the largest noise level of the tests"
-    if errors.drift_V is not None and errors.degrees_of_freedom is not None:
-        found = errors.ramp_sd_V * math.sqrt(max(errors.covariance[-1][-1], 0.0))
-        if abs((stated.drift_se_V or 0.0) - found) > ROUNDINGS * ROUNDING_V * (1 + found):
-            yield f"repeatability.drift_se_V is {stated.drift_se_V}, but {found:.7f} follows from the ramps' scatter"
-
-
-def _about_errors(curve: CertifiedCurve) -> Iterator[str]:
-    """Yield why errors are none: of an unevenness that is no drift's, or a covariance that is that of nothing."""
-    known, uneven = np.array(curve.errors.covariance), curve.errors.uneven_V
-    if uneven and abs(uneven - UNEVEN * abs(curve.errors.drift_V or 0.0)) > ROUNDINGS * ROUNDING_V:
-        yield f"uneven_V: {uneven}, expected 0 or {UNEVEN:.0%} of the drift, {curve.errors.drift_V}"
-    row, column = np.unravel_index(np.abs(known - known.T).argmax(), known.shape)
-    if known[row, column] != known[column, row]:
-        yield f"covariance[{row}][{column}]: {known[row, column]}, but [{column}][{row}] is {known[column, row]}"
-    elif np.linalg.eigvalsh(known)[0] <= 0:
-        yield "covariance: it is that of no quantities, for a sum of them would have a negative variance"
 
 
 def _through(dp_MPa: np.ndarray, start_MPa: float) -> Callable[[np.ndarray], np.ndarray]:
