@@ -144,7 +144,7 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     tables = _read_low_flow([Path(path) for path in paths_of(arguments.low_flow)], options.u_max)
     refuse_copies([*tests, *tables])
     if alike := {test.source for test in tests} & {table.source for table in tables}:
-        raise InputError(f"--low-flow: a recording is called '{alike.pop()}' too; rename one, so that both can be named")
+        raise InputError(f"--low-flow: a recording is called '{alike.pop()}' too; rename one of them")
     asked = None if arguments.order is None else paths_of(arguments.order)
     tests, order = in_order(tests, paths, asked), stated_order(tests, paths, asked)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):

@@ -149,7 +149,8 @@ class TestAReadingBelowTheThreshold:
 
     def test_the_notch_is_one_that_the_meter_hides(self):
         found = side_of(NOTCHED)
-        flows = [float(NOTCHED.flow(np.array(u), dp, rising=False)) for dp, u in zip(PRESSURES, found.curve.u_lower_V, strict=True)]
+        pairs = zip(PRESSURES, found.curve.u_lower_V, strict=True)
+        flows = [float(NOTCHED.flow(np.array(u), dp, rising=False)) for dp, u in pairs]
         assert 0.05 < max(flows) < FLOOR
 
     def test_lowers_all_thresholds_to_a_command_at_which_there_is_none(self):

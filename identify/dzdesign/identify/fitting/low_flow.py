@@ -164,8 +164,8 @@ def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) ->
         "{source} shows at least {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, below the threshold on {branch} of "
         "{threshold:.4g V} that the ramps show, and more than the {least:.3g L/min} that count as none: add a row "
         "of {branch} at a lower command where no more flows, or declare what may flow by --zero-flow",
-        source=row.source, flow=row.at_least_L_min, u=row.u_V, at=row.dp_MPa, branch=IN_WORDS[branch], threshold=threshold,
-        least=least,
+        source=row.source, flow=row.at_least_L_min, u=row.u_V, at=row.dp_MPa, branch=IN_WORDS[branch],
+        threshold=threshold, least=least,
     )  # fmt: skip
 
 

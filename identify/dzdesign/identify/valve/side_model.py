@@ -268,7 +268,8 @@ class SideModel:
             by_hand, meter = units.text(unseen, ".3g L/min"), units.text(level, ".2f L/min")
             return f"flow below {by_hand} (the low-flow readings; the meter shows it from {meter} on) counts as none"
         flow = units.text(level, ".2f L/min")
-        return f"flow below {flow} (meter's floor, its noise, or 0.5 % of the largest flow) counts as none"
+        by = "noise level: the meter's floor, what averages resolve, or 0.5 % of the largest flow"
+        return f"flow below {flow} ({by}) counts as none"
 
     @property
     def curve(self) -> CertifiedCurve:
