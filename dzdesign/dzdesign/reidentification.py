@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL
-from dzdesign.core.errors import InputError, and_more, quoted
+from dzdesign.core.errors import InputError, and_more, one_line, quoted
 from dzdesign.core.options import Paths
 from dzdesign.stages.identify import IdentifyArguments, identify_again, stated_options
 from dzdesign.stages.recordings import expand
@@ -51,7 +51,7 @@ def identified_again(compensator: "Compensator", given: GivenFiles) -> "Check":
 
     Which file is which its hash decides, whatever its name, its folder and the order.
     """
-    from dzdesign.verify.requirements import AS_STATED, RAMPS
+    from dzdesign.verify.requirements import AS_STATED
 
     valve = compensator.valve
     if valve.tool != THIS_TOOL:
@@ -59,34 +59,40 @@ def identified_again(compensator: "Compensator", given: GivenFiles) -> "Check":
             f"identified by {quoted(f'{valve.tool.name} {valve.tool.version}')}, and this is {THIS_TOOL.name} "
             f"{THIS_TOOL.version}; make valve.json and all that follows from it again, or verify with that version"
         )
-        return RAMPS.check(holds=None, text=text)
+        return _check(holds=None, text=text)
     stated = {each.sha256: each.source for each in valve.made_from}
     if foreign := [path for digest, path in given.paths.items() if digest not in stated]:
-        return RAMPS.check(holds=False, text=_about_foreign(foreign[0], given, stated))
+        return _check(holds=False, text=_about_foreign(foreign[0], given, stated))
     if missing := [name for digest, name in stated.items() if digest not in given.paths]:
         text = f"valve.json was made from {len(stated)} files, and --ramps lacks {and_more(missing, MOST_NAMED)}"
-        return RAMPS.check(holds=None, text=f"{text}; give all of them")
+        return _check(holds=None, text=f"{text}; give all of them")
     if valve.options is None:
         text = "valve.json does not say with which options it was identified; make it again with `dzdesign identify`"
-        return RAMPS.check(holds=None, text=text)
+        return _check(holds=None, text=text)
     if len({each.source for each in valve.made_from}) < len(valve.made_from):
-        return RAMPS.check(holds=False, text="valve.json names two of its files alike; make it again")
+        return _check(holds=False, text="valve.json names two of its files alike; make it again")
     files = {each.source: given.paths[each.sha256] for each in valve.made_from}
     try:
         found = identify_again(valve.options, valve.record, files)
     except InputError as error:
-        return RAMPS.check(holds=False, text=f"from the same files nothing can be identified with its options: {error}")
+        return _check(holds=False, text=f"from the same files nothing can be identified with its options: {error}")
     differing = list(_differences(valve, found))
     text = f"from {len(files)} files, with {_options_in_words(valve)}"
     if differing:
         place, one, other = differing[0]
         more = f" (and {len(differing) - 1} more)" if len(differing) > 1 else ""
         text = f"'{place}' of valve.json is {_words(one)}, but {_words(other)} follows {text}{more}"
-        return RAMPS.check(holds=False, text=f"{text}; make it again with `dzdesign identify`")
+        return _check(holds=False, text=f"{text}; make it again with `dzdesign identify`")
     text = f"identified again {text}: every number the same"
     if others := len(compensator.lot) - 1 if compensator.lot else 0:
         text += f"; of the lot's other {others} valves {AS_STATED}"
-    return RAMPS.check(holds=True, text=text)
+    return _check(holds=True, text=text)
+
+
+def _check(*, holds: bool | None, text: str) -> "Check":
+    from dzdesign.verify.requirements import RAMPS
+
+    return RAMPS.check(holds=holds, text=one_line(text))  # names and options of a file that anyone may have written
 
 
 def _about_foreign(path: Path, given: GivenFiles, stated: Mapping[str, str]) -> str:

@@ -38,6 +38,7 @@ from dzdesign.report.summary import headline, worst_of
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.loop_results import PressureResult
+from dzdesign.verify.requirements import AS_STATED
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
