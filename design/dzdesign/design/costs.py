@@ -132,7 +132,8 @@ def _cost_of_dither(compensator: Compensator) -> str:
     )
     what = f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full drive"
     if recorded is None:
-        return f"{what}: the offset stands lower by that much, so that zero command stays shut at the wave's top"
+        by = "that much" if kept == peak else f"{kept:.2%}, what the controlled current makes of it at its worst corner"
+        return f"{what}: the offset stands lower by {by}, so that zero command stays shut at the wave's top"
     return (
         f"{what}: the ramps were recorded with {recorded.in_words()}, so the bounds hold under it; the offset stands "
         f"lower by {kept:.3%} only, for what the two waves differ in"
