@@ -75,9 +75,10 @@ def identify_sides(
     tests = [without_dither(test, dither, options.u_max) for test in tests]
     sides, warnings = _each_side(tests, options, units, low_flow)
     lag = next(iter(sides.values())).described.lag
-    files = dict.fromkeys(
-        [*((test.source, test.sha256) for test in tests), *((table.source, table.sha256) for table in low_flow)]
-    )
+    # In whatever order they came: those of the pressure drops, then those of a side that was refused, then tables.
+    files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
+    files |= dict.fromkeys(sorted((test.source, test.sha256) for test in tests))
+    files |= dict.fromkeys(sorted((table.source, table.sha256) for table in low_flow))
     model = ValveModel(
         tool=THIS_TOOL,
         made_from=tuple(SourceFile(source=source, sha256=digest) for source, digest in files),

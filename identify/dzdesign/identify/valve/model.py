@@ -94,8 +94,8 @@ class ValveModel(ShownInNotebooks, Artefact):
     options: Annotated[
         StatedOptions | None,
         Meta(
-            description="Options of `identify` with which the files in made_from, in that order, give this file again; "
-            "null where nobody wrote them down."
+            description="Options of `identify` with which the files in made_from give this file again; null where "
+            "nobody wrote them down."
         ),
     ] = None
     simulated: Annotated[
