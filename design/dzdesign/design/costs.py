@@ -34,12 +34,24 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
             f"from the first flow seen down to the onset: below {units.text(least, '.3g L/min')} not all of the "
             "recordings show a flow"
         )
-    if compensator.negative is None and valve.sides.get("negative") is not None:
-        lines.append(
-            "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "
-            "two solenoids"
-        )
-    return tuple(lines + _cost_of_options(compensator))
+    return tuple(lines + _left_out(compensator) + _cost_of_options(compensator))
+
+
+def design_warnings(compensator: Compensator) -> tuple[str, ...]:
+    """Return one line for each failure that the firmware can't see, and for a side of the valve that it does not drive.
+
+    They are among the costs; whoever generates a firmware without a look at these is told them again.
+    """
+    return (*hidden_failures(compensator), *_left_out(compensator))
+
+
+def _left_out(compensator: Compensator) -> list[str]:
+    if compensator.negative is not None or compensator.valve.sides.get("negative") is None:
+        return []
+    return [
+        "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "
+        "two solenoids"
+    ]
 
 
 def lines_of_tests(compensator: Compensator, sign: int) -> list[str]:
