@@ -131,9 +131,8 @@ FAULTS = {
     "a far stop 0.1 % too near": number("STROKE_M", 0.999),
     "a stop that throws back": text("plant_stops.h", "plant->v = 0.0;", "plant->v *= -0.3;"),
     "no stop at rest": text("plant_stops.h", "return fmax(-position, ", "return fmax(0.0 * position, "),
-    "a pulse at the period's end": text(
-        "plant_period.h", "plant->counts - 2 * compare;", "2 * compare - plant->counts;"
-    ),
+    "a pulse at the period's end": text("plant_period.h", "2 * (plant->counts - compare)", "2 * compare"),
+    "a middle value elsewhere": text("plant_period.h", "= balance(plant, 1.0) -", "= 0.9 * balance(plant, 1.0) -"),
     "the edge passed as if it were smooth": text("plant_period.h", "#define AT_EDGE 0.01", "#define AT_EDGE 1e9"),
     "a compare value at once": text(
         "loop.c", "(in_force < plant->counts) ? in_force", "((int32_t)compare < plant->counts) ? (int32_t)compare"

@@ -101,13 +101,18 @@ class PlantComparison:
     kind: Annotated[WindowKind, about("What the command, or the pressure drop, does in it.")]
     side: Side
     dp_MPa: PressureDrop
-    then_MPa: Annotated[float, quantity("MPa", "Pressure drop at no flow after a load step; else the same.", ge=0)]
+    then_MPa: Annotated[
+        float, quantity("MPa", "Pressure drop at no flow after a load step; else the same.", ge=0, le=1000)
+    ]
     seconds: Annotated[float, quantity("s", "Length of the window.", gt=0, le=1000)]
     position_difference: Annotated[
-        float, quantity("1", "Largest distance of the spool's positions at the ends of PWM periods, over the stroke.")
+        float,
+        quantity(
+            "1", "Largest distance of the spool's positions at the ends of PWM periods, over the stroke.", ge=0, le=1e6
+        ),
     ]
     flow_difference: Annotated[
-        float, quantity("1", "Largest difference of the flows there, over the largest one of the window.")
+        float, quantity("1", "Largest difference of the flows there, over the largest one of the window.", ge=0, le=1e6)
     ]
     q_largest_L_min: Annotated[Flow, about("That largest flow, by the integrator.")]
     unlike_compare_values: Annotated[Count, about("PWM periods in which the two loops' compare values differ.")]
