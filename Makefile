@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-identify bench-isr bench-verify
+.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-c2000ware bench-identify bench-isr bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -44,6 +44,10 @@ $(VENV)/.bench: $(STAMP)
 # A minute or two; needs the simulators that .ci/run installs.
 bench-isr: $(STAMP)
 	$(BIN)/python benchmarks/isr/run.py
+
+# Both C2000 targets against TI's headers, which are not ours to give: `make bench-c2000ware C2000WARE=FOLDER`.
+bench-c2000ware: $(STAMP)
+	DZDESIGN_C2000WARE="$(C2000WARE)" $(BIN)/pytest -q benchmarks/c2000ware
 
 # Minutes, most of them for mutants; `make bench-verify BENCH=--quick` tries a part of those.
 bench-verify: $(STAMP)

@@ -7,17 +7,20 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import read_bytes, sha256_of
-from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
+from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError, quoted
 
 if TYPE_CHECKING:
+    from dzdesign.codegen.project import Firmware
     from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.verify.requirements import Check
 
 
 def regenerated(folder: Path) -> "Check":
-    """Tell whether every file is what `codegen` makes of compensator.json, but for those that are the user's.
+    """Tell whether every file is what `codegen` makes of compensator.json, but for what is the user's.
+
+    Of a project file that is the folder of C2000Ware, of a header or a linker file all but what changes generated C.
 
     It is not checked where another version of dzdesign generated the firmware, or one with other targets: then nothing
     tells an edited file from a generated one, so the firmware does not hold.
@@ -31,18 +34,44 @@ def regenerated(folder: Path) -> "Check":
         return REGENERATED.check(holds=None, text=reason)
     content = read_bytes(folder / "compensator.json", "compensator")
     try:
-        expected = generate(read_compensator(folder), manifest.target, content).manifest
+        firmware = generate(read_compensator(folder), manifest.target, content)
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
+    expected = firmware.manifest
     compared = {name: digest for name, digest in expected.files.items() if name not in expected.board}
     others = [name for name in sorted(compared) if _digest(folder / name) != compared[name]]
-    keys = sorted(field.name for field in fields(expected))
-    others += [f"{key} of manifest.json" for key in keys if getattr(manifest, key) != getattr(expected, key)]
+    others += _others_in_manifest(folder, manifest, expected)
+    others += _faults_of_the_users(folder, firmware)
     if others:
         text = f"otherwise than generated now: {', '.join(others)}; make the firmware again with `dzdesign codegen`"
         return REGENERATED.check(holds=False, text=text)
     text = f"generated again for {manifest.target}: {len(compared)} files and the manifest are the same, byte for byte"
     return REGENERATED.check(holds=True, text=text)
+
+
+def _others_in_manifest(folder: Path, manifest: "FirmwareManifest", expected: "FirmwareManifest") -> list[str]:
+    """Return the keys of the manifest that are others; where none is, whether it is written otherwise."""
+    keys = sorted(field.name for field in fields(expected))
+    others = [f"{key} of {MANIFEST_NAME}" for key in keys if getattr(manifest, key) != getattr(expected, key)]
+    if not others and read_bytes(folder / MANIFEST_NAME, "firmware manifest") != to_json_bytes(expected):
+        others.append(f"keys or spelling of {MANIFEST_NAME}")
+    return others
+
+
+def _faults_of_the_users(folder: Path, firmware: "Firmware") -> list[str]:
+    """Return what stands in files of the user's that is not the user's to change."""
+    from dzdesign.verify.firmware.project_file import WARE_VARIABLE, is_project, project_faults
+    from dzdesign.verify.firmware.unchanged_files import user_files
+    from dzdesign.verify.firmware.user_code import interference
+
+    board = firmware.manifest.board
+    found = [
+        f"{name}, in which {WARE_VARIABLE} alone is yours: {fault}"
+        for name in filter(is_project, board)
+        for fault in project_faults(folder / name, firmware.files[name], folder)
+    ]
+    theirs = [*board, *user_files(folder, firmware.manifest)]
+    return found + list(interference(folder, theirs, firmware.files, frozenset(board)))
 
 
 def _not_generated_here(manifest: "FirmwareManifest") -> str:

@@ -65,6 +65,10 @@ def test_without_a_word_the_drive_is_by_duty(example_compensator):
         ({"supply": "24 V"}, "--supply"),
         ({"rated_current": "1"}, "--rated-current"),
         ({"current_signal": "0..1.2 A on 4 ohm"}, "4"),
+        ({"current_signal": "0..0.5 A on 2 ohm + 0.15 V"}, "--current-signal"),
+        ({"current_signal": "0..1.2 A on 2 ohm + 0.15 V = 0..2.4 A"}, "--current-signal"),
+        ({"current_signal": "0..1.2 V x 2 + 0.15 V"}, "--current-signal"),
+        ({"supply_signal": "0..24 V x 0.075"}, "--supply-signal"),
     ],
 )
 def test_words_that_are_none_are_refused(changed, said):

@@ -43,6 +43,8 @@ HIDDEN = [
     ((BOTH, BOTH), (), ()),
     ((WHOLE, BOTH), ("a broken wire of sensor A",), ("a reading of sensor A above its span",)),
     ((BOTH, WHOLE), (), ("a broken wire of sensor B",)),
+    # A live zero of 12 codes: the converter's offset of 15 makes as much of a broken wire.
+    (("0.01..2.8 V", "0.01..2.8 V"), ("a broken wire of sensor A",), ("a broken wire of sensor B",)),
     ((NO_ROOM, NO_ROOM), (), ("a reading of sensor A above its span",)),
     ((BOTH, f"{NO_ROOM} = 10 MPa"), ("a reading of sensor B above its span",), ()),
     (("0..3 V = 10 MPa", WHOLE), ("a broken wire of sensor A",),

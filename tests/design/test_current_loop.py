@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
     CurrentSensor,
@@ -16,8 +18,12 @@ from dzdesign.design.current.choosing import (
     worst_step,
 )
 from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
+from dzdesign.design.current.drive import CurrentRequest, design_current_drive
 from dzdesign.design.current.margins import Gains, impulse_response, loop_transfer, margins, worst_margins
-from dzdesign.design.current.step_response import Coils, run_loop, step_responses
+from dzdesign.design.current.step_response import Coils, released_overshoot_A, run_loop, step_responses
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.verify.exhaustive.zero_command import counted_dither
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
 
 on_both = pytest.mark.parametrize("name", SENSORS)
@@ -67,6 +73,18 @@ def test_every_corner_has_its_margins_step_and_little_overshoot(name):
     assert all(step.rise_s > step.least_s for step in steps)
 
 
+@on_both
+def test_no_corner_overshoots_as_it_is_released_and_none_is_held_down_for_nothing(name):
+    """Every fortieth of the rated current: less than a code. Beginning at the integral it is dozens of codes."""
+    loop, line = example_loop(name), sensor_line(SENSORS[name], CONVERTER)
+    corners, code_A = list(COIL.corners()), 1 / (line.V_per_A * line.codes_per_V)
+    for share in np.arange(0.025, 1.01, 0.025):
+        means, _ = run_loop(loop, COIL, corners, SAMPLING, line, [round(share * 60000)] * 300)
+        assert means.max() <= share + code_A
+    assert released_overshoot_A(replace(loop, release=0), COIL, SAMPLING, line) > 50 * code_A
+    assert released_overshoot_A(replace(loop, release=loop.release // 2), COIL, SAMPLING, line) > code_A
+
+
 def test_gains_beyond_the_gain_margin_oscillate_and_gains_within_do_not():
     """The margin is of the transfer function; the oscillation is that of coil, PWM, sampling and limits."""
     name = "supply unknown"
@@ -114,7 +132,9 @@ def test_a_wider_supply_costs_speed():
     "sensor",
     [
         CurrentSensor(V_per_A=2.6, offset_V=0.15),
-        CurrentSensor(V_per_A=2.0, supply_divider=0.1),
+        CurrentSensor(V_per_A=2.0, offset_V=0.15, supply_divider=0.1),
+        CurrentSensor(V_per_A=2.0),  # an offset below the converter's zero is not seen
+        CurrentSensor(V_per_A=2.0, offset_V=0.06),  # nor is all that is calibrated away
     ],
 )
 def test_a_sensor_beyond_the_converter_is_refused(sensor):
@@ -128,3 +148,62 @@ def test_a_circuit_that_is_none_is_refused(changed):
         CoilCircuit(
             **{"resistance_ohm": 3.5, "inductance_H": 0.04, "rated_A": 1.0, "supply_V": (18.0, 32.0), **changed}
         )
+
+
+@pytest.mark.parametrize("changed", [{"rated_A": 50.0}, {"supply_V": (1.0, 1000.0)}])
+def test_a_current_that_no_supply_drives_in_time_is_refused(changed):
+    circuit = replace(COIL, **changed)
+    sensor = CurrentSensor(V_per_A=2.0 / circuit.rated_A, offset_V=0.15)
+    with pytest.raises(InputError, match=r"carries|reach"):
+        design_current_drive(CurrentRequest(circuit=circuit, sensor=sensor, sampling=SAMPLING), CONVERTER, 60000)
+
+
+def test_corners_that_cannot_carry_the_rated_current_are_said():
+    """They have no step, so "the slowest" is none of them."""
+
+    def words(rated_A, V_per_A):
+        sensor = CurrentSensor(V_per_A=V_per_A, offset_V=0.15)
+        request = CurrentRequest(circuit=replace(COIL, rated_A=rated_A), sensor=sensor, sampling=SAMPLING)
+        return design_current_drive(request, CONVERTER, 60000).in_words(RecordedUnits())
+
+    assert len(words(1.0, 2.0)) == 2 and "3.44 A" in words(5.0, 0.4)[2]
+
+
+def wave_peak(corner: Corner, loop, set_point: int, counts: int, ticks: int) -> float:
+    """The largest mean current of a period in the wave, counts, by an own coil of 200 steps a period."""
+    steps, amperes, sensor = 200, 0.0, SENSORS["supply unknown"]
+    duty, integral, ramped, last = 0.0, 0.0, 0.0, np.zeros(SAMPLING.samples)
+    zero, unit, peak = loop.offset_nominal, 2.0**loop.gain_shift, 0.0
+    at = ((np.arange(SAMPLING.samples) + 0.5) / SAMPLING.samples * steps).astype(int)
+    for period in range(1000):
+        course = []
+        for step in range(steps):
+            on = np.clip(duty * steps - step, 0, 1)
+            volts = on * corner.supply_V - (1 - on) * COIL.freewheel_V
+            rate = (volts - corner.resistance_ohm * amperes) / corner.inductance_H
+            amperes = max(amperes + rate * SAMPLING.period_s / steps, 0.0)
+            course.append(amperes)
+        codes = np.floor((sensor.offset_V + np.array(course)[at] * sensor.V_per_A) * 4096 / 3)
+        total, last = codes[: SAMPLING.before].sum() + last[SAMPLING.before :].sum(), codes
+        aim = set_point + counts if period // ticks % 2 == 0 else set_point - counts
+        ramped += np.clip(aim - ramped, -loop.rate, loop.rate)
+        error = ramped - (total - zero) * loop.current_gain / 2**loop.current_shift
+        asked = integral + loop.proportional * error + loop.feed_forward * ramped
+        integral += loop.integral * error
+        duty = np.clip(asked / unit, 0, 60000) / 60000
+        peak = max(peak, np.mean(course)) if period >= 700 else 0.0
+    return peak / COIL.rated_A * 60000
+
+
+def test_the_current_overshoots_the_dither_and_the_offset_keeps_that_free(example_valve):
+    """The set point's peak of 600 counts is passed by a third at half the inductance and the highest supply."""
+    texts = {"coil": "3.5 ohm 40 mH", "rated_current": "1 A", "supply": "18..32 V", "drive": "current"}
+    texts |= {"current_signal": "0..1.2 A on 2 ohm + 0.15 V", "dither": "150 Hz 1 %"}
+    made = design(example_valve, options_of(texts, target_named("host").inputs()))
+    drive, set_point = made.current_drive, made.compare(0, 200)
+    corner = Corner(3.5 * 0.75 + 0.5, 0.02, 32.0)
+    over = wave_peak(corner, drive.loop, set_point, 600, made.drive_functions.dither_ticks) - set_point - 600
+    assert over > 150
+    assert drive.dither_above_counts == pytest.approx(over, abs=44)  # two codes
+    assert made.dither_reserve_counts == 600 + drive.dither_above_counts == counted_dither(made)
+    assert made.positive.budget.line("dither").half_width == made.dither_reserve_counts

@@ -20,6 +20,7 @@ from dzdesign.design.lot.setting import lot_setting
 from dzdesign.design.machine.allowance import dither_reserve
 from dzdesign.design.machine.bench_current import check_bench_current, recorded_full_A
 from dzdesign.design.machine.colder_coil import colder_coil
+from dzdesign.design.offset import above_tests
 from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.redesign_check import prove_certificates, prove_derived
@@ -120,7 +121,7 @@ def test_the_budget_adds_up_to_the_ceiling(designed):
     """It ends where the table's own ceiling is; no component alone takes more than all of them."""
     budget, signals = designed.positive.budget, designed.signals
     assert [budget.line(name) is not None for name in ("oil", "ageing", "recording")] == [True] * 3
-    above = AboveChoice(choice=designed.above, step_codes=designed.beta_step_codes)
+    above = AboveChoice.on(designed.machine, designed.above, designed.beta_step_codes)
     curve = guarded_curve(designed.valve.positive, "closing", designed.below_dp0, above)
     limit = offset_ceiling(curve, designed.u_max_V, designed.allowance(1)).limit
     curve_V = designed.valve.positive.certified["closing"].u_threshold_V
@@ -258,11 +259,19 @@ def test_the_rated_current_must_be_that_of_full_command(example_valve):
     signal = replace(example_valve, recorded_units=RecordedUnits(command=CommandUnit(unit="mA", factor=2.0)))
     assert recorded_full_A(by_current) == pytest.approx(0.8)
     assert recorded_full_A(signal) is None and recorded_full_A(example_valve) is None
-    check_bench_current(by_current, 0.8, None, 0.01)
-    check_bench_current(example_valve, 1.0, None, 0.01)
-    for valve, declared in ((by_current, None), (example_valve, 1.2)):
+    check_bench_current(by_current, 0.8, 0.8)
+    check_bench_current(example_valve, 1.0, None)
+    for valve, declared in ((by_current, None), (example_valve, 1.2), (example_valve, 0.999)):
         with pytest.raises(InputError, match="--rated-current"):
-            check_bench_current(valve, 1.0, declared, 0.01)
+            check_bench_current(valve, 1.0, declared)
+
+
+def test_a_bench_current_beside_the_rated_one_is_not_hidden_in_its_error(example_valve):
+    """0.96 A +- 5 % may be 0.912 A, but the budget's factor is 0.95: the threshold over 1 A would be 4 % lower."""
+    with pytest.raises(InputError, match="--rated-current"):
+        design(example_valve, options(CURRENT | {"bench_current": "0.96 A +- 5 %"}))
+    exact = design(example_valve, options(CURRENT | {"rated_current": "0.96 A", "bench_current": "0.96 A +- 5 %"}))
+    assert exact.machine.least_factors["bench current"] == Fraction("0.95")
 
 
 def test_a_machine_of_another_drive_is_no_machine_of_the_compensator(example_compensator):
@@ -283,3 +292,29 @@ def test_a_lot_setting_is_under_every_bound_less_the_same_machine(example_valve)
     prove_derived(machine)
     with pytest.raises(RequirementError):
         prove_lot(replace(recording, machine=machine.machine))
+
+
+class TestTheBenchsGaugeAboveTheTests:
+    """Its gain is wrong by as much above the tests as at the last one: further from it, the drop is further off."""
+
+    def margin_mV(self, designed):
+        """Return the least margin above the tests, mV, of a gauge whose gain was wrong by all its error at the last."""
+        bound, machine = designed.valve.positive.certified["closing"].above.bound(), designed.machine
+        last = bound.dp_MPa[0]
+        gain, factor = 1 + Fraction(repr(machine.bench_pressure_error_MPa)) / last, machine.least_factor
+        worst = []
+        for code in range(int(designed.signals.dp_code(last)) + 1, int(designed.signals.dp_code(Fraction(10)))):
+            drive = Fraction(designed.compare(designed.signals.command.zero_code, code), designed.signals.compare_max)
+            at_MPa = designed.signals.dp_MPa(code) * gain
+            worst.append(bound.at(at_MPa) * factor - drive * designed.u_max_V)
+        return float(1000 * min(worst))
+
+    def test_it_is_counted(self, designed):
+        assert self.margin_mV(designed) >= 0
+
+    def test_without_it_the_bound_is_passed(self, example_valve, monkeypatch):
+        bare = DECLARED["amplifier"] | {"amplifier": "0 %", "oil": "0 %", "ageing": "0 %", "pressure_error": "0 %"}
+        chosen = options(bare | {"bench_pressure_error": "0.4 MPa", "pressure_converter": "0 + 0 + 0 codes"})
+        assert self.margin_mV(design(example_valve, chosen)) >= 0
+        monkeypatch.setattr(above_tests, "_drawn_together", lambda bound, _: bound)
+        assert self.margin_mV(design(example_valve, chosen)) < 0

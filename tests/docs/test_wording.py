@@ -66,7 +66,8 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, capsys):
     # What the signals hide is no cost among others: it comes first.
     first = design.index("warning: of sensor A a broken wire")
     assert first < design.index("law paper") < design.index("cost: ") and "cost: of sensor" not in design
-    assert re.search(r"drive range of the law k x_max/u_max = \d+/\d+ = 0\.\d{5} \(from its offset", design)
+    travel = r"drive range of the law k x_max/u_max = \d+/\d+ = 0\.\d{5} \(from the opening threshold to"
+    assert re.search(travel, design)
     nodes = len(example_compensator.positive.beta)
     assert f"beta(dP): straight between {nodes} nodes, each a whole number of 1/32768" in design
     assert "both as shares of full command" in design

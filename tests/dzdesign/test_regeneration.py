@@ -1,6 +1,5 @@
 """A firmware whose own hashes all fit, and which is not what `codegen` makes of its compensator.json."""
 
-import json
 from functools import partial
 
 import pytest
@@ -8,7 +7,6 @@ import pytest
 from dzdesign import api
 from dzdesign.codegen.project import generate, write_firmware
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
 from dzdesign.regeneration import regenerated
 from dzdesign.verify import verification
 from dzdesign.verify.closed_loop.loop import RampSequence
@@ -16,6 +14,7 @@ from dzdesign.verify.firmware.folder import read_firmware_manifest
 from dzdesign.verify.firmware.unchanged_files import files_unchanged
 from dzdesign.verify.requirements import REGENERATED
 from dzdesign.verify.untried import not_tried
+from tests.support.attacked_firmware import edit, seal
 from tests.support.evidence import read_evidence
 from tests.support.synthetic import needs_compiler
 
@@ -24,29 +23,11 @@ PROJECT = "f28335/dzdesign.projectspec"
 QUICK = RampSequence(rest=0.5, ramp=4.0, top=0.5)
 
 
-def seal(folder, change=lambda manifest: None):
-    """Make the manifest's hashes those of the files as they are."""
-    path = folder / MANIFEST_NAME
-    manifest = json.loads(path.read_text())
-    change(manifest)
-    manifest["files"] = {
-        name: digest if name in manifest["board"] else sha256_of((folder / name).read_bytes())
-        for name, digest in manifest["files"].items()
-    }
-    path.write_text(to_json(manifest))
-
-
 def test_what_codegen_wrote_is_what_it_writes(example_compensator, firmware_folder, tmp_path):
     assert regenerated(firmware_folder).holds
     for target in ("cortex-m4", "host"):
         write_firmware(generate(example_compensator, target), tmp_path / target)
         assert regenerated(tmp_path / target).holds
-
-
-def edit(folder, name, old, new):
-    text = (folder / name).read_text()
-    assert old in text
-    (folder / name).write_text(text.replace(old, new, 1))
 
 
 @pytest.mark.parametrize(

@@ -68,14 +68,14 @@ def test_the_bars_are_the_contributions_and_the_line_is_their_sum_as_certified(m
     rows = list(csv.reader(io.StringIO(figure.csv)))
     assert [float(row[-1]) for row in rows[1:]] == pytest.approx(budget.combined_mV)
     parts = re.findall(r">([^<>]+ \((?:measured|declared|default)\))<", figure.svg)
-    assert {"coil temperature (declared)", "supply (declared)", "recording (measured)"} <= set(parts)
+    assert {"coil temperature (default)", "supply (default)", "recording (measured)"} <= set(parts)
     assert ">taken off the threshold (mV)<" in figure.svg and "smaller ones, in the table<" in figure.svg
 
 
 def test_the_words_name_the_sum_and_its_largest_component(machine):
     budget = machine.positive.budget
     words = taken_off(budget, AS_COMPUTED)
-    assert f"{max(budget.combined_mV):.0f} mV" in words and "supply (declared)" in words
+    assert f"{max(budget.combined_mV):.0f} mV" in words and "supply (default)" in words
     assert "the recording and the declared machine" in reach_of_certificate(machine)
 
 
@@ -84,7 +84,7 @@ def test_c_and_readme_say_what_is_certified(example_valve, machine, target):
     bare, declared = designed(example_valve, {}, target), designed(example_valve, DECLARED, target)
     for compensator, of, said in (
         (bare, "Certificate of the recording: ", "No machine was declared"),
-        (declared, "Certificate of the recording and the declared machine: ", "supply (declared)"),
+        (declared, "Certificate of the recording and the declared machine: ", "supply (default)"),
     ):
         files = generate(compensator, target, to_json_bytes(compensator)).files
         header = " ".join(files["core/dz_comp.h"].replace("\n *", " ").split())

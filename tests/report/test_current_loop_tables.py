@@ -14,7 +14,8 @@ from dzdesign.verify.current.results import (
 
 CORNER = CurrentCorner(
     resistance_ohm=4.0, inductance_H=0.04, supply_V=24.0, phase_margin_deg=55.0, gain_margin=2.8, limit_cycle_codes=0.3,
-    steady_error_codes=0.02, current_error_codes=0.6, rise_s=0.006, least_rise_s=0.0028, overshoot=0.05, faults=0,
+    steady_error_codes=0.02, current_error_codes=0.6, release_overshoot_codes=0.2,
+    rise_s=0.006, least_rise_s=0.0028, overshoot=0.05, faults=0,
 )  # fmt: skip
 VALVE = ValveAtCorners(
     dp_MPa=2.0, runs=9, opening_least=0.011, opening_largest=0.0115, q_zero_L_min=0.1, q_released_L_min=0.0,
@@ -24,7 +25,7 @@ RESULT = CurrentLoopResult(
     states=ControllerStates(states=1000, seed=1, wrong=0, first_wrong=None),
     seconds=10.0, shares=(0.5, 1.0), not_carried=1,
     corners=(CORNER, replace(CORNER, rise_s=None, least_rise_s=None, overshoot=None)),
-    offset_codes=(), offset_error_codes=0.0,
+    offset_codes=(), offset_error_codes=0.0, dither_above_counts=0.0, dither_below_counts=0.0,
     faults=(FaultRun(name="the wire breaks", expected="OPEN", seen_after_s=None, limit_s=0.04, latched=False),),
     valve=(VALVE,),
 )  # fmt: skip

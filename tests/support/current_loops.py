@@ -16,6 +16,7 @@ PLAIN = CurrentLoop(
     integral=130,
     feed_forward=680,
     integral_limit=60000,
+    release=768,
     offset_nominal=400,
     offset_tolerance=160,
     offset_shift=6,
@@ -44,7 +45,8 @@ LARGEST = replace(
     integral=8191,
     feed_forward=8191,
     integral_limit=65535,
+    release=65535,
     offset_shift=0,
     rate=65535,
 )
-LOOPS = {"plain": PLAIN, "supply": replace(PLAIN, supply=SUPPLY, integral_limit=5000), "largest": LARGEST}
+LOOPS = {"plain": PLAIN, "supply": replace(PLAIN, supply=SUPPLY, integral_limit=5000, release=1000), "largest": LARGEST}

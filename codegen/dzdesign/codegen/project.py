@@ -1,6 +1,5 @@
 """`generate`: a `Compensator` and a target in, the files of a C project out."""
 
-import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -14,11 +13,11 @@ from dzdesign.codegen.banner import Banner, banner_of, board_lines
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.current_files import CURRENT_HEADERS, CURRENT_SOURCES, FAULT_BITS, current_files
 from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core_files
+from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.provenance import constants_of
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.wiring import wiring_of
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of, write_folder
-from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
@@ -54,16 +53,20 @@ class Firmware(ShownInNotebooks):
 
     files: Mapping[str, str]
     manifest: FirmwareManifest
+    compensator: Compensator
     note: str = ""
 
 
-def write_firmware(firmware: Firmware, folder: Path) -> Firmware:
+def write_firmware(firmware: Firmware, folder: Path, *, over_another: bool = False) -> Firmware:
     """Write a firmware folder; board files that their user changed in an earlier one stay as they are.
 
     The result is the same firmware, with a note on what was kept, and on a target that was replaced. A place that can't
-    be written, or holds files that would be lost, is an `InputError`.
+    be written, or holds files that would be lost, is an `InputError`; so is one with the firmware of another design,
+    unless it is to be written over.
     """
-    earlier = _target_in(Path(folder))
+    if not over_another:
+        refuse_another_design(Path(folder), firmware.compensator)
+    earlier = target_in(Path(folder))
     kept = write_folder(folder, firmware.files, firmware.manifest)
     notes = [firmware.note] if firmware.note else []
     if earlier not in ("", firmware.manifest.target):
@@ -75,14 +78,6 @@ def write_firmware(firmware: Firmware, folder: Path) -> Firmware:
             note += f"; would be generated otherwise now: {', '.join(newer)}"
         notes.append(f"{note}; for what is generated now, move yours away or choose a new folder with -o")
     return replace(firmware, note="; ".join(notes))
-
-
-def _target_in(folder: Path) -> str:
-    """Return the target of the firmware that lies in a folder; nothing where there is none."""
-    with contextlib.suppress(InputError):
-        content = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
-        return read_artefact(content, FirmwareManifest, MANIFEST_NAME).target
-    return ""
 
 
 def target_named(name: str) -> Target:
@@ -139,7 +134,7 @@ def generate(
         constants=constants_of(compensator, {path: file.constants for path, file in core.items()}),
         files={path: sha256_of(text.encode()) for path, text in files.items()},
     )
-    return Firmware(files=files, manifest=manifest, note=note)
+    return Firmware(files=files, manifest=manifest, compensator=compensator, note=note)
 
 
 def target_files(compensator: Compensator, target: Target, banner: Banner) -> dict[str, str]:

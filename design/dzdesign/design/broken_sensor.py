@@ -43,9 +43,9 @@ def hidden_failure(compensator: Compensator, sign: int) -> HiddenFailure | None:
     """Return the failures that raise the offset of a side unseen; None where every one is seen or lowers it."""
     model, side = compensator.valve.sides[SIDE_NAMES[sign]], compensator.side(sign)
     if model.trend == "increasing":
-        failures = compensator.signals.hidden_excess(sign)
+        failures = compensator.signals.hidden_excess(sign, broken_code(compensator))
     elif model.trend == "decreasing":
-        failures = compensator.signals.hidden_shortfall(sign)
+        failures = compensator.signals.hidden_shortfall(sign, broken_code(compensator))
     else:
         return None
     if not failures:
@@ -59,6 +59,15 @@ def hidden_failure(compensator: Compensator, sign: int) -> HiddenFailure | None:
         flows.append((flow or 0.0, test.dp_MPa or 0.0, flow))
     _, dp_MPa, flow = max(flows, key=lambda each: each[:2])
     return HiddenFailure(failures=failures, dp_MPa=dp_MPa, flow_L_min=flow)
+
+
+def broken_code(compensator: Compensator) -> int:
+    """Return the largest code that a broken wire may read: the converter's offset, and its noise, at no voltage."""
+    machine, target = compensator.machine, compensator.target
+    if machine is not None:
+        return machine.pressure_offset_codes + machine.pressure_noise_codes
+    converter = target.converter if target else Converter()
+    return converter.offset_codes + converter.noise_codes
 
 
 def refuse_hidden_failures(compensator: Compensator) -> None:

@@ -66,7 +66,7 @@ def prove_certificates(compensator: Compensator) -> None:
         if model is None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
         stated = law.certificate
-        above = AboveChoice(choice=compensator.above, step_codes=STEP_CODES)
+        above = AboveChoice.on(compensator.machine, compensator.above, STEP_CODES)
         curve = guarded_curve(model, stated.guard, compensator.below_dp0, above)
         allowance = compensator.allowance(sign)
         ceiling = offset_ceiling(curve, compensator.u_max_V, allowance)

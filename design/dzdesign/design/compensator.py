@@ -214,7 +214,8 @@ class Compensator(ShownInNotebooks, Artefact):
     @property
     def dither_reserve_counts(self) -> int:
         """Counts by which the offset stays lower for the dither; next to none where the ramps were recorded with it."""
-        return dither_reserve(self.drive_functions.dither(self.signals), self.valve.dither, self.machine)
+        driven = self.drive_functions.dither(self.signals)
+        return dither_reserve(driven, self.valve.dither, self.machine, self.current_drive)
 
     def allowance(self, sign: int) -> Allowance:
         """Return what the offset of a side leaves free under the certified curve."""

@@ -34,12 +34,24 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
             f"from the first flow seen down to the onset: below {units.text(least, '.3g L/min')} not all of the "
             "recordings show a flow"
         )
-    if compensator.negative is None and valve.sides.get("negative") is not None:
-        lines.append(
-            "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "
-            "two solenoids"
-        )
-    return tuple(lines + _cost_of_options(compensator))
+    return tuple(lines + _left_out(compensator) + _cost_of_options(compensator))
+
+
+def design_warnings(compensator: Compensator) -> tuple[str, ...]:
+    """Return one line for each failure that the firmware can't see, and for a side of the valve that it does not drive.
+
+    They are among the costs; whoever generates a firmware without a look at these is told them again.
+    """
+    return (*hidden_failures(compensator), *_left_out(compensator))
+
+
+def _left_out(compensator: Compensator) -> list[str]:
+    if compensator.negative is not None or compensator.valve.sides.get("negative") is None:
+        return []
+    return [
+        "the valve's negative side is left out: the command has one sign; give a --command-signal of both to drive "
+        "two solenoids"
+    ]
 
 
 def lines_of_tests(compensator: Compensator, sign: int) -> list[str]:
@@ -132,7 +144,8 @@ def _cost_of_dither(compensator: Compensator) -> str:
     )
     what = f"dither of {frequency:.4g} Hz (half a wave is a whole number of PWM periods) and ±{peak:.2%} of full drive"
     if recorded is None:
-        return f"{what}: the offset stands lower by that much, so that zero command stays shut at the wave's top"
+        by = "that much" if kept == peak else f"{kept:.2%}, what the controlled current makes of it at its worst corner"
+        return f"{what}: the offset stands lower by {by}, so that zero command stays shut at the wave's top"
     return (
         f"{what}: the ramps were recorded with {recorded.in_words()}, so the bounds hold under it; the offset stands "
         f"lower by {kept:.3%} only, for what the two waves differ in"

@@ -64,8 +64,7 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
     law(options.law)
     u_max = _full_command(valve, options)
     if options.current is not None and (machine := options.machine) is not None:
-        rated_A = options.current.circuit.rated_A
-        check_bench_current(valve, rated_A, machine.bench_full_A, machine.bench_current_error or 0.0)
+        check_bench_current(valve, options.current.circuit.rated_A, machine.bench_full_A)
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
     if len(signals.signs) == 2:
@@ -73,7 +72,8 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
     functions = options.drive_functions(transition_codes)
     dither = functions.dither(signals)
     dither.check(valve.dither)
-    reserve, laws = dither_reserve(dither, valve.dither, options.machine), {}
+    current_drive = options.current_drive()
+    reserve, laws = dither_reserve(dither, valve.dither, options.machine, current_drive), {}
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
         allowance = allowance_of(signals, options.machine, sign=sign, dither_counts=reserve)
@@ -98,7 +98,7 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
         zero_band_codes=options.error.zero_band_codes if transition_codes else 0,
         command_error=options.error,
         drive_functions=functions,
-        current_drive=options.current_drive(),
+        current_drive=current_drive,
         machine=options.machine,
         costs=(),
         valve=valve,
@@ -157,7 +157,7 @@ def _side_law(
     signals = options.signals
     if "branch-order" not in options.accept:
         refuse_crossed_branches(side)
-    above = AboveChoice(choice=options.above, step_codes=STEP_CODES)
+    above = AboveChoice.on(options.machine, options.above, STEP_CODES)
     certified = guarded_curve(side, options.guard, options.below_dp0, above)
     opening = opening_offset(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))

@@ -198,7 +198,8 @@ class DesignOptions:
         if len(self.signals.signs) == 2:
             raise InputError("--drive current is for one solenoid, but the command has both signs; give --drive duty")
         converter = self.request.target.converter if self.request else Converter()
-        return design_current_drive(self.current, converter, self.signals.compare_max)
+        dither = (self._dither_counts(), self._dither_ticks())
+        return design_current_drive(self.current, converter, self.signals.compare_max, dither)
 
     def drive_functions(self, transition_codes: int) -> DriveFunctions:
         """Return what the drive does around the law, in the firmware's integers."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
+from itertools import takewhile
 
 from dzdesign.core.errors import InputError, RequirementError, quoted
 from dzdesign.design.certificate import prove_certificates
@@ -15,6 +16,8 @@ from dzdesign.design.signals import SIDE_NAMES
 
 #: Coarsest unit of the law's coefficients, see `dzdesign.design.quantise`.
 COARSEST = Fraction(1, 2**12)
+#: Characters before the first difference of two texts that a message shows.
+CONTEXT = 12
 
 
 def refuse_without_options(compensator: Compensator, source: str) -> None:
@@ -48,8 +51,9 @@ def prove_derived(compensator: Compensator) -> None:
     # The hash of valve.json counts its spacing, which is not kept.
     redesigned = replace(redesigned, tool=compensator.tool, made_from=compensator.made_from)
     for place, one, other in _differences(compensator, redesigned):
+        stated, follows = _from_where_they_differ(one, other)
         raise InputError(
-            f"'{place}' is {_words(one)}, but {_words(other)} follows from its valve and its options; "
+            f"'{place}' is {_words(stated)}, but {_words(follows)} follows from its valve and its options; "
             f"{Compensator.REMEDY}"
         )
 
@@ -96,6 +100,16 @@ def _differences(stated: object, follows: object, place: str = "") -> Iterator[t
             yield from _differences(stated.get(key), follows.get(key), f"{place}.{key}")
     else:
         yield place, stated, follows
+
+
+def _from_where_they_differ(stated: object, follows: object) -> tuple[object, object]:
+    """Return two values, of long texts what stands about their first difference: a message shows only so much."""
+    if not (isinstance(stated, str) and isinstance(follows, str)):
+        return stated, follows
+    alike = takewhile(lambda pair: pair[0] == pair[1], zip(stated, follows, strict=False))
+    same = sum(1 for _ in alike)
+    begin = stated.rfind(" ", 0, max(same - CONTEXT, 0)) + 1
+    return stated[begin:], follows[begin:]
 
 
 def _words(value: object) -> str:

@@ -76,11 +76,18 @@ class SideLaw:
         Fraction,
         quantity(
             "1",
-            "k x_max / u_max of the law: command from its offset u_min0 to full flow, over full command. In valve.json "
-            "k x_max counts from the knee, which lies higher.",
+            "k x_max / u_max of the law: command from its u_min0 to full flow, over full command. In valve.json it "
+            "counts from the knee.",
         ),
     ]
-    u_min0_over_u_max: Annotated[Fraction, quantity("1", "The law's offset at dP0 over full command.")]
+    u_min0_over_u_max: Annotated[
+        Fraction,
+        quantity(
+            "1",
+            "u_min0 of the law at dP0 over full command: the offset; with a transition the opening threshold and its "
+            "error, from which the law's line behind the transition starts.",
+        ),
+    ]
     beta: Annotated[
         tuple[Node, ...],
         Meta(
@@ -100,6 +107,11 @@ class SideLaw:
         Budget | None,
         Meta(description="What keeps the offset under the identified threshold, component by component."),
     ] = None
+
+    @property
+    def start(self) -> str:
+        """What `u_min0` is, in words; with a transition the certified offset lies lower."""
+        return "the certified offset" if self.transition_beta is None else "the opening threshold"
 
     def __post_init__(self) -> None:
         if not 0 < self.u_min0_over_u_max < 1:

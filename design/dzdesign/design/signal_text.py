@@ -24,7 +24,9 @@ class PinSignal:
 
     #: As it was written, for messages.
     text: str
-    #: Ends of the span, in V or A.
+    #: V, or A of a signal on a shunt.
+    unit: str
+    #: Ends of the span, in that unit.
     low: Fraction
     high: Fraction
     #: Of the line.
@@ -76,6 +78,7 @@ def parse_signal(text: str, option: str) -> PinSignal:
         raise InputError(f"{option}: '{text}' has gain 0")
     return PinSignal(
         text=text,
+        unit="V" if found.shunt_ohm is None else "A",
         low=found.low * factor,
         high=found.high * factor,
         volts_per_unit=found.gain * (found.shunt_ohm or 1),

@@ -30,6 +30,7 @@ class Arguments(GenerateArguments):
 
 def run(arguments: Arguments, json: bool) -> int:
     """Generate a firmware and print its files, or print the targets."""
+    from dzdesign.design.costs import design_warnings
     from dzdesign.terminal.tables import print_firmware
 
     if arguments.list_targets:
@@ -37,6 +38,8 @@ def run(arguments: Arguments, json: bool) -> int:
     if arguments.compensator is None:
         raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
     firmware = generate(arguments)
+    for line in design_warnings(firmware.compensator):
+        say(f"warning: {line}")
     if firmware.note:
         say(firmware.note)
     if json:

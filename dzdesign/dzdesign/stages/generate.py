@@ -27,6 +27,8 @@ class GenerateArguments(DesignChoices):
     """Folder to write, with the C project."""
     target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
     """Microcontroller (default: that of the design; of a VALVE.json f28335)."""
+    replace: Annotated[bool, Option()] = False
+    """Write over the firmware of another design in the folder."""
 
 
 def generate(arguments: GenerateArguments) -> "Firmware":
@@ -35,7 +37,8 @@ def generate(arguments: GenerateArguments) -> "Firmware":
     Raises
     ------
     InputError
-        If the file can't be read, a number in it does not follow, or the target counts otherwise.
+        If the file can't be read, a number in it does not follow, the target counts otherwise, or the folder holds the
+        firmware of another design.
     """
     from dzdesign.codegen.project import DEFAULT_TARGET, target_named, write_firmware
     from dzdesign.codegen.project import generate as generate_project
@@ -67,7 +70,9 @@ def generate(arguments: GenerateArguments) -> "Firmware":
             compensator = read_artefact(content, Compensator, source)
             refuse_without_options(compensator, source)
             firmware = generate_project(_proven(compensator, f"'{source}'", arguments), arguments.target, content)
-    return firmware if arguments.output is None else write_firmware(firmware, Path(arguments.output))
+    if arguments.output is None:
+        return firmware
+    return write_firmware(firmware, Path(arguments.output), over_another=arguments.replace)
 
 
 def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> "Compensator":

@@ -121,8 +121,8 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         f"premise: {side.premise_in_words(units)}",
         *_premise_lines(side),
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f}: "
-        "command from the knee to full stroke, as a share of full command; the law's counts from its offset, which "
-        "lies lower"
+        "command from the knee to full stroke, as a share of full command; the law's counts from its own "
+        "u_min0"
         + (
             f"; k = {units.number(side.k_V_mm, '.4f V/mm')} ± {units.text(side.k_V_mm_se or 0.0, '.4f V/mm')}"
             if side.k_V_mm is not None
@@ -176,7 +176,7 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
     """Print the law, the certificate and what the choices cost."""
     from dzdesign.derivation.law import law
-    from dzdesign.design.costs import hidden_failures, lines_of_tests
+    from dzdesign.design.costs import design_warnings, lines_of_tests
     from dzdesign.design.signal_descriptions import signals_in_words
     from dzdesign.design.signals import SIDE_NAMES
     from dzdesign.terminal.budget_table import print_budgets
@@ -193,8 +193,8 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         low, high = (float(end) for end in certificate.dp_MPa)
         label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
         lines += [
-            f"{label}drive range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from its offset, "
-            f"below the valve's knee, to full flow), offset at dP0 u_min0/u_max = {_rational(side.u_min0_over_u_max)}, "
+            f"{label}drive range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} "
+            f"(from {side.start} to full flow), u_min0/u_max at dP0 = {_rational(side.u_min0_over_u_max)}, "
             f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate of {compensator.certified_of}: the offset stays below the "
@@ -209,10 +209,10 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         ]
     if compensator.current_drive is not None:
         lines += compensator.current_drive.in_words(units)
-    hidden = hidden_failures(compensator)
-    elsewhere = {*hidden, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
+    warnings = design_warnings(compensator)
+    elsewhere = {*warnings, *(line for sign in compensator.signals.signs for line in lines_of_tests(compensator, sign))}
     console = console or new_console()
-    for line in (*(f"warning: {line}" for line in hidden), *lines):
+    for line in (*(f"warning: {line}" for line in warnings), *lines):
         put_line(console, line)
     print_costs_at_tests(compensator, console)
     if compensator.machine is not None:

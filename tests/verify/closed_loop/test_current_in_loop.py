@@ -17,11 +17,16 @@ from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.valve_at_corners import valve_at_corners, valve_at_corners_check
-from tests.codegen.test_current_control import TEXTS
+from tests.codegen.test_current_control import MEASURED, TEXTS
 from tests.support.example_coil import COIL
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
+#: A machine without errors of its own: the offset lies right below the band, so that nothing hides an overshoot.
+ACCURATE = {
+    "current_error": "0.01 %", "bench_current": "1 A +- 0.01 %", "oil": "0.01 %", "ageing": "0.01 %",
+    "pressure_error": "0.01 %", "bench_pressure_error": "0.001 MPa", "pressure_converter": "0 + 0 + 0 codes",
+}  # fmt: skip
 QUICK = RampSequence(rest=0.5, ramp=10.0, top=0.5)
 
 
@@ -74,6 +79,22 @@ def test_a_controller_that_lets_the_current_go_is_seen(right, wrong, example_val
 
     found = [valve_at_corners(scene, COIL) for scene in scenes(example_valve, TEXTS, tmp_path / "fw", edit=edit)]
     assert valve_at_corners_check(found, AS_COMPUTED).holds is False
+
+
+def test_a_controller_that_begins_at_its_integral_opens_the_valve_as_it_is_released(example_valve, tmp_path):
+    """From zero the current went past the set point, and past the opening threshold just above it, for 40 ms."""
+
+    def edit(text: str) -> str:
+        assert text.count(" - RELEASE;") == 1
+        return text.replace(" - RELEASE;", ";")
+
+    right, wrong = (
+        valve_at_corners(scenes(example_valve, MEASURED | ACCURATE, tmp_path / name, edit=each)[1], COIL)
+        for name, each in (("right", str), ("wrong", edit))
+    )
+    assert wrong.q_released_L_min > 1e-3 and right.q_released_L_min == wrong.q_zero_L_min == 0
+    assert valve_at_corners_check([right], AS_COMPUTED).holds is True
+    assert valve_at_corners_check([right, wrong], AS_COMPUTED).holds is False
 
 
 def test_a_flow_that_no_recording_shows_is_no_zero(example_valve, tmp_path):

@@ -98,10 +98,12 @@ def test_other_machines_give_the_same_hashes(name, machine, states):
 
 
 SEEDED = {
+    "output not below the integral on release": (" - RELEASE;", ";"),
+    "output too low on release": (" - RELEASE;", " - RELEASE - 1u;"),
     "rounding of the output": ("+ GAIN_HALF)", ")"),
     "rounding of the current": ("* CURRENT_GAIN) + CURRENT_HALF", "* CURRENT_GAIN)"),
     "no anti-windup": ("(error & ~past_end) * INTEGRAL", "error * INTEGRAL"),
-    "anti-windup at one end": ("(negative(asked) & negative(error))", "0u"),
+    "anti-windup at one end": (" | (asked & error))", ")"),
     "another limit": ("smaller(counts, COMPARE_LIMIT) & on", "smaller(counts, COMPARE_LIMIT + 1u) & on"),
     "integral without end": ("larger(smaller(integral, INTEGRAL_LIMIT), 0u - INTEGRAL_LIMIT) & on", "integral & on"),
     "integral kept at zero": ("0u - INTEGRAL_LIMIT) & on", "0u - INTEGRAL_LIMIT)"),
@@ -247,7 +249,7 @@ def test_the_supply_scales_the_output():
     "changed",
     [
         {"proportional": 8192}, {"samples": 3}, {"current_gain": 30000}, {"over_sum": 100}, {"offset_tolerance": 65500},
-        {"integral_limit": 65535, "gain_shift": 14}, {"open_ticks": 0},
+        {"integral_limit": 65535, "gain_shift": 14}, {"open_ticks": 0}, {"release": 60001},
     ],
 )  # fmt: skip
 def test_integers_that_could_overflow_are_refused(changed):

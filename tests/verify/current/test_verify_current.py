@@ -147,7 +147,9 @@ def test_one_code_too_many_in_one_of_a_million_states_is_seen(controlled, tmp_pa
     assert failing(found.checks) == {"current-controller"}
 
 
-TAMPERED = {"gain": {"proportional": 2}, "feed-forward": {"feed_forward": 3}, "rate": {"rate": 6}}
+TAMPERED = {
+    "gain": {"proportional": 2}, "feed-forward": {"feed_forward": 3}, "rate": {"rate": 6}, "release": {"release": 0},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("number", TAMPERED)
@@ -155,7 +157,7 @@ def test_another_loop_in_compensator_json_is_seen(number, controlled, tmp_path):
     """C and compensator.json agree: what is stated of the loop, and the loop itself, must tell."""
     drive = controlled.current_drive
     changed = {name: min(getattr(drive.loop, name) * by, 8191) for name, by in TAMPERED[number].items()}
-    changed = changed if number != "rate" else {"rate": 60000}
+    changed |= {"rate": {"rate": 60000}, "release": {"release": 0}}.get(number, {})
     tampered = replace(controlled, current_drive=replace(drive, loop=replace(drive.loop, **changed)))
     found = current_checks(firmware_of(tampered, tmp_path / "firmware"), tampered, silent, STATES)
     assert "current-controller" not in failing(found.checks)
@@ -233,3 +235,14 @@ def test_a_set_point_that_the_supply_cannot_carry_is_said(controlled, tmp_path):
     assert found.result.not_carried > 0
     settles = next(check for check in found.checks if check.id == "current-settles")
     assert str(found.result.not_carried) in settles.text
+
+
+@pytest.mark.parametrize("kept", ["what the coil makes", "the set point's peak alone"])
+def test_a_dither_that_the_current_overshoots_is_kept_free_or_seen(kept, example_valve, tmp_path):
+    target = target_named("cortex-m4").inputs()
+    made = design(example_valve, options_of(TEXTS | {"dither": "150 Hz 1 %"}, target))
+    if kept == "the set point's peak alone":
+        made = replace(made, current_drive=replace(made.current_drive, dither_above_counts=0))
+    found = current_checks(firmware_of(made, tmp_path / "firmware"), made, silent, STATES)
+    assert failing(found.checks) == ({"current-settles"} if kept == "the set point's peak alone" else set())
+    assert found.result.dither_above_counts > 150 and found.result.dither_below_counts > 100

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from dzdesign.core.recorded_units import AS_COMPUTED
@@ -10,9 +9,8 @@ from dzdesign.verify.closed_loop import loop as native_loop
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.motion import NAMED
 from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.integrator import comparison, spool
+from dzdesign.verify.integrator import comparison
 from dzdesign.verify.integrator.compiled_calls import compiled_core
-from dzdesign.verify.integrator.spool import Acting, CvodesSpool, SpoolState
 from tests.support.synthetic import needs_compiler
 from tests.verify.closed_loop.test_current_in_loop import TEXTS, scenes
 

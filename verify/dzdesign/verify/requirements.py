@@ -85,7 +85,9 @@ OWN_PLANT = Requirement(
 LOAD_STEPS = Requirement(
     id="load-steps", title="load steps and frozen sensors in the closed loop", how="`verify --plant`"
 )
-SERIES = Requirement(id="series", title="a series of plants, with tolerances", how="`verify --tolerances`")
+SERIES = Requirement(
+    id="series", title="a series of plants, with tolerances", how="`verify --plant` with `--tolerances`"
+)
 CURRENT_STATES = Requirement(id="current-controller", title="the current controller equals its exact model")
 CURRENT_MARGINS = Requirement(id="current-margins", title="the current loop is stable at every corner")
 CURRENT_SETTLES = Requirement(id="current-settles", title="the current settles at every corner")

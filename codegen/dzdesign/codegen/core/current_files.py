@@ -94,6 +94,8 @@ def current_constants(loop: CurrentLoop) -> list[Define]:
          f"{loop.feed_forward / unit:.6g}", ("feed_forward", "gain_shift")),
         ("INTEGRAL_LIMIT", loop.integral_limit << loop.gain_shift, "uint32", "largest integral to either side",
          f"{loop.integral_limit} PWM counts", ("integral_limit", "gain_shift")),
+        ("RELEASE", loop.release << loop.gain_shift, "uint32", "how far the output is below the integral",
+         f"{loop.release} PWM counts: the current does not overshoot on release", ("release", "gain_shift")),
         ("OFFSET_NOMINAL", loop.offset_nominal, "plain", "sum without current", "as designed", ("offset_nominal",)),
         ("OFFSET_LOW", max(loop.offset_nominal - loop.offset_tolerance, 0), "plain", "lowest plausible offset", "",
          ("offset_nominal", "offset_tolerance")),

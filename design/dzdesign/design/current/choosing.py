@@ -11,7 +11,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
 from dzdesign.design.current.loop import CORRECTION_SHIFT, LARGEST_ERROR, LARGEST_GAIN, CurrentLoop, SupplyCorrection
 from dzdesign.design.current.margins import SEARCH_GRID, Gains, worst_margins
-from dzdesign.design.current.step_response import SensorLine, StepResponse, step_responses
+from dzdesign.design.current.step_response import SensorLine, StepResponse, released_overshoot_A, step_responses
 from dzdesign.design.target_inputs import Converter
 
 #: Phase margin that the gains are chosen for, and the least that a loop may have.
@@ -22,6 +22,10 @@ INTEGRAL_TIME = 2.0
 #: current.
 CHOSEN_OVERSHOOT = 0.08
 RATE_PERIODS = (4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 25, 32, 40, 50, 64, 80, 100, 125, 160, 200, 250, 320, 400, 500)
+#: How far the output begins below the integral, in 64ths of the largest power of two in the PWM's range (a constant of
+#: few bits is one instruction); and the overshoot that a release may have, codes.
+RELEASES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64)
+RELEASED_CODES = 0.5
 #: Share of the rated current above which it is too high, and for how long it may be, s.
 OVER_SHARE, OVER_S = 1.2, 2e-3
 #: Shares of the converter's range and of the rated current beyond which the load counts as shorted, the lower one.
@@ -94,6 +98,12 @@ def choose_loop(
     compare_limit: int | None = None,
 ) -> CurrentLoop:
     """Return the current loop in integers; a coil or a sensor that allows none is an `InputError`."""
+    if circuit.duty(circuit.nominal, circuit.rated_A) >= 1:
+        raise InputError(
+            f"the coil carries at most {circuit.nominal_V / circuit.nominal.resistance_ohm:.3g} A at "
+            f"{circuit.nominal_V:.3g} V, expected more than the rated current of {circuit.rated_A:g} A; check --coil, "
+            "--rated-current and --supply"
+        )
     gains = choose_gains(circuit, sampling, sensor.supply_divider > 0)
     sums = _Sums(circuit=circuit, sensor=sensor, converter=converter, sampling=sampling)
     counts = circuit.rated_A / circuit.nominal_V  # of the PWM for a count of current, over V/A
@@ -117,7 +127,8 @@ def choose_loop(
         current_shift=current_shift,
         gain_shift=gain_shift,
         **{name: round(value * 2**gain_shift) for name, value in real.items()},
-        integral_limit=1 << (compare_max.bit_length() - 1),  # a power of two is one instruction
+        integral_limit=3 << (compare_max.bit_length() - 2),  # two bits are one instruction
+        release=0,
         offset_nominal=sums.offset,
         offset_tolerance=round(OFFSET_SHARE * converter.levels) * sampling.samples,
         offset_shift=OFFSET_SHIFT,
@@ -129,7 +140,8 @@ def choose_loop(
         open_ticks=ceil(OPEN_PATIENCE * slowest_s * log(OPEN_TIMES / (OPEN_TIMES - 1)) * sampling.tick_Hz),
         supply=_supply_correction(circuit, sensor, converter),
     )
-    return _with_rate(loop, circuit, sampling, sensor_line(sensor, converter))
+    line = sensor_line(sensor, converter)
+    return _with_release(_with_rate(loop, circuit, sampling, line), circuit, sampling, line)
 
 
 def sensor_line(sensor: CurrentSensor, converter: Converter) -> SensorLine:
@@ -155,6 +167,25 @@ def _with_rate(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSamplin
     )
 
 
+def _with_release(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, line: SensorLine) -> CurrentLoop:
+    """Return the loop whose output begins low enough that no current overshoots as the drive is released.
+
+    What the integral takes up on the way would carry the current past the
+    offset, where the valve opens. It comes up from below instead, within some time constants of the integral.
+    """
+    unit = max((1 << (loop.full_counts.bit_length() - 1)) // 64, 1)
+    allowed_A = RELEASED_CODES / (line.V_per_A * line.codes_per_V)
+    low, high = -1, len(RELEASES) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        tried = replace(loop, release=RELEASES[middle] * unit)
+        if released_overshoot_A(tried, circuit, sampling, line) <= allowed_A:
+            high = middle
+        else:
+            low = middle
+    return replace(loop, release=RELEASES[high] * unit)
+
+
 def worst_step(steps: Sequence[StepResponse]) -> tuple[StepResponse, StepResponse]:
     """Return the slowest step, and the one that overshoots most."""
     return max(steps, key=lambda step: step.rise_s), max(steps, key=lambda step: step.overshoot)
@@ -175,6 +206,13 @@ class _Sums:
             raise InputError(
                 f"at {OVER_SHARE:.0%} of the rated current its sensor gives {top_V:.4g} V, expected at most "
                 f"{SHORT_RANGE * full_V:.4g} V of the converter's {full_V:g} V; lower the shunt or its gain"
+            )
+        least_V = OFFSET_SHARE * full_V
+        if not self.sensor.offset_V > least_V:
+            raise InputError(
+                f"without current its sensor gives {self.sensor.offset_V:g} V, expected more than {least_V:.3g} V: an "
+                "offset below the converter's zero is not seen, so that the calibration leaves it in the current; "
+                "shift the sensor, such as '0..1.2 A on 2 ohm + 0.15 V'"
             )
         if self.sampling.samples * self.converter.code_max > 65535:
             raise InputError(f"{self.sampling.samples} samples of the current do not fit a sum of 16 bits")

@@ -1,12 +1,13 @@
 """`CurrentDrive`: current control as compensator.json keeps it, with what it was designed for and what it holds."""
 
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, isfinite
 from typing import Annotated
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
@@ -18,9 +19,10 @@ from dzdesign.design.current.choosing import (
     worst_step,
 )
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.dither_response import dither_departure
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.current.margins import worst_margins
-from dzdesign.design.current.step_response import step_responses
+from dzdesign.design.current.step_response import STEP_S, step_responses
 from dzdesign.design.target_inputs import Converter
 
 
@@ -38,6 +40,17 @@ class CurrentDrive:
     least_rise_s: Annotated[float, quantity("s", "The same at that corner with the switch on all the time.")]
     fall_s: Annotated[float, quantity("s", "90 to 10 % at the slowest corner: the freewheeling diode decides.")]
     overshoot: Annotated[float, quantity("1", "Largest overshoot of the step up, of its height.")]
+    dither_above_counts: Annotated[
+        int,
+        Meta(
+            description="By how much the current's peak in the dither lies above the set point's at any corner.",
+            ge=0,
+            le=65535,
+        ),
+    ]
+    dither_below_counts: Annotated[
+        int, Meta(description="The same below it: where the loop does not follow to the wave's top.", ge=0, le=65535)
+    ]
 
     def __post_init__(self) -> None:
         if self.phase_margin_deg < LEAST_PHASE_DEG:
@@ -67,6 +80,19 @@ class CurrentDrive:
             f"the worst corner; 10 to 90 % in {1e3 * self.rise_s:.1f} ms at the slowest ({1e3 * self.least_rise_s:.1f} "
             f"ms with the switch on all the time), overshoot up to {self.overshoot:.1%}; 90 to 10 % takes up to "
             f"{1e3 * self.fall_s:.0f} ms, as the freewheeling diode alone brakes",
+            *self._weak_in_words(units),
+        )
+
+    def _weak_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
+        """Say what flows at most where no supply drives the rated current; those corners have no step."""
+        circuit = self.circuit
+        weakest = min(circuit.corners(), key=lambda corner: corner.supply_V / corner.resistance_ohm)
+        if circuit.duty(weakest, circuit.rated_A) < 1:
+            return ()
+        most_A, at_V = weakest.supply_V / weakest.resistance_ohm, weakest.supply_V
+        return (
+            f"at {at_V:g} V the hottest coil of {weakest.resistance_ohm:.3g} ohm carries {units.text(most_A, '.3g A')} "
+            "at most, so that full command has less than the rated current; step and margins are of the others",
         )
 
 
@@ -83,12 +109,22 @@ class CurrentRequest:
     sampling: CurrentSampling
 
 
-def design_current_drive(request: CurrentRequest, converter: Converter, compare_max: int) -> CurrentDrive:
-    """Choose the loop of a coil, and compute what it holds."""
+def design_current_drive(
+    request: CurrentRequest, converter: Converter, compare_max: int, dither: tuple[int, int] = (0, 1)
+) -> CurrentDrive:
+    """Choose the loop of a coil, and compute what it holds; a dither has a peak, counts, and periods of half a wave."""
     circuit, sensor, sampling = request.circuit, request.sensor, request.sampling
     loop = choose_loop(circuit, sensor, converter, sampling, compare_max=compare_max)
     phase, gain = worst_margins(circuit, sampling, gains_of(loop, circuit))
-    slowest, largest = worst_step(step_responses(loop, circuit, sampling, sensor_line(sensor, converter)))
+    line = sensor_line(sensor, converter)
+    slowest, largest = worst_step(step_responses(loop, circuit, sampling, line))
+    if not isfinite(slowest.rise_s):
+        raise InputError(
+            f"with {slowest.corner.resistance_ohm:.3g} ohm and {slowest.corner.inductance_H:.3g} H at "
+            f"{slowest.corner.supply_V:.3g} V the current does not reach 90 % of the rated one in {1e3 * STEP_S:g} ms; "
+            "declare narrower ranges of coil and supply, or a lower --rated-current"
+        )
+    above, below = dither_departure(loop, circuit, sampling, line, counts=dither[0], ticks=dither[1])
     high, low = 0.9 * circuit.rated_A, 0.1 * circuit.rated_A
     return CurrentDrive(
         circuit=circuit,
@@ -101,4 +137,6 @@ def design_current_drive(request: CurrentRequest, converter: Converter, compare_
         least_rise_s=round(slowest.least_s, 9),
         fall_s=round(max(circuit.fastest_fall_s(corner, high, low) for corner in circuit.corners()), 9),
         overshoot=round(largest.overshoot, 6),
+        dither_above_counts=above,
+        dither_below_counts=below,
     )

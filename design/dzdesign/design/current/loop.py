@@ -64,6 +64,9 @@ class CurrentLoop:
     integral: Annotated[Gain, Meta(description="The same, added in every PWM period.")]
     feed_forward: Annotated[Gain, Meta(description="PWM counts for a count of set point, over 2^gain_shift.")]
     integral_limit: Annotated[Count, Meta(description="Largest integral to either side, PWM counts.")]
+    release: Annotated[
+        Count, Meta(description="PWM counts that the output is below the integral, which begins at 0 on release.")
+    ]
     offset_nominal: Annotated[Count, Meta(description="Sum of codes without current, as designed.")]
     offset_tolerance: Annotated[Count, Meta(description="Largest deviation of it that is calibrated away.")]
     offset_shift: Annotated[
@@ -94,6 +97,8 @@ class CurrentLoop:
             raise RuleError(f"the gain of the current is {self.current_gain} over 2^{self.current_shift}")
         if self.integral_limit << self.gain_shift > 65535 * 8192:
             raise RuleError("the integral's limit and the gains' binary places need more than 31 bits")
+        if self.release > self.integral_limit:
+            raise RuleError(f"release is {self.release}, expected at most the integral's limit {self.integral_limit}")
         if self.offset_nominal + self.offset_tolerance > 65535:
             raise RuleError("the offset's tolerance reaches past the end of the sum")
         if not 0 < self.open_sum < self.over_sum < self.short_sum <= 65535:

@@ -6,6 +6,7 @@ compare values are those of the firmware (a test holds it to that).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from dzdesign.design.current.loop import CORRECTION_SHIFT, CurrentLoop
 
 #: The step, as shares of the rated current, and where its rise is read.
 STEP = (0.1, 0.9)
-SETTLE_S, STEP_S = 0.15, 0.06
+SETTLE_S, STEP_S = 0.25, 0.06
+#: Set points of a release from zero, of the rated current, and for how long the current is watched.
+RELEASED, RELEASED_S = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0), 0.12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,9 +88,12 @@ def run_loop(
     corners: Sequence[Corner],
     sampling: CurrentSampling,
     sensor: SensorLine,
-    set_points: Sequence[int] | np.ndarray,
+    set_points: Sequence[int | np.ndarray] | np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean current in A and compare value, (periods, corners), over a set point above zero for each period."""
+    """Return mean current in A and compare value, (periods, corners), over a set point above zero for each period.
+
+    A set point may be one for each corner, (corners,).
+    """
     coils, unit = Coils(circuit, corners, sampling), float(1 << loop.gain_shift)
     count, before = len(corners), sampling.before
     integral, compare, ramped = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -104,7 +110,7 @@ def run_loop(
         ramped = ramped + np.clip(set_point - ramped, -loop.rate, loop.rate)
         above = np.maximum(total - loop.offset_nominal, 0)
         error = ramped - np.floor(above * loop.current_gain / (1 << loop.current_shift) + 0.5)
-        asked = integral + loop.proportional * error + loop.feed_forward * ramped
+        asked = integral - loop.release * unit + loop.proportional * error + loop.feed_forward * ramped
         counts = np.floor(np.maximum(asked, 0) / unit + 0.5)
         if loop.supply is not None:
             counts = np.floor(np.minimum(counts, 65535) * factor / (1 << CORRECTION_SHIFT) + 0.5)
@@ -149,3 +155,18 @@ def step_responses(
             )
         )
     return found
+
+
+def released_overshoot_A(
+    loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, sensor: SensorLine
+) -> float:
+    """Return how far the mean current of a period gets past the set point it is released to, at most; all corners."""
+    tried = [
+        (corner, share)
+        for corner, share in product(circuit.corners(), RELEASED)
+        if circuit.duty(corner, share * circuit.rated_A) < 1
+    ]
+    counts = np.round(np.array([share for _, share in tried]) * loop.full_counts)
+    periods = round(RELEASED_S * sampling.tick_Hz)
+    means, _ = run_loop(loop, circuit, [corner for corner, _ in tried], sampling, sensor, [counts] * periods)
+    return float((means - counts / loop.full_counts * circuit.rated_A).max())

@@ -3,16 +3,18 @@
 import re
 from collections.abc import Mapping
 
-from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.choices import DRIVES, NEEDED, OF_CURRENT
-from dzdesign.design.current.choosing import CurrentSensor
+from dzdesign.design.current.choosing import OVER_SHARE, CurrentSensor
 from dzdesign.design.current.circuit import CoilCircuit
 from dzdesign.design.current.drive import CurrentRequest
-from dzdesign.design.signal_text import parse_signal
+from dzdesign.design.signal_text import PinSignal, parse_signal
 from dzdesign.design.target_inputs import TargetInputs
 
+#: Of the ends of a sensor's range: that of the decimal numbers in them.
+ROUNDING = 1e-9
 NUMBER = r"\d+(?:\.\d+)?(?:[eE]-?\d+)?"
 RANGE = rf"(?:\s*x\s*(?P<{{0}}low>{NUMBER})\s*\.\.\s*(?P<{{0}}high>{NUMBER}))?"
 COIL = re.compile(
@@ -40,11 +42,14 @@ def current_request(text: Mapping[str, str], target: TargetInputs) -> CurrentReq
             f"--drive current needs {', '.join(missing)}; write for example --coil '3.5 ohm 40 mH' --rated-current "
             "'1 A' --supply '18..32 V' --current-signal '0..1.2 A on 2 ohm + 0.15 V'"
         )
-    sensor = parse_signal(text["current_signal"], "--current-signal")
+    circuit, sensor = _circuit(text), parse_signal(text["current_signal"], "--current-signal")
     sensor.check_within(target.converter)
+    _check_measured(sensor, "--current-signal", "A", OVER_SHARE * circuit.rated_A)
     supply = parse_signal(text["supply_signal"], "--supply-signal") if text["supply_signal"] else None
+    if supply is not None:
+        _check_measured(supply, "--supply-signal", "V", circuit.supply_V[1])
     return CurrentRequest(
-        circuit=_circuit(text),
+        circuit=circuit,
         sensor=CurrentSensor(
             V_per_A=float(sensor.volts_per_unit),
             offset_V=float(sensor.offset_V),
@@ -52,6 +57,20 @@ def current_request(text: Mapping[str, str], target: TargetInputs) -> CurrentReq
         ),
         sampling=target.current_sampling,
     )
+
+
+def _check_measured(signal: PinSignal, option: str, unit: str, needed: float) -> None:
+    """Refuse a signal of another quantity, one that stands for something else, and one that ends too low."""
+    if signal.unit != unit or signal.meaning is not None:
+        example = "'0..1.2 A on 2 ohm + 0.15 V'" if unit == "A" else "'0..36 V x 0.075'"
+        raise InputError(
+            f"{option} is {quoted(signal.text)}, expected a range in {unit} that stands for itself, such as {example}"
+        )
+    if float(signal.high) < needed * (1 - ROUNDING):
+        raise InputError(
+            f"{option} is {quoted(signal.text)}, which ends at {float(signal.high):g} {unit}, expected {needed:g} "
+            f"{unit} or more: beyond its end a sensor tells nothing"
+        )
 
 
 def _circuit(text: Mapping[str, str]) -> CoilCircuit:

@@ -202,7 +202,7 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     allowance = first.allowance(sign)
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
-    above = AboveChoice(choice=first.above, step_codes=STEP_CODES)
+    above = AboveChoice.on(first.machine, first.above, STEP_CODES)
     curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
     low, high = _common_interval([curves])
     above_least = _above_the_least(curves, allowance, float(u_max))

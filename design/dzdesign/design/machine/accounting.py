@@ -181,8 +181,8 @@ def _declared(component: Component, machine: Machine | None) -> tuple[Origin, st
     known = DECLARED[component]
     if machine is None or known.field not in machine.defaults:
         return "declared", known.option
-    if component in RANGES:  # the range was declared, its value on the bench was not
-        return "declared", f"{known.option.partition(',')[0]}; {machine.defaults[known.field]}"
+    if component in RANGES:  # the range was declared, but what it is counted from was not
+        return "default", f"{machine.defaults[known.field]}; the range by {known.option.partition(',')[0]}"
     return "default", machine.defaults[known.field]
 
 

@@ -9,6 +9,7 @@ from fractions import Fraction
 from math import ceil, prod
 
 from dzdesign.core.dither import Dither, DrivenDither
+from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.machine.budget import Component
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.signals import Signals
@@ -98,13 +99,24 @@ def allowance_of(
     )
 
 
-def dither_reserve(driven: DrivenDither, recorded: Dither | None, machine: Machine | None = None) -> int:
+def dither_reserve(
+    driven: DrivenDither,
+    recorded: Dither | None,
+    machine: Machine | None = None,
+    current_drive: CurrentDrive | None = None,
+) -> int:
     """Return by how many counts the offset stays lower for the dither.
 
     Where the ramps were recorded with it, its peak on a machine that gives more current for a drive is larger than on
     the bench by as much as the threshold is smaller, and by that difference the valve passes flow earlier.
+
+    A controlled current overshoots the set point's wave, or stays short of it: what counts is the current's peak, of
+    ramps that were recorded with the wave any other one than theirs.
     """
     reserve = driven.reserve(recorded)
+    if current_drive is not None:
+        above, below = current_drive.dither_above_counts, current_drive.dither_below_counts
+        reserve += above if recorded is None else max(above, below)
     if machine is None or recorded is None:
         return reserve
     return reserve + ceil(driven.counts * (1 - machine.least_factor))

@@ -10,6 +10,8 @@ from dzdesign.identify.valve.model import ValveModel
 
 #: Reading of the command that may be a coil's current and no signal of 0..20 mA, A.
 LEAST_COIL_A = 0.05
+#: Two currents are one to this share: the rounding of units.
+SAME_CURRENT = 1e-6
 
 
 def recorded_full_A(valve: ValveModel) -> float | None:
@@ -24,15 +26,18 @@ def recorded_full_A(valve: ValveModel) -> float | None:
     return ampere if ampere >= LEAST_COIL_A else None
 
 
-def check_bench_current(valve: ValveModel, rated_A: float, declared_A: float | None, error: float) -> None:
-    """Refuse a rated current that is not the one of full command on the bench, to its error."""
+def check_bench_current(valve: ValveModel, rated_A: float, declared_A: float | None) -> None:
+    """Refuse a rated current that is not the one of full command on the bench.
+
+    The budget has that one's error, which is about the rated current: a distance between the two would not be in it.
+    """
     recorded_A = recorded_full_A(valve)
     known = {"--bench-current": declared_A, "the recorded command": recorded_A}
     for what, ampere in known.items():
-        if ampere is not None and abs(ampere / rated_A - 1) > error:
+        if ampere is not None and abs(ampere / rated_A - 1) > SAME_CURRENT:
             raise InputError(
-                f"--rated-current is {rated_A:g} A, but full command was {ampere:g} A on the bench by {what}, so the "
-                f"recorded thresholds are not the same shares of it; give --rated-current '{ampere:g} A'"
+                f"--rated-current is {rated_A:g} A, but full command was {ampere:.9g} A on the bench by {what}, so the "
+                f"recorded thresholds are not the same shares of it; give --rated-current '{ampere:.9g} A'"
             )
 
 

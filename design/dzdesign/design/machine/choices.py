@@ -20,8 +20,9 @@ class MachineChoices:
     bench_supply: Annotated[Text, Option("V", MACHINE, example="24 V")] = None
     """Supply voltage while the ramps were recorded (default: 12, 24 or 48 V, the one within --supply)."""
     amplifier: Annotated[Text, Option("E", MACHINE, example="1 %")] = None
-    """Accuracy of an amplifier between PWM and coil that controls the current: by how much its current may differ from
-    that of the bench over coil temperature and supply, such as "1 %" (default: none, the duty goes to the coil)."""
+    """Accuracy of an amplifier between PWM and coil that controls the current, of its value and not of full scale: by
+    how much it may differ from that of the bench over coil temperature and supply, such as "1 %" (default: none, the
+    duty goes to the coil)."""
     current_error: Annotated[Text, Option("E", MACHINE, example="1 %")] = None
     """Accuracy of the current that --drive current controls, of its value: shunt, its amplifier and the converter's
     gain together (default: 1 % and the gain error of the target's converter)."""

@@ -1,6 +1,7 @@
 """What a declared machine costs, and what was not declared, in a person's words."""
 
 from fractions import Fraction
+from math import inf
 
 import numpy as np
 
@@ -22,27 +23,38 @@ def machine_costs(compensator: Compensator, sign: int) -> list[str]:
     ]
     lines = [
         f"the budget takes {units.text(1e3 * max(taken), '.0f mV')} from the threshold at most "
-        f"({max(taken) / float(compensator.u_max_V):.2%} of command); most of it {budget.largest.component}, "
+        f"({max(taken) / float(compensator.u_max_V):.2%} of command); the largest part: {budget.largest.component}, "
         f"{budget.largest.price:.2%}"
     ]
-    factor = float(machine.largest_factor)
-    knees = [test.u_knee_rising_V for test in compensator.valve.sides[SIDE_NAMES[sign]].tests if test.u_knee_rising_V]
-    if knees and factor * max(knees) > float(compensator.u_max_V):
-        lines.append(
-            f"at the other end of the machine the threshold is {factor:.3f} times the bench's: the valve does not open "
-            "at any duty; control the current, or declare narrower ranges"
-        )
-    else:
-        lines.append(
-            f"at the other end of the machine the threshold is {factor:.3f} times the bench's, so the dead zone is "
-            "longer by that"
-        )
+    lines += _other_end(compensator, sign)
     lines += _jump(compensator, sign)
     drive = compensator.current_drive
     if drive is not None and sign > 0:
         premise = premise_of_bench_current(compensator.valve, drive.circuit.rated_A, machine.bench_full_A)
         lines += [premise] if premise else []
     return lines
+
+
+def _other_end(compensator: Compensator, sign: int) -> list[str]:
+    """Say how long the dead zone is on the machine that opens last, which the transition does not reach."""
+    if compensator.machine is None:
+        return []
+    factor, found = float(compensator.machine.largest_factor), []
+    limit = compensator.drive_functions.compare_limit / compensator.signals.compare_max
+    for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+        if test.u_knee_rising_V is not None:
+            dp_code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
+            knee = factor * test.u_knee_rising_V / float(compensator.u_max_V)
+            corners = corners_of(compensator, dp_code, sign)
+            found.append(corners.command_at(knee) if knee <= limit else inf)
+    if not found:
+        return []
+    words = f"at the other end of the machine the threshold is {factor:.3f} times the bench's: "
+    if max(found) > 1:
+        words += "the valve does not open at any command; control the current, or declare narrower ranges"
+    else:
+        words += f"the dead zone on opening is there up to {max(found):.2%} of command"
+    return [words]
 
 
 def _jump(compensator: Compensator, sign: int) -> list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.design_choices import Above
+from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import Certificate
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
@@ -74,6 +75,14 @@ class AboveChoice:
     choice: Above
     #: Codes between two nodes of the table.
     step_codes: int
+    #: Of a pressure drop that the tests were recorded at, up to the last one, MPa; above them it grows with the drop.
+    bench_error_MPa: Fraction = Fraction(0)
+
+    @classmethod
+    def on(cls, machine: Machine | None, choice: Above, step_codes: int) -> "AboveChoice":
+        """Return a choice for a machine, whose bench's gauge counts above the tests too."""
+        error_MPa = Fraction(repr(machine.bench_pressure_error_MPa)) if machine else Fraction(0)
+        return cls(choice=choice, step_codes=step_codes, bench_error_MPa=error_MPa)
 
     def of(self, curve: CertifiedCurve) -> OffsetAbove | None:
         """Return how the offset of a curve goes on above its last test; None: it is held.
@@ -85,7 +94,8 @@ class AboveChoice:
             return None
         last_MPa, last_V = (Fraction(repr(values[-1])) for values in (curve.offset_dp_MPa, curve.offset_V))
         if continued is not None:
-            return OffsetAbove.under(continued.bound(), last_V, certified=continued.certified)
+            bound = _drawn_together(continued.bound(), self.bench_error_MPa)
+            return OffsetAbove.under(bound, last_V, certified=continued.certified)
         held = BoundPiece(last_MPa, last_MPa + FURTHEST_MPa, last_V, last_V, Fraction(0))
         return OffsetAbove.under(CertifiedBound(pieces=(held,)), last_V, certified=False)
 
@@ -97,6 +107,29 @@ class AboveChoice:
         if self.choice != "release":
             return None
         return ((tested.stop - 1) // self.step_codes + 1 + RELEASE_SEGMENTS) * self.step_codes
+
+
+def _drawn_together(bound: CertifiedBound, error_MPa: Fraction) -> CertifiedBound:
+    """Return a bound above the tests where each pressure drop of the bench was wrong by up to an error at the last one.
+
+    A gauge's gain is wrong by as much at each test, so the drop at which a threshold truly is goes on as far beyond the
+    last test as the drop that was read, times 1 + error / last; the error at the last test itself counts as elsewhere.
+    Errors that change their sign from test to test are those of no gauge.
+    """
+    last = bound.dp_MPa[0]
+    factor = 1 + error_MPa / last
+    return CertifiedBound(
+        pieces=tuple(
+            BoundPiece(
+                last + (piece.from_MPa - last) / factor,
+                last + (piece.to_MPa - last) / factor,
+                piece.low_V,
+                piece.high_V,
+                piece.curvature * factor**2,
+            )
+            for piece in bound.pieces
+        )
+    )
 
 
 def above_in_words(choice: Above, certificate: Certificate, side: SideModel, units: RecordedUnits) -> str:

@@ -28,6 +28,7 @@ def _corners(result: CurrentLoopResult) -> Table:
         ("gain margin", lambda one: number(one.gain_margin, 2)),
         ("limit cycle (codes)", lambda one: number(one.limit_cycle_codes, 2)),
         ("steady error (codes)", lambda one: number(one.steady_error_codes, 2)),
+        ("beyond the set point on release (codes)", lambda one: number(one.release_overshoot_codes, 2)),
         ("10 to 90 % (ms)", lambda one: _optional(one.rise_s, 1, 1e3)),
         ("switch on all the time (ms)", lambda one: _optional(one.least_rise_s, 1, 1e3)),
         ("overshoot (%)", lambda one: _optional(one.overshoot, 1, 100.0)),

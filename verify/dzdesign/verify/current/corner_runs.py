@@ -1,6 +1,6 @@
 """The C with the coil at every declared corner: set points held, a step, faults of the circuit."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from math import ceil, inf
 from typing import NamedTuple
@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from dzdesign.design.current.circuit import Corner
+from dzdesign.design.drive_functions import DriveFunctions
 from dzdesign.verify.current.coil_simulation import Change, CoilLoop, CoilSimulation
 from dzdesign.verify.current.declared_circuit import (
     conducting_duty,
+    declared_corners,
     least_rise_s,
     nominal_corner,
 )
@@ -22,6 +24,7 @@ from dzdesign.verify.current.stability import stability_margins
 SHARES = (0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 SETTLE_S, HELD_S = 1.0, 10.0
 #: The step, of the rated current, and for how long before and after it the set point stands.
+DITHERED_S = (0.3, 0.1)
 STEP, BEFORE_S, AFTER_S = (0.1, 0.9), 0.15, 0.06
 RISEN = 0.9
 #: Of the offset's tolerance: a sensor's zero that is calibrated away, and one that is not.
@@ -42,6 +45,8 @@ class HeldCurrent:
     reading_swing: float
     reading_error: float
     current_error: float
+    #: Beyond the set point, before it has settled.
+    release_overshoot: float
     faults: int
 
 
@@ -57,12 +62,13 @@ def held_current(simulation: CoilSimulation, corner: Corner, share: float, offse
     # As the converter gives it without current: rounded down.
     zero = np.floor((around.sensor.offset_V * _codes_per_V(around)) + offset_codes)
     readings = found.total[settle:].astype(float) / sampling.samples - zero
-    mean = found.mean_A[settle:] * codes_per_A
+    released, mean = np.split(found.mean_A * codes_per_A, [settle])
     return HeldCurrent(
         mean_swing=float(np.ptp(mean)),
         reading_swing=float(np.ptp(readings)),
         reading_error=float(abs(readings.mean() - asked)),
         current_error=float(abs(mean.mean() - asked)),
+        release_overshoot=max(float(released.max() - asked), 0.0),
         faults=int(found.faults[-1]),
     )
 
@@ -76,6 +82,27 @@ def offset_errors(around: CoilLoop) -> tuple[float, ...]:
     per_sample = around.loop.offset_tolerance / around.sampling.samples
     zero = around.sensor.offset_V * _codes_per_V(around)
     return tuple(share * per_sample for share in OFFSET_SHARES if zero + share * per_sample >= 0)
+
+
+def dithered_current(
+    simulation: CoilSimulation, functions: DriveFunctions, set_points: Collection[int]
+) -> tuple[float, float]:
+    """Return by how many counts the current's peak lies above and below the set point's, at most of all corners.
+
+    The set points are those of zero command, about which the wave runs until it has settled.
+    """
+    around, counts = simulation.around, functions.dither_counts
+    unit_A, above, below = around.circuit.rated_A / around.loop.full_counts, 0.0, 0.0
+    settle, seen = (round(seconds * around.sampling.tick_Hz) for seconds in DITHERED_S)
+    up = np.arange(settle + seen) // functions.dither_ticks % 2 == 0
+    for set_point in set_points if counts else ():
+        wave = np.where(up, set_point + counts, max(set_point - counts, 0))
+        for corner in declared_corners(around.circuit):
+            if carries(around, corner, (set_point + counts) / around.loop.full_counts):
+                mean_A = simulation.run(corner, wave).mean_A[settle:]
+                peak = float(mean_A.max()) / unit_A - set_point - counts
+                above, below = max(above, peak), max(below, -peak)
+    return above, below
 
 
 def carries(around: CoilLoop, corner: Corner, share: float) -> bool:
@@ -112,6 +139,7 @@ def run_corner(simulation: CoilSimulation, corner: Corner) -> CornerRun:
         limit_cycle_codes=max((max(each.mean_swing, each.reading_swing) for each in held), default=0.0),
         steady_error_codes=max((each.reading_error for each in held), default=0.0),
         current_error_codes=max((each.current_error for each in held), default=0.0),
+        release_overshoot_codes=max((each.release_overshoot for each in held), default=0.0),
         rise_s=rise_s,
         least_rise_s=least_s,
         overshoot=overshoot,

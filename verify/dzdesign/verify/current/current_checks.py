@@ -10,7 +10,15 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.verify.current.coil_simulation import CoilLoop, CoilSimulation, coil_loop_of
-from dzdesign.verify.current.corner_runs import HELD_S, SHARES, fault_runs, held_current, offset_errors, run_corner
+from dzdesign.verify.current.corner_runs import (
+    HELD_S,
+    SHARES,
+    dithered_current,
+    fault_runs,
+    held_current,
+    offset_errors,
+    run_corner,
+)
 from dzdesign.verify.current.declared_circuit import declared_corners, nominal_corner
 from dzdesign.verify.current.results import ControllerStates, CurrentCorner, CurrentLoopResult, FaultRun
 from dzdesign.verify.current.state_check import BLOCK, SEED, StateFindings, check_states, hashes_on
@@ -31,6 +39,8 @@ STATES = 10_000_000
 FEW_STATES = BLOCK
 #: Least phase margin; largest limit cycle and steady error, codes of the converter; largest overshoot.
 LEAST_PHASE_DEG, MOST_SWING_CODES, MOST_ERROR_CODES, MOST_OVERSHOOT = 45.0, 2.0, 1.0, 0.10
+#: Largest current beyond a set point that comes from zero, codes: the valve stays shut as the drive is released.
+MOST_RELEASE_CODES = 1.0
 #: How far what is found may lie from what compensator.json says of the same.
 SAME_DEG, SAME_GAIN, SAME_OVERSHOOT = 0.1, 0.02, 0.002
 #: Chance of which a wrong state among those that are drawn would be missed.
@@ -69,7 +79,7 @@ def current_checks(
         core = read_controller(folder)
         found = check_states(drive.loop, core, states)
         say("running the current controller with the coil at every corner")
-        result = _result(CoilSimulation(around, core), found)
+        result = _result(CoilSimulation(around, core), found, compensator)
     except RequirementError as error:
         return CurrentChecks(checks=(CURRENT_STATES.check(holds=False, text=str(error)),))
     return CurrentChecks(checks=checks_of(result, drive, around), result=result)
@@ -80,7 +90,7 @@ def checks_of(result: CurrentLoopResult, drive: CurrentDrive, around: CoilLoop) 
     return (
         _states_check(result.states),
         _margins_check(result, drive),
-        _settles_check(result),
+        _settles_check(result, drive, around),
         _step_check(result, drive, around),
         _faults_check(result.faults),
     )
@@ -109,8 +119,16 @@ def controller_on_machine(folder: Path, compensator: Compensator, machine: Machi
     return MACHINE_CODE.check(name=name, holds=wrong + host.wrong == 0, text=text)
 
 
-def _result(simulation: CoilSimulation, found: StateFindings) -> CurrentLoopResult:
-    around = simulation.around
+def zero_command_points(compensator: Compensator) -> tuple[int, ...]:
+    """Return the set points at zero command at the ends of the tested interval, counts."""
+    signals, ends = compensator.signals, compensator.positive.certificate.dp_MPa
+    zero = signals.command.zero_code
+    return tuple(sorted({compensator.compare(zero, round(signals.dp_code(dp))) for dp in ends}))
+
+
+def _result(simulation: CoilSimulation, found: StateFindings, compensator: Compensator) -> CurrentLoopResult:
+    around, functions = simulation.around, compensator.drive_functions
+    above, below = dithered_current(simulation, functions, zero_command_points(compensator))
     corners = [run_corner(simulation, corner) for corner in declared_corners(around.circuit)]
     offsets = offset_errors(around)
     shifted = partial(held_current, simulation, nominal_corner(around.circuit), 0.5)
@@ -122,6 +140,8 @@ def _result(simulation: CoilSimulation, found: StateFindings) -> CurrentLoopResu
         corners=tuple(corner.found for corner in corners),
         offset_codes=offsets,
         offset_error_codes=max((shifted(offset).reading_error for offset in offsets), default=0.0),
+        dither_above_counts=above,
+        dither_below_counts=below,
         faults=tuple(fault_runs(simulation)),
     )
 
@@ -158,26 +178,40 @@ def _margins_check(result: CurrentLoopResult, drive: CurrentDrive) -> Check:
     return CURRENT_MARGINS.check(holds=same and phase.phase_margin_deg >= LEAST_PHASE_DEG, text=text)
 
 
-def _settles_check(result: CurrentLoopResult) -> Check:
+def _settles_check(result: CurrentLoopResult, drive: CurrentDrive, around: CoilLoop) -> Check:
     swing = max(result.corners, key=lambda corner: corner.limit_cycle_codes)
     error = max(result.corners, key=lambda corner: corner.steady_error_codes)
     current = max(corner.current_error_codes for corner in result.corners)
+    released = max(result.corners, key=lambda corner: corner.release_overshoot_codes)
     tried = len(result.corners) * len(result.shares) - result.not_carried
     text = (
         f"{tried} set points of {result.seconds:g} s each, without dither: limit cycle up to "
         f"{swing.limit_cycle_codes:.2f} codes (at {_at(swing)}; allowed: {MOST_SWING_CODES:g}), steady error up to "
         f"{error.steady_error_codes:.2f} codes (at {_at(error)}; allowed: {MOST_ERROR_CODES:g}), of the current itself "
-        f"{current:.2f}"
+        f"{current:.2f}; on its way there from zero the current is up to {released.release_overshoot_codes:.2f} codes "
+        f"beyond (at {_at(released)}; allowed: {MOST_RELEASE_CODES:g})"
     )
     if result.not_carried:
         text += f"; {result.not_carried} set points lie beyond what the supply can drive, and were not tried"
     if result.offset_codes:
         shifts = ", ".join(f"{offset:+.0f}" for offset in result.offset_codes)
         text += f"; with a sensor's zero off by {shifts} codes {result.offset_error_codes:.2f} codes, once calibrated"
+    kept = max(
+        result.dither_above_counts - drive.dither_above_counts,
+        result.dither_below_counts - drive.dither_below_counts,
+    )
+    if drive.dither_above_counts or drive.dither_below_counts:
+        text += (
+            f"; in the dither the current's peak lies up to {result.dither_above_counts:.0f} counts above the set "
+            f"point's and {result.dither_below_counts:.0f} below it, for which compensator.json keeps "
+            f"{drive.dither_above_counts} and {drive.dither_below_counts}"
+        )
     faults = [corner for corner in result.corners if corner.faults]
     if faults:
         text += f"; faults {faults[0].faults:#x} of a circuit without a fault at {_at(faults[0])}"
     settles = not faults and max(error.steady_error_codes, result.offset_error_codes) <= MOST_ERROR_CODES
+    settles &= kept * around.codes_per_A * around.circuit.rated_A / around.loop.full_counts <= MOST_ERROR_CODES
+    settles = settles and released.release_overshoot_codes <= MOST_RELEASE_CODES
     return CURRENT_SETTLES.check(holds=settles and swing.limit_cycle_codes <= MOST_SWING_CODES and tried > 0, text=text)
 
 

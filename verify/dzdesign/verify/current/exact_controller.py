@@ -25,7 +25,7 @@ class ExactController:
     """One controller: its state, and what it puts out after each period of the PWM."""
 
     loop: CurrentLoop
-    #: PWM counts.
+    #: PWM counts; from where the output stands when it is released.
     integral: Fraction = field(default_factory=Fraction)
     compare: int = 0
     faults: int = NO_OFFSET
@@ -60,7 +60,7 @@ class ExactController:
         self._detect(total, above)
         gain = {name: Fraction(getattr(loop, name), 1 << loop.gain_shift) for name in ("proportional", "integral")}
         feed_forward = Fraction(loop.feed_forward, 1 << loop.gain_shift) * self.ramped
-        asked = self.integral + gain["proportional"] * error + feed_forward
+        asked = self.integral - loop.release + gain["proportional"] * error + feed_forward
         counts = self._corrected(floor(max(asked, Fraction(0)) + HALF), supply_code)
         winds_up = (counts > loop.compare_limit and error > 0) or (asked < 0 and error < 0)
         if not winds_up:
@@ -112,7 +112,7 @@ def exact_ticks(loop: CurrentLoop, given: Columns) -> dict[str, np.ndarray]:
         (OPEN, open_ticks >= loop.open_ticks),
     ):
         faults |= np.where(stands, bit, 0)
-    asked = given["integral"] + loop.proportional * error + loop.feed_forward * aim
+    asked = given["integral"] - loop.release * unit + loop.proportional * error + loop.feed_forward * aim
     counts = _corrected(loop, _rounded(np.maximum(asked, 0), unit), given["supply_code"])
     winds_up = ((counts > loop.compare_limit) & (error > 0)) | ((asked < 0) & (error < 0))
     end = loop.integral_limit * unit

@@ -52,6 +52,9 @@ class CurrentCorner:
             ge=0, le=1e6,
         ),
     ]  # fmt: skip
+    release_overshoot_codes: Annotated[
+        float, quantity("codes", "Largest mean current beyond the set point, as that comes from zero.", ge=0, le=1e6)
+    ]
     rise_s: Annotated[
         float | None,
         quantity("s", "10 to 90 % of the rated current; null where the supply can't carry that, or it is not reached."),
@@ -107,8 +110,8 @@ class ValveAtCorners:
 
     @property
     def q_beyond_L_min(self) -> float:
-        """Flow at zero command beyond what is allowed there."""
-        return self.q_zero_L_min - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
+        """Flow at zero command beyond what is allowed there, after closing or as the drive is released."""
+        return max(self.q_zero_L_min, self.q_released_L_min) - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,6 +129,10 @@ class CurrentLoopResult:
     offset_error_codes: Annotated[
         float, quantity("codes", "Largest departure of the mean reading from the set point with them.", ge=0, le=1e6)
     ]
+    dither_above_counts: Annotated[
+        float, quantity("counts", "By how much the current's peak in the dither lies above the set point's.", ge=0)
+    ]
+    dither_below_counts: Annotated[float, quantity("counts", "The same below it.", ge=0)]
     faults: Annotated[tuple[FaultRun, ...], about("One entry a fault.")]
     valve: Annotated[
         tuple[ValveAtCorners, ...],

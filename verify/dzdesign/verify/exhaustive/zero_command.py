@@ -148,14 +148,17 @@ def counted_dither(compensator: Compensator) -> int:
     """Return how many counts of the dither are drive at zero command, written from the documentation anew.
 
     The whole peak, unless the ramps were recorded with a dither: then by how much its peak is another, and what a
-    motion that falls with the square of the frequency makes of the frequency's difference.
+    motion that falls with the square of the frequency makes of the frequency's difference. Of a controlled current
+    also by how much its wave departs from the set point's, which `current_checks` holds to the coil.
     """
     functions, signals, recorded = compensator.drive_functions, compensator.signals, compensator.valve.dither
+    drive = compensator.current_drive
+    above, below = (drive.dither_above_counts, drive.dither_below_counts) if drive else (0, 0)
     if recorded is None:
-        return functions.dither_counts
+        return functions.dither_counts + above
     half_waves = 2 * Fraction(repr(recorded.frequency_Hz)) * functions.dither_ticks / signals.tick_Hz
     other_peak = abs(Fraction(repr(recorded.peak)) * signals.compare_max - functions.dither_counts)
-    return ceil(other_peak + functions.dither_counts * abs(1 - half_waves * half_waves))
+    return ceil(other_peak + functions.dither_counts * abs(1 - half_waves * half_waves)) + max(above, below)
 
 
 def margin_of_sagging(

@@ -10,6 +10,7 @@ from pathlib import Path
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
+from dzdesign.verify.firmware.project_file import is_project
 from dzdesign.verify.firmware.unchanged_files import USER_FOLDER, changed_files, user_files
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.host_compiler import (
@@ -43,8 +44,12 @@ def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
 
 
 def changed_board_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
-    """Return the files of the target that the user fills in and that are no longer as generated."""
-    return sorted(name for name in changed_files(folder, manifest) if name in manifest.board)
+    """Return the files of the target that the user fills in and that are no longer as generated.
+
+    The project file is none of them: nothing in it goes unchecked.
+    """
+    changed = (name for name in changed_files(folder, manifest) if name in manifest.board)
+    return sorted(name for name in changed if not is_project(name))
 
 
 def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:

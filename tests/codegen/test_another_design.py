@@ -1,0 +1,103 @@
+"""`codegen` over the firmware of another design asks for `--replace`; design's warnings are said again."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from dzdesign.codegen.earlier_firmware import refuse_another_design
+from dzdesign.codegen.project import generate, write_firmware
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.errors import InputError
+from tests.support.paths import GOLDENS_FULL
+from tests.support.synthetic import with_side
+
+#: A valve with both sides, and options of a drive for both with 4-20 mA sensors.
+BOTH_SIDES = GOLDENS_FULL / "valve.json"
+BIPOLAR = (
+    "--command-signal=-10..10 V x 0.15 + 1.5 V", "--command-error", "1.9 % + 1 code",
+    "--pressure-a", "4..20 mA on 120 ohm = 25 MPa", "--pressure-b", "4..20 mA on 120 ohm = 25 MPa",
+)  # fmt: skip
+
+
+@pytest.fixture
+def valve_file(example_valve, tmp_path):
+    path = tmp_path / "valve.json"
+    path.write_bytes(to_json_bytes(example_valve))
+    return path
+
+
+def contents(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def codegen(capsys, tmp_path):
+    """Run `codegen` into one folder; returns exit status and what was said beside the files."""
+
+    def run(source, *options):
+        status = main(["codegen", str(source), "--target", "host", "-o", str(tmp_path / "firmware"), *options])
+        return status, capsys.readouterr().err
+
+    return run
+
+
+def test_the_default_design_does_not_go_over_a_bipolar_one(codegen, tmp_path):
+    """Seeded: a firmware for two solenoids, then `codegen valve.json` with no options into the same folder."""
+    status, said = codegen(BOTH_SIDES, *BIPOLAR)
+    assert status == 0 and "left out" not in said
+    before = contents(tmp_path / "firmware")
+    status, said = codegen(BOTH_SIDES)
+    assert status == 2 and contents(tmp_path / "firmware") == before
+    assert "two solenoids, this one one solenoid" in said and "--command-signal '-10..10 V" in said
+    assert "--replace" in said and "-o" in said
+    status, said = codegen(BOTH_SIDES, "--replace")
+    assert status == 0 and "warning: the valve's negative side is left out" in said
+    assert "dz_comp_negative" not in (tmp_path / "firmware/core/dz_comp.h").read_text()
+    assert codegen(BOTH_SIDES)[0] == 0  # now it is the same design
+
+
+def test_another_option_is_named(valve_file, codegen, tmp_path):
+    assert codegen(valve_file, "--guard", "mean")[0] == 0
+    before = contents(tmp_path / "firmware")
+    status, said = codegen(valve_file)
+    assert status == 2 and "--guard 'mean', here 'closing'" in said and contents(tmp_path / "firmware") == before
+
+
+def test_another_valve_is_named(example_compensator, tmp_path):
+    write_firmware(generate(example_compensator, "host"), tmp_path / "firmware")
+    other = replace(example_compensator.valve, made_from=example_compensator.valve.made_from[:2])
+    with pytest.raises(InputError, match="its valve is another one"):
+        refuse_another_design(tmp_path / "firmware", replace(example_compensator, valve=other))
+
+
+def test_other_numbers_of_the_same_options_are_another_design(example_compensator, tmp_path):
+    write_firmware(generate(example_compensator, "host"), tmp_path / "firmware")
+    beta = tuple(max(value - 1, 1) for value in example_compensator.positive.beta)
+    with pytest.raises(InputError, match="other numbers"):
+        write_firmware(generate(with_side(example_compensator, beta=beta), "host"), tmp_path / "firmware")
+
+
+def test_the_same_design_is_written_again_also_of_another_version_and_for_another_target(example_compensator, tmp_path):
+    firmware = generate(example_compensator, "host")
+    write_firmware(firmware, tmp_path / "firmware")
+    write_firmware(firmware, tmp_path / "firmware")
+    older = json.loads(to_json_bytes(example_compensator))
+    older["tool"]["version"] = "0.0.9"
+    content = to_json(older).encode()
+    write_firmware(generate(example_compensator, "host", content), tmp_path / "older")
+    write_firmware(firmware, tmp_path / "older")
+    note = write_firmware(generate(example_compensator, "cortex-m4"), tmp_path / "older").note
+    assert "was replaced by this one for cortex-m4" in note
+
+
+def test_a_firmware_whose_compensator_is_gone_is_not_written_over(example_compensator, tmp_path):
+    firmware = generate(example_compensator, "host")
+    write_firmware(firmware, tmp_path / "firmware")
+    (tmp_path / "firmware/compensator.json").unlink()
+    with pytest.raises(InputError, match="can't be read"):
+        write_firmware(firmware, tmp_path / "firmware")
+    write_firmware(firmware, tmp_path / "firmware", over_another=True)
+    assert (tmp_path / "firmware/compensator.json").is_file()

@@ -1,0 +1,80 @@
+"""The user's headers and linker files: they may not change what the generated C means, which includes them."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path, PurePosixPath
+
+from dzdesign.verify.firmware.build_inputs import SOURCES
+
+#: Texts are kept: what looks like a comment in one is none.
+COMMENT = re.compile(r"""("(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')|/\*.*?\*/|//[^\n]*""", re.DOTALL)
+#: A line that goes on, as C and its trigraphs write it.
+CONTINUED = re.compile(r"(?:\\|\?\?/)[ \t]*\r?\n")
+HASH, BLANK = r"^[^\S\n]*(?:#|%:|\?\?=)[^\S\n]*", r"[^\S\n]*"
+MACRO = re.compile(rf"{HASH}(?:define|undef){BLANK}(\w+)", re.MULTILINE)
+INCLUDE = re.compile(rf"{HASH}(?:include_next|include|import){BLANK}([^\n]*)", re.MULTILINE)
+INCLUDED_SCRIPT = re.compile(r"\bINCLUDE\s+(\S+)")
+NAME = re.compile(r"[A-Za-z_]\w*")
+FUNCTION = re.compile(r"\b(dz_\w+)\s*\(")
+#: A symbol that a linker file gives an address, over that of the C.
+ASSIGNED = re.compile(r"\b(\w+)\s*(?:[-+*/&|]|<<|>>)?=(?!=)")
+LINKER_FILES = {".ld", ".lds", ".lcf", ".icf", ".sct", ".cmd"}
+QUOTES = "\"'"
+C_FILES = {".c", ".s", ".asm"}
+
+
+def interference(folder: Path, names: list[str], generated: Mapping[str, str], board: frozenset[str]) -> Iterator[str]:
+    """Yield in which file of the user's something stands that changes what the generated C means or where it lies.
+
+    `names` are the user's files, `generated` the texts of all that codegen makes and `board` those of them that are for
+    the user to fill in: what was generated there may stay. The core's C includes no file of the user's. A C file of the
+    user's is compiled by itself, and what it does is not looked at, but for what it includes.
+    """
+    code = {name: _without_comments(text) for name, text in generated.items() if name.endswith((".c", ".h"))}
+    reached = {name for name in code if name not in board and not (name.startswith("core/") and name.endswith(".c"))}
+    used = {word for name in reached for word in NAME.findall(code[name])}
+    functions = {word for text in code.values() for word in FUNCTION.findall(text)}
+    for name in names:
+        path = folder / name
+        if not path.is_file():
+            continue
+        text = _without_comments(path.read_text(encoding="utf-8", errors="replace"))
+        before = _without_comments(generated.get(name, ""))
+        yield from (f"{name} {fault}" for fault in _faults(path, text, before, used, functions))
+        yield from (f"{name} includes {found}" for found in _odd_includes(path, text, folder))
+
+
+def _faults(path: Path, text: str, before: str, used: set[str], functions: set[str]) -> Iterator[str]:
+    """Yield what a file of the user's changes."""
+    ending = path.suffix.lower()
+    if ending in LINKER_FILES:
+        for word in sorted({*ASSIGNED.findall(text)} & functions - {*ASSIGNED.findall(before)}):
+            yield f"gives {word} another address"
+        return
+    if ending in C_FILES:
+        return
+    macros = {*MACRO.findall(text)} - {*MACRO.findall(before)}
+    for word in sorted(macros & used):
+        yield f"makes {word}, which the generated C uses, a macro"
+    for word in sorted({*NAME.findall(text)} & functions - {*NAME.findall(before)} - macros):
+        yield f"has {word}, a function of the generated C; call it from a C file"
+
+
+def _odd_includes(path: Path, text: str, folder: Path) -> Iterator[str]:
+    """Yield what is included of the firmware's folder and is not looked at here, by its ending or by a macro."""
+    places = {path.parent, folder, *(place for place in folder.iterdir() if place.is_dir())}
+    if path.suffix.lower() in LINKER_FILES:
+        words = [f'"{word.strip(QUOTES)}"' for word in INCLUDED_SCRIPT.findall(text)]
+    else:
+        words = INCLUDE.findall(text)
+    for word in words:
+        if word[:1] not in ('"', "<"):
+            yield f"by the macro {word.strip()[:40]}, which is not followed; write the header's name"
+            continue
+        name = word[1:].partition('"' if word[0] == '"' else ">")[0]
+        if any((place / name).is_file() for place in places) and PurePosixPath(name).suffix.lower() not in SOURCES:
+            yield f"{name}, which is no header by its ending"
+
+
+def _without_comments(text: str) -> str:
+    return COMMENT.sub(lambda found: found[1] or " ", CONTINUED.sub("", text))
