@@ -9,7 +9,9 @@ from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.loop_results import ClosedLoopResult
 from dzdesign.verify.requirements import ALWAYS
 
-LOOP = ClosedLoopResult(plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=())
+LOOP = ClosedLoopResult(
+    plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=(), against_integrator=()
+)
 EVIDENCE = Evidence(
     tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), board_not_compiled="",
     checks=tuple(each.check(holds=True, text="yes") for each in ALWAYS), inputs=(), closed_loop=LOOP, scenarios=(),

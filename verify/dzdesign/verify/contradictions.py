@@ -10,6 +10,7 @@ from dzdesign.verify.current.current_checks import checks_of
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.all_inputs import input_checks
 from dzdesign.verify.exhaustive.lot_check import lot_checked
+from dzdesign.verify.integrator.comparison import native_plant_check
 from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, OF_CURRENT, POPULATION, ZERO_COMMAND, Check
 
 
@@ -34,6 +35,11 @@ def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple
             follow += loop_checks(
                 loop.pressures, evidence.scenarios, compensator, evidence.population, plant_given=given
             )
+
+        if loop.against_integrator:
+            by_current, is_stand_in = drive is not None, loop.plant is None
+            compared = loop.against_integrator
+            follow += [native_plant_check(compared, units, is_stand_in=is_stand_in, by_current=by_current)]
 
     def key(check: Check) -> tuple[object, ...]:  # another version may word it otherwise, and units be another valve's
         worded_alike = evidence.tool == THIS_TOOL and (compensator is not None or check.id != ZERO_COMMAND.id)

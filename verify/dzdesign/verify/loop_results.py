@@ -91,6 +91,37 @@ def flow_in_words(flow_L_min: float, unseen_below_L_min: float | None, units: Re
     return units.number(flow_L_min, ".2f L/min")
 
 
+WindowKind = Literal["ramp", "step", "load step"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlantComparison:
+    """The closed loop's plant beside CasADi's integrator, over one window of time."""
+
+    kind: Annotated[WindowKind, about("What the command, or the pressure drop, does in it.")]
+    side: Side
+    dp_MPa: PressureDrop
+    then_MPa: Annotated[
+        float, quantity("MPa", "Pressure drop at no flow after a load step; else the same.", ge=0, le=1000)
+    ]
+    seconds: Annotated[float, quantity("s", "Length of the window.", gt=0, le=1000)]
+    position_difference: Annotated[
+        float,
+        quantity(
+            "1", "Largest distance of the spool's positions at the ends of PWM periods, over the stroke.", ge=0, le=1e6
+        ),
+    ]
+    flow_difference: Annotated[
+        float, quantity("1", "Largest difference of the flows there, over the largest one of the window.", ge=0, le=1e6)
+    ]
+    q_largest_L_min: Annotated[Flow, about("That largest flow, by the integrator.")]
+    unlike_compare_values: Annotated[Count, about("PWM periods in which the two loops' compare values differ.")]
+    codes_at_border: Annotated[
+        Count, about("Pressures so close to the border of two codes that the plant's code was taken.")
+    ]
+    impacts: Annotated[Count, about("How often the spool met a stop, by the integrator.")]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClosedLoopResult:
     """Ramps in closed loop with the generated C."""
@@ -115,6 +146,9 @@ class ClosedLoopResult:
     ]
     pressures: Annotated[
         tuple[PressureResult, ...], about("One entry a side and tested pressure drop; none if it did not run.")
+    ]
+    against_integrator: Annotated[
+        tuple[PlantComparison, ...], about("One entry a side and kind of window; none if it did not run.")
     ]
 
 

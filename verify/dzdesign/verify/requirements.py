@@ -53,6 +53,7 @@ ZERO_FLOW = Requirement(id="zero-flow", title="no flow at zero command in the cl
 ZERO_FLOW_AFTER_SCENARIOS = Requirement(
     id="zero-flow-after-scenarios", title="no flow at zero command after any scenario"
 )
+NATIVE_PLANT = Requirement(id="native-plant", title="the plant of the closed loop moves as CasADi's integrator has it")
 CERTIFICATE = Requirement(id="certificate", title="the certificate follows from the valve")
 BOUNDS = Requirement(id="bounds", title="the bounds follow from the valve's thresholds and errors")
 LAW = Requirement(id="law", title="the law follows from the valve and the options")
@@ -106,11 +107,12 @@ CURRENT_VALVE = Requirement(
 )
 #: What follows from the figures that stand beside the checks: of every input, and of the closed loop.
 FROM_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK)
-FROM_LOOP = (PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS)
+FROM_LOOP = (PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, NATIVE_PLANT)
 #: What every `verify` checks, in the order of the report.
 ALWAYS = (
     FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK, DRIVE,
-    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CERTIFICATE, BOUNDS, LAW, VALVE,
+    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, NATIVE_PLANT, CERTIFICATE, BOUNDS, LAW,
+    VALVE,
     REGENERATED,
 )  # fmt: skip
 #: What every `verify` checks beside it where the drive is by current.

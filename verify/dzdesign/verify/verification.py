@@ -30,6 +30,8 @@ from dzdesign.verify.firmware.folder import read_compensator, read_firmware_mani
 from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
 from dzdesign.verify.firmware.unchanged_files import files_unchanged, user_files
+from dzdesign.verify.integrator.comparison import compare_with_integrator
+from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EXACT_LAW, Check
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 
@@ -96,9 +98,13 @@ def verify(
     # A compiler's time, not ours.
     building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
     core, loop, current = _try_core(folder, manifest, compensator, say), FirmwareLoop(), CurrentChecks()
+    compared: tuple[PlantComparison, ...] = ()
+    of_plant: tuple[Check, ...] = ()
     if core.inputs:
-        current = current_checks(folder, compensator, say)
-        loop = close_the_loop(building.result(), compensator, plant, sequence or RampSequence(), tolerances, say, watch)
+        current, scenes = current_checks(folder, compensator, say), building.result()
+        loop = close_the_loop(scenes, compensator, plant, sequence or RampSequence(), tolerances, say, watch)
+        compared, native_plant = compare_with_integrator(folder, scenes, say)
+        of_plant = (native_plant,)
     board, law = board_compiles(folder, manifest, include), law_follows(compensator)
     checks = (
         files_unchanged(folder, manifest),
@@ -106,6 +112,7 @@ def verify(
         *core.checks,
         *current.checks,
         *loop.checks,
+        *of_plant,
         certificate_follows(compensator),
         bounds_follow(compensator),
         law,
@@ -121,7 +128,7 @@ def verify(
         board_not_compiled=board.not_compiled,
         checks=checks,
         inputs=core.inputs,
-        closed_loop=loop.result(plant, plant_source, plant_sha256),
+        closed_loop=loop.result(plant, plant_source, plant_sha256, compared),
         scenarios=loop.scenarios,
         population=loop.population,
         monte_carlo=loop.monte_carlo,

@@ -20,7 +20,7 @@ from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
 from dzdesign.verify.closed_loop.valve_at_corners import valve_at_corners, valve_at_corners_check
 from dzdesign.verify.current.results import ValveAtCorners
-from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, Population, ScenarioResult, Side
+from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, PlantComparison, Population, ScenarioResult, Side
 from dzdesign.verify.requirements import Check
 
 #: Shows how far a stage is: pieces and their number in, the pieces out.
@@ -48,7 +48,9 @@ class FirmwareLoop:
     #: Of a drive by current.
     valve_at_corners: tuple[ValveAtCorners, ...] = ()
 
-    def result(self, plant: Plant | None, source: str, sha256: str | None) -> ClosedLoopResult:
+    def result(
+        self, plant: Plant | None, source: str, sha256: str | None, against_integrator: tuple[PlantComparison, ...]
+    ) -> ClosedLoopResult:
         """Return what the evidence has of the ramps and of the plant, given from a file or made of the recordings."""
         return ClosedLoopResult(
             plant=plant,
@@ -57,6 +59,7 @@ class FirmwareLoop:
             dynamics=None if plant else self.dynamics,
             back_MPa=self.backs_MPa,
             pressures=tuple(loop.result for loop in self.loops),
+            against_integrator=against_integrator,
         )
 
 

@@ -23,7 +23,7 @@ from dzdesign.verify.toolchain.host_compiler import load_library
 PERIODS_PER_RECORD = 25
 RECORD_S = PERIODS_PER_RECORD * PWM_PERIOD_S
 #: Numbers in a record, as loop.c has them.
-RECORDED = ("compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m")
+RECORDED = ("compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m", "code_a", "code_b")
 #: Pressure behind the edge where none is given, as on a bench: what both sensors see beside the drop.
 BENCH_BACK_MPA = 1.0
 #: Flow at zero command below this is none: the edge is shut, only the last bits of a number remain.
@@ -57,7 +57,7 @@ class RampSequence:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopRun:
     """Records of one run, 100 a second unless others were asked for: time in s, command share, compare value, dP in
-    MPa, flow in L/min, position of the spool in mm, all (N,).
+    MPa, flow in L/min, position of the spool in mm, the codes of sensors A and B that the core read last, all (N,).
 
     Of the flow three: at the record's end; its mean over the record, and its largest there. A dither of 100 Hz or more
     has a whole wave in a record: its mean is what a meter sees, its largest is at the wave's top.
@@ -71,6 +71,8 @@ class LoopRun:
     q_mean_L_min: np.ndarray
     q_largest_L_min: np.ndarray
     position_mm: np.ndarray
+    code_a: np.ndarray
+    code_b: np.ndarray
 
 
 def _waits_s(compensator: Compensator) -> float:
@@ -123,8 +125,8 @@ class ClosedLoop:
             for path in sorted((firmware / "core").glob("*.[ch]")):
                 sources[path.name] = path.read_text(encoding="utf-8")
         #: Of a drive by current the coil, at a supply.
-        self._coil = nominal_coil(compensator) if firmware and compensator else None
-        sources |= coil_sources(self._coil)
+        self.coil = nominal_coil(compensator) if firmware and compensator else None
+        sources |= coil_sources(self.coil)
         self._library = load_library(sources, "the closed loop", FLOATING)
         #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
         self._dither = dither or _recorded_dither(compensator)
@@ -147,14 +149,14 @@ class ClosedLoop:
         parameters, counts = plant.parameters, self._signals.compare_max
         self._plant = numbers_of(parameters, counts)
         #: The same, moved by a given current.
-        self._of_current = numbers_of(replace(parameters, L_c_H=HOLDING_H), counts) if self._coil else self._plant
+        self._of_current = numbers_of(replace(parameters, L_c_H=HOLDING_H), counts) if self.coil else self._plant
         #: Of a stand-in its recorded characteristic.
         self._curve = plant.table if isinstance(plant, StandIn) else None
         #: Full command, V.
         self.u_max_V = plant.parameters.u_max_V
         self._stand_in = plant if isinstance(plant, StandIn) else None
 
-    def _wave(self) -> tuple[int, int, bool]:
+    def wave(self) -> tuple[int, int, bool]:
         """Return the wave about a direct command, counts and periods of half of it; whether the plant has it in it.
 
         A plant of equations feels the dither in time: that of the drive, and about a direct command that of the
@@ -172,7 +174,7 @@ class ClosedLoop:
     @property
     def has_dither(self) -> bool:
         """Whether a direct command has a wave about it."""
-        return self._wave()[0] > 0
+        return self.wave()[0] > 0
 
     def leak_L_min(self, dp_MPa: float) -> float:
         """Return what the valve passes without any drive at a pressure drop: no compensator can stop it."""
@@ -190,7 +192,7 @@ class ClosedLoop:
         """Return the same loop with so many times the drive at the plant: another voltage, or another current."""
         other = copy.copy(self)
         other._plant = self._plant.driven(ratio)
-        other._of_current = self._of_current.driven(ratio) if self._coil else other._plant
+        other._of_current = self._of_current.driven(ratio) if self.coil else other._plant
         return other
 
     def with_added_drive(self, added_V: float) -> "ClosedLoop":
@@ -224,16 +226,16 @@ class ClosedLoop:
         Resistance and inductance are factors of the declared coil's; without a supply it is the nominal one. For a
         drive by current only.
         """
-        if self._coil is None:
+        if self.coil is None:
             raise InputError("this loop's drive is by duty; a coil and its supply belong to one by current")
         other = copy.copy(self)
-        other._coil = self._coil.at(resistance=resistance, inductance=inductance, supply_V=supply_V)
+        other.coil = self.coil.at(resistance=resistance, inductance=inductance, supply_V=supply_V)
         return other
 
     @property
     def controls_current(self) -> bool:
         """Whether the law's output is the set point of a current, in a coil that `with_coil` may change."""
-        return self._coil is not None
+        return self.coil is not None
 
     def run(
         self,
@@ -271,10 +273,10 @@ class ClosedLoop:
             shown = self.channels.pressure_codes(dp_frozen_MPa, back)
         codes = np.full((command.size, 2), -1) if shown is None else shown
         record = np.empty((command.size, len(RECORDED)))
-        channels, coil = self.channels, self._coil if mode != "direct" else None
+        channels, coil = self.channels, self.coil if mode != "direct" else None
         signals, plant, negative = self._signals, self._of_current if coil else self._plant, self._negative
         choices = (
-            command.size, periods_per_record, mode != "direct", negative, channels.swapped, *self._wave(),
+            command.size, periods_per_record, mode != "direct", negative, channels.swapped, *self.wave(),
             signals.code_max, signals.compare_max, errors.seed,
         )  # fmt: skip
         series = (

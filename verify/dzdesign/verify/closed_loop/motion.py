@@ -2,7 +2,9 @@
 
 Eqs. (19)-(23) are linear but for one acceleration that depends on the spool's position: pressure and flow force. The
 linear part is solved exactly, by matrix exponentials that are tabulated over the duty; the acceleration is interpolated
-through its values at the start, the middle and the end of the period, which makes an exponential Runge-Kutta step.
+through its values at the start, the middle and the end of the period, which makes an exponential Runge-Kutta step. The
+pulse makes a ripple that such a parabola does not follow; so the middle value is taken where the step is exact of an
+acceleration that is straight in the position (`balanced` of period_maps.py), and not at the position in the middle.
 Where a stop or the edge is passed within the period, plant_period.h takes it apart and follows `plant_path`.
 """
 
@@ -15,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
+from dzdesign.verify.closed_loop.period_maps import BALANCE_TERMS, FINE, MAP, balanced, period_map, response_tables
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, derivatives, opening_of, orifice
 
 if TYPE_CHECKING:
@@ -25,8 +28,6 @@ Acceleration = Callable[[Any], Any]
 #: Radians of the fastest motion in a step: what the Taylor series leaves out is below 1e-12 of it.
 STEP_RAD = 0.6
 ORDER = 12
-#: Half counts of the compare value in a step of the coarse table of responses.
-FINE = 512
 #: Change of the acceleration that its interpolation does not explain, as a share of the spring's at full stroke, beyond
 #: which the period is taken apart.
 JUMP_SHARE = 1e-4
@@ -34,13 +35,7 @@ JUMP_SHARE = 1e-4
 NAMED = (
     "STROKE_M", "HALF_PLAY_V", "VOLTS_PER_CHARGE", "U_MAX_V", "PERIOD_S", "DECAY", "DRIVE", "PER_SETTLED",
     "PULL", "SPRING", "DAMPING", "PUSH", "OVERLAP_M", "REACH_M", "STEPS", "LINEAR", "JUMP",
-)  # fmt: skip
-#: Entries of the exact maps over a period, row by column of (current, position, speed, charge); of the position in its
-#: middle; what the acceleration adds: to the middle and, foreseen, to the end from its value at the start, and to
-#: position and speed from its values at start, middle and end.
-MAP = (
-    "i_i", "q_i", "x_i", "x_x", "x_v", "v_i", "v_x", "v_v", "mid_i", "mid_x", "mid_v",
-    "mid_start", "ahead_start", "x_start", "x_mid", "x_end", "v_start", "v_mid", "v_end",
+    *(f"BALANCE_{term}" for term in range(BALANCE_TERMS)),
 )  # fmt: skip
 
 
@@ -101,6 +96,7 @@ class Numbers:
         flat, fine = self.flat.copy(), self.fine.copy()
         for name, power in (("U_MAX_V", 1), ("PER_SETTLED", -1), ("REACH_M", 1)):
             flat[NAMED.index(name)] *= ratio**power
+        flat[NAMED.index("BALANCE_0") :][:BALANCE_TERMS] *= ratio
         fine[:, 8:] *= ratio
         return Numbers(flat, self.coarse * ratio, fine)
 
@@ -123,51 +119,11 @@ def numbers_of(plant: Plant, compare_max: int) -> Numbers:
         JUMP_SHARE * -by_state[2, 1] * stroke,
     )  # fmt: skip
     extracted = np.array(equations().extracted(parameters)).ravel()
-    return Numbers(np.concatenate([named, _map(rates), parameters, extracted]), *_times(rates, drive, 2 * compare_max))
-
-
-def _map(rates: np.ndarray) -> list[float]:
-    """Return the entries of `MAP`: exponentials of the linear part, and integrals of them against polynomials."""
-    from scipy.linalg import expm
-
-    def over(seconds: float) -> tuple[np.ndarray, np.ndarray]:
-        # Powers of time s^j/j! drive the speed: an exponential of a larger matrix holds their responses, j = 0, 1, 2.
-        larger = np.zeros((7, 7))
-        larger[:4, :4], larger[2, 4], larger[4, 5], larger[5, 6] = rates, 1.0, 1.0, 1.0
-        found = expm(larger * seconds)
-        return found[:4, :4], found[:4, 4:]
-
-    end, by_power = over(PWM_PERIOD_S)
-    middle, by_power_middle = over(PWM_PERIOD_S / 2)
-    share = 1 / PWM_PERIOD_S
-    # Values at 0, T/2, T -> coefficients of s^j/j!.
-    quadratic = np.array([[1, 0, 0], [-3 * share, 4 * share, -share], [4 * share**2, -8 * share**2, 4 * share**2]])
-    return [
-        end[0, 0], end[3, 0], *end[1, :3], *end[2, :3], *middle[1, :3],
-        by_power_middle[1, 0], by_power[1, 0], *(by_power[1] @ quadratic), *(by_power[2] @ quadratic),
-    ]  # fmt: skip
-
-
-def _times(rates: np.ndarray, drive: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return `Numbers.coarse` and `Numbers.fine` for `count` parts of a period."""
-    from scipy.linalg import expm
-
-    driven = np.zeros((5, 5))
-    driven[:4, :4], driven[:4, 4] = rates, drive
-    part = driven * (PWM_PERIOD_S / count)
-    fine, coarse = _powers(expm(part), FINE), _powers(expm(part * FINE), count // FINE + 1)
-    (i, x, v, charge), push = range(4), slice(0, 4)
-    entries = [(i, i), (charge, i), (x, i), (x, x), (x, v), (v, i), (v, x), (v, v)]
-    free = np.stack([fine[:, row, column] for row, column in entries], axis=1)
-    return np.ascontiguousarray(coarse[:, push, 4]), np.hstack([free, fine[:, push, 4]])
-
-
-def _powers(matrix: np.ndarray, count: int) -> np.ndarray:
-    """Return the powers 0 to count - 1 of a matrix, (count, n, n)."""
-    powers = np.eye(len(matrix))[None]
-    while len(powers) < count:
-        powers = np.concatenate([powers, powers @ (powers[-1] @ matrix)])
-    return powers[:count]
+    entries, series = period_map(rates), np.zeros(BALANCE_TERMS)
+    if not linear:
+        entries, series = balanced(rates, drive, entries)
+    flat = np.concatenate([named, series, entries, parameters, extracted])
+    return Numbers(flat, *response_tables(rates, drive, 2 * compare_max))
 
 
 @cache
@@ -218,7 +174,7 @@ def motion_header() -> str:
     ):
         generator.add(ca.Function(name, inputs, outputs))
     names = ", ".join(f"PLANT_{name.upper()}" for name in (*NAMED, *MAP))
-    sizes = f"#define PLANT_TERMS {ORDER + 1}\n#define PLANT_FINE {FINE}\n"
+    sizes = f"#define PLANT_TERMS {ORDER + 1}\n#define PLANT_FINE {FINE}\n#define BALANCE_TERMS {BALANCE_TERMS}\n"
     return f"enum {{ {names} }};\n{sizes}{generator.dump()}"
 
 
@@ -232,8 +188,8 @@ def _step(
     at_middle = acceleration(middle)
     free_x = through.x_i * i + through.x_x * x + through.x_v * v + response[1]
     free_v = through.v_i * i + through.v_x * x + through.v_v * v + response[2]
-    # Not from `at_middle`, which would have to be waited for; the difference is of the fourth order.
-    at_end = acceleration(free_x + through.ahead_start * start)
+    # An acceleration that runs straight on from the start through the middle.
+    at_end = acceleration(free_x + through.ahead_start * start + through.ahead_slope * (at_middle - start))
     return [
         through.i_i * i + response[0],
         free_x + through.x_start * start + through.x_mid * at_middle + through.x_end * at_end,

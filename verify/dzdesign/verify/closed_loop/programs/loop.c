@@ -5,7 +5,7 @@
 #include "dz_drive.h"
 #include "plant_coil.h"
 
-#define RECORDED 6
+#define RECORDED 8
 
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
@@ -114,6 +114,7 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
     struct dz_drive drive;
     struct coil_run coil;
     uint16_t compare = 0u;
+    uint16_t pressures[2] = {0u, 0u};
     int32_t tick = 0;
     uint32_t seed = task->seed;
 
@@ -133,7 +134,6 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
 
             if (task->amplifier) {
                 if (tick == 0) {
-                    uint16_t pressures[2];
                     const uint16_t u_code = convert(&task->channels[0], task->command[k], &seed);
 
                     read_pressures(task, plant, k, &seed, pressures);
@@ -163,6 +163,8 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
         record[RECORDED * k + 3] = sum / (double)task->every;
         record[RECORDED * k + 4] = largest;
         record[RECORDED * k + 5] = plant->x;
+        record[RECORDED * k + 6] = (double)pressures[0];
+        record[RECORDED * k + 7] = (double)pressures[1];
     }
 }
 
@@ -170,7 +172,8 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
  * series, channels: see `task`; errors: three numbers a channel, see `channel_of`.
  * p, coarse, fine: the plant, see motion.py; curve: its recorded characteristic, see stand_in.py, or null; coil, sensor:
  * of a drive by current, or null.
- * record[n][6]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m. */
+ * record[n][8]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m; the
+ * last codes of sensors A and B. */
 EXPORT void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *back_MPa,
                     const double *bias_V, const int32_t *shown, const int32_t *zeros, const int32_t *fulls,
                     const double *spans, const double *errors, const double *p, const double *coarse,

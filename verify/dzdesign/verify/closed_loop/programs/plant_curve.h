@@ -103,17 +103,12 @@ static inline double curve_share(const struct plant *plant, int branch, double u
     return share;
 }
 
-/* Flow and pressure drop at the spool's mean position over a period: between the branches the spool stands still. */
-static inline void curve_flow(struct plant *plant, double x)
+/* Flow and pressure drop of the share of the largest flow that passes. */
+static inline void curve_passes(struct plant *plant)
 {
-    const double u = x * plant->curve[CURVE_V_PER_M];
-    const double opening = curve_share(plant, 0, u);
-    const double closing = curve_share(plant, 1, u);
     const int steps = (int)plant->curve[CURVE_SAG_STEPS];
     double left = 0.0;
 
-    plant->share = (plant->share > closing) ? closing : plant->share;
-    plant->share = (plant->share < opening) ? opening : plant->share;
     for (int side = 0; side < 2; side++) {
         const double *sag = &(side ? plant->above : plant->below)[TEST_SAG];
         const double at = fmin(plant->share, 1.0) * (double)steps;
@@ -124,6 +119,18 @@ static inline void curve_flow(struct plant *plant, double x)
     }
     plant->flow = plant->share * plant->q_max;
     plant->dp_MPa = plant->supply_MPa * left;
+}
+
+/* The same at the spool's mean position over a period: between the branches the spool stands still. */
+static inline void curve_flow(struct plant *plant, double x)
+{
+    const double u = x * plant->curve[CURVE_V_PER_M];
+    const double opening = curve_share(plant, 0, u);
+    const double closing = curve_share(plant, 1, u);
+
+    plant->share = (plant->share > closing) ? closing : plant->share;
+    plant->share = (plant->share < opening) ? opening : plant->share;
+    curve_passes(plant);
 }
 
 #endif

@@ -6,6 +6,8 @@
 
 /* Where the edge is passed, each phase is moved in so many pieces. */
 #define PIECES 8
+/* There the acceleration has a kink: this share of what its interpolation may else leave unexplained. */
+#define AT_EDGE 0.01
 
 /* Whether a spool at a stop stays there through the period: by the current's largest value, or its least. */
 static inline int held(const struct plant *plant, double after)
@@ -36,6 +38,7 @@ static inline int32_t whole_period(struct plant *plant, int linear, double *char
     const double *p = plant->p;
     double i, x, v, middle, end, near;
     double excess = 0.0;
+    int at_edge;
 
     if (linear) {
         const casadi_real *arg[7] = {&plant->i, &plant->x, &plant->v, plant->response, &plant->acts, &plant->push, p};
@@ -51,12 +54,13 @@ static inline int32_t whole_period(struct plant *plant, int linear, double *char
     }
     /* Further than this from a stop it can't have been there and back. */
     near = (fabs(plant->v) + fabs(v)) * p[PLANT_PERIOD_S] + ripple_m(plant);
+    at_edge = !linear && (p[PLANT_OVERLAP_M] >= fmin(plant->x, x) - near) &&
+              (p[PLANT_OVERLAP_M] <= fmax(plant->x, x) + near);
     if ((plant->x <= near) || (x <= near) || (middle <= near) || (plant->x >= p[PLANT_STROKE_M] - near) ||
         (x >= p[PLANT_STROKE_M] - near) || (middle >= p[PLANT_STROKE_M] - near)) {
-        return (!linear && (p[PLANT_OVERLAP_M] >= fmin(plant->x, x) - near) &&
-                (p[PLANT_OVERLAP_M] <= fmax(plant->x, x) + near)) ? PIECES : 1;
+        return at_edge ? PIECES : 1;
     }
-    if (fabs(excess) > p[PLANT_JUMP]) {
+    if (fabs(excess) > (at_edge ? AT_EDGE : 1.0) * p[PLANT_JUMP]) {
         return PIECES;
     }
     plant->i = i;
@@ -85,6 +89,18 @@ static inline struct response response_after(const struct plant *plant, int32_t 
     return response;
 }
 
+/* What full voltage adds in a share of a period, at its end, to where the middle value stands (motion.py). */
+static inline double balance(const struct plant *plant, double share)
+{
+    const double *terms = &plant->p[PLANT_BALANCE_0];
+    double value = 0.0;
+
+    for (int term = BALANCE_TERMS - 1; term >= 0; term--) {
+        value = value * share + terms[term];
+    }
+    return value;
+}
+
 /* What the voltage adds in a period of this compare value: the rest of a whole one's, as off is all that comes after. */
 static inline void respond(struct plant *plant, int32_t compare)
 {
@@ -97,7 +113,11 @@ static inline void respond(struct plant *plant, int32_t compare)
     plant->response[1] = plant->all.x - off.x;
     plant->response[2] = plant->all.v - off.v;
     plant->response[3] = plant->all.charge - off.charge;
-    plant->response[4] = plant->half_x - ((off_half > 0) ? response_after(plant, off_half).x : 0.0);
+    if (plant->p[PLANT_LINEAR] > 0.5) {
+        plant->response[4] = plant->half_x - ((off_half > 0) ? response_after(plant, off_half).x : 0.0);
+    } else {
+        plant->response[4] = balance(plant, 1.0) - balance(plant, (double)(plant->counts - compare) / plant->counts);
+    }
 }
 
 /* Another pressure drop at no flow. */
@@ -115,6 +135,7 @@ static inline void plant_supply(struct plant *plant, double supply_MPa)
         act(plant);
         if (plant->curve) {
             curve_supply(plant);
+            curve_passes(plant); /* the flow sags the new supply as it did the old one */
         }
     }
 }

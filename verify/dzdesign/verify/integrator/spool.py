@@ -1,0 +1,216 @@
+"""Coil and spool by Eqs. (19)-(23), integrated by CasADi's CVODES from PWM edge to PWM edge; the stops are events.
+
+Written from the paper once more, as it checks motion.py and the C beside it: nothing of them is used here. Beyond the
+paper: preload, the force by which the pressure drop helps to open, and the flow force in the load f_eL; overlap; stops
+that swallow the spool's speed; and the play, a force that is constant over a period of the PWM (see `reference_loop`).
+
+CVODES takes Adams' formulas at a relative tolerance of 1e-12. Against the same at 1e-14 a position is then off by
+5e-12 mm; collocation of order 3 to 6 in one element a phase, no faster, by 1e-7 mm, as its step does not end where the
+metering edge opens.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dzdesign.verify.closed_loop.plant import Plant
+
+if TYPE_CHECKING:
+    import casadi
+
+#: Of CVODES, for states in A, A ms, mm and m/s.
+CVODES: dict[str, Any] = {
+    "linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional",
+    "reltol": 1e-12, "abstol": 1e-14, "max_num_steps": 1_000_000,
+}  # fmt: skip
+#: Rests and flights in one phase; more would be chatter at a stop.
+MOST_EVENTS = 20
+#: Of a phase, ms: nothing shorter is integrated.
+SHORTEST_MS = 1e-12
+#: Of an excursion from a stop, mm: a shorter one is none.
+NEAR_MM = 1e-12
+
+
+@dataclass(slots=True)
+class SpoolState:
+    """Where coil and spool are."""
+
+    #: A.
+    current: float = 0.0
+    #: Of the current since the period began, A ms.
+    charge: float = 0.0
+    #: mm.
+    position: float = 0.0
+    #: m/s.
+    speed: float = 0.0
+    #: At stops, so far.
+    impacts: int = 0
+
+    def array(self) -> np.ndarray:
+        """Return it as CVODES has it."""
+        return np.array([self.current, self.charge, self.position, self.speed])
+
+    def take(self, found: np.ndarray) -> None:
+        """Become what CVODES found."""
+        self.current, self.charge, self.position, self.speed = map(float, found)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Acting:
+    """What acts through one phase."""
+
+    #: At the amplifier: u_max or nothing.
+    volts: float
+    #: Force beside the solenoid's: what the play adds, N.
+    push_N: float
+    #: Pressure drop at no flow, MPa.
+    supply_MPa: float
+    #: Whether the current stays as it is, as another coil makes it.
+    current_held: bool = False
+
+
+def load_force(plant: Plant, opening_mm: "casadi.SX | float", dp_MPa: "casadi.SX | float") -> "casadi.SX | float":
+    """Return f_eL of Eq. (23), N: preload, less what the pressure drop takes off, and the flow force."""
+    return (
+        plant.preload_N
+        - plant.pressure_force_N_MPa * dp_MPa
+        + plant.flow_force_N_mm_MPa * opening_mm * dp_MPa
+    )  # fmt: skip
+
+
+def drop_left(plant: Plant, opening_mm: "casadi.SX | float", supply_MPa: "casadi.SX | float") -> "casadi.SX | float":
+    """Return the pressure drop in MPa that Eq. (24) leaves of a supply: Q = G sqrt(dP), dP = supply - droop Q^2."""
+    conductance_2 = (plant.C_d_W_mm * 1e-3 * opening_mm * 1e-3 * 60_000) ** 2 * 2e6 / plant.rho_kg_m3
+    return supply_MPa / (1 + plant.droop_MPa_L_min2 * conductance_2)
+
+
+class CvodesSpool:
+    """Coil and spool of one plant."""
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self._solve = _integrator(plant)
+        #: Force per volt of command at rest, from Eqs. (19)-(22), N/V: by it a play in V is one in N.
+        loop_ohm = plant.R_c_ohm + plant.r_p_ohm + plant.K_a * plant.K_fi_V_A
+        self.N_per_V = plant.K_i_N_A * plant.K_a / loop_ohm
+        #: At full command and at rest, A.
+        self.full_A = plant.u_max_V * plant.K_a / loop_ohm
+
+    def phase(self, state: SpoolState, acting: Acting, milliseconds: float) -> None:
+        """Move through one phase, in which the voltage is constant, with every stop that is met in it."""
+        left = milliseconds
+        for _ in range(MOST_EVENTS):
+            if left <= SHORTEST_MS:
+                return
+            if self._is_held(state, acting):
+                left -= self._rest(state, acting, left)
+                if left <= SHORTEST_MS:
+                    return
+            left -= self._fly(state, acting, left)
+        # To and fro at a stop, by less and less.
+        state.take(self._integrated(state, acting, left, free=False))
+
+    def stays(self, state: SpoolState, acting: Acting) -> bool:
+        """Whether nothing moves: no voltage, no current, and a stop that holds the spool."""
+        return state.current == 0.0 and (acting.volts == 0.0 or acting.current_held) and self._is_held(state, acting)
+
+    def _pull(self, state: SpoolState, acting: Acting) -> float:
+        """Return the force on a spool at rest where it is, N."""
+        plant = self._plant
+        opening = max(state.position - plant.overlap_mm, 0.0)
+        load = load_force(plant, opening, drop_left(plant, opening, acting.supply_MPa))
+        return float(
+            plant.K_i_N_A * state.current - plant.K_et_N_m * 1e-3 * state.position - load + acting.push_N
+        )  # Eqs. (22), (23)
+
+    def _is_held(self, state: SpoolState, acting: Acting) -> bool:
+        if state.speed != 0.0 or 0.0 < state.position < self._plant.stroke_mm:
+            return False
+        return (self._pull(state, acting) > 0.0) == (state.position > 0.0)
+
+    def _integrated(self, state: SpoolState, acting: Acting, milliseconds: float, *, free: bool) -> np.ndarray:
+        given = [
+            milliseconds, acting.volts, acting.push_N, acting.supply_MPa, float(free), float(not acting.current_held),
+        ]  # fmt: skip
+        found: np.ndarray = np.array(self._solve(x0=state.array(), p=given)["xf"]).ravel()
+        return found
+
+    def _rest(self, state: SpoolState, acting: Acting, left: float) -> float:
+        """Stay at a stop until the current lets go, or to the end; return for how long."""
+
+        def pull_after(milliseconds: float) -> float:
+            later = SpoolState(position=state.position)
+            later.current = float(self._integrated(state, acting, milliseconds, free=False)[0])
+            return self._pull(later, acting)
+
+        away = 1.0 if state.position <= 0.0 else -1.0
+        taken = left
+        if away * pull_after(left) > 0.0:
+            taken = _root(pull_after, 0.0, left)
+        state.take(self._integrated(state, acting, taken, free=False))
+        return taken
+
+    def _fly(self, state: SpoolState, acting: Acting, left: float) -> float:
+        """Move free of the stops until one is met, or to the end; return for how long."""
+
+        def after(milliseconds: float) -> np.ndarray:
+            return self._integrated(state, acting, milliseconds, free=True)
+
+        def outside(position: float) -> float:
+            return max(-position, position - self._plant.stroke_mm)
+
+        end = after(left)
+        inside, out = 0.0, left
+        if state.speed * end[3] < 0.0:
+            turn = _root(lambda ms: float(after(ms)[3]), 0.0, left)
+            inside, out = (0.0, turn) if outside(float(after(turn)[2])) > 0.0 else (turn, left)
+        elif state.speed == 0.0 and outside(float(end[2])) > 0.0:
+            inside = self._turn_from_rest(after, left)
+        furthest = float((end if out == left else after(out))[2])
+        if outside(furthest) <= 0.0:
+            state.take(end)
+            return left
+        stop = 0.0 if furthest < 0.0 else self._plant.stroke_mm
+        met = inside
+        if outside(float(after(inside)[2]) if inside > 0.0 else state.position) < -NEAR_MM:
+            met = _root(lambda ms: float(after(ms)[2]) - stop, inside, out)
+        if met > 0.0:
+            state.take(after(met))
+        state.position, state.speed = stop, 0.0
+        state.impacts += 1
+        return max(met, SHORTEST_MS)
+
+    @staticmethod
+    def _turn_from_rest(after: Callable[[float], np.ndarray], left: float) -> float:
+        """Return when a spool that left a stop and came back in one phase turned; 0 where that is too soon to tell."""
+        at_end, begin = float(after(left)[3]), left / 2
+        while begin > SHORTEST_MS and float(after(begin)[3]) * at_end >= 0.0:
+            begin /= 2
+        return _root(lambda ms: float(after(ms)[3]), begin, left) if begin > SHORTEST_MS else 0.0
+
+
+def _root(value: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function of unlike signs at both ends is zero."""
+    from scipy.optimize import brentq
+
+    return float(brentq(value, low, high, xtol=1e-13, rtol=1e-14))
+
+
+def _integrator(plant: Plant) -> "casadi.Function":
+    """Return CVODES over a phase of any length: the time is counted in shares of it."""
+    import casadi as ca
+
+    state, given = ca.SX.sym("state", 4), ca.SX.sym("given", 6)
+    current, _, position, speed = ca.vertsplit(state)
+    milliseconds, volts, push, supply, free, own_current = ca.vertsplit(given)
+    opening = ca.fmax(position - plant.overlap_mm, 0)
+    load = load_force(plant, opening, drop_left(plant, opening, supply))
+    u_e = plant.K_a * (volts - plant.K_fi_V_A * current)  # Eqs. (19), (21)
+    by_current = (u_e - (plant.R_c_ohm + plant.r_p_ohm) * current) / plant.L_c_H  # Eq. (20), A/s
+    f_e = plant.K_i_N_A * current  # Eq. (22)
+    by_speed = (f_e - plant.B_e_N_s_m * speed - plant.K_et_N_m * 1e-3 * position - load + push) / plant.m_e_kg  # (23)
+    rates = ca.vertcat(own_current * 1e-3 * by_current, current, free * speed, free * 1e-3 * by_speed)
+    problem = {"x": state, "p": given, "ode": milliseconds * rates}
+    return ca.integrator("phase", "cvodes", problem, 0, 1, CVODES)
