@@ -38,6 +38,7 @@ from dzdesign.report.summary import headline, worst_of
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.loop_results import PressureResult
+from dzdesign.verify.requirements import AS_STATED
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
@@ -79,7 +80,7 @@ def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo)
     loops = evidence["closed_loop"]["pressures"]
     head = html[: html.index('<section id="data">')]
     tried = f"all {len(evidence['checks'])} that were tried"
-    assert f"Every requirement holds, {tried}; the certificate is of the recording<" in head
+    assert f"Every requirement holds, {tried}; the certificate is of the recording; {AS_STATED}<" in head
     assert "no machine was declared" in head and "Certificate of the recording<" in head
     before, after = (100 * max(each[key] for each in loops) for key in ("dead_zone_opening", "residual_opening"))
     assert f"{before:.1f} % → {after:.1f} %" in head
@@ -365,10 +366,10 @@ def test_the_plant_of_the_tests_stands_in_the_closed_loop(copied):
 def test_the_papers_numbers_are_shown_where_they_lie(copied):
     ours = Outcome(by="product", value=54.1, difference=0.2, allowed=(53.8, 54.0))
     row = PaperNumber(
-        valve="first valve", quantity="dead zone", unit="%", dp_MPa=1.0, published="53.9", in_fit=False,
+        valve="first valve", quantity="dead zone", unit="%", dp_MPa=1.0, published="53.9", kind="predicted",
         outcomes=(ours,), tolerance="0.1", why="because",
     )  # fmt: skip
-    paper = Reproduction(tool=THIS_TOOL, made_from=(), paper="10.1/x", numbers=(row,), valves=())
+    paper = Reproduction(tool=THIS_TOOL, made_from=(), paper="10.1/x", assumptions=(), numbers=(row,), valves=())
     folder = copied / "paper"
     folder.mkdir()
     content = to_json_bytes(paper)

@@ -61,6 +61,8 @@ class Option:
     named: bool = False
     #: A mapping that the command line takes an entry at a time, ``NAME = TEXT``, on top of the options file's table.
     by_entry: bool = False
+    #: A repeatable option that takes several values at once, as a shell makes them of a pattern.
+    several: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

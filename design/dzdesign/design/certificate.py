@@ -46,7 +46,7 @@ def certify(
     return Certificate(
         confidence=side.certificate.confidence,
         guard=guard,
-        level_L_min=side.certificate.level_L_min,
+        level_L_min=side.unseen_below_L_min(guard),
         zero_flow_L_min=side.zero_flow_L_min,
         dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]),
         holds_to_MPa=holds_to,

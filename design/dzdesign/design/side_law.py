@@ -23,7 +23,12 @@ class Certificate:
     guard: Annotated[Guard, Meta(description="The threshold that they bound.")]
     level_L_min: Annotated[
         float,
-        quantity("L/min", "Flow that counted as flow when the thresholds were identified.", ge=0, le=1e6),
+        quantity(
+            "L/min",
+            "Flow from which on a flow at the bounds would have been seen: by the meter, or by readings by hand.",
+            ge=0,
+            le=1e6,
+        ),
     ]
     zero_flow_L_min: Annotated[
         float,

@@ -167,6 +167,8 @@ def _add_option(place: argparse._ActionsContainer, argument: Argument) -> None:
         place.add_argument(argument.name, nargs=nargs, default=argparse.SUPPRESS, metavar=option.metavar, help=text)
     else:
         action = "append" if argument.is_repeatable and nargs is None else "store"
+        if option.several:
+            action, nargs = "extend", "+"
         place.add_argument(
             *names, action=action, nargs=nargs, required=argument.required, default=argparse.SUPPRESS,
             metavar=option.metavar, help=text, dest=argument.name,

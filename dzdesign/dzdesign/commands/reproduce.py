@@ -21,7 +21,7 @@ class Arguments:
 
 
 def run(arguments: Arguments, json: bool) -> int:
-    """Reproduce the paper's numbers and figures; 1 if a number that must agree does not."""
+    """Reproduce the paper's numbers and figures; 1 if one is missed by more than a stated reason explains."""
     from dzdesign.reproduce.reproduction import reproduce
     from dzdesign.terminal.reproduction_tables import print_reproduction
 

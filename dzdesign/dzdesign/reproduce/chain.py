@@ -8,21 +8,21 @@ from pathlib import Path
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.derivation.account.published import DP0_MPA, RAMP_S, RECORDS_HZ, U_MAX_V
+from dzdesign.derivation.account.published import DP0_MPA, FIRST, RAMP_S, RECORDS_HZ, U_MAX_V
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes, read_ramp_file
 from dzdesign.report.reproduction import Hashes, ReproducedValve
+from dzdesign.reproduce.load_and_oil import LoadAndOil, run_load_and_oil
 from dzdesign.reproduce.recovered_valves import RecoveredValve
-from dzdesign.reproduce.valve_runs import ValveRuns, run_valve
+from dzdesign.reproduce.valve_runs import PRESSURES_MPA, ValveRuns, run_valve
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import L_MIN, MPA
 from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulate_ramp
 
-#: Pressure drops of the ramp tests, MPa: the paper's two and some between ("multiple groups", section 1), closer at
-#: dP0, because between two tests only the lower of their bounds is certain.
-TESTED_MPA = (1.0, 1.1, 1.5, 2.0, 3.0, 4.0, 5.0)
+#: Of the ramp tests, MPa: those of Sections 2 and 4.2, and no other.
+TESTED_MPA = PRESSURES_MPA
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,11 +32,13 @@ class Chain:
     files: dict[str, str]
     valve: ReproducedValve
     runs: ValveRuns
+    #: Of the first valve, which Section 4.3 is about.
+    load_and_oil: LoadAndOil | None = None
 
 
 def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None) -> Chain:
     """Run a recovered valve through the product; `say` is told each stage before it begins."""
-    name = valve.published.name
+    name = valve.published.name + (" with hysteresis" if valve.plant.hysteresis_V else "")
     bench = bench_of(valve)
     with tempfile.TemporaryDirectory(prefix="dzdesign-") as scratch:
         say(f"{name}: ramp tests of the recovered valve")
@@ -64,6 +66,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         say(f"{name}: closed loop")
         loop = ClosedLoop(valve.plant, Path(scratch) / "firmware", compensator)
         runs = run_valve(valve, loop, compensator)
+        beside = run_load_and_oil(valve, loop, product=True) if valve.published is FIRST else None
     place = name.replace(" ", "_")
     return Chain(
         files={
@@ -72,7 +75,8 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
             f"{place}/compensator.json": compensator_json,
         },
         valve=ReproducedValve(
-            valve=name,
+            valve=valve.published.name,
+            hysteresis_V=valve.plant.hysteresis_V,
             parameters=valve.parameters(),
             fitted_to=valve.figures,
             at_bound=valve.at_bound,
@@ -88,6 +92,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
             ),
         ),
         runs=runs,
+        load_and_oil=beside,
     )
 
 

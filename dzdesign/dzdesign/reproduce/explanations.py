@@ -1,146 +1,186 @@
-"""Why our numbers may differ from the paper's, and by how much: each reason with its own figures."""
+"""Why our numbers miss the paper's: each reason with its own figures, and the range of values that it can explain."""
 
+import math
 from collections.abc import Mapping
+from itertools import product as combinations
 
 from dzdesign.derivation.account.published import (
+    ABOUT_LARGEST_L_MIN,
     DP0_MPA,
     DP1_MPA,
     DROP_ASSUMED,
+    DUTY_COMMAND_V,
     FIRST,
     METER_ACCURACY_L_MIN,
     METER_FLOOR_L_MIN,
     SATURATED_FROM_V,
+    SIMULATION,
     U_MAX_V,
+    PublishedValve,
 )
-from dzdesign.reproduce.recovered_valves import at_rest, printed_at
+from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.displacement_readings import DISPLACEMENT, half_digits_off
+from dzdesign.reproduce.recovered_valves import Reading, at_rest, half_digit, printed_at
+from dzdesign.reproduce.rows import Reason
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, Drive, ValveRuns
 
-#: What reading our own runs may cost: per cent of full command, share of a flow, L/min at zero command; and what
-#: "about" is taken to mean, as a share.
-READING: Mapping[str, float] = {"%": 0.1, "L/min": 0.005, "L/min at zero": 0.05, "about": 0.1}
-#: A flow that prints as none, L/min.
-PRINTED_NONE = 0.005
-#: Per cent of command that the certified margin may cost: identification's own goal.
-MARGIN_PERCENT = 0.8
-#: What "little effect" on the step response is taken to mean: a share of its time.
-LITTLE = 0.2
-TOLERANCES: Mapping[str, str] = {
-    "fitted": f"half a unit of the last printed digit, and for reading the closed loop {READING['%']:g} % of full "
-    f"command, {100 * READING['L/min']:g} % of a flow",
-    "rounding": "half a unit of the last printed digit",
-    "flow": f"half a unit of the last printed digit, and {100 * READING['L/min']:g} % for reading the closed loop",
-    "metered flow": f"half a unit of the last printed digit, and the meter's accuracy, 0.5 % of its range: "
-    f"{float(METER_ACCURACY_L_MIN):g} L/min",
-    "residual": "at most what is printed and half a unit of its last digit: a smaller dead zone is no fault",
-    "metered residual": "at most what is printed and half a unit of its last digit, or, if that is more, the "
-    "command that the meter's floor takes where no flow is hidden at zero command, and "
-    f"{MARGIN_PERCENT:g} % for the certified margin",
-    "about": f"{100 * READING['about']:g} %: the paper says 'about', and reads it off a figure; required of the "
-    "paper's law alone",
-    "none": f"of the product none ({PRINTED_NONE:g} L/min prints as 0.00); of the paper's law what its meter does "
-    f"not show, and {READING['L/min at zero']:g} L/min for the rounding of the thresholds that it is made of",
-    "step": f"'little' is taken as {100 * LITTLE:g} %",
-}
 DROP = f"taken {DROP_ASSUMED}"
-#: Which valve Fig. 13 may be of.
-DUTY_OF_SECOND = (
-    "Fig. 13 does not name its valve; the product's offset lies below the threshold, the paper's at the first flow seen"
+#: By how much the closed loop may differ from the plant at rest, as a share.
+OF_THE_LOOP = 0.01
+LAW_AT_FULL_COMMAND = "Eq. (18) gives full command at full command, so the valve has the flow that it has without it"
+#: What the displacement's dead zone is a share of.
+READINGS: Mapping[Reading, str] = {
+    "overlap": "read as a share of the largest displacement, the travel that opens nothing: T6e of `dzdesign derive`",
+    "preload": "read as a share of full command, that which moves nothing",
+}
+AMPLITUDE = "the level of an output pin, which no design sets: Figs. 12 and 13 are drawn with it"
+DUTY_OF_ONE = "Fig. 13 does not name its valve: of the two rows one at most can agree"
+LOAD = (
+    "the paper gives neither the loads nor a number; ours is the largest change of the flow over the load at a "
+    "constant pressure drop: only the rounding of the two sensors' codes is left"
 )
-DUTY_OF_FIRST = "not required: Fig. 13 does not name its valve, and its 55 % fits the second"
-#: The paper has three numbers for one flow.
-ABOUT_LARGEST = (
-    f"not required: the paper prints {FIRST.flow1} without and {FIRST.flow1_with} L/min with compensator for the same "
-    "valve and pressure drop; the fit follows the former"
-)
-TEMPERATURE = (
-    "not compared: the paper gives neither the temperatures nor the oil. In Eqs. (19)-(24) no threshold depends on it"
-)
+OIL_FLOW = "the paper says that it rises with the oil's temperature; ours is the rise in per cent over the assumed oils"
+NO_SATURATION = "the paper sees none: ours is the command at which the flow comes within 0.1 % of its largest"
 
 
-def displacement_beside(runs: ValveRuns) -> str:
-    """Say why the displacement at dP1 can't be what is printed."""
-    valve = runs.valve.published
-    opening = float(valve.flow1) / float(valve.flow0) / (DP1_MPA / DP0_MPA) ** 0.5
-    printed = float(valve.stroke1_mm) / float(valve.stroke0_mm)
-    return (
-        f"the paper contradicts itself: by Eq. (24) its flows of {valve.flow0} and {valve.flow1} L/min need the "
-        f"opening to fall to {100 * opening:.1f} %, its displacements fall to {100 * printed:.1f} %; the fit follows "
-        "the flows"
-    )
+def displacement(quantity: str, reading: Reading, dp_MPa: float) -> Reason:
+    """Say whether the paper contradicts itself, or only this reading of Fig. 6 fails, or the rounding explains it."""
+    off = {name: half_digits_off(name, quantity, dp_MPa) for name in ("overlap", "preload")}
+    best = " and ".join(f"{number:.2f} with {name}" for name, number in off.items())
+    found = f"beside the flow's numbers and the displacement at {DP0_MPA} MPa a valve of Eqs. (19)-(24) has it to "
+    if min(off.values()) > 1:
+        text = (
+            f"the paper contradicts itself in both readings: {found}{best} half digits at best; by Eq. (24) "
+            f"the opening has to fall to {100 * _opening_left():.1f} %"
+        )
+    elif off[reading] > 1:
+        other = "overlap" if reading == "preload" else "preload"
+        text = f"this reading can't have it, the one with {other} can: {found}{best} half digits at best"
+    else:
+        text = f"within the rounding of what it is predicted from: {found}{off[reading]:.2f} half digits at best"
+    by_hand = _displacement_by_hand(quantity, reading, dp_MPa)
+    return Reason(text, (by_hand * (1 - OF_THE_LOOP), by_hand * (1 + OF_THE_LOOP)))
 
 
-def displacement_before_flow(runs: ValveRuns, dp_MPa: float) -> str:
-    """Say why the displacement's dead zone can't exceed the flow's."""
-    printed = printed_at(runs.valve.published, dp_MPa)
-    return (
-        "the paper contradicts itself: by Eq. (24) no flow starts before the spool moves, but it reads "
-        f"{printed.displacement_dead_zone_percent} % of displacement and {printed.dead_zone_percent} % of flow; the "
-        "fit follows the flow"
-    )
+def _opening_left() -> float:
+    """Return the share of the opening at the reference that the largest flows leave beside it, Eq. (24)."""
+    return float(SIMULATION.flow1) / float(SIMULATION.flow0) / math.sqrt(DP1_MPA / DP0_MPA)
 
 
-def residual(runs: ValveRuns, dp_MPa: float) -> str:
+def _displacement_by_hand(quantity: str, reading: Reading, dp_MPa: float) -> float:
+    """Return what Eq. (24) makes of the printed flows: another way than the fit's."""
+    if reading == "preload" and quantity != DISPLACEMENT:
+        return float(printed_at(SIMULATION, dp_MPa).dead_zone_percent)  # the spool moves when the flow begins
+    largest, share = float(SIMULATION.stroke0_mm), float(SIMULATION.displacement_dead_zone0_percent) / 100
+    dead = largest * share if reading == "overlap" else 0.0
+    travel = dead + (largest - dead) * (1.0 if dp_MPa == DP0_MPA else _opening_left())
+    return travel if quantity == DISPLACEMENT else 100 * dead / travel
+
+
+def residual(runs: ValveRuns, dp_MPa: float, by: Driver) -> Reason:
     """Say what the printed dead zone with compensator tells of the paper's offset, which it does not print."""
-    recovered = runs.valve
-    valve = recovered.published
-    ours = ""
-    if (Drive(PRODUCT), dp_MPa) in runs.ramps:
-        ours = f"; the product's is {runs.onset_percent(Drive(PRODUCT), dp_MPa):.2f} % without a meter between"
+    recovered, valve = runs.valve, runs.valve.published
+    printed = float(valve.residual_percent)
+    if by == PRODUCT and runs.dead_zone_percent(Drive(PRODUCT), dp_MPa) > printed:
+        return _residual_of_product(runs, dp_MPa)
     if not recovered.level_L_min:
-        return "the paper does not say how far below the threshold its offset stays, nor at what flow it reads" + ours
-    printed = float(valve.residual_percent) / 100
+        text = "the paper does not say how far below the threshold its offset stays, nor at what flow it reads"
+        return Reason(text, (0.0, printed))
     u_min0, u_min1 = (float(text) / 100 for text in (valve.dead_zone0_percent, valve.dead_zone1_percent))
     beta, seen = (1.0, u_min0) if dp_MPa == DP0_MPA else (u_min1 / u_min0, u_min1)
     gain = 1 - beta * u_min0  # of Eq. (18) with k x_max = u_max - u_min0
     rest = at_rest(recovered.plant, dp_MPa)
-    hidden = float(rest.flow_per_volt) * (U_MAX_V * (seen - gain * printed) - float(rest.opens_V))
-    floor = float(METER_FLOOR_L_MIN)
+    hidden = float(rest.flow_per_volt) * (U_MAX_V * (seen - gain * printed / 100) - float(rest.opens_V))
     what = (
         f"its offset lets {hidden:.2f} L/min pass at zero command, below what its meter shows"
         if hidden > 0
         else "its offset stays below the threshold"
     )
-    return (
-        f"read where the meter starts, {floor:g} L/min: a dead zone of {valve.residual_percent} % there means that "
-        f"{what}; the paper prints no offset{ours}"
+    text = (
+        f"the paper prints no offset, and one at the dead zone that it reads leaves none; read where the meter starts, "
+        f"{float(METER_FLOOR_L_MIN):g} L/min, {valve.residual_percent} % mean that {what}"
     )
+    return Reason(text, (0.0, printed))
 
 
-def flow_with(flow: str, without: str, metered: bool, explained: bool) -> str:
+def _residual_of_product(runs: ValveRuns, dp_MPa: float) -> Reason:
+    """Say what the product's dead zone is made of where it is larger than what is printed."""
+    valve, band = runs.valve.published, runs.product_zero_band_percent
+    line = 100 * runs.valve.level_L_min / float(printed_at(valve, dp_MPa).flow)
+    opens0, opens1 = (float(at_rest(runs.valve.plant, each).opens_V) for each in (DP0_MPA, DP1_MPA))
+    fall = 100 * (opens0 - opens1) / (U_MAX_V - opens0)
+    text = (
+        f"no flow is hidden at zero command: where the meter starts, a straight line from zero reads {line:.2f} %, "
+        f"the product's zero band adds {band:.2f} %, and its offset, which two tests allow at {DP0_MPA} MPa to be no "
+        f"higher than at {DP1_MPA}, up to {fall:.1f} %"
+    )
+    return Reason(text, (0.0, line + band + fall))
+
+
+def flow_with(runs: ValveRuns, dp_MPa: float) -> Reason:
     """Say why the law can't make the largest flow larger."""
-    if not metered or flow == without:
-        return ""
-    law = "Eq. (18) gives full command at full command, so with it the valve has the flow that it has without"
-    change = float(flow) - float(without)
-    if explained:
-        return f"{law}; the {change:.1f} L/min between both printed flows are within the meter's accuracy"
-    return (
-        f"not required: {law}, but the paper prints {change:.1f} L/min more, beyond its meter's accuracy of "
-        f"{float(METER_ACCURACY_L_MIN):g} L/min; the recordings must differ in more than the compensator"
+    printed = printed_at(runs.valve.published, dp_MPa)
+    change, room = float(printed.flow_with) - float(printed.flow), float(METER_ACCURACY_L_MIN)
+    text = (
+        f"{LAW_AT_FULL_COMMAND}; the paper prints {change:.1f} L/min more, beyond its meter's accuracy of {room:g} "
+        "L/min: its recordings differ in more than the compensator"
     )
+    reach = room + half_digit(printed.flow)
+    return Reason(text, (float(printed.flow) - reach, float(printed.flow) + reach))
 
 
-def zero_without_beta(runs: ValveRuns) -> str:
-    """Say by what the product's offset lies below the paper's."""
-    recovered = runs.valve
-    if not recovered.level_L_min:
-        return "the product's offset stays below the threshold's certified bound, so without beta less passes too"
-    opens = float(at_rest(recovered.plant, DP0_MPA).opens_V)
-    seen = float(recovered.published.dead_zone0_percent) / 100 * U_MAX_V
-    return (
-        f"the paper's offset is the command of the first flow seen, {seen:.2f} V; the valve opens at {opens:.3f} V, "
-        "and the product's offset stays below that, so without beta less passes too"
+def flow_with_stop(runs: ValveRuns) -> Reason:
+    """Say what the product's stop at the reference costs beside it."""
+    opens0, opens1, stops = (
+        float(each)
+        for each in (
+            at_rest(runs.valve.plant, DP0_MPA).opens_V,
+            at_rest(runs.valve.plant, DP1_MPA).opens_V,
+            at_rest(runs.valve.plant, DP0_MPA).stops_V,
+        )
     )
-
-
-def zero_with_beta(runs: ValveRuns) -> str:
-    """Say what the paper's law lets pass under its meter's floor."""
-    if not runs.valve.level_L_min:
-        return ""
-    return (
-        f"with an offset at the first flow seen, the paper's law lets the meter's floor of "
-        f"{runs.valve.level_L_min:g} L/min pass at zero command, which its meter does not show"
+    least = float(at_rest(runs.valve.plant, DP1_MPA).flow_per_volt) * (stops - opens0)
+    text = (
+        f"the product takes k x_max up to the stop, {stops - opens0:.2f} V at {DP0_MPA} MPa, and full command for no "
+        f"more; at {DP1_MPA} MPa the flow force keeps the spool off its stop, and {U_MAX_V - opens1:.2f} V were left"
     )
+    return Reason(text, (least * (1 - OF_THE_LOOP), float(FIRST.flow1)))
+
+
+def about_largest() -> Reason:
+    """Say that the paper has three numbers for one flow."""
+    reach = float(METER_ACCURACY_L_MIN) + half_digit(FIRST.flow1)
+    text = (
+        f"the paper prints {FIRST.flow1} L/min without and {FIRST.flow1_with} with compensator for the same valve and "
+        f"pressure drop, and about {ABOUT_LARGEST_L_MIN}; the fit follows the first"
+    )
+    return Reason(text, (float(FIRST.flow1) - reach, float(FIRST.flow1) + reach))
+
+
+def zero_without_beta(runs: ValveRuns, by: Driver) -> Reason:
+    """Say what the rounding of the dead zones makes of it; of the product by what its offset lies below the paper's."""
+    valve = runs.valve.published
+    if by == PAPER:
+        low, high = _rounding_of_zero_flow(valve)
+        text = (
+            f"within the rounding of the dead zones and the flow that it is predicted from: they allow {low:.3f} to "
+            f"{high:.3f} L/min"
+        )
+        return Reason(text, (low, high))
+    opens0, opens1 = (float(at_rest(runs.valve.plant, each).opens_V) for each in (DP0_MPA, DP1_MPA))
+    text = (
+        f"the product's offset is none of the paper's: two tests allow it no higher than {opens1:.2f} V, where the "
+        f"valve opens at {DP1_MPA} MPa, though at {DP0_MPA} MPa at {opens0:.2f} V; without beta less passes too"
+    )
+    return Reason(text, (0.0, float(valve.zero_flow_without_beta)))
+
+
+def _rounding_of_zero_flow(valve: PublishedValve) -> tuple[float, float]:
+    """Return the least and the largest flow that T3b of the derivation gives within the printed digits."""
+    texts = (valve.dead_zone0_percent, valve.dead_zone1_percent, valve.flow1)
+    ends = [(float(text) - half_digit(text), float(text) + half_digit(text)) for text in texts]
+    flows = [flow * (first - second) / (100 - second) for first, second, flow in combinations(*ends)]
+    return min(flows), max(flows)
 
 
 def step(runs: ValveRuns) -> str:
@@ -153,13 +193,43 @@ def step(runs: ValveRuns) -> str:
     return f"the text gives no time and no parameters of the motion; those of the default plant: {times}"
 
 
-def saturation(runs: ValveRuns) -> str:
-    """Say why the recovered valve has no stop."""
-    valve = runs.valve.published
-    stopped = (DP1_MPA / DP0_MPA) ** 0.5
-    printed = float(valve.flow1) / float(valve.flow0)
-    return (
-        f"not required: a spool that meets its stop from {SATURATED_FROM_V[0]} V on at both pressure drops would by "
-        f"Eq. (24) pass {stopped:.2f} times the flow at {DP1_MPA} MPa, the paper prints {printed:.2f} times; the fit "
-        "follows the flows, by a flow force and without a stop"
+def no_stop_beside() -> Reason:
+    """Say why the stop isn't met at the other pressure drop."""
+    stopped, printed = (DP1_MPA / DP0_MPA) ** 0.5, float(FIRST.flow1) / float(FIRST.flow0)
+    text = (
+        f"a spool at its stop at both pressure drops would by Eq. (24) pass {stopped:.2f} times the flow at {DP1_MPA} "
+        f"MPa, the paper prints {printed:.2f} times; the fit follows the flows, with a flow force that keeps the spool "
+        "off its stop there"
     )
+    return Reason(text, (float(SATURATED_FROM_V[1]), float(U_MAX_V)))
+
+
+def no_saturation_of_product() -> Reason:
+    """Say why the product's curve isn't flat below full command."""
+    text = "the product takes k x_max up to the stop, so that full command just meets it"
+    return Reason(text, (float(SATURATED_FROM_V[1]), float(U_MAX_V)))
+
+
+def temperature(published: str) -> Reason:
+    """Say what of the plant depends on the oil's temperature."""
+    text = (
+        "in Eqs. (19)-(24) no threshold depends on the temperature, as Assumption 1 says: only the density moves the "
+        "command at which the meter starts; the paper gives neither the temperatures nor the oil"
+    )
+    return Reason(text, (0.0, float(published)))
+
+
+def duty(runs: ValveRuns, by: Driver) -> Reason:
+    """Say which offsets a duty cycle tells of."""
+    valve, share = runs.valve.published, DUTY_COMMAND_V / U_MAX_V
+    seen, half = float(valve.dead_zone0_percent), half_digit(valve.dead_zone0_percent)
+    opens1 = 100 / U_MAX_V * float(at_rest(runs.valve.plant, DP1_MPA).opens_V)
+    low, high = (100 * share + (1 - share) * offset for offset in (opens1, seen + half))  # Eq. (14) by hand
+    if by == PRODUCT:
+        text = (
+            "the product's offset lies below the command of the first flow seen, which is the paper's: between the "
+            "commands at which the valve opens"
+        )
+        return Reason(text, (low, high))
+    text = f"{DUTY_OF_ONE}; of an offset of {seen:g} % Eq. (14) makes {high - (1 - share) * half:.1f} %"
+    return Reason(text, (high - 2 * (1 - share) * half, high))

@@ -1,122 +1,83 @@
-"""The paper's figures 2, 3, 6 to 8, 16 to 19 and 23, redrawn from the recovered valves; printed numbers as marks."""
+"""The paper's figures 2, 3, 6 to 8, 12, 13, 16 to 23, redrawn from the recovered valves; printed numbers as marks."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, U_MAX_V
+from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, SATURATED_FROM_V, U_MAX_V
 from dzdesign.derivation.law import law
-from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
+from dzdesign.identify.plots.frame import finish, plot_style, saved
 from dzdesign.report.reproduction import Driver
-from dzdesign.reproduce.recovered_valves import at_rest, printed_at
+from dzdesign.reproduce.bench_figures import effect_of_load, effect_of_oil, pulse
+from dzdesign.reproduce.figure_parts import (
+    BLACK,
+    COLOURS,
+    GREY,
+    LAWS,
+    MARKS,
+    NO_BETA,
+    WITH,
+    WITHOUT,
+    Panel,
+    draw_both,
+    draw_floor,
+    draw_ramp,
+    drawn_panels,
+    mark,
+    mark_with,
+    mark_without,
+    panels_of,
+    titled,
+)
+from dzdesign.reproduce.recovered_valves import OF_READING, at_rest, printed_at, recover_simulated
+from dzdesign.reproduce.rows import Subject
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, PRODUCT, STEP_AT_S, Drive, ValveRuns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Reference and beside it: they differ in hue for the colour-blind (Okabe and Ito), and in lightness in print.
-COLOURS = dict(zip(PRESSURES_MPA, ("#0072B2", "#E69F00"), strict=True))
-BLACK, GREY = "#000000", "#6E6E6E"
-#: Lines say who drives.
-Line = str | tuple[int, tuple[int, ...]]
-WITHOUT: Line = ":"
-WITH: Line = "-"
-NO_BETA: Line = (0, (5, 2))
-#: Records between two points of a line: a tenth of a second of a ramp of 100 s.
-EVERY = 10
 #: Command of Fig. 3's example, V.
 EXAMPLE_V = 4.0
-MARKS = "marks: the printed numbers, in the colours of their pressure drops"
-LAWS = {PAPER: "the paper's law", PRODUCT: "the product's C"}
 
 
-def figure_files(runs: Sequence[ValveRuns]) -> dict[str, bytes]:
-    """Draw every figure of the simulated, first and second valve: file name -> SVG; the same runs, the same bytes."""
+def figure_files(valves: Sequence[Subject], stopped: Subject) -> dict[str, bytes]:
+    """Draw every figure of the simulated, first and second valve, and of the first with a stop: file name -> SVG; the
+    same runs, the same bytes.
+    """
     with plot_style():
-        return {f"figure_{number:02}.svg": saved(figure, "svg") for number, figure in _figures(runs)}
+        return {f"figure_{name}.svg": saved(figure, "svg") for name, figure in figures(valves, stopped)}
 
 
-def _figures(runs: Sequence[ValveRuns]) -> Iterator[tuple[int, "Figure"]]:
-    simulated, first, second = runs
-    yield 2, _over_pressure(simulated)
-    yield 3, _construction(simulated)
-    yield 6, _static_without(simulated)
-    yield 7, _with_and_without(simulated, 7, "static characteristics (simulated valve)", with_beta_alone=False)
-    yield 8, _step(simulated)
-    yield 16, _beside_simulation(simulated, first, 16, "dead zone over pressure drop, without compensator", (DIRECT,))
-    yield 17, _beside_simulation(simulated, first, 17, "simulation and test, with compensator", (PAPER, PRODUCT))
-    yield 18, _with_and_without(first, 18, "static flow without and with compensator (first valve)")
-    yield 19, _with_and_without(second, 19, "static flow without and with compensator (second valve)")
-    yield 23, _effect_of_beta(first)
-
-
-def _titled(number: int, height: float, title: str, *more: str) -> "Figure":
-    return new_figure(height, f"Fig. {number}, redrawn: {title}", *more)
-
-
-def _panels(number: int, title: str, draw: Callable[["Axes", Driver], None], drives: Sequence[Driver]) -> "Figure":
-    """Draw one panel per driver, with one scale."""
-    figure = _titled(number, 4.8, title, MARKS)
-    panels = np.atleast_1d(figure.subplots(1, len(drives), sharey=True))
-    for axes, by in zip(panels, drives, strict=True):
-        draw(axes, by)
-        axes.set(xlabel="command u_i (V)", xlim=(0, U_MAX_V * 1.02))
-        if by in LAWS:
-            axes.set_title(LAWS[by])
-    panels[0].set(ylabel="flow Q (L/min)", ylim=(0, None))
-    return finish(figure, 3)
-
-
-def _draw_ramp(
-    axes: "Axes", runs: ValveRuns, drive: Drive, dp_MPa: float, line: Line, label: str, *,
-    color: str = "", width: float = 1.8, of: str = "q_mean_L_min",
-) -> None:  # fmt: skip
-    """Draw the rising branch of a ramp: the flow, or another quantity `of` the run."""
-    run = runs.ramps[drive, dp_MPa]
-    rising = slice(0, int(np.argmax(run.command)) + 1, EVERY)
-    axes.plot(
-        U_MAX_V * run.command[rising], getattr(run, of)[rising], ls=line, label=label, lw=width,
-        color=color or COLOURS[dp_MPa],
-    )  # fmt: skip
-
-
-def _mark(axes: "Axes", u_V: float, y: float, dp_MPa: float, marker: str, what: str, hollow: bool = False) -> None:
-    """Mark a number that the paper prints, in the colour of its pressure drop; hollow marks show what is below them."""
-    (line,) = axes.plot(u_V, y, marker, ls="none", clip_on=False, zorder=6, label=f"printed: {what}")
-    if hollow:
-        line.set(mfc="none", mec=COLOURS[dp_MPa], mew=1.7, ms=11 if dp_MPa == DP0_MPA else 7)
-    else:
-        line.set(mfc=COLOURS[dp_MPa], mec=BLACK, mew=1.0, ms=7)
-
-
-def _mark_without(axes: "Axes", runs: ValveRuns, dp_MPa: float) -> None:
-    """Mark dead zone and largest flow without compensator."""
-    printed = printed_at(runs.valve.published, dp_MPa)
-    dead_zone_V = float(printed.dead_zone_percent) / 100 * U_MAX_V
-    _mark(axes, dead_zone_V, runs.valve.level_L_min, dp_MPa, "^", "dead zone")
-    _mark(axes, U_MAX_V, float(printed.flow), dp_MPa, "s", "largest flow")
-
-
-def _mark_with(axes: "Axes", runs: ValveRuns, dp_MPa: float) -> None:
-    """Mark dead zone and largest flow with compensator."""
-    valve = runs.valve.published
-    dead_zone_V = float(valve.residual_percent) / 100 * U_MAX_V
-    _mark(axes, dead_zone_V, runs.valve.level_L_min, dp_MPa, "v", "dead zone, with", hollow=True)
-    _mark(axes, U_MAX_V, float(printed_at(valve, dp_MPa).flow_with), dp_MPa, "o", "largest flow, with", hollow=True)
-
-
-def _draw_floor(axes: "Axes", runs: ValveRuns) -> None:
-    if runs.valve.level_L_min:
-        axes.axhline(runs.valve.level_L_min, color=GREY, ls=(0, (1, 3)), lw=1.2, label="meter's floor")
+def figures(valves: Sequence[Subject], stopped: Subject) -> Iterator[tuple[str, "Figure"]]:
+    """Yield each figure with its number in the paper, two digits; what a stop changes of Fig. 18 stands beside it."""
+    simulated, first, second = valves
+    static = "static flow without and with compensator"
+    yield "02", _over_pressure(simulated.runs)
+    yield "03", _construction(simulated.runs)
+    yield "06", _static_without()
+    yield "07", _with_and_without_beta(simulated)
+    yield "08", _step(simulated.runs)
+    yield "12", pulse(12, (first.runs, second.runs), with_compensator=False)
+    yield "13", pulse(13, (first.runs, second.runs), with_compensator=True)
+    over = "dead zone over pressure drop, without compensator"
+    yield "16", _beside_simulation(simulated, first, 16, over, (DIRECT,))
+    yield "17", _beside_simulation(simulated, first, 17, "simulation and test, with compensator", (PAPER, PRODUCT))
+    yield "18", drawn_panels(18, f"{static} (first valve)", panels_of(first), draw_both)
+    yield "18_with_a_stop", _saturation(stopped, f"{static} (first valve, with a stop)")
+    yield "19", drawn_panels(19, f"{static} (second valve)", panels_of(second), draw_both)
+    yield "20", effect_of_load(20, first)
+    yield "21", effect_of_load(21, first)
+    yield "22", effect_of_oil(first)
+    yield "23", _effect_of_beta(first)
 
 
 def _over_pressure(runs: ValveRuns) -> "Figure":
     """Fig. 2: flow over the commands of both signs at several pressure drops; the valve is taken as symmetric."""
     from matplotlib import colormaps
 
-    figure = _titled(2, 4.8, "dead zone in the flow curves", "simulated valve at rest; negative side: its mirror image")
+    figure = titled(2, 4.8, "dead zone in the flow curves", "simulated valve at rest; negative side: its mirror image")
     axes = figure.subplots()
     pressures = np.arange(DP0_MPA, DP1_MPA + 1)
     for index, dp_MPa in enumerate(pressures):
@@ -138,7 +99,7 @@ def _construction(runs: ValveRuns) -> "Figure":
     flow = largest * EXAMPLE_V / U_MAX_V  # Eq. (9)
     kappa = 1 - opens / U_MAX_V  # k x_max over u_max
     driven = law("paper").evaluate_gain(1.0, kappa) * EXAMPLE_V + law("paper").evaluate_offset(1.0, opens)
-    figure = _titled(3, 4.8, "static flow at the reference point, simulated valve", f"{DP0_MPA} MPa, valve at rest")
+    figure = titled(3, 4.8, "static flow at the reference point, simulated valve", f"{DP0_MPA} MPa, valve at rest")
     axes = figure.subplots()
     blue = COLOURS[DP0_MPA]
     axes.plot([0, opens, U_MAX_V], [0, 0, largest], WITHOUT, color=blue, lw=2.2, label="without compensator")
@@ -154,51 +115,64 @@ def _construction(runs: ValveRuns) -> "Figure":
     ):
         axes.annotate("", (end, height), (start, height), arrowprops={"arrowstyle": "<->", "color": BLACK})
         axes.text((start + end) / 2, height - 0.02 * largest, text, ha="center", va="top")
-    _mark(axes, opens, 0, DP0_MPA, "^", "dead zone")
+    mark(axes, opens, 0, DP0_MPA, "^", "dead zone")
     axes.set(xlabel="command (V)", ylabel="flow Q (L/min)", xlim=(0, 1.02 * U_MAX_V), ylim=(3.2 * low, 1.05 * largest))
     return finish(figure, 1)
 
 
-def _static_without(runs: ValveRuns) -> "Figure":
-    """Fig. 6: displacement and flow over the command."""
-    figure = _titled(6, 4.8, "static characteristics without compensator (simulated valve)", MARKS)
-    travel, flow = figure.subplots(1, 2)
-    for dp_MPa in PRESSURES_MPA:
-        printed, line = printed_at(runs.valve.published, dp_MPa), WITH if dp_MPa == DP0_MPA else NO_BETA
-        _draw_ramp(travel, runs, Drive(DIRECT), dp_MPa, line, "", of="position_mm")
-        _draw_ramp(flow, runs, Drive(DIRECT), dp_MPa, line, f"{dp_MPa:g} MPa")
-        moves_V = float(printed.displacement_dead_zone_percent) / 100 * U_MAX_V
-        _mark(travel, U_MAX_V, float(printed.stroke_mm), dp_MPa, "D", "largest displacement")
-        _mark(travel, moves_V, 0.0, dp_MPa, ">", "dead zone of displacement")
-        _mark_without(flow, runs, dp_MPa)
-    for axes, quantity in ((travel, "displacement x_e (mm)"), (flow, "flow Q (L/min)")):
-        axes.set(xlabel="command u_i (V)", ylabel=quantity, xlim=(0, 1.02 * U_MAX_V), ylim=(0, None))
-    return finish(figure, 3)
-
-
-def _with_and_without(runs: ValveRuns, number: int, title: str, with_beta_alone: bool = True) -> "Figure":
-    """Figs. 7, 18, 19: without compensator and with it; Fig. 7 also ignoring beta."""
-    valve = runs.valve.published
-
-    def draw(axes: "Axes", by: Driver) -> None:
+def _static_without() -> "Figure":
+    """Fig. 6: displacement in both readings of its dead zone, and flow, over the command."""
+    more = "valve at rest; the flow is the same in both readings of the displacement's dead zone"
+    figure = titled(6, 5.0, "static characteristics without compensator (simulated valve)", more, MARKS)
+    every = figure.subplots(1, 3)
+    for axes, reading in zip(every, OF_READING, strict=False):
+        valve = recover_simulated(reading)
         for dp_MPa in PRESSURES_MPA:
-            _draw_ramp(axes, runs, Drive(DIRECT), dp_MPa, WITHOUT, f"without, {dp_MPa:g} MPa")
-            _draw_ramp(axes, runs, Drive(by), dp_MPa, WITH, f"with, {dp_MPa:g} MPa")
-            _mark_without(axes, runs, dp_MPa)
-            _mark_with(axes, runs, dp_MPa)
-        if not with_beta_alone:
-            beside = PRESSURES_MPA[1]
-            _draw_ramp(axes, runs, Drive(by, False), beside, NO_BETA, f"with, without β, {beside:g} MPa", color=BLACK)
-            _mark(axes, 0.0, float(valve.zero_flow_without_beta), beside, "*", "zero command without β")
-        _draw_floor(axes, runs)
+            rest, printed = at_rest(valve.plant, dp_MPa), printed_at(valve.published, dp_MPa)
+            moves, opens = float(rest.moves_V), float(rest.opens_V)
+            travel, overlap = float(rest.position_mm(U_MAX_V)), valve.plant.overlap_mm
+            line, share = WITH if dp_MPa == DP0_MPA else NO_BETA, float(printed.displacement_dead_zone_percent) / 100
+            corners = ([0, moves, opens, U_MAX_V], [0, 0, overlap, travel])
+            axes.plot(*corners, ls=line, color=COLOURS[dp_MPa], lw=1.8, label=f"{dp_MPa:g} MPa")
+            mark(axes, U_MAX_V, float(printed.stroke_mm), dp_MPa, "D", "largest displacement")
+            dead = (share * U_MAX_V, 0.0) if reading == "preload" else (opens, share * float(printed.stroke_mm))
+            mark(axes, *dead, dp_MPa, ">", "displacement's dead zone")
+        of = "command" if reading == "preload" else "travel"
+        axes.set(ylabel="displacement x_e (mm)", title=f"by {reading}: a share of the {of}", ylim=(0, 1.9))
+    simulated = recover_simulated("preload")
+    for dp_MPa in PRESSURES_MPA:
+        rest = at_rest(simulated.plant, dp_MPa)
+        opens = float(rest.opens_V)
+        flow = float(rest.flow_per_volt) * (U_MAX_V - opens)
+        line = WITH if dp_MPa == DP0_MPA else NO_BETA
+        every[2].plot([0, opens, U_MAX_V], [0, 0, flow], ls=line, color=COLOURS[dp_MPa], lw=1.8)
+        printed = printed_at(simulated.published, dp_MPa)
+        mark(every[2], float(printed.dead_zone_percent) / 100 * U_MAX_V, 0.0, dp_MPa, "^", "dead zone of flow")
+        mark(every[2], U_MAX_V, float(printed.flow), dp_MPa, "s", "largest flow")
+    every[2].set(ylabel="flow Q (L/min)", title="either", ylim=(0, None))
+    for axes in every:
+        axes.set(xlabel="command u_i (V)", xlim=(0, 1.02 * U_MAX_V))
+    return finish(figure, 2)
 
-    return _panels(number, title, draw, (PAPER, PRODUCT))
+
+def _with_and_without_beta(subject: Subject) -> "Figure":
+    """Fig. 7: without compensator, with it, and with it ignoring beta."""
+    beside = PRESSURES_MPA[1]
+
+    def draw(axes: "Axes", panel: Panel) -> None:
+        draw_both(axes, panel)
+        label = f"with, without β, {beside:g} MPa"
+        draw_ramp(axes, panel.runs, Drive(panel.by, False), beside, NO_BETA, label, color=BLACK)
+        flow = float(panel.runs.valve.published.zero_flow_without_beta)
+        mark(axes, 0.0, flow, beside, "*", "zero command without β")
+
+    return drawn_panels(7, "static characteristics (simulated valve)", panels_of(subject), draw)
 
 
 def _step(runs: ValveRuns) -> "Figure":
     """Fig. 8: the step to full command."""
-    figure = _titled(8, 4.4, f"step of the command from 0 to {U_MAX_V} V (simulated valve, {DP0_MPA} MPa)",
-                     "one point a period of the PWM; dynamics of the default plant, none are printed")  # fmt: skip
+    figure = titled(8, 4.4, f"step of the command from 0 to {U_MAX_V} V (simulated valve, {DP0_MPA} MPa)",
+                    "one point a period of the PWM; dynamics of the default plant, none are printed")  # fmt: skip
     axes = figure.subplots()
     for by, name, line, colour in (
         (DIRECT, "without compensator", WITHOUT, BLACK),
@@ -212,28 +186,44 @@ def _step(runs: ValveRuns) -> "Figure":
 
 
 def _beside_simulation(
-    simulated: ValveRuns, tested: ValveRuns, number: int, title: str, drives: Sequence[Driver]
+    simulated: Subject, tested: Subject, number: int, title: str, drivers: Sequence[Driver]
 ) -> "Figure":
     """Figs. 16, 17: the simulated valve beside the first one."""
+    panels = panels_of(tested, drivers)
+    beside = dict(zip(map(id, panels), panels_of(simulated, drivers), strict=True))
 
-    def draw(axes: "Axes", by: Driver) -> None:
+    def draw(axes: "Axes", panel: Panel) -> None:
+        runs, by = panel
+        other = beside[id(panel)].runs
         for dp_MPa in PRESSURES_MPA:
-            _draw_ramp(axes, simulated, Drive(by), dp_MPa, NO_BETA, f"simulated valve, {dp_MPa:g} MPa", width=1.4)
-            _draw_ramp(axes, tested, Drive(by), dp_MPa, WITH, f"first valve, {dp_MPa:g} MPa")
-            (_mark_without if by == DIRECT else _mark_with)(axes, tested, dp_MPa)
-        _draw_floor(axes, tested)
+            draw_ramp(axes, other, Drive(by), dp_MPa, NO_BETA, f"simulated valve, {dp_MPa:g} MPa", width=1.4)
+            draw_ramp(axes, runs, Drive(by), dp_MPa, WITH, f"first valve, {dp_MPa:g} MPa")
+            (mark_without if by == DIRECT else mark_with)(axes, runs, dp_MPa)
+        draw_floor(axes, runs)
 
-    return _panels(number, title, draw, drives)
+    return drawn_panels(number, title, panels, draw)
 
 
-def _effect_of_beta(runs: ValveRuns) -> "Figure":
+def _saturation(stopped: Subject, title: str) -> "Figure":
+    """Fig. 18 with the stop that Section 4.2 tells of: the commands from which on the paper's curves are flat."""
+
+    def draw(axes: "Axes", panel: Panel) -> None:
+        draw_both(axes, panel)
+        low, high = (float(text) for text in SATURATED_FROM_V)
+        axes.axvspan(low, high, color=GREY, alpha=0.25, lw=0, label=f"printed: flat from {low:g}-{high:g} V on")
+
+    return drawn_panels(18, title, panels_of(stopped), draw)
+
+
+def _effect_of_beta(subject: Subject) -> "Figure":
     """Fig. 23: with and without beta at dP1."""
     dp_MPa = PRESSURES_MPA[1]
 
-    def draw(axes: "Axes", by: Driver) -> None:
-        _draw_ramp(axes, runs, Drive(by), dp_MPa, WITH, "with β")
-        _draw_ramp(axes, runs, Drive(by, False), dp_MPa, NO_BETA, "without β", color=BLACK)
-        _mark(axes, 0.0, float(runs.valve.published.zero_flow_without_beta), dp_MPa, "*", "zero command without β")
-        _draw_floor(axes, runs)
+    def draw(axes: "Axes", panel: Panel) -> None:
+        runs, by = panel
+        draw_ramp(axes, runs, Drive(by), dp_MPa, WITH, "with β")
+        draw_ramp(axes, runs, Drive(by, False), dp_MPa, NO_BETA, "without β", color=BLACK)
+        mark(axes, 0.0, float(runs.valve.published.zero_flow_without_beta), dp_MPa, "*", "zero command without β")
+        draw_floor(axes, runs)
 
-    return _panels(23, f"impact of β on the flow (first valve, {dp_MPa:g} MPa)", draw, (PAPER, PRODUCT))
+    return drawn_panels(23, f"impact of β on the flow (first valve, {dp_MPa:g} MPa)", panels_of(subject), draw)

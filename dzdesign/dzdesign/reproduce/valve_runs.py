@@ -43,7 +43,9 @@ class ValveRuns:
     #: To full command at dP0, one record a PWM period.
     steps: dict[Drive, LoopRun]
     #: Of the product at the command of Fig. 13 and dP0; None without a firmware.
-    product_duty_percent: float | None
+    product_duty_percent: float | None = None
+    #: Commands about zero that the product takes for zero, per cent of full.
+    product_zero_band_percent: float = 0.0
 
     def dead_zone_percent(self, drive: Drive, dp_MPa: float, level_L_min: float | None = None) -> float:
         """Return the command, per cent of full, at which rising flow passes a level: of the paper unless given."""
@@ -56,7 +58,7 @@ class ValveRuns:
         level = FLOW_SHARE * float(self.ramps[drive, dp_MPa].q_mean_L_min.max())
         return self.dead_zone_percent(drive, dp_MPa, level)
 
-    def displacement_dead_zone_percent(self, dp_MPa: float) -> float:
+    def still_percent(self, dp_MPa: float) -> float:
         """Return the command, per cent of full, at which the spool of the bare valve begins to move."""
         run = self.ramps[Drive(DIRECT), dp_MPa]
         moved = np.flatnonzero(run.position_mm > FLOW_SHARE * run.position_mm.max())
@@ -89,7 +91,8 @@ def paper_drive(valve: PublishedValve, command: np.ndarray, dp_MPa: float, with_
     says whether the selector of Eq. (7) heeds the pressure drop.
     """
     u_min0, u_min1 = (float(text) / 100 for text in (valve.dead_zone0_percent, valve.dead_zone1_percent))
-    beta = u_min1 / u_min0 if with_beta and dp_MPa > DP0_MPA else 1.0  # Eqs. (5), (7)
+    fitted = float(np.interp(dp_MPa, PRESSURES_MPA, (u_min0, u_min1)))  # Eq. (4): two tests determine a straight line
+    beta = fitted / u_min0 if with_beta and dp_MPa > DP0_MPA else 1.0  # Eqs. (5), (7)
     chosen = law("paper")
     drive = chosen.evaluate_gain(beta, 1 - u_min0) * command + chosen.evaluate_offset(beta, u_min0)
     return np.asarray(np.clip(drive, 0.0, 1.0))
@@ -106,19 +109,26 @@ def run_valve(valve: RecoveredValve, loop: ClosedLoop, compensator: Compensator 
     ramps: dict[tuple[Drive, float], LoopRun] = {}
     for dp_MPa in PRESSURES_MPA:
         ramps[Drive(DIRECT), dp_MPa] = loop.run(command, dp_MPa)
-        for with_beta in (True, False):
+        for with_beta in (True, False) if valve.published.zero_flow_without_beta else (True,):
             driven = loop.run(paper_drive(valve.published, command, dp_MPa, with_beta), dp_MPa)
             ramps[Drive(PAPER, with_beta), dp_MPa] = replace(driven, command=command)
             if compensator:
                 ramps[Drive(PRODUCT, with_beta), dp_MPa] = _run_product(loop, command, dp_MPa, with_beta)
-    duty = None
+    duty, band = None, 0.0
     if compensator:
-        rest = np.zeros(ceil(loop.waits_s / RECORD_S) + 1)  # the drive waits for zero command after a reset
-        held = np.concatenate([rest, np.full(2, DUTY_COMMAND_V / U_MAX_V)])
+        held = np.concatenate([resting(loop), np.full(2, DUTY_COMMAND_V / U_MAX_V)])
         at_duty = _run_product(loop, held, PRESSURES_MPA[0], with_beta=True)
         duty = 100 * float(at_duty.compare[-1]) / compensator.signals.compare_max
-    steps = _steps(valve, loop, compensator is not None)
-    return ValveRuns(valve=valve, ramps=ramps, steps=steps, product_duty_percent=duty)
+        band = 100 * compensator.zero_band_codes / compensator.signals.command.span(1)
+    return ValveRuns(
+        valve=valve, ramps=ramps, steps=_steps(valve, loop, compensator is not None), product_duty_percent=duty,
+        product_zero_band_percent=band,
+    )  # fmt: skip
+
+
+def resting(loop: ClosedLoop) -> np.ndarray:
+    """Return zero command for as long as the drive waits for it after a reset."""
+    return np.zeros(ceil(loop.waits_s / RECORD_S) + 1)
 
 
 def _run_product(loop: ClosedLoop, command: np.ndarray, dp_MPa: float, with_beta: bool) -> LoopRun:

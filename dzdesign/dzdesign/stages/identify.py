@@ -1,18 +1,21 @@
 """`identify`: ramp tests -> ValveModel."""
 
 import datetime
-from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass, fields
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.dither import read_dithered
+from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import number, percent, quantity
-from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text
-from dzdesign.stages.recording_order import in_order
+from dzdesign.core.options import FIT, METER, RECORDINGS, AnyPath, Option, Paths, Table, Text, arguments_of, paths_of
+from dzdesign.stages.recording_order import in_order, stated_order
 from dzdesign.stages.recording_parts import parts_of
 from dzdesign.stages.recordings import (
     RampArguments,
     check_places,
+    distinct_names,
     expand,
     meter_choices,
     read_recordings,
@@ -23,8 +26,15 @@ from dzdesign.terminal.progress import stage_progress
 
 if TYPE_CHECKING:
     from dzdesign.identify.options import IdentifyOptions
+    from dzdesign.identify.reading.low_flow_table import LowFlowTable
+    from dzdesign.identify.reading.ramp_test import RampTest
     from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.identify.valve.stated_options import StatedOptions
 
+#: Arguments that are no option of the identification itself: what is read and written, and what nothing is made of.
+NOT_STATED = ("ramps", "output", "plots", "record")
+#: Options that name files: stated by the names that these have in made_from.
+FILES = ("order", "low_flow")
 #: Of the threshold between the tests.
 PREMISES = "dzdesign.identify.constants:PREMISES"
 
@@ -79,6 +89,9 @@ class IdentifyArguments(IdentifyChoices):
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="valve.json", short="-o")] = None
     """File to write."""
+    low_flow: Annotated[Paths, Option("TABLE.csv", METER)] = ()
+    """Table of flows measured by hand below the meter's floor, with a measuring glass or by a cylinder's drift: columns
+    u_V, dP_MPa, Q [mL/min], Q_error [mL/min] and branch (opening or closing). Repeatable."""
     order: Annotated[Paths | None, Option("FILE", RECORDINGS)] = None
     """Recordings in the order in which they were taken, such as "p1.csv, p5.csv, p1_again.csv", to tell a drift of the
     valve from the pressure drop (default: from date and time in the recordings). Repeatable; in the options file also
@@ -127,13 +140,89 @@ def identify(arguments: IdentifyArguments) -> "ValveModel":
     options, record = identify_options(arguments), record_of(arguments.record)
     check_places(ValveModel, arguments.output, arguments.plots)
     paths = expand(arguments.ramps)
-    tests = read_recordings(
-        paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
-        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows,
-    )  # fmt: skip
-    refuse_copies(tests)
-    tests = in_order(parts_of(tests, arguments.from_, arguments.to, options.u_max), paths, arguments.order)
+    tests = _read(arguments, options, paths)
+    tables = _read_low_flow([Path(path) for path in paths_of(arguments.low_flow)], options.u_max)
+    refuse_copies([*tests, *tables])
+    if alike := {test.source for test in tests} & {table.source for table in tables}:
+        raise InputError(f"--low-flow: a recording is called '{alike.pop()}' too; rename one of them")
+    asked = None if arguments.order is None else paths_of(arguments.order)
+    tests, order = in_order(tests, paths, asked), stated_order(tests, paths, asked)
     with stage_progress(f"fitting {len(tests)} recording{'s' if len(tests) > 1 else ''}"):
-        found = identify_sides(tests, options, record)
+        found = identify_sides(tests, options, record, tables)
+    stated = stated_options(arguments, order=order, low_flow=[table.source for table in tables])
+    found = replace(found, model=replace(found.model, options=stated))
     write_results(found.model, arguments.output, arguments.plots, lambda: plot_files(found))
     return found.model
+
+
+def _read(
+    arguments: IdentifyArguments, options: "IdentifyOptions", paths: Paths, names: Sequence[str] = ()
+) -> "list[RampTest]":
+    """Read the recordings, those parts that are asked for."""
+    tests = read_recordings(
+        paths, u_max=options.u_max, columns=arguments.columns, dp=arguments.dp,
+        sample_rate=arguments.sample_rate, skip_rows=arguments.skip_rows, names=names,
+    )  # fmt: skip
+    return parts_of(tests, arguments.from_, arguments.to, options.u_max)
+
+
+def _read_low_flow(
+    paths: list[Path], u_max: float, names: Sequence[str] = ()
+) -> "list[LowFlowTable]":
+    """Read the tables of flows that were measured by hand."""
+    from dzdesign.identify.reading.low_flow_table import read_low_flow
+
+    return [read_low_flow(path, u_max, name) for path, name in zip(paths, names or distinct_names(paths), strict=True)]
+
+
+def identify_again(options: "StatedOptions", record: Mapping[str, str], files: Mapping[str, Path]) -> "ValveModel":
+    """Identify a valve as its valve.json says that it was; `files` by the names of made_from, in that order.
+
+    Raises
+    ------
+    InputError
+        If an option or a file can't be read, or no threshold can be given; the reason.
+    """
+    from dzdesign.identify.identification import identify_sides
+    from dzdesign.identify.reading.series_order import in_stated_order
+
+    known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, *FILES}
+    given: dict[str, Any] = {**options.texts, **options.tables, **options.lists}
+    order, by_hand = (given.pop(name, ()) for name in FILES)
+    if strange := [name for name in given if name not in known]:
+        raise InputError(f"its options name {quoted(strange[0])}, which is no option of `identify`")
+    arguments = IdentifyArguments([], **given)
+    choices = identify_options(arguments)
+    if strange := [name for name in by_hand if name not in files]:
+        raise InputError(f"its option low_flow names {quoted(strange[0])}, which is none of the files in made_from")
+    tables = _read_low_flow([files[name] for name in by_hand], choices.u_max, by_hand)
+    ramps = {name: path for name, path in files.items() if name not in by_hand}
+    tests = _read(arguments, choices, list(ramps.values()), list(ramps))
+    if order:
+        by_name = {test.source: test for test in tests}
+        if sorted(order) != sorted(by_name):
+            raise InputError("its option order does not name each recording once")
+        stated = {test.source: test for test in in_stated_order([by_name[name] for name in order])}
+        tests = [stated[test.source] for test in tests]
+    model = identify_sides(tests, choices, record, tables).model
+    return replace(model, options=options)
+
+
+def stated_options(
+    arguments: IdentifyArguments, order: Sequence[str] = (), low_flow: Sequence[str] = ()
+) -> "StatedOptions":
+    """Return the options as valve.json has them: all but places and the record, those that were not given too."""
+    from dzdesign.identify.valve.stated_options import StatedOptions
+
+    texts: dict[str, str] = {}
+    tables: dict[str, Mapping[str, str]] = {}
+    lists = {name: tuple(files) for name, files in zip(FILES, (order, low_flow), strict=True) if files}
+    for argument in arguments_of(IdentifyArguments):
+        value = None if argument.name in (*NOT_STATED, *FILES) else getattr(arguments, argument.name)
+        if isinstance(value, Mapping):
+            tables[argument.name] = {str(key): str(text) for key, text in value.items()}
+        elif isinstance(value, list | tuple):
+            lists[argument.name] = tuple(map(str, value))
+        elif value is not None:
+            texts[argument.name] = str(value)
+    return StatedOptions(texts=texts, tables=tables, lists=lists)

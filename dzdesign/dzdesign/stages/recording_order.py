@@ -26,7 +26,7 @@ def in_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | 
 
     if order is None:
         return list(tests)
-    places = [place for item in paths_of(order) for place in _named(os.fspath(item), paths, tests)]
+    places = _places(tests, paths, order)
     twice = next((place for count, place in enumerate(places) if place in places[:count]), None)
     missing = next((place for place in range(len(tests)) if place not in places), None)
     if twice is not None:
@@ -35,6 +35,15 @@ def in_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | 
         raise _wrong(f"lacks '{tests[missing].source}'")
     stated = dict(zip(places, in_stated_order([tests[place] for place in places]), strict=True))
     return [stated[place] for place in range(len(tests))]
+
+
+def stated_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | None) -> tuple[str, ...]:
+    """Return the names of the recordings in the order of taking, as `in_order` read it; none where none is stated."""
+    return () if order is None else tuple(tests[place].source for place in _places(tests, paths, order))
+
+
+def _places(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths) -> list[int]:
+    return [place for item in paths_of(order) for place in _named(os.fspath(item), paths, tests)]
 
 
 def _wrong(what: str) -> InputError:

@@ -3,7 +3,7 @@
 import fnmatch
 import glob
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,6 +36,7 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.core.artefact_types import Artefact
+    from dzdesign.identify.reading.low_flow_table import LowFlowTable
     from dzdesign.identify.reading.ramp_test import RampTest
 
 
@@ -103,10 +104,12 @@ def read_recordings(
     sample_rate: Text = None,
     skip_rows: int | str | None = None,
     what: str = "reading recordings",
+    names: Sequence[str] = (),
 ) -> "list[RampTest]":
     """Read the recordings that patterns name, by the options of those names; `u_max`, V, is what 100 % means.
 
-    Refuses a file that can't be read, or has no pressure drop where [dp] names those of others. `what` is for the bar.
+    Refuses a file that can't be read, or has no pressure drop where [dp] names those of others. `what` is for the bar;
+    `names` are those of the recordings, one a file, where they are not those of the files.
     """
     from dzdesign.identify.reading.column_labels import parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
@@ -116,7 +119,7 @@ def read_recordings(
     skipped = None if skip_rows is None else read_skip_rows(skip_rows, "--skip-rows")
     rate = None if sample_rate is None else read_sample_rate(sample_rate, "--sample-rate")
     paths = expand(patterns)
-    names = distinct_names(paths)
+    names = names or distinct_names(paths)
     tests = []
     for path, name in with_bar(list(zip(paths, names, strict=True)), what):
         declared = _declared_dp(name, dp)
@@ -200,7 +203,7 @@ def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
             )
 
 
-def refuse_copies(tests: list["RampTest"]) -> None:
+def refuse_copies(tests: Sequence["RampTest | LowFlowTable"]) -> None:
     """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty."""
     known: dict[str, str] = {}
     for test in tests:

@@ -32,6 +32,9 @@ class VerifyArguments:
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", command_default="evidence", short="-o")] = None
     """Folder to write, with the evidence."""
+    ramps: Annotated[Paths, Option("RAMP", several=True)] = ()
+    """Recordings that valve.json was made from, or patterns such as "ramps/*.csv", in any order: identify again, and
+    compare with the valve that the firmware carries (default: its thresholds are taken as stated)."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
     """File with the plant of the closed loop, like examples/paper_valve/plant.toml (default: made of the identified
     thresholds)."""
@@ -62,10 +65,12 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
         If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
     """
     from dzdesign.regeneration import regenerated
+    from dzdesign.reidentification import GivenFiles, identified_again
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
+    from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.verification import SCHEMA, evidence_files, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
@@ -78,6 +83,7 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
         plant_source = plant_source or Path(arguments.plant).name  # how the evidence calls the plant
     tolerances = read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None
     backs_MPa = _back_pressures_MPa(texts_of(arguments.back_pressure))
+    recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
     with _firmware_folder(arguments.firmware) as folder:
         ware = arguments.c2000ware
         added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
@@ -86,6 +92,9 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
                 folder, plant, plant_source, digest, tolerances=tolerances, backs_MPa=backs_MPa,
                 include=[Path(place) for place in paths_of(arguments.include)], say=stage, watch=stage.each,
             )  # fmt: skip
+        if recordings:
+            with stage_progress("identifying again"):
+                added.append(identified_again(read_compensator(folder), recordings))
         more, mutants = _further_checks(arguments, folder, verification)
         verification = verification.with_checks(regenerated(folder), *added, *more)
         if mutants:

@@ -139,11 +139,8 @@ def _guarded(side: "SideModel", units: "RecordedUnits") -> str:
     """Say which threshold is bounded, and what counts as no flow."""
     if declared := side.zero_flow_in_words(units):
         return f"(the command that passes the flow allowed at zero); below, {declared}"
-    return (
-        "(the knee, or the tail's zero where the edge is soft); flow below "
-        f"{units.text(side.certificate.level_L_min, '.2f L/min')} (noise level: the meter's floor, what averages "
-        "resolve, or 0.5 % of the largest flow) counts as none"
-    )
+    none = side.none_in_words(side.certificate.guard, units)
+    return f"(the knee, or the tail's zero where the edge is soft); {none}"
 
 
 def _betas(side: "SideModel", units: "RecordedUnits") -> str:
@@ -201,8 +198,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
             f"{units.span(low, high, '.3f MPa')}, at every pressure code; "
             + (
-                f"flow below {units.text(certificate.level_L_min, '.2f L/min')} (meter's floor, its noise, or 0.5 % of "
-                "the largest flow) counts as none"
+                compensator.valve.sides[SIDE_NAMES[sign]].none_in_words(certificate.guard, units)
                 if certificate.zero_flow_L_min is None
                 else compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)
             ),

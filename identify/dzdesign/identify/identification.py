@@ -18,6 +18,7 @@ from dzdesign.identify.data_quality.recordings import about_recordings
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.dithered_command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
+from dzdesign.identify.reading.low_flow_table import LowFlowTable, readings_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.units_of_columns import shown_units, units_of
 from dzdesign.identify.results import Identification, SideIdentification
@@ -57,18 +58,27 @@ def identify(
 
 
 def identify_sides(
-    tests: Sequence[RampTest], options: IdentifyOptions | None = None, record: Mapping[str, str] | None = None
+    tests: Sequence[RampTest],
+    options: IdentifyOptions | None = None,
+    record: Mapping[str, str] | None = None,
+    low_flow: Sequence[LowFlowTable] = (),
 ) -> Identification:
-    """Identify a valve as `identify` does, and return beside it what each side was found from."""
+    """Identify a valve as `identify` does, and return beside it what each side was found from.
+
+    `low_flow` are flows below the meter's floor that were measured by hand.
+    """
     options = options or IdentifyOptions()
     if not tests:
         raise InputError("no ramp tests were given; expected at least one file")
     units = shown_units(tests, options)
     dither = options.dithered.of(units_of(tests), options.u_max) if options.dithered else None
     tests = [without_dither(test, dither, options.u_max) for test in tests]
-    sides, warnings = _each_side(tests, options, units)
+    sides, warnings = _each_side(tests, options, units, low_flow)
     lag = next(iter(sides.values())).described.lag
+    # In whatever order they came: those of the pressure drops, then those of a side that was refused, then tables.
     files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
+    files |= dict.fromkeys(sorted((test.source, test.sha256) for test in tests))
+    files |= dict.fromkeys(sorted((table.source, table.sha256) for table in low_flow))
     model = ValveModel(
         tool=THIS_TOOL,
         made_from=tuple(SourceFile(source=source, sha256=digest) for source, digest in files),
@@ -102,21 +112,23 @@ def identify_sides(
 
 
 def _each_side(
-    tests: Sequence[RampTest], options: IdentifyOptions, units: RecordedUnits
+    tests: Sequence[RampTest], options: IdentifyOptions, units: RecordedUnits, low_flow: Sequence[LowFlowTable]
 ) -> tuple[dict[str, SideIdentification], list[Warning_]]:
     """Identify each side that was recorded; warnings and a refusal are in the units of the recordings."""
     sides: dict[str, SideIdentification] = {}
     warnings: list[Warning_] = []
     for name, sign in SIDES.items():
-        of_side = tests_of_side(tests, sign, options.u_max)
+        of_side, by_hand = tests_of_side(tests, sign, options.u_max), readings_of_side(low_flow, sign)
         if not of_side:
+            if by_hand:
+                raise InputError(f"{by_hand[0].source} is of {name} commands, but no ramp test is; record one")
             continue
         in_side = units.of_side(name)
         mixed = about_mixed_pressures(of_side)
         pressures = (*mixed, *about_single_pressures(of_side, mixed))
         of_side, side_options, clipped = without_clipping(of_side, options)
         try:
-            sides[name] = identify_side(of_side, side_options, in_side)
+            sides[name] = identify_side(of_side, side_options, in_side, by_hand)
         except InputError as error:
             # Ramps of several pressures taken for one test may be refused for any reason: the cause is this.
             cause = f"; it may be that {in_units(mixed[0].text, in_side)}" if mixed else ""

@@ -9,11 +9,13 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.worded import all_of, worded
 from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.data_quality.low_flow import about_low_flow
 from dzdesign.identify.data_quality.side_warnings import find_warnings
 from dzdesign.identify.fitting.certifying import Certified, Tested, certify_thresholds
 from dzdesign.identify.fitting.constrained_fits import KneeFit, fit_knees
 from dzdesign.identify.fitting.guarded_thresholds import Guarding, guard_thresholds
 from dzdesign.identify.fitting.identifying import identify_curve
+from dzdesign.identify.fitting.low_flow import unseen_of_curve, with_low_flow
 from dzdesign.identify.fitting.opening import opening_curve
 from dzdesign.identify.fitting.threshold import Threshold
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
@@ -25,6 +27,7 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.results import SideIdentification
 from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard
+from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
@@ -36,9 +39,14 @@ PAPER_DP0 = 1 * MPA
 
 
 def identify_side(
-    tests: Sequence[RampTest], options: IdentifyOptions, units: RecordedUnits = AS_COMPUTED
+    tests: Sequence[RampTest],
+    options: IdentifyOptions,
+    units: RecordedUnits = AS_COMPUTED,
+    low_flow: Sequence[LowFlow] = (),
 ) -> SideIdentification:
     """Identify the side of positive commands from ramp tests in any order; texts of its model are in `units`.
+
+    `low_flow` are flows below the meter's floor that were measured by hand.
 
     Raises
     ------
@@ -48,17 +56,20 @@ def identify_side(
     group = describe_tests(tests, options)
     free = fit_knees([item.shapes for item in group.tests], floor=group.floor, u_max=options.u_max, trend="flat")
     reference = _reference(group.tests, options.dp0)
-    guarding = guard_thresholds(group, free, options)
+    guarding, lowered = with_low_flow(guard_thresholds(group, free, options), group, low_flow, options)
     certified = _certify(group, guarding, reference, options)
     curve = next(iter(certified.values())).curve
     knees = guarding.knees if curve.premise == "monotone" else free
-    model = _side_model(group, guarding, certified, knees, reference, options, units)
+    model = _side_model(group, guarding, certified, knees, reference, options, units, low_flow)
     departure = np.maximum(guarding.departure, guarding.guarded_departure)
     return SideIdentification(
         model=model,
         described=group,
         knees=knees,
-        warnings=find_warnings(model, group, departure, next(iter(certified.values())), options),
+        warnings=(
+            *find_warnings(model, group, departure, next(iter(certified.values())), options),
+            *about_low_flow(model, lowered),
+        ),
     )
 
 
@@ -108,6 +119,7 @@ def _side_model(
     reference: int,
     options: IdentifyOptions,
     units: RecordedUnits,
+    low_flow: Sequence[LowFlow],
 ) -> SideModel:
     """Assemble one side: what was identified, the curves that may be certified, and k x_max."""
     described, trend = group.tests, guarding.trend
@@ -118,6 +130,7 @@ def _side_model(
     several = len(described) > 1
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
     rows = range(len(described))
+    level = group.noise_level / L_MIN
     return SideModel(
         tests=tuple(_test_result(group, knees, row, curves[guard], options, units) for row in rows),
         reference=Reference(
@@ -136,10 +149,12 @@ def _side_model(
         certificate=BoundsBasis(
             confidence=options.confidence,
             guard=guard,
-            level_L_min=group.noise_level / L_MIN,
+            level_L_min=level,
+            unseen_below_L_min=unseen_of_curve(low_flow, guard, curves[guard], level)[0],
             zero_flow_L_min=None if options.zero_flow is None else options.zero_flow / L_MIN,
             repeatability=_repeatability(group.between(guarding.column)),
         ),
+        low_flow=tuple(low_flow),
         identified=joint.curves,
         certified=curves,
         opening_curve=opening_curve(guarding.opening, trend.direction, curves, options.u_max)

@@ -17,23 +17,41 @@ Hash = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 Driver = Literal["valve", "paper's law", "product"]
 
 
+#: How a printed number stands to ours: it went into the fit; ours is a prediction; it is taken over as it is; or the
+#: paper has words and no digits, and nothing can agree.
+Kind = Literal["fitted", "predicted", "given", "in words"]
+Range = tuple[Number, Number]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """Our number for one of the paper's, one way."""
 
     by: Annotated[Driver, Meta(description="Bare valve, the paper's law, or the whole product.")]
+    hysteresis_V: Annotated[float, quantity("V", "Hysteresis that is assumed of the valve.", ge=0, le=1e6)] = 0.0
     value: Annotated[Number | None, Meta(description="In the number's unit; null: not compared.")]
     difference: Annotated[Number | None, Meta(description="Ours less the printed one; null: no number is printed.")]
-    allowed: Annotated[tuple[Number, Number] | None, Meta(description="Range required of it; null: none.")]
-    holds: Annotated[bool | None, Meta(description="Whether it lies in the range; null: nothing is required.")] = field(
+    allowed: Annotated[
+        Range | None, Meta(description="The printed digits and a measurement error about them; null: no digits.")
+    ]
+    reason: Annotated[str, Meta(description="Why it misses; empty where it agrees, or where nobody knows.")] = ""
+    explained: Annotated[Range | None, Meta(description="How far the reason reaches; null: there is none.")] = None
+    agrees: Annotated[bool | None, Meta(description="Whether it lies in the range; null: no digits.")] = field(
         init=False
+    )
+    accounted: Annotated[bool, Meta(description="Whether it agrees, or misses within what its reason explains.")] = (
+        field(init=False)
     )
 
     def __post_init__(self) -> None:
-        holds = None
-        if self.allowed is not None and self.value is not None:
-            holds = self.allowed[0] <= self.value <= self.allowed[1]
-        object.__setattr__(self, "holds", holds)
+        agrees = _within(self.value, self.allowed)
+        object.__setattr__(self, "agrees", agrees)
+        reasoned = bool(self.reason) and _within(self.value, self.explained) is True
+        object.__setattr__(self, "accounted", agrees is not False or reasoned)
+
+
+def _within(value: float | None, limits: Range | None) -> bool | None:
+    return None if value is None or limits is None else limits[0] <= value <= limits[1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,21 +63,30 @@ class PaperNumber:
     unit: Annotated[str, Meta(description="Of all values here.")]
     dp_MPa: Annotated[float | None, quantity("MPa", "Pressure drop.")]
     published: Annotated[str, Meta(description="As printed.")]
-    in_fit: Annotated[
-        bool, Meta(description="Whether it went into the fit of the valve's parameters; else ours is a prediction.")
+    kind: Annotated[
+        Kind, Meta(description="Whether it went into a fit, is predicted, is taken over, or has no digits to compare.")
     ]
     outcomes: Annotated[
         tuple[Outcome, ...], Meta(description="Of the bare valve; or of the paper's law and of the product.")
     ]
-    tolerance: Annotated[str, Meta(description="Why the ranges are so wide; empty where nothing is required.")]
-    why: Annotated[str, Meta(description="Where ours differs, or need not agree: why.")]
+    tolerance: Annotated[str, Meta(description="What the ranges are made of; empty where there are none.")]
+    why: Annotated[str, Meta(description="What is to be known of the number, whether it agrees or not.")]
+    agrees: Annotated[
+        bool | None,
+        Meta(description="Whether every outcome without an assumed hysteresis agrees; null: no digits, or given."),
+    ] = field(init=False)
     holds: Annotated[
-        bool | None, Meta(description="Whether every requirement of it holds; null: there is none.")
+        bool | None,
+        Meta(description="Whether each agrees, or misses for a reason that reaches so far; null: as in `agrees`."),
     ] = field(init=False)
 
     def __post_init__(self) -> None:
-        required = [outcome.holds for outcome in self.outcomes if outcome.holds is not None]
-        object.__setattr__(self, "holds", all(required) if required else None)
+        compared = [one for one in self.outcomes if one.agrees is not None and not one.hysteresis_V]
+        if self.kind in ("given", "in words"):
+            compared = []
+        agrees = all(one.agrees for one in compared) if compared else None
+        object.__setattr__(self, "agrees", agrees)
+        object.__setattr__(self, "holds", all(one.accounted for one in compared) if compared else None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +127,7 @@ class ReproducedValve:
     """A valve of the paper: its recovered plant, and what the product made of it."""
 
     valve: Annotated[str, Meta(description="Its name.")]
+    hysteresis_V: Annotated[float, quantity("V", "Hysteresis that is assumed of it.", ge=0, le=1e6)]
     parameters: Annotated[Mapping[str, Parameter], Meta(description="Name of a plant's parameter -> parameter.")]
     fitted_to: Annotated[tuple[FittedFigure, ...], Meta(description="The printed figures that the fit used.")]
     at_bound: Annotated[tuple[str, ...], Meta(description="Parameters that a bound of the fit holds.")]
@@ -117,7 +145,10 @@ class Reproduction(Artefact):
         "dzdesign.reproduction/1"
     )
     paper: Annotated[str, Meta(description="Its DOI.", pattern="^10[.]")]
-    holds: Annotated[bool, Meta(description="Whether every number that must agree does.")] = field(init=False)
+    holds: Annotated[
+        bool, Meta(description="Whether every number agrees, or is missed for a reason that reaches so far.")
+    ] = field(init=False)
+    assumptions: Annotated[tuple[str, ...], Meta(description="What the paper does not say and this takes for granted.")]
     numbers: Annotated[tuple[PaperNumber, ...], Meta(description="In the order of the paper.", min_length=1)]
     valves: Annotated[tuple[ReproducedValve, ...], Meta(description="In the order of the paper.")]
 

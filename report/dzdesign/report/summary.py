@@ -52,7 +52,10 @@ def _verdict(chain: Chain) -> Headline:
         reasons = tuple(f"{check.name}: {check.text}" for check in others)
         text = "THE EVIDENCE CONTRADICTS ITSELF: what it says to hold does not follow from its figures"
         return Headline(kind="bad", text=text, reasons=reasons)
-    return _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
+    judged = _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
+    if judged.kind == "good" and evidence.reservation:
+        return replace(judged, text=f"{judged.text}; {evidence.reservation}")
+    return judged
 
 
 def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headline:
@@ -186,7 +189,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         "the certified offset, half a count kept for the rounding"
         + (f"; {units.text(least, '.3f mV')} of the C's compare values under the threshold's bound" if inputs else "")
         + (
-            f". Flow below {units.text(worst.level_L_min, '.2f L/min')} counts as none"
+            f". F{at_zero.none_in_words(worst.guard, units)[1:]}"
             if worst.zero_flow_L_min is None
             else f"; {at_zero.zero_flow_in_words(units)}"
         )

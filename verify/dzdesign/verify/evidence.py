@@ -14,7 +14,7 @@ from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.design_choices import Above
 from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.loop_results import ClosedLoopResult, Count, MonteCarlo, Population, ScenarioResult, Side, about
-from dzdesign.verify.requirements import ALWAYS, OF_CURRENT, Check
+from dzdesign.verify.requirements import ALWAYS, AS_STATED, OF_CURRENT, RAMPS, Check
 
 Sign = Literal[1, -1]
 Names = tuple[str, ...]
@@ -204,6 +204,12 @@ class Evidence(Artefact):
         parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
         parts += [f"{NOT_CHECKED}: {', '.join(unknown)}"] if unknown else []
         return "; ".join(parts) or "Every requirement holds."
+
+    @property
+    def reservation(self) -> str:
+        """What a good verdict is not about: thresholds that no ramp test was compared with; empty where all were."""
+        compared = any(check.id == RAMPS.id and check.holds for check in self.checks)
+        return "" if compared else AS_STATED
 
     def with_checks(self, *checks: Check) -> "Evidence":
         """Return the evidence with further requirements."""

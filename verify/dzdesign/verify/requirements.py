@@ -54,6 +54,7 @@ ZERO_FLOW_AFTER_SCENARIOS = Requirement(
     id="zero-flow-after-scenarios", title="no flow at zero command after any scenario"
 )
 CERTIFICATE = Requirement(id="certificate", title="the certificate follows from the valve")
+BOUNDS = Requirement(id="bounds", title="the bounds follow from the valve's thresholds and errors")
 LAW = Requirement(id="law", title="the law follows from the valve and the options")
 #: Of a valve.json that is written as `identify` writes it the hash is known without the file.
 VALVE = Requirement(
@@ -63,6 +64,12 @@ VALVE = Requirement(
 )
 #: Checked by the front door, which may ask the generator; this room shares no code with it.
 REGENERATED = Requirement(id="regenerated", title="the files are those that codegen makes of compensator.json")
+#: Checked by the front door, which asks `identify`. Without it thresholds are taken as stated.
+RAMPS = Requirement(
+    id="identified-again",
+    title="the valve is what its ramp tests give",
+    how="`verify --ramps` with the recordings that valve.json was made from",
+)
 BOARD_FILES = Requirement(id="board-files", title="your board files compile")
 MACHINE_CODE = Requirement(
     id="machine-code", title="machine code of other processors, in simulators", how="`verify --machine-code`"
@@ -103,9 +110,12 @@ FROM_LOOP = (PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARI
 #: What every `verify` checks, in the order of the report.
 ALWAYS = (
     FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK, DRIVE,
-    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CERTIFICATE, LAW, VALVE, REGENERATED,
+    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CERTIFICATE, BOUNDS, LAW, VALVE,
+    REGENERATED,
 )  # fmt: skip
 #: What every `verify` checks beside it where the drive is by current.
 OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS, CURRENT_VALVE)
+#: What a verdict adds where the ramp tests were not there.
+AS_STATED = "thresholds taken as stated"
 #: What is checked if it is asked for.
-OPTIONAL = (MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)
+OPTIONAL = (RAMPS, MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)

@@ -28,6 +28,7 @@ from dzdesign.verify.firmware.compensator_checks import certificate_follows, law
 from dzdesign.verify.firmware.compilation import board_compiles, changed_board_files, check_include, compiles_strictly
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.manifest import manifest_follows
+from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
 from dzdesign.verify.firmware.unchanged_files import files_unchanged, user_files
 from dzdesign.verify.requirements import EXACT_LAW, Check
 from dzdesign.verify.toolchain.host_compiler import host_compiler
@@ -59,7 +60,8 @@ class Verification(ShownInNotebooks):
         words = self.evidence.verdict
         if not self.holds or self.derived is None:
             return words
-        return f"{words.removesuffix('.')}; the certificate is of {self.derived.certified_of}."
+        parts = [words.removesuffix("."), f"the certificate is of {self.derived.certified_of}"]
+        return "; ".join([*parts, *filter(None, [self.evidence.reservation])]) + "."
 
     def with_checks(self, *checks: Check) -> "Verification":
         """Return the verification with further requirements."""
@@ -105,6 +107,7 @@ def verify(
         *current.checks,
         *loop.checks,
         certificate_follows(compensator),
+        bounds_follow(compensator),
         law,
         valve_follows(folder, compensator),
         *board.checks,

@@ -33,8 +33,10 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:
         text += f", so that {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)}."
     elif certificate.guard == "closing":
-        flow = units.text(certificate.level_L_min, ".2f L/min")
-        text += f", so that less than {flow} flows: what the recordings can't show."
+        by_hand = certificate.level_L_min < compensator.valve.sides[SIDE_NAMES[sign]].certificate.level_L_min
+        flow = units.text(certificate.level_L_min, ".3g L/min" if by_hand else ".2f L/min")
+        shown = "as the low-flow readings show" if by_hand else "what the recordings can't show"
+        text += f", so that less than {flow} flows: {shown}."
     else:
         text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
     text += f" {_beyond(compensator, sign)}"

@@ -23,9 +23,14 @@ DUTY_COMMAND_V = 2
 DUTY_WITHOUT_PERCENT, DUTY_WITH_PERCENT = "20", "55"
 #: Eqs. (29)-(31): largest code of the converter, full scale at its pin, counts per volt there.
 LARGEST_CODE, PIN_V, COUNTS_PER_PIN_VOLT = "4095", "3", "1365"
+#: Section 3: frequency and amplitude of the PWM that both figures show.
+PWM_KHZ, PWM_AMPLITUDE_V = "2.5", "3.16"
 #: Section 4.2: commands from which on the first valve's curves with compensator are flat, V.
 SATURATED_FROM_V = ("8", "8.5")
-#: Section 4.3: change of the dead zone with the oil's temperature, over 1000; which temperatures, the text leaves open.
+#: Section 4.3, as are the next two: pressure drop and commands of the tests with load and oil temperature.
+LOAD_DP_MPA = 3
+LOAD_COMMANDS_V = ("1.5", "3.5")
+#: Change of the dead zone with the oil's temperature, over 1000; which temperatures, the text leaves open.
 TEMPERATURE_CHANGE_PER_MILLE = "2"
 
 

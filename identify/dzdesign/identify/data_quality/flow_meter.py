@@ -77,7 +77,7 @@ def _about_the_noise_level(side: SideModel, options: IdentifyOptions) -> Iterato
     if options.noise_level is None:
         return
     declared, worst = options.noise_level / L_MIN, max(side.tests, key=lambda test: test.noise_level_L_min)
-    if worst.noise_level_L_min > 1.001 * declared:
+    if min(worst.noise_level_L_min, side.certificate.unseen_below_L_min) > 1.001 * declared:
         yield warn("noise-level", worst.source, declared_L_min=declared, level_L_min=worst.noise_level_L_min)
 
 

@@ -126,7 +126,7 @@ def _sag(item: DescribedTest) -> float:
 
 def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Finding]:
     floor = group.floor / L_MIN
-    if floor > 0:
+    if floor > 0 and side.certificate.unseen_below_L_min >= floor:
         yield warn("onset-hidden", floor_L_min=floor)
     for test, item in zip(side.tests, group.tests, strict=True):
         knee = test.u_knee_rising_V if test.u_knee_falling_V is None else test.u_knee_falling_V

@@ -9,16 +9,13 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import Worded, worded
 from dzdesign.identify.constants import MPA, REFUSED, Premise
-from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
+from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR
 from dzdesign.identify.fitting.constrained_fits import fit_offset
 from dzdesign.identify.fitting.continuing import AtTests, bound_above
+from dzdesign.identify.fitting.error_statement import budget_of_free, stated_errors
 from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
 from dzdesign.identify.fitting.offsets import OffsetUnderBound, fit_offset_under
-from dzdesign.identify.fitting.premises import (
-    bound_line,
-    confidence_at_tests,
-    find_curvature,
-)
+from dzdesign.identify.fitting.premises import bound_line, find_curvature
 from dzdesign.identify.fitting.vertices import Vertex, find_vertex
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.above_tests import AboveTests
@@ -78,9 +75,7 @@ def bounds_under_premises(guarded: GuardedThreshold, tested: Tested) -> dict[Pre
         )  # fmt: skip
         found.insert(0, smooth)
     if dp.size > 1:
-        confidence = confidence_at_tests(options.confidence)
-        statistical = lower_bounds(free.value, free.se, between, confidence, np.zeros(dp.size))
-        budget = np.maximum(statistical - free.bound, 0.0)
+        budget = budget_of_free(guarded, options.confidence)
         fit = bound_line(dp, free.value, free.se, budget, between, confidence=options.confidence, u_max=options.u_max)
         line = BoundUnderPremise(
             premise="line", value=fit.value, se=free.se, lower=fit.bound, curvature=np.zeros(dp.size - 1),
@@ -162,6 +157,7 @@ def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
         dp_MPa=tuple(map(float, tested.dp_MPa)) if with_dp else (),
         u_threshold_V=tuple(map(float, value)),
         u_lower_V=tuple(map(float, bound.lower)),
+        errors=stated_errors(guarded, taken, bound.se, value, bound.lower, tested.options.confidence),
         u_min0_V=offset.u_min0,
         offset_dp_MPa=tuple(map(float, offset.dp_MPa)) if with_dp else (),
         offset_V=tuple(map(float, offset.offset)),

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.identify.constants import MPA, REFUSED, Premise
-from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR, lower_bounds
+from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR
+from dzdesign.identify.fitting.error_statement import budget_of_free
 from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold
 from dzdesign.identify.fitting.premises import (
     LARGEST_DEGREES,
-    confidence_at_tests,
     line_weights,
     of_whole_path,
 )
@@ -154,9 +154,7 @@ def _band(
     tests count by the weights' size.
     """
     free, between = guarded.free, guarded.between
-    confidence = confidence_at_tests(options.confidence)
-    statistical = lower_bounds(free.value, free.se, between, confidence, np.zeros(dp.size))
-    budget = np.maximum(statistical - free.bound, 0.0)
+    budget = budget_of_free(guarded, options.confidence)
     at_nodes, along = weights_of(nodes), weights_of(np.geomspace(nodes[0], nodes[-1], PATH_POINTS))
     drift, uneven = (between.drift.change, between.drift.uneven) if between.drift else (0.0, 0.0)
     taken_off = []

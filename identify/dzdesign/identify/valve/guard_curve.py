@@ -13,6 +13,7 @@ from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.constants import REFUSED, Premise
 from dzdesign.identify.valve.above_tests import AboveTests
+from dzdesign.identify.valve.bound_errors import BoundErrors
 from dzdesign.identify.valve.certified_bound import CertifiedBound, largest_excess
 from dzdesign.identify.valve.estimated_curvature import (
     END_FACTOR_OF_THREE,
@@ -104,6 +105,7 @@ class CertifiedCurve:
             "M/2 (dP - a) (b - dP), or, for monotone, the lower of both.",
         ),
     ]
+    errors: Annotated[BoundErrors, Meta(description="What the lower bounds at the tests are made of.")]
     u_min0_V: Annotated[Voltage, Meta(description="The largest offset at dP0 that the certificate allows.")]
     offset_dp_MPa: Annotated[
         tuple[PressureDrop, ...], quantity("MPa", "Nodes of the offset; empty where the pressure drop is unknown.")
@@ -129,6 +131,8 @@ class CertifiedCurve:
                 f"{len(self.u_lower_V)} lower bounds stand beside {len(self.u_threshold_V)} thresholds, expected one "
                 "each"
             )
+        if len(self.errors.noise_se_V) != len(self.u_lower_V):
+            raise RuleError(f"{len(self.errors.noise_se_V)} errors stand beside {len(self.u_lower_V)} bounds")
         if bool(self.dp_MPa) != bool(self.offset_dp_MPa) or (
             self.dp_MPa and (self.dp_MPa[0], self.dp_MPa[-1]) != (self.offset_dp_MPa[0], self.offset_dp_MPa[-1])
         ):

@@ -13,6 +13,7 @@ from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.identify.valve.quantity_types import Flow, Probability
 from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.identify.valve.stated_options import StatedOptions
 from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST_ENTRIES, checked_record
 
 #: Both sides, and the sign of the command that opens each.
@@ -90,6 +91,13 @@ class ValveModel(ShownInNotebooks, Artefact):
             max_length=MOST_ENTRIES,
         ),
     ]
+    options: Annotated[
+        StatedOptions | None,
+        Meta(
+            description="Options of `identify` with which the files in made_from give this file again; null where "
+            "nobody wrote them down."
+        ),
+    ] = None
     simulated: Annotated[
         bool, Meta(description="Whether a recording is simulated: no measurement, so no firmware for a machine.")
     ]

@@ -11,6 +11,7 @@ from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.guard_curve import GUARDS, ROUNDING_V, CertifiedCurve, Guard, OpeningCurve
 from dzdesign.identify.valve.identified_curve import BETA_ROUNDING, IDENTIFIED, IdentifiedCurve
+from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.quantity_types import (
     Flow,
     IdentifiedRatio,
@@ -75,6 +76,13 @@ class BoundsBasis:
         Flow | None,
         Meta(description="Flow at zero command, a leak included, that --zero-flow declared as allowed; null: none."),
     ]
+    unseen_below_L_min: Annotated[
+        Flow,
+        Meta(
+            description="Flow at the guard's bounds below which nothing is known: level_L_min, or less where the "
+            "low-flow readings show at every test, at its guarded threshold or above, that no more flows."
+        ),
+    ]
     repeatability: Annotated[Repeatability, Meta(description="What differs from ramp to ramp.")]
 
 
@@ -114,6 +122,10 @@ class SideModel:
         tuple[PressureDrop, PressureDrop] | None, quantity("MPa", "Tested interval; nothing is certified outside it.")
     ] = field(init=False)
     certificate: Annotated[BoundsBasis, Meta(description="What the lower bounds rest on.")]
+    low_flow: Annotated[
+        tuple[LowFlow, ...],
+        Meta(description="Flows that were measured by hand where the meter shows none, as --low-flow gave them."),
+    ]
     active_constraints: Annotated[
         tuple[str, ...], Meta(description="Constraints of the fits that hold with equality, in words.")
     ]
@@ -240,6 +252,24 @@ class SideModel:
             return self.zero_flow_L_min
         places, flows = ([getattr(test, key) for test in self.tests] for key in ("dp_MPa", "zero_flow_L_min"))
         return float(np.interp(dp_MPa, places, flows))
+
+    def unseen_below_L_min(self, guard: str) -> float:
+        """Return the flow at a guard's bounds below which nothing is known, L/min: of another guard the meter's level.
+
+        Readings by hand tell of the default one's bounds.
+        """
+        basis = self.certificate
+        return basis.unseen_below_L_min if guard == basis.guard else basis.level_L_min
+
+    def none_in_words(self, guard: str, units: RecordedUnits) -> str:
+        """Say which flow at a guard's bounds counts as none, and by what."""
+        unseen, level = self.unseen_below_L_min(guard), self.certificate.level_L_min
+        if unseen < level:
+            by_hand, meter = units.text(unseen, ".3g L/min"), units.text(level, ".2f L/min")
+            return f"flow below {by_hand} (the low-flow readings; the meter shows it from {meter} on) counts as none"
+        flow = units.text(level, ".2f L/min")
+        by = "noise level: the meter's floor, what averages resolve, or 0.5 % of the largest flow"
+        return f"flow below {flow} ({by}) counts as none"
 
     @property
     def curve(self) -> CertifiedCurve:

@@ -33,25 +33,46 @@ def acceptance_section(assessment: Assessment | None, reproduction: Reproduction
 
 def _paper_table(valve: str, rows: Sequence[PaperNumber]) -> Table:
     """Return the numbers of one valve; why each may differ stands below, once."""
-    texts = dict.fromkeys(text for row in rows for text in (row.tolerance, row.why) if text)
+    texts = dict.fromkeys(text for row in rows for text in _notes(row))
     marks = {text: f"[{place}]" for place, text in enumerate(texts, start=1)}
 
     def ours(row: PaperNumber, by: str) -> Cell:
-        return in_number_font(next((_ours(each) for each in row.outcomes if each.by == by), "–"))
+        return in_number_font(" / ".join(_ours(each) for each in row.outcomes if each.by == by) or "–")
 
     return table_of(
-        f"The paper's {valve}",
+        f"The paper's {valve}: without, and with an assumed hysteresis where two values stand",
         rows,
         ("quantity", lambda row: row.quantity),
         ("dP (MPa)", lambda row: in_number_font("–" if row.dp_MPa is None else f"{row.dp_MPa:g}")),
-        ("published", lambda row: in_number_font(f"{row.published} {'' if row.unit == '1' else row.unit}".strip())),
+        ("published", lambda row: in_number_font(_printed(row))),
         ("bare valve", lambda row: ours(row, "valve")),
         ("paper's law", lambda row: ours(row, "paper's law")),
         ("product", lambda row: ours(row, "product")),
-        ("agrees", lambda row: "not required" if row.holds is None else verdict(row.holds)),
-        ("notes", lambda row: in_number_font(" ".join(marks[text] for text in (row.tolerance, row.why) if text))),
+        ("kind", lambda row: row.kind),
+        ("agrees, or is missed for a reason", _verdict),
+        ("notes", lambda row: in_number_font(" ".join(marks[text] for text in _notes(row)))),
         notes=[f"{mark} {text}" for text, mark in marks.items()],
     )
+
+
+def _printed(row: PaperNumber) -> str:
+    """Return a printed number with its unit; words have none."""
+    return f"{row.published} {row.unit}" if row.published[0].isdigit() and row.unit != "1" else row.published
+
+
+def _notes(row: PaperNumber) -> list[str]:
+    """Return what a number's range is made of, why ours misses it, and what else is to be known of it."""
+    texts = (row.tolerance, *(each.reason for each in row.outcomes), row.why)
+    return [text for text in dict.fromkeys(texts) if text]
+
+
+def _verdict(row: PaperNumber) -> Cell | str:
+    """Return the verdict of a number; only what is predicted can agree."""
+    if row.holds is False:
+        return verdict(False)
+    if row.kind != "predicted":
+        return "–"
+    return "agrees" if row.agrees else "missed"
 
 
 def _ours(outcome: Outcome) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.units import chance
 from dzdesign.design.compensator import Compensator
+from dzdesign.identify.valve.low_flow import IN_WORDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.compensator_sides import laws_of
@@ -29,6 +30,8 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
         fits.append(lines_figure(side, name, both, units))
         thresholds.append(thresholds_figure(side, guard, name, both, units))
         tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands", units))
+        if side.low_flow:
+            tables.append(low_flow_table(side, f"Flows measured by hand, {name} commands", units))
         betas.append(beta_figure(side, guard, name, both, compensator if law else None, units))
     meter, units = valve.meter, valve.recorded_units
     shown = units.in_words()
@@ -55,7 +58,12 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             tables=tables,
             lines=(
                 *(f"Premise, {name} commands: {side.premise_in_words(units)}." for name, side in valve.sides.items()),
-                *(f"{warning.text}." for warning in valve.warnings if warning.code in ORDER),
+                *(
+                    f"At the bounds, {name} commands: {side.none_in_words(side.certificate.guard, units)}."
+                    for name, side in valve.sides.items()
+                    if side.low_flow
+                ),
+                *(f"{warning.text}." for warning in valve.warnings if warning.code in (*ORDER, "low-flow")),
             ),
         ),
         "beta": Section(
@@ -63,6 +71,21 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             missing="" if any(betas) else "One pressure drop was tested, so β is 1 and its trend is not known.",
         ),
     }
+
+
+def low_flow_table(side: SideModel, title: str, units: RecordedUnits) -> Table:
+    """Return the readings of flows below the meter's floor."""
+    command, dp, flow = (units.label(unit) for unit in ("V", "MPa", "L/min"))
+    return table_of(
+        title,
+        side.low_flow,
+        ("reading", lambda row: row.source),
+        ("branch", lambda row: IN_WORDS[row.branch]),
+        (f"command ({command})", lambda row: recorded(row.u_V, ".3f V", units)),
+        (f"dP ({dp})", lambda row: recorded(row.dp_MPa, ".3f MPa", units)),
+        (f"flow ({flow})", lambda row: recorded(row.q_L_min, ".4f L/min", units)),
+        (f"error ({flow})", lambda row: recorded(row.q_error_L_min, ".4f L/min", units)),
+    )
 
 
 def _trend(name: str, side: SideModel, units: RecordedUnits) -> str:

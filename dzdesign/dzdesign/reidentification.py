@@ -1,0 +1,151 @@
+"""A firmware's valve against what `identify` makes of its ramp tests now: also what no check of a file can tell.
+
+Thresholds, bounds and hashes that were edited together fit one another; the recordings do not fit them. Stands here and
+not in verify, which shares no code with what it checks: this one check asks `identify` itself.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dzdesign.core.artefact_files import read_bytes, sha256_of
+from dzdesign.core.artefact_types import THIS_TOOL
+from dzdesign.core.errors import InputError, and_more, one_line, quoted
+from dzdesign.core.options import Paths
+from dzdesign.stages.identify import IdentifyArguments, identify_again, stated_options
+from dzdesign.stages.recordings import expand
+
+if TYPE_CHECKING:
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.verify.requirements import Check
+
+#: valve.json has seven decimals: on another machine the last one may differ. Of a larger number the same share.
+ROUNDING = 1e-6
+#: Files, and options, that a sentence names.
+MOST_NAMED = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GivenFiles:
+    """The files that are said to be a valve's recordings, by the SHA-256 of their bytes."""
+
+    paths: Mapping[str, Path]
+
+    @classmethod
+    def read(cls, patterns: Paths) -> "GivenFiles":
+        """Hash the files that patterns name; refuse one that can't be read or is given twice."""
+        paths: dict[str, Path] = {}
+        for path in expand(patterns):
+            digest = sha256_of(read_bytes(path, "ramp file"))
+            if digest in paths:
+                raise InputError(f"--ramps: '{path}' is byte for byte the same file as '{paths[digest]}'; give it once")
+            paths[digest] = path
+        return cls(paths=paths)
+
+
+def identified_again(compensator: "Compensator", given: GivenFiles) -> "Check":
+    """Tell whether identifying again, from the recordings that a compensator's valve names, gives the same valve.
+
+    Which file is which its hash decides, whatever its name, its folder and the order.
+    """
+    from dzdesign.verify.requirements import AS_STATED
+
+    valve = compensator.valve
+    if valve.tool != THIS_TOOL:
+        text = (
+            f"identified by {quoted(f'{valve.tool.name} {valve.tool.version}')}, and this is {THIS_TOOL.name} "
+            f"{THIS_TOOL.version}; make valve.json and all that follows from it again, or verify with that version"
+        )
+        return _check(holds=None, text=text)
+    stated = {each.sha256: each.source for each in valve.made_from}
+    if foreign := [path for digest, path in given.paths.items() if digest not in stated]:
+        return _check(holds=False, text=_about_foreign(foreign[0], given, stated))
+    if missing := [name for digest, name in stated.items() if digest not in given.paths]:
+        text = f"valve.json was made from {len(stated)} files, and --ramps lacks {and_more(missing, MOST_NAMED)}"
+        return _check(holds=None, text=f"{text}; give all of them")
+    if valve.options is None:
+        text = "valve.json does not say with which options it was identified; make it again with `dzdesign identify`"
+        return _check(holds=None, text=text)
+    if len({each.source for each in valve.made_from}) < len(valve.made_from):
+        return _check(holds=False, text="valve.json names two of its files alike; make it again")
+    files = {each.source: given.paths[each.sha256] for each in valve.made_from}
+    try:
+        found = identify_again(valve.options, valve.record, files)
+    except InputError as error:
+        return _check(holds=False, text=f"from the same files nothing can be identified with its options: {error}")
+    differing = list(_differences(valve, found))
+    text = f"from {len(files)} files, with {_options_in_words(valve)}"
+    if differing:
+        place, one, other = differing[0]
+        more = f" (and {len(differing) - 1} more)" if len(differing) > 1 else ""
+        text = f"'{place}' of valve.json is {_words(one)}, but {_words(other)} follows {text}{more}"
+        return _check(holds=False, text=f"{text}; make it again with `dzdesign identify`")
+    text = f"identified again {text}: every number the same"
+    if others := len(compensator.lot) - 1 if compensator.lot else 0:
+        text += f"; of the lot's other {others} valves {AS_STATED}"
+    return _check(holds=True, text=text)
+
+
+def _check(*, holds: bool | None, text: str) -> "Check":
+    from dzdesign.verify.requirements import RAMPS
+
+    return RAMPS.check(holds=holds, text=one_line(text))  # names and options of a file that anyone may have written
+
+
+def _about_foreign(path: Path, given: GivenFiles, stated: Mapping[str, str]) -> str:
+    """Say of a file that valve.json was not made from it, or that it is another one of the same name."""
+    digest = next(digest for digest, other in given.paths.items() if other == path)
+    namesakes = [known for known, name in stated.items() if name.rpartition("/")[2] == path.name]
+    if namesakes and not any(known in given.paths for known in namesakes):
+        return f"'{path}' has the SHA-256 {digest}, but valve.json was made from a {path.name} of {namesakes[0]}"
+    return (
+        f"valve.json was not made from '{path}' (SHA-256 {digest}), but from {len(stated)} other files; leave it out, "
+        "or identify again with it"
+    )
+
+
+def _differences(stated: object, follows: object, place: str = "") -> Iterator[tuple[str, object, object]]:
+    """Yield place, value and what follows, of all that differs by more than rounding."""
+    if is_dataclass(stated) and type(stated) is type(follows):
+        for field in fields(stated):
+            path = f"{place}.{field.name}" if place else field.name
+            yield from _differences(getattr(stated, field.name), getattr(follows, field.name), path)
+    elif isinstance(stated, Mapping) and isinstance(follows, Mapping):
+        for key in {**follows, **stated}:
+            yield from _differences(stated.get(key), follows.get(key), f"{place}.{key}")
+    elif _are_rows(stated, follows):
+        for index, (one, other) in enumerate(zip(stated, follows, strict=True)):  # type: ignore[call-overload]
+            yield from _differences(one, other, f"{place}[{index}]")
+    elif stated != follows and not _are_near(stated, follows):
+        yield place, stated, follows
+
+
+def _are_rows(stated: object, follows: object) -> bool:
+    rows = isinstance(stated, Sequence) and isinstance(follows, Sequence) and not isinstance(stated, str)
+    return rows and len(stated) == len(follows)  # type: ignore[arg-type]
+
+
+def _are_near(stated: object, follows: object) -> bool:
+    """Tell whether two numbers are one but for rounding; True and False are none."""
+    if not (isinstance(stated, float) and isinstance(follows, float)):
+        return False
+    return math.isclose(stated, follows, rel_tol=ROUNDING, abs_tol=ROUNDING)
+
+
+def _options_in_words(valve: "ValveModel") -> str:
+    """Name the options that are not the default: recordings read otherwise give another valve just as faithfully."""
+    default = stated_options(IdentifyArguments([]))
+    stated = valve.options or default
+    other = [f"{name} = {text}" for name, text in stated.texts.items() if default.texts.get(name) != text]
+    other += [f"{name} = {dict(table)}" for name, table in stated.tables.items()]
+    other += [f"{name} = {', '.join(texts)}" for name, texts in stated.lists.items()]
+    return f"its options ({'; '.join(other)})" if other else "the default options"
+
+
+def _words(value: object) -> str:
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"{len(value)} entries"
+    return "nothing" if value is None else quoted(value)

@@ -1,0 +1,29 @@
+"""What readings by hand below the meter's floor changed, and what they lack."""
+
+from collections.abc import Iterator, Mapping
+
+from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.fitting.low_flow import Lowered, unseen_of_curve
+from dzdesign.identify.valve.guard_curve import Guard
+from dzdesign.identify.valve.side_model import SideModel
+
+
+def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterator[Finding]:
+    """Yield the warnings about the readings of one side: thresholds that were lowered, and tests without a reading."""
+    for guard, each in lowered.items():
+        yield warn(
+            "low-flow", each.by.source, "lowered",
+            guard=guard, depth_mV=1e3 * each.depth, flow_L_min=each.by.at_least_L_min, u_V=each.by.u_V,
+            dp_MPa=each.by.dp_MPa,
+        )  # fmt: skip
+    if not side.low_flow:
+        return
+    guard, level = side.certificate.guard, side.certificate.level_L_min
+    _, missing = unseen_of_curve(side.low_flow, guard, side.curve, level)
+    if missing:
+        first = missing[0]
+        yield warn(
+            "low-flow", None, "short",
+            count=len(missing), tests=len(side.tests), branch=guard, dp_MPa=side.curve.dp_MPa[first],
+            u_V=side.curve.u_threshold_V[first], level_L_min=level,
+        )  # fmt: skip

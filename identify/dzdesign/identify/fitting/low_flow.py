@@ -1,0 +1,199 @@
+"""What flows that were measured by hand say of the guarded thresholds, which the meter shows from its floor on only.
+
+Flow grows with the command. So where a reading shows flow at a command below a threshold, the edge opens below that
+command: the threshold is lowered to the highest command below it that a reading shows none at, and so are those of all
+tests, for one edge has made them. And where a reading shows at most so much at the threshold or above it, no more flows
+at any bound, which lies below the threshold by all that the next closing may differ.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.core.worded import Worded, worded
+from dzdesign.identify.constants import L_MIN, MPA
+from dzdesign.identify.fitting.guarded_thresholds import GuardedThreshold, Guarding
+from dzdesign.identify.fitting.threshold import Threshold
+from dzdesign.identify.fitting.zero_flow import allowed_at_zero
+from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.described_tests import DescribedTests
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
+from dzdesign.identify.valve.low_flow import IN_WORDS, SAME_PRESSURE, Branch, LowFlow
+
+#: The branch of each guard that a branch has.
+BRANCH_OF: dict[Guard, Branch] = {"closing": "falling", "opening": "rising"}
+COLUMN_OF = {"rising": 0, "falling": 1}
+#: A threshold that was lowered to the command of a reading is that command, but for rounding.
+ROUNDING_V = 1e-6
+#: Of a ramp's flow, what it may differ from a reading at rest by beside the threshold's own error: its meter's span.
+OF_FLOW = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lowered:
+    """By how much the thresholds of a guard were lowered, V, and the reading that asked for most of it."""
+
+    depth: float
+    by: LowFlow
+
+
+def with_low_flow(
+    guarding: Guarding, group: DescribedTests, rows: Sequence[LowFlow], options: IdentifyOptions
+) -> tuple[Guarding, dict[Guard, Lowered]]:
+    """Return thresholds that agree with the readings, and which of them were lowered for that.
+
+    Raises
+    ------
+    InputError
+        If a reading is of no tested pressure drop, or contradicts the ramps, or shows flow below a threshold and no
+        other shows a command at which there is none.
+    """
+    if not rows:
+        return guarding, {}
+    dp = _tested(group, rows)
+    for row in rows:
+        _refuse_another_valve(row, dp, guarding, group)
+    none = what_counts_as_none(group, options)
+    depths: dict[Guard, Lowered] = {}
+    for guard, branch in BRANCH_OF.items():
+        if guard in guarding.thresholds:
+            found = [_lowered(row, rows, branch, guarding.thresholds[guard], dp, none) for row in rows]
+            if lowered := max(filter(None, found), key=lambda each: each.depth, default=None):
+                depths[guard] = lowered
+    taken_off: dict[Guard, float] = {guard: each.depth for guard, each in depths.items()}
+    if "mean" in guarding.thresholds:
+        taken_off["mean"] = sum(taken_off.get(guard, 0.0) for guard in BRANCH_OF) / 2
+    thresholds = {
+        name: _shifted(threshold, taken_off.get(name, 0.0)) for name, threshold in guarding.thresholds.items()
+    }
+    return replace(guarding, thresholds=thresholds), depths
+
+
+def what_counts_as_none(group: DescribedTests, options: IdentifyOptions) -> np.ndarray:
+    """Return the flow above which a reading shows that the edge is open, at each test, L/min (T,).
+
+    The flow that is allowed at zero, or what was declared as noise level, which the readings may resolve where the
+    meter does not; else the meter's noise level. A leak may flow beside the latter two.
+    """
+    allowed = allowed_at_zero(group, options)
+    level = group.noise_level if options.noise_level is None else options.noise_level
+    return np.array(allowed or [level + leak for leak in group.leak]) / L_MIN
+
+
+def _tested(group: DescribedTests, rows: Sequence[LowFlow]) -> np.ndarray:
+    """Return the tested pressure drops, MPa; refuse readings where none is known, or at another one."""
+    if group.tests[0].dp is None:
+        raise InputError(f"{rows[0].source}: the ramp tests have no pressure drop to compare with; declare it by --dp")
+    dp = np.array([(item.dp or 0.0) / MPA for item in group.tests])
+    for row in rows:
+        if not dp[0] * (1 - SAME_PRESSURE) <= row.dp_MPa <= dp[-1] * (1 + SAME_PRESSURE):
+            raise InputError(
+                worded(
+                    "{source}: its pressure drop is {at:.3g MPa}, expected {low:.3g #MPa} to {high:.3g MPa} as in the "
+                    "ramp tests; measure it there, or record a ramp at its pressure drop",
+                    source=row.source, at=row.dp_MPa, low=dp[0], high=dp[-1],
+                )
+            )  # fmt: skip
+    return dp
+
+
+def _refuse_another_valve(row: LowFlow, dp: np.ndarray, guarding: Guarding, group: DescribedTests) -> None:
+    """Refuse a reading that a ramp at its pressure drop contradicts: a wrong unit, or another valve."""
+    for test, item in enumerate(group.tests):
+        shape = item.shapes[COLUMN_OF[row.branch]]
+        if shape is None or not row.is_at(float(dp[test])):
+            continue
+        apart = max(_apart(each, test) for each in guarding.thresholds.values())
+        low, high = (_seen(shape, row.u_V + shift, group.leak[test]) for shift in (-apart, apart))
+        level = group.noise_level / L_MIN
+        if row.at_most_L_min < (1 - OF_FLOW) * low - level or row.at_least_L_min > (1 + OF_FLOW) * high + level:
+            raise InputError(
+                worded(
+                    "{source} has {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, but the ramps show {low:.3g #L/min} "
+                    "to {high:.3g L/min} there: check its units, its branch, and whether it is of this valve",
+                    source=row.source, flow=row.q_L_min, u=row.u_V, at=row.dp_MPa, low=low, high=high,
+                )
+            )  # fmt: skip
+
+
+def _apart(threshold: GuardedThreshold, test: int) -> float:
+    """Return how far a threshold stands above its bound at a test, V: by so much the next closing may differ."""
+    return max(float((each.value - each.bound)[test]) for each in (threshold.free, threshold.ordered))
+
+
+def _seen(shape: BranchShape, u: float, leak: float) -> float:
+    """Return the flow that a branch shows at a command, L/min, its leak included."""
+    return (float(np.interp(u, *shape.prepared.recorded)) + leak) / L_MIN
+
+
+def _lowered(
+    row: LowFlow,
+    rows: Sequence[LowFlow],
+    branch: Branch,
+    guarded: GuardedThreshold,
+    dp: np.ndarray,
+    none: np.ndarray,
+) -> Lowered | None:
+    """Return by how much a reading lowers a branch's thresholds; None where it agrees with them.
+
+    Raises
+    ------
+    InputError
+        If no reading below it shows that there is none.
+    """
+    values = [np.interp(row.dp_MPa, dp, each.value) for each in (guarded.free, guarded.ordered)]
+    threshold, least = float(max(values)), float(np.interp(row.dp_MPa, dp, none))
+    if not row.shows_flow_on(branch) or row.u_V > threshold or row.at_least_L_min <= least:
+        return None
+    shut = [
+        other.u_V
+        for other in rows
+        if other.shows_none_on(branch) and other.is_at(row.dp_MPa) and other.u_V < row.u_V
+        and other.at_most_at(row.dp_MPa) <= least
+    ]  # fmt: skip
+    if not shut:
+        raise InputError(_open_below(row, branch, threshold, least))
+    return Lowered(depth=threshold - max(shut), by=row)
+
+
+def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) -> Worded:
+    return worded(
+        "{source} shows at least {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, below the threshold on {branch} of "
+        "{threshold:.4g V} that the ramps show, and more than the {least:.3g L/min} that count as none: add a row "
+        "of {branch} at a lower command where no more flows, or declare what may flow by --zero-flow",
+        source=row.source, flow=row.at_least_L_min, u=row.u_V, at=row.dp_MPa, branch=IN_WORDS[branch],
+        threshold=threshold, least=least,
+    )  # fmt: skip
+
+
+def _shifted(guarded: GuardedThreshold, depth: float) -> GuardedThreshold:
+    def lower(each: Threshold) -> Threshold:
+        return replace(each, value=each.value - depth, bound=each.bound - depth)
+
+    return replace(guarded, free=lower(guarded.free), ordered=lower(guarded.ordered)) if depth else guarded
+
+
+def unseen_of_curve(
+    rows: Sequence[LowFlow], guard: Guard, curve: CertifiedCurve, level_L_min: float
+) -> tuple[float, tuple[int, ...]]:
+    """Return the flow at a guard's bounds below which nothing is known, L/min, and the tests that no reading tells of.
+
+    It is the meter's level unless a reading at every test, at its threshold or above, shows that no more flows there.
+    """
+    found, missing = [], []
+    for test, (dp, threshold) in enumerate(zip(curve.dp_MPa, curve.u_threshold_V, strict=False)):
+        told = [
+            row.at_most_at(dp)
+            for row in rows
+            if guard in BRANCH_OF and row.shows_none_on(BRANCH_OF[guard]) and row.is_at(dp)
+            and row.u_V >= threshold - ROUNDING_V
+        ]
+        if told:
+            found.append(min(told))
+        else:
+            missing.append(test)
+    least = level_L_min if missing or not found else min(level_L_min, max(found))
+    return least, tuple(missing)

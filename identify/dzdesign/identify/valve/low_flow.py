@@ -1,0 +1,57 @@
+"""`LowFlow`: a flow that was measured by hand where the meter shows none; an entry of ``low_flow`` in valve.json."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_types import quantity
+from dzdesign.identify.valve.quantity_types import PressureDrop, Voltage
+
+Branch = Literal["rising", "falling"]
+#: As a person says it.
+IN_WORDS: dict[Branch, str] = {"rising": "opening", "falling": "closing"}
+#: A reading tells of a test whose pressure drop is within this share of its own.
+SAME_PRESSURE = 0.05
+#: As `Flow`, which is rounded to L/min with seven decimals: 0.1 µL/min.
+SmallFlow = Annotated[float, quantity("L/min", ge=0, le=1e6)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LowFlow:
+    """One reading: command and pressure drop held, flow by volume and time, or by the speed and area of a piston."""
+
+    source: Annotated[str, Meta(description="Table and row.")]
+    branch: Annotated[
+        Branch, Meta(description="Way on which the command was reached: rising from below, falling from above.")
+    ]
+    u_V: Annotated[Voltage, Meta(description="Command.")]
+    dp_MPa: Annotated[PressureDrop, Meta(description="Pressure drop over the metering edge.")]
+    q_L_min: Annotated[SmallFlow, Meta(description="Flow, a leak included.")]
+    q_error_L_min: Annotated[SmallFlow, Meta(description="Its largest error.")]
+
+    @property
+    def at_least_L_min(self) -> float:
+        """The least that flows."""
+        return self.q_L_min - self.q_error_L_min
+
+    @property
+    def at_most_L_min(self) -> float:
+        """The most that flows."""
+        return self.q_L_min + self.q_error_L_min
+
+    def shows_flow_on(self, branch: Branch) -> bool:
+        """Tell whether a flow of it flows on a branch too: after closing a spool is at least as far open."""
+        return self.branch in (branch, "rising")
+
+    def shows_none_on(self, branch: Branch) -> bool:
+        """Tell whether no more than its flow flows on a branch too: after opening it is at most as far open."""
+        return self.branch in (branch, "falling")
+
+    def at_most_at(self, dp_MPa: float) -> float:
+        """Return the most that flows at another pressure drop, L/min: a small flow is laminar at the most."""
+        return self.at_most_L_min * max(1.0, dp_MPa / self.dp_MPa)
+
+    def is_at(self, dp_MPa: float) -> bool:
+        """Tell whether it tells of a test at that pressure drop."""
+        return abs(self.dp_MPa - dp_MPa) <= SAME_PRESSURE * dp_MPa

@@ -1,0 +1,29 @@
+"""`StatedOptions`: what `identify` was asked for, as written; part of valve.json, so that it can be asked again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from msgspec import Meta
+
+#: Of texts of an option, and of names of files in a table or a list.
+LONGEST = 4096
+Name = Annotated[str, Meta(min_length=1, max_length=LONGEST)]
+Words = Annotated[str, Meta(max_length=LONGEST)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatedOptions:
+    """Options of `identify` as written, those that were not given by their default; without one they are left out."""
+
+    texts: Annotated[Mapping[Name, Words], Meta(description="Options of one text, such as meter_lag.")] = field(
+        default_factory=dict
+    )
+    tables: Annotated[
+        Mapping[Name, Mapping[Name, Words]],
+        Meta(description="Options that were given as a table, such as columns, or dp by the recording's name."),
+    ] = field(default_factory=dict)
+    lists: Annotated[
+        Mapping[Name, tuple[Words, ...]],
+        Meta(description="Options of several texts; of order the recordings in the order in which they were taken."),
+    ] = field(default_factory=dict)

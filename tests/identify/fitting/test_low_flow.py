@@ -1,0 +1,233 @@
+"""Flows measured by hand below the meter's floor: of valves whose small flows are known, behind a meter with one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.identification import identify_sides
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.reading.low_flow_table import LowFlowTable
+from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.low_flow import LowFlow
+
+L_MIN, MPA = 1e-3 / 60, 1e6
+PRESSURES = (1.0, 3.0, 5.0)
+FLOOR = 0.6
+
+
+@dataclass(frozen=True)
+class Valve:
+    """An edge that opens with a small gain first: a notch, whose flow the meter does not show. V, L/min, MPa."""
+
+    knee_V: float = 5.4
+    knee_V_MPa: float = -0.05
+    hysteresis_V: float = 0.1
+    gain: float = 4.0
+    notch_V: float = 0.0
+    notch_gain: float = 0.2
+
+    def flow(self, u_V, dp_MPa, *, rising):
+        knee = self.knee_V + self.knee_V_MPa * dp_MPa - (0.0 if rising else self.hysteresis_V)
+        main = self.gain * np.maximum(u_V - knee, 0.0)
+        notch = self.notch_gain * np.clip(u_V - (knee - self.notch_V), 0.0, self.notch_V)
+        return (main + notch) * np.sqrt(dp_MPa)
+
+    def ramp(self, dp_MPa, seed=0):
+        up = np.linspace(0, 10, 5000)
+        u = np.concatenate([up, up[::-1]])
+        rising = np.arange(u.size) < up.size
+        q = np.where(rising, self.flow(u, dp_MPa, rising=True), self.flow(u, dp_MPa, rising=False))
+        noise = 0.05 * np.random.default_rng([seed, int(dp_MPa)]).standard_normal(u.size)
+        read = np.where(q < FLOOR, 0.0, q + noise)
+        return RampTest(
+            source=f"ramp_{dp_MPa:g}.csv", sha256=f"{int(dp_MPa):064d}", time=np.arange(u.size) / 50.0, u=u,
+            q=read * L_MIN, dp=np.full(u.size, dp_MPa * MPA),
+        )  # fmt: skip
+
+    def reading(self, u_V, dp_MPa, branch="falling", error=0.005):
+        flow = float(self.flow(np.array(u_V), dp_MPa, rising=branch == "rising"))
+        return LowFlow(
+            source=f"low.csv, {u_V:.3f} V", branch=branch, u_V=u_V, dp_MPa=dp_MPa, q_L_min=flow, q_error_L_min=error
+        )
+
+
+SHARP, NOTCHED = Valve(), Valve(notch_V=0.6)
+RAMPS = {valve: [valve.ramp(dp) for dp in PRESSURES] for valve in (SHARP, NOTCHED)}
+
+
+def identified(valve, rows=(), **options):
+    tables = [LowFlowTable(source="low.csv", sha256="a" * 64, rows=tuple(rows))] if rows else []
+    chosen = IdentifyOptions(meter_floor=FLOOR * L_MIN, meter_lag=0.0, meter_lag_tolerance=0.0, **options)
+    return identify_sides(RAMPS[valve], chosen, None, tables).model
+
+
+def side_of(*args, **options):
+    return identified(*args, **options).positive
+
+
+def thresholds(valve, **options):
+    return side_of(valve, **options).curve.u_threshold_V
+
+
+def at_thresholds(valve, beyond=0.0, branch="falling", **options):
+    """Return readings at every test's threshold, or so many volts beyond."""
+    pairs = zip(PRESSURES, thresholds(valve, **options), strict=True)
+    return [valve.reading(u + beyond, dp, branch) for dp, u in pairs]
+
+
+def codes(model):
+    return [warning.code for warning in model.warnings]
+
+
+class TestAReadingThatAgrees:
+    def test_lowers_the_level_below_which_nothing_is_seen(self):
+        before, after = side_of(SHARP), identified(SHARP, at_thresholds(SHARP, 0.002))
+        assert before.certificate.unseen_below_L_min == before.certificate.level_L_min >= FLOOR
+        basis = after.positive.certificate
+        worst = max(row.at_most_L_min for row in after.positive.low_flow)
+        assert basis.unseen_below_L_min == pytest.approx(worst, abs=1e-6) and worst < 0.05
+        assert basis.level_L_min == before.certificate.level_L_min
+        assert after.positive.curve.u_lower_V == before.curve.u_lower_V
+        assert "onset-hidden" in codes(identified(SHARP)) and "onset-hidden" not in codes(after)
+        assert "low-flow" not in codes(after)
+
+    def test_is_kept_with_its_file(self):
+        model = identified(SHARP, at_thresholds(SHARP, 0.002))
+        assert model.made_from[-1].source == "low.csv" and len(model.positive.low_flow) == 3
+
+    def test_says_nothing_where_it_is_below_the_threshold(self):
+        """The next closing may be lower than the one that was measured: the bound counts on that, the reading not."""
+        bounds = side_of(SHARP).curve.u_lower_V
+        rows = [SHARP.reading(u, dp) for dp, u in zip(PRESSURES, bounds, strict=True)]
+        model = identified(SHARP, rows)
+        assert model.positive.certificate.unseen_below_L_min >= FLOOR
+        assert "low-flow" in codes(model) and "onset-hidden" in codes(model)
+
+    def test_says_nothing_of_closing_where_it_was_taken_on_opening(self):
+        model = identified(SHARP, at_thresholds(SHARP, 0.002, "rising"))
+        assert model.positive.certificate.unseen_below_L_min >= FLOOR and "low-flow" in codes(model)
+
+    def test_says_nothing_of_a_test_at_another_pressure_drop(self):
+        model = identified(SHARP, at_thresholds(SHARP, 0.002)[1:])
+        assert model.positive.certificate.unseen_below_L_min >= FLOOR and "low-flow" in codes(model)
+
+    def test_at_a_lower_pressure_drop_counts_for_more_flow_at_the_test(self):
+        rows = at_thresholds(SHARP, 0.002)
+        near = [LowFlow(**{**_fields(row), "dp_MPa": 0.96 * row.dp_MPa, "q_L_min": 0.02}) for row in rows]
+        assert side_of(SHARP, near).certificate.unseen_below_L_min == pytest.approx(0.025 / 0.96, abs=1e-6)
+
+    def test_takes_the_least_of_several_and_the_worst_of_the_tests(self):
+        rows = [row for beyond in (0.002, 0.02) for row in at_thresholds(SHARP, beyond)]
+        first = max(row.at_most_L_min for row in rows[:3])
+        assert side_of(SHARP, rows).certificate.unseen_below_L_min == pytest.approx(first, abs=1e-6)
+
+    def test_whose_error_is_larger_than_the_level_lowers_nothing(self):
+        rows = [SHARP.reading(row.u_V, row.dp_MPa, error=2.0) for row in at_thresholds(SHARP, 0.002)]
+        assert side_of(SHARP, rows).certificate.unseen_below_L_min >= FLOOR
+
+    def test_comes_in_any_order(self):
+        rows = at_thresholds(SHARP, 0.002)
+        assert side_of(SHARP, rows).certificate == side_of(SHARP, rows[::-1]).certificate
+
+
+def _fields(row):
+    return {name: getattr(row, name) for name in row.__slots__}
+
+
+class TestAReadingBelowTheThreshold:
+    """A notch passes flow that the meter does not show: what the certificate would deny."""
+
+    NONE = 0.02 * L_MIN
+
+    def rows(self, depths=(0.1, 0.5, 0.65)):
+        return [
+            NOTCHED.reading(u - depth, dp) for dp, u in zip(PRESSURES, thresholds(NOTCHED), strict=True)
+            for depth in depths
+        ]  # fmt: skip
+
+    def test_the_notch_is_one_that_the_meter_hides(self):
+        found = side_of(NOTCHED)
+        pairs = zip(PRESSURES, found.curve.u_lower_V, strict=True)
+        flows = [float(NOTCHED.flow(np.array(u), dp, rising=False)) for dp, u in pairs]
+        assert 0.05 < max(flows) < FLOOR
+
+    def test_lowers_all_thresholds_to_a_command_at_which_there_is_none(self):
+        before = side_of(NOTCHED, noise_level=self.NONE)
+        model = identified(NOTCHED, self.rows(), noise_level=self.NONE)
+        after = model.positive
+        flows = [
+            float(NOTCHED.flow(np.array(u), dp, rising=False))
+            for dp, u in zip(PRESSURES, after.curve.u_lower_V, strict=True)
+        ]
+        assert max(flows) * L_MIN <= self.NONE
+        depth = np.subtract(before.curve.u_threshold_V, after.curve.u_threshold_V)
+        assert np.ptp(depth) < 1e-5 and depth[0] > 0.5
+        assert after.certificate.unseen_below_L_min < 0.03
+        warning = next(each for each in model.warnings if each.code == "low-flow")
+        assert "closing" in warning.text and warning.source.startswith("low.csv")
+
+    def test_lowers_them_all_by_one_reading_too(self):
+        rows = [row for row in self.rows() if row.dp_MPa == 3.0]
+        depths = np.subtract(thresholds(NOTCHED), side_of(NOTCHED, rows, noise_level=self.NONE).curve.u_threshold_V)
+        assert depths.min() > 0.5
+
+    def test_on_opening_lowers_closing_too_for_after_closing_as_much_flows_at_least(self):
+        opens = side_of(NOTCHED).certified["opening"].u_threshold_V[1]
+        closes = thresholds(NOTCHED)[1]
+        rows = [NOTCHED.reading(closes - 0.1, 3.0, "rising"), NOTCHED.reading(closes - 0.8, 3.0, "falling")]
+        assert opens > closes
+        assert side_of(NOTCHED, rows, noise_level=self.NONE).curve.u_threshold_V[1] == pytest.approx(
+            closes - 0.8, abs=2e-3
+        )
+
+    def test_without_one_that_shows_none_is_refused_in_one_sentence(self, wording):
+        with wording.refusal(InputError):
+            identified(NOTCHED, self.rows((0.1,)), noise_level=self.NONE)
+
+    def test_of_less_than_what_may_flow_at_zero_is_none(self):
+        before = thresholds(NOTCHED, zero_flow=0.5 * L_MIN)
+        after = side_of(NOTCHED, self.rows(), zero_flow=0.5 * L_MIN)
+        assert after.curve.u_threshold_V == before
+
+    def test_within_its_error_of_none_lowers_nothing(self):
+        rows = [NOTCHED.reading(row.u_V, row.dp_MPa, error=0.6) for row in self.rows()]
+        assert side_of(NOTCHED, rows, noise_level=self.NONE).curve.u_threshold_V == thresholds(
+            NOTCHED, noise_level=self.NONE
+        )
+
+
+class TestAReadingThatNoRampAgreesWith:
+    @pytest.mark.parametrize("factor", [1e-3, 1e3], ids=["mL/min for L/min", "L/min for mL/min"])
+    def test_by_its_unit_is_refused(self, wording, factor):
+        row = SHARP.reading(thresholds(SHARP)[1] + 0.8, 3.0)
+        wrong = LowFlow(**{**_fields(row), "q_L_min": factor * row.q_L_min})
+        assert side_of(SHARP, [row])
+        with wording.refusal(InputError):
+            identified(SHARP, [wrong])
+
+    def test_of_a_valve_that_opens_earlier_is_refused(self, wording):
+        with wording.refusal(InputError):
+            identified(SHARP, [Valve(knee_V=4.4).reading(5.0, 3.0)])
+
+    def test_at_no_tested_pressure_drop_is_refused(self, wording):
+        with wording.refusal(InputError):
+            identified(SHARP, [SHARP.reading(5.0, 7.0)])
+
+    def test_of_a_side_without_a_ramp_is_refused(self, wording):
+        row = SHARP.reading(5.0, 3.0)
+        with wording.refusal(InputError):
+            identified(SHARP, [LowFlow(**{**_fields(row), "u_V": -5.0})])
+
+
+def test_the_negative_side_has_its_own_readings():
+    from dataclasses import replace
+
+    tests = [replace(test, u=-test.u, q=-test.q) for test in RAMPS[SHARP]]
+    rows = tuple(LowFlow(**{**_fields(row), "u_V": -row.u_V}) for row in at_thresholds(SHARP, 0.002))
+    table = LowFlowTable(source="low.csv", sha256="a" * 64, rows=rows)
+    options = IdentifyOptions(meter_floor=FLOOR * L_MIN, meter_lag=0.0, meter_lag_tolerance=0.0)
+    both = identify_sides([*RAMPS[SHARP], *tests], options, None, [table]).model.sides
+    assert both["negative"].certificate.unseen_below_L_min < 0.05 < both["positive"].certificate.unseen_below_L_min
+    assert [row.u_V > 0 for row in both["negative"].low_flow] == [True] * 3 and not both["positive"].low_flow
