@@ -34,7 +34,7 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Re-derive the paper's equations; 1 if one of those printed is not found as a correct account finds it."""
     from dzdesign.derivation.account.account import STATEMENTS, verify_statements
-    from dzdesign.derivation.account.passages import find_transcription_faults
+    from dzdesign.derivation.account.passages.transcription import find_transcription_faults
     from dzdesign.derivation.presentation.report import check_format, closure, render
 
     check_format(arguments.format)
@@ -71,7 +71,7 @@ def _text_of(paper: AnyPath | None) -> str | None:
 def _run_mutations(arguments: Arguments, json: bool) -> int:
     """Count the wrong statements and numbers that the account catches; 1 if one of them is not caught."""
     from dzdesign.derivation.account.account import verify_statements
-    from dzdesign.derivation.account.mutation import score_mutations
+    from dzdesign.derivation.account.mutation.scoring import score_mutations
     from dzdesign.terminal.tables import print_mutations
 
     with stage_progress("making every statement wrong in every small way"):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dzdesign.codegen.project import Firmware
     from dzdesign.core.recorded_units import RecordedUnits
-    from dzdesign.derivation.account.mutation import AccountMutants
+    from dzdesign.derivation.account.mutation.scoring import AccountMutants
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.ramp_result import TestResult

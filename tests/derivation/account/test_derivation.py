@@ -14,7 +14,7 @@ from dzdesign.derivation.account import identity
 from dzdesign.derivation.account import symbol_units as units
 from dzdesign.derivation.account.account import SECTIONS, STATEMENTS, verify_statements
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
-from dzdesign.derivation.account.mutation import WAYS, score_mutations
+from dzdesign.derivation.account.mutation.scoring import WAYS, score_mutations
 from dzdesign.derivation.account.proof import judge, prove
 from dzdesign.derivation.account.published import FIRST
 from dzdesign.derivation.account.scope import scope

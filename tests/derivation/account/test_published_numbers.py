@@ -7,10 +7,16 @@ from pathlib import Path
 import pytest
 
 from dzdesign.commands import derive
-from dzdesign.derivation.account import passages, published
+from dzdesign.derivation.account import published
 from dzdesign.derivation.account.account import STATEMENTS
-from dzdesign.derivation.account.passage_digests import PASSAGES
-from dzdesign.derivation.account.passages import Passage, digest_of, find_transcription_faults, passages_of
+from dzdesign.derivation.account.passages import transcription as passages
+from dzdesign.derivation.account.passages.digests import PASSAGES
+from dzdesign.derivation.account.passages.transcription import (
+    Passage,
+    digest_of,
+    find_transcription_faults,
+    passages_of,
+)
 from dzdesign.derivation.account.published import transcribed
 
 #: Where the paper's text is, for who has it.
@@ -73,7 +79,7 @@ def test_a_misprint_makes_derive_fail_and_is_named(monkeypatch, capsys):
 def test_the_account_takes_published_numbers_from_one_place():
     """A digit typed beside a formula would have no passage."""
     typed = []
-    for path in ACCOUNT.glob("*.py"):
+    for path in ACCOUNT.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             called = (
                 isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "Rational"

@@ -17,9 +17,9 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.conditions import Finding, judge_condition
 from dzdesign.derivation.account.coverage import branch_conditions, is_exhaustive, meets_all_branches
 from dzdesign.derivation.account.identity import agree
-from dzdesign.derivation.account.renaming import find_renaming_fault
+from dzdesign.derivation.account.renaming import check_grounds, find_renaming_fault
 from dzdesign.derivation.account.solving import solve_relations
-from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
+from dzdesign.derivation.account.statement import Case, Ground, Outcome, Statement
 from dzdesign.derivation.account.steps import Relation, Step, derive_in_steps
 from dzdesign.derivation.account.symbol_units import find_unit_error
 from dzdesign.derivation.symbols import Name
@@ -117,25 +117,6 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
             verdict if hear is None or not verdict.as_expected else overrule(verdict, hear(verdict, earlier))
         )
     return tuple(verdicts.values())
-
-
-def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
-    """Raise `RequirementError` if a statement rests on itself, a later one, an unknown one, or a copy of itself."""
-    for ground in statement.grounds:
-        if ground.number == statement.number:
-            raise RequirementError(f"{statement.number} is its own premise")
-        if ground.number in order and ground.number not in earlier:
-            raise RequirementError(
-                f"{statement.number} rests on {ground.number}, which stands after it: that may be circular"
-            )
-        if ground.number not in earlier:
-            raise RequirementError(f"{statement.number} rests on {ground.number}, which is not stated")
-        # A tie between `law.py` and the paper compares two transcriptions, so there a copy is the point.
-        # A special case of an earlier statement is a result; the statement itself is not.
-        premise = earlier[ground.number]
-        is_copy = premise.symbol == statement.symbol and agree(premise.members[-1], statement.members[-1])
-        if is_copy and statement.kind is not Kind.LAW and ground.derivative is None:
-            raise RequirementError(f"{statement.number} rests on a copy of itself, {ground.number}")
 
 
 def _with_units(verdict: Verdict) -> Verdict:

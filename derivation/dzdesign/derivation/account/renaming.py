@@ -1,9 +1,13 @@
 """Whether a ground taken at one pressure drop is taken there as a whole, and one taken at a number says so."""
 
+from collections.abc import Mapping, Sequence
+
 import sympy
 from sympy.core.function import AppliedUndef
 
-from dzdesign.derivation.account.statement import Ground, Statement
+from dzdesign.core.errors import RequirementError
+from dzdesign.derivation.account.identity import agree
+from dzdesign.derivation.account.statement import Ground, Kind, Statement
 from dzdesign.derivation.symbols import AT_PRESSURE_DROPS, Name, gamma_0, gamma_1
 
 #: Names at dP0 and at dP1 of one quantity.
@@ -39,3 +43,22 @@ def _families(present: set[sympy.Basic], replaced: dict[Name, sympy.Expr]) -> li
         if any(replaced.get(name) == value for name, value in moved.items()):
             found.append((f"from dP{1 - index} to dP{index}", moved))
     return found
+
+
+def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
+    """Raise `RequirementError` if a statement rests on itself, a later one, an unknown one, or a copy of itself."""
+    for ground in statement.grounds:
+        if ground.number == statement.number:
+            raise RequirementError(f"{statement.number} is its own premise")
+        if ground.number in order and ground.number not in earlier:
+            raise RequirementError(
+                f"{statement.number} rests on {ground.number}, which stands after it: that may be circular"
+            )
+        if ground.number not in earlier:
+            raise RequirementError(f"{statement.number} rests on {ground.number}, which is not stated")
+        # A tie between `law.py` and the paper compares two transcriptions, so there a copy is the point.
+        # A special case of an earlier statement is a result; the statement itself is not.
+        premise = earlier[ground.number]
+        is_copy = premise.symbol == statement.symbol and agree(premise.members[-1], statement.members[-1])
+        if is_copy and statement.kind is not Kind.LAW and ground.derivative is None:
+            raise RequirementError(f"{statement.number} rests on a copy of itself, {ground.number}")

@@ -12,7 +12,7 @@ import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from dzdesign.derivation.account.passage_digests import PASSAGES
+from dzdesign.derivation.account.passages.digests import PASSAGES
 from dzdesign.derivation.account.published import transcribed
 
 _WORDS = 6  # before the number, and as many after it

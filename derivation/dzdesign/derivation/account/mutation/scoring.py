@@ -15,13 +15,14 @@ from msgspec import Meta
 
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact
 from dzdesign.core.errors import RequirementError
-from dzdesign.derivation.account.ground_mutants import ground_mutants, kind_mutants
 from dzdesign.derivation.account.ledger import find_kind_fault, names_in
-from dzdesign.derivation.account.mutants import formula_mutants, names_of, scope_mutants, unit_of
-from dzdesign.derivation.account.passages import find_transcription_faults
-from dzdesign.derivation.account.proof import Verdict, check_grounds, judge
+from dzdesign.derivation.account.mutation.formula_mutants import formula_mutants, names_of, scope_mutants, unit_of
+from dzdesign.derivation.account.mutation.ground_mutants import ground_mutants, kind_mutants
+from dzdesign.derivation.account.passages.transcription import find_transcription_faults
+from dzdesign.derivation.account.proof import Verdict, judge
 from dzdesign.derivation.account.published import transcribed
 from dzdesign.derivation.account.referee.referee import hear
+from dzdesign.derivation.account.renaming import check_grounds
 from dzdesign.derivation.account.statement import Statement
 from dzdesign.derivation.symbols import Name
 

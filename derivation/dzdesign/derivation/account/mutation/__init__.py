@@ -1,0 +1,1 @@
+"""How sharp the account is: wrong statements of every kind, and how many of them show."""
