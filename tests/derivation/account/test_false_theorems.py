@@ -166,7 +166,7 @@ def test_a_false_theorem_does_not_follow(name, account, monkeypatch):
     claim, named = FALSE[name]
     statements = {**BY_NUMBER, "false": claim}
     judged = judge(claim, statements, account)
-    verdict = overrule(judged, hear(judged, statements))
+    verdict = overrule(judged, hear(judged, statements)) if judged.as_expected else judged
     assert not verdict.holds
     assert not verdict.as_expected
     assert named in verdict.words

@@ -20,10 +20,12 @@ _SAMPLES, _SEED = 2000, 20261121
 
 
 def unit_of(name: Name) -> str:
+    """Return the unit of a symbol, as the account states it; nothing for a function."""
     return QUANTITIES[name].unit if name in QUANTITIES else ""
 
 
 def names_of(expression: sympy.Expr) -> set[Name]:
+    """Return the symbols and applied functions of an expression."""
     return set(expression.atoms(AppliedUndef) | expression.free_symbols)
 
 

@@ -20,6 +20,7 @@ class NoNumberError(Exception):
 
 
 def agree(left: float, right: float) -> bool:
+    """Return whether two numbers are one, to the rounding of doubles through a formula."""
     return math.isclose(left, right, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE)
 
 
