@@ -32,7 +32,7 @@ def firmware(tmp_path):
     def generated(target: str, *options: str, both: bool = False) -> Path:
         valve = (FULL if both else GOLDENS) / "valve.json"
         folder = tmp_path / "firmware"
-        assert main(["codegen", str(valve), "--target", target, *options, "-o", str(folder)]) == 0
+        assert main(["codegen", str(valve), "--target", target, *options, "--replace", "-o", str(folder)]) == 0
         return folder
 
     return generated

@@ -1,7 +1,6 @@
 """Every number of the paper is the one that stands in its passage; a wrong one fails without the paper."""
 
 import ast
-import os
 from pathlib import Path
 
 import pytest
@@ -18,9 +17,10 @@ from dzdesign.derivation.account.passages.transcription import (
     passages_of,
 )
 from dzdesign.derivation.account.published import transcribed
+from tests.support.synthetic import SHARED
 
-#: Where the paper's text is, for who has it.
-PAPER = "DZDESIGN_PAPER"
+#: The paper's text, for who has it.
+PAPER = SHARED.parent / "paper.txt"
 ACCOUNT = Path(published.__file__).parent
 
 
@@ -62,9 +62,9 @@ def test_numbers_are_looked_up_in_a_text():
     assert find_transcription_faults({"dead zone": "41.5"}, row, paper=moved)
 
 
-@pytest.mark.skipif(PAPER not in os.environ, reason=f"{PAPER} does not name the paper's text")
+@pytest.mark.skipif(not PAPER.is_file(), reason=f"the paper's text is not at {PAPER}")
 def test_the_paper_has_every_number():
-    text = Path(os.environ[PAPER]).read_text(encoding="utf-8")
+    text = PAPER.read_text(encoding="utf-8")
     assert find_transcription_faults(paper=text) == []
 
 

@@ -178,15 +178,15 @@ def test_the_closed_loop_catches_a_wrong_law_in_the_c(monkeypatch, tmp_path):
     from dzdesign.design.designing import design
     from dzdesign.identify.valve.model import ValveModel
 
-    first = recover_valves()[1]
-    content = run_chain(first).files["first_valve/valve.json"].encode()
+    second = recover_valves()[2]
+    content = run_chain(second).files["second_valve/valve.json"].encode()
     valve = read_artefact(content, ValveModel, "valve.json")
     seed(monkeypatch, WRONG["beta on all of Eq. (14)"])
     compensator = design(valve)
     firmware = generate(compensator, "host")
     write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     assert check_all_inputs(tmp_path / "firmware").holds
-    runs = run_valve(first, ClosedLoop(first.plant, tmp_path / "firmware", compensator), compensator)
+    runs = run_valve(second, ClosedLoop(second.plant, tmp_path / "firmware", compensator), compensator)
     unexplained = {
         (number.quantity, number.dp_MPa, outcome.by)
         for number in paper_numbers.numbers_of_valve(Subject(runs=runs))

@@ -128,7 +128,7 @@ def test_the_stand_in_of_a_dithered_recording_is_not_dithered_twice(bench, tmp_p
         expected = hysteresis_left(made, test)[LEVELS.index(0.5)]  # from the recorded branches
         assert width(scene) == pytest.approx(expected, abs=5e-4)
         assert all(not each.must_shut or each.q_zero_L_min == 0 for each in run_scenarios(scene))
-    monkeypatch.setattr(ClosedLoop, "_wave", lambda _: (0, 1, False))
+    monkeypatch.setattr(ClosedLoop, "wave", lambda _: (0, 1, False))
     twice = scenes_of(folder, made, None)[1]
     assert width(twice) < 0.8 * expected
 
@@ -154,7 +154,7 @@ def test_a_plant_that_is_given_feels_the_dither_of_the_recordings_without_the_co
         return 10 * (opened - run.command[7999 - np.argmax(run.q_mean_L_min[::-1] >= half)])
 
     assert abs(width_V()) < 0.03
-    monkeypatch.setattr(ClosedLoop, "_wave", lambda _: (0, 1, False))  # the seeded fault
+    monkeypatch.setattr(ClosedLoop, "wave", lambda _: (0, 1, False))  # the seeded fault
     assert width_V() > 0.12
 
 
