@@ -192,7 +192,7 @@ class TestWhatCanNotBeChecked:
 
     def test_an_option_that_identify_does_not_have(self, valve, ramps):
         def strange(document):
-            document["options"]["texts"]["plots"] = "/tmp/elsewhere"
+            document["options"]["texts"]["plots"] = "elsewhere"
 
         check = tried(changed(valve, strange), in_folder(ramps))
         assert check.holds is False and "plots" in check.text

@@ -170,8 +170,8 @@ def _with_rate(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSamplin
 def _with_release(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, line: SensorLine) -> CurrentLoop:
     """Return the loop whose output begins low enough that no current overshoots as the drive is released.
 
-    What the integral takes up on the way would carry the current past the
-    offset, where the valve opens. It comes up from below instead, within some time constants of the integral.
+    What the integral takes up on the way would carry the current past the offset, where the valve opens. It comes up
+    from below instead, within some time constants of the integral.
     """
     unit = max((1 << (loop.full_counts.bit_length() - 1)) // 64, 1)
     allowed_A = RELEASED_CODES / (line.V_per_A * line.codes_per_V)
