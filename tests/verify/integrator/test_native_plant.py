@@ -11,6 +11,7 @@ from dzdesign.verify.closed_loop.motion import NAMED
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.integrator import comparison
 from dzdesign.verify.integrator.compiled_calls import compiled_core
+from dzdesign.verify.integrator.spool import CvodesSpool
 from tests.support.synthetic import needs_compiler
 from tests.verify.closed_loop.test_current_in_loop import TEXTS, scenes
 
@@ -64,6 +65,19 @@ def test_a_drive_by_current_is_compared_with_its_coil(given, example_valve, exam
     found = comparison.compare(window, compiled_core(tmp_path, window.scene.loop.coil))
     assert found.q_largest_L_min > 1 and found.unlike_compare_values == 0
     assert max(found.position_difference, found.flow_difference) < 5e-6
+
+
+@needs_compiler
+def test_no_stop_is_looked_for_where_none_can_be_reached(firmware_folder, example_compensator, example_plant,
+                                                         monkeypatch):  # fmt: skip
+    """Looked for in every phase, the same is found; by a reach that is too short, another flight."""
+    plant = replace(example_plant, stroke_mm=1.5)
+    found = compared(firmware_folder, example_compensator, plant, seconds=0.03)
+    reach, runs = CvodesSpool._reach_mm, []
+    for factor in (1e9, 1e-3):
+        monkeypatch.setattr(CvodesSpool, "_reach_mm", lambda *given, by=factor: by * reach(*given))
+        runs.append(compared(firmware_folder, example_compensator, plant, seconds=0.03))
+    assert found.impacts >= 2 and runs[0] == found and runs[1] != found
 
 
 def number(name, factor):

@@ -140,17 +140,31 @@ class CvodesSpool:
     def _rest(self, state: SpoolState, acting: Acting, left: float) -> float:
         """Stay at a stop until the current lets go, or to the end; return for how long."""
 
-        def pull_after(milliseconds: float) -> float:
-            later = SpoolState(position=state.position)
-            later.current = float(self._integrated(state, acting, milliseconds, free=False)[0])
-            return self._pull(later, acting)
+        def after(milliseconds: float) -> np.ndarray:
+            return self._integrated(state, acting, milliseconds, free=False)
 
-        away = 1.0 if state.position <= 0.0 else -1.0
-        taken = left
-        if away * pull_after(left) > 0.0:
-            taken = _root(pull_after, 0.0, left)
-        state.take(self._integrated(state, acting, taken, free=False))
+        def pull(later: np.ndarray) -> float:
+            return self._pull(SpoolState(position=state.position, current=float(later[0])), acting)
+
+        away, taken, end = 1.0 if state.position <= 0.0 else -1.0, left, after(left)
+        if away * pull(end) > 0.0:
+            taken = _root(lambda ms: pull(after(ms)), 0.0, left)
+            end = after(taken)
+        state.take(end)
         return taken
+
+    def _reach_mm(self, state: SpoolState, acting: Acting, end: np.ndarray, left: float) -> float:
+        """Return how far at most a spool between the stops gets in a phase: every force one way, and no damping.
+
+        In a phase the current goes one way, so that it is largest at an end of it.
+        """
+        plant = self._plant
+        load_N = abs(plant.preload_N) + acting.supply_MPa * (
+            abs(plant.pressure_force_N_MPa) + abs(plant.flow_force_N_mm_MPa) * (plant.stroke_mm - plant.overlap_mm)
+        )  # Eq. (23), at its largest
+        force_N = plant.K_i_N_A * max(abs(state.current), abs(float(end[0]))) + abs(acting.push_N)
+        force_N += plant.K_et_N_m * 1e-3 * plant.stroke_mm + load_N
+        return abs(state.speed) * left + force_N / plant.m_e_kg * 1e-3 * left**2 / 2
 
     def _fly(self, state: SpoolState, acting: Acting, left: float) -> float:
         """Move free of the stops until one is met, or to the end; return for how long."""
@@ -162,6 +176,10 @@ class CvodesSpool:
             return max(-position, position - self._plant.stroke_mm)
 
         end = after(left)
+        reach = self._reach_mm(state, acting, end, left)
+        if outside(state.position) < -reach:
+            state.take(end)
+            return left
         inside, out = 0.0, left
         if state.speed * end[3] < 0.0:
             turn = _root(lambda ms: float(after(ms)[3]), 0.0, left)
