@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from dzdesign.core.recorded_units import AS_COMPUTED
@@ -12,6 +13,7 @@ from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.integrator import comparison
 from dzdesign.verify.integrator.compiled_calls import compiled_core
 from dzdesign.verify.integrator.spool import CvodesSpool
+from dzdesign.verify.integrator.switched_coil import SwitchedCoil
 from tests.support.synthetic import needs_compiler
 from tests.verify.closed_loop.test_current_in_loop import TEXTS, scenes
 
@@ -62,9 +64,30 @@ def test_the_stand_in_is_within_rounding(kind, firmware_folder, example_compensa
 def test_a_drive_by_current_is_compared_with_its_coil(given, example_valve, example_plant, tmp_path):
     found_scenes = scenes(example_valve, TEXTS, tmp_path, example_plant if given else None)
     window = short(found_scenes, "step", 0.06)
-    found = comparison.compare(window, compiled_core(tmp_path, window.scene.loop.coil))
+    library = compiled_core(tmp_path, window.scene.loop.coil)
+    found = comparison.compare(window, library)
     assert found.q_largest_L_min > 1 and found.unlike_compare_values == 0
     assert max(found.position_difference, found.flow_difference) < 5e-6
+    assert_its_coil_is_that_of_the_closed_form(SwitchedCoil(window.scene.loop.coil, library))
+
+
+def assert_its_coil_is_that_of_the_closed_form(coil):
+    """On, off, and off until the diode blocks, at every span of a phase; on over the whole period is one span more."""
+    ohm, henry = coil._corner.resistance_ohm, coil._corner.inductance_H
+    for volts, on, begin_A, longest_ms in (
+        (coil._corner.supply_V, True, 0.1, 0.4), (-coil._circuit.freewheel_V, False, 0.5, 0.4),
+        (-coil._circuit.freewheel_V, False, 0.02, 100.0),
+    ):  # fmt: skip
+        spans = np.linspace(0.0, longest_ms, coil._sampling.samples + 2).tolist()
+        end_A, coil._current = volts / ohm, begin_A
+        blocks_ms = np.inf if on else 1e3 * henry / ohm * np.log1p(-begin_A / end_A)
+        assert (blocks_ms < longest_ms) == (longest_ms == 100.0)
+        currents, charge = coil._passed(spans, on=on)
+        flows_ms = np.minimum(spans, blocks_ms)
+        expected = end_A + (begin_A - end_A) * np.exp(-1e-3 * ohm / henry * flows_ms)
+        np.testing.assert_allclose(currents, expected, rtol=0, atol=1e-10)
+        passed = end_A * flows_ms[-1] + 1e3 * henry / ohm * (begin_A - expected[-1])
+        assert charge == pytest.approx(passed, abs=1e-9)
 
 
 @needs_compiler
