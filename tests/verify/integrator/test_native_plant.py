@@ -10,7 +10,7 @@ from dzdesign.verify.closed_loop import loop as native_loop
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.motion import NAMED
 from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.integrator import comparison
+from dzdesign.verify.integrator import comparison, cvodes
 from dzdesign.verify.integrator.compiled_calls import compiled_core
 from dzdesign.verify.integrator.spool import CvodesSpool
 from dzdesign.verify.integrator.switched_coil import SwitchedCoil
@@ -101,6 +101,14 @@ def test_no_stop_is_looked_for_where_none_can_be_reached(firmware_folder, exampl
         monkeypatch.setattr(CvodesSpool, "_reach_mm", lambda *given, by=factor: by * reach(*given))
         runs.append(compared(firmware_folder, example_compensator, plant, seconds=0.03))
     assert found.impacts >= 2 and runs[0] == found and runs[1] != found
+
+
+@needs_compiler
+def test_an_integrator_that_gives_up_has_compared_nothing(firmware_folder, example_compensator, monkeypatch):
+    monkeypatch.setitem(cvodes.OPTIONS, "max_num_steps", 2)
+    found_scenes = scenes_of(firmware_folder, example_compensator, None)
+    found, check = comparison.compare_with_integrator(firmware_folder, found_scenes, lambda _: None)
+    assert found == () and check.holds is None and "TOO_MUCH_WORK" in check.text
 
 
 def number(name, factor):

@@ -7,16 +7,13 @@ blocks at no current. Nothing of coil.h is used here.
 import ctypes
 from collections.abc import Sequence
 from math import floor
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dzdesign.verify.closed_loop.coil_in_loop import CoilAtSupply
 from dzdesign.verify.integrator.compiled_calls import CompiledController
-from dzdesign.verify.integrator.spool import CVODES, SHORTEST_MS
-
-if TYPE_CHECKING:
-    import casadi
+from dzdesign.verify.integrator.cvodes import Cvodes
+from dzdesign.verify.integrator.spool import SHORTEST_MS
 
 
 class SwitchedCoil:
@@ -27,7 +24,7 @@ class SwitchedCoil:
         self._corner, self._circuit, self._sampling = coil.corner, around.circuit, around.sampling
         self._sensor, self._converter = around.sensor, around.converter
         self._full_counts = around.loop.full_counts
-        self._solve = _integrator(self._sampling.samples + 2)
+        self._cvodes = _integrator(self._sampling.samples + 2)
         self._current = 0.0
         self._compare = 0
         none = self._code(self._sensor.offset_V)
@@ -80,16 +77,15 @@ class SwitchedCoil:
         spans = np.zeros(self._sampling.samples + 2)
         spans[: len(spans_ms)] = spans_ms
         given = [volts, self._corner.resistance_ohm, self._corner.inductance_H, *spans]
-        found = self._solve(x0=np.repeat([self._current, 0.0], spans.size), p=given)["xf"]
-        return np.array(found).reshape(2, spans.size).T[: len(spans_ms)]
+        found = self._cvodes.end([self._current] * spans.size + [0.0] * spans.size, given)
+        return found.reshape(2, spans.size).T[: len(spans_ms)]
 
 
-def _integrator(spans: int) -> "casadi.Function":
+def _integrator(spans: int) -> Cvodes:
     """Return CVODES of a coil for as many spans of time, all from the same beginning: one run has them all."""
     import casadi as ca
 
     current, charge, given = ca.SX.sym("current", spans), ca.SX.sym("charge", spans), ca.SX.sym("given", 3 + spans)
     volts, ohm, henry = given[0], given[1], given[2]
     rates = ca.vertcat(1e-3 * (volts - ohm * current) / henry, current)
-    problem = {"x": ca.vertcat(current, charge), "p": given, "ode": ca.repmat(given[3:], 2, 1) * rates}
-    return ca.integrator("coil", "cvodes", problem, 0, 1, CVODES)
+    return Cvodes(ca.vertcat(current, charge), given, ca.repmat(given[3:], 2, 1) * rates)
