@@ -111,6 +111,13 @@ def test_an_integrator_that_gives_up_has_compared_nothing(firmware_folder, examp
     assert found == () and check.holds is None and "TOO_MUCH_WORK" in check.text
 
 
+def test_verify_compares_two_seconds(whole_windows, firmware_folder, example_compensator):
+    """Other tests take less of it: see `short_windows_beside_casadi`."""
+    windows = comparison.windows_of(scenes_of(firmware_folder, example_compensator, None))
+    assert {each.kind for each in windows} == {"ramp", "step", "load step"}
+    assert sum(each.seconds for each in windows) == pytest.approx(2.0)
+
+
 def number(name, factor):
     """Multiply one number of the native plant."""
 
