@@ -62,7 +62,7 @@ def failing(checks) -> set[str]:
 
 
 def test_a_firmware_with_current_control_holds(either, tmp_path, whole_windows):
-    """All that `verify` requires, with every input and whole windows, in one run; 27 corners and each kind of fault stand in evidence."""
+    """All that `verify` requires, every input and whole windows; 27 corners and each kind of fault are in evidence."""
     evidence = verify(firmware_of(either, tmp_path / "firmware")).evidence
     assert failing(evidence.checks) == set()
     assert {each.id for each in OF_CURRENT} <= {check.id for check in evidence.checks}
