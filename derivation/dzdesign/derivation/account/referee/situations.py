@@ -94,7 +94,7 @@ def _drive(valve: PlainValve, name: str, dP: float, u_i: float) -> float:
     if name == "target":
         return kappa * u_i + offset
     ratio = offset / valve.u_min0
-    return law(name).evaluate_gain(ratio, kappa) * u_i + law(name).evaluate_offset(ratio, valve.u_min0)
+    return float(law(name).evaluate_gain(ratio, kappa) * u_i + law(name).evaluate_offset(ratio, valve.u_min0))
 
 
 @cache
