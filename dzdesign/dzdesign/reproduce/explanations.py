@@ -8,16 +8,15 @@ from dzdesign.derivation.account.published import (
     ABOUT_LARGEST_L_MIN,
     DP0_MPA,
     DP1_MPA,
-    DROP_ASSUMED,
     DUTY_COMMAND_V,
     FIRST,
-    METER_ACCURACY_L_MIN,
     METER_FLOOR_L_MIN,
     SATURATED_FROM_V,
     SIMULATION,
     U_MAX_V,
     PublishedValve,
 )
+from dzdesign.derivation.account.readings import DROP_ASSUMED, METER_ACCURACY_L_MIN
 from dzdesign.report.reproduction import Driver
 from dzdesign.reproduce.displacement_readings import DISPLACEMENT, half_digits_off
 from dzdesign.reproduce.recovered_valves import Reading, at_rest, half_digit, printed_at

@@ -105,7 +105,8 @@ def test_a_dead_zone_that_overlap_can_have_is_no_contradiction(monkeypatch):
     """Seeded: 61 % of travel at 5 MPa, which Eq. (24) makes of the printed flows."""
     displacement_readings.least_misfit.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setattr(displacement_readings, "SIMULATION", replace(SIMULATION, displacement_dead_zone1_percent="61"))
+        wrong = replace(SIMULATION, displacement_dead_zone_rises_percent="7")
+        patch.setattr(displacement_readings, "SIMULATION", wrong)
         assert (
             half_digits_off("overlap", DISPLACEMENT_DEAD_ZONE, 5.0)
             < 1

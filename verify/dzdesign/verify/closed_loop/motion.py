@@ -10,7 +10,7 @@ Where a stop or the edge is passed within the period, plant_period.h takes it ap
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -89,7 +89,18 @@ class Numbers:
     #: (FINE, 12): the same in 0, 1, ... half counts, after the first eight entries of `MAP` for that time, which are
     #: what it does to a state that is there already.
     fine: np.ndarray
+    #: The spool's stiffness over its mass, 1/s², of its spring and of its flow force per MPa; the rate of all that moves
+    #: faster than these, rad/s.
+    stiffness: tuple[float, float]
+    beside_rad_s: float
 
+    def up_to(self, dp_MPa: float) -> np.ndarray:
+        """Return `flat` with no more steps in a period than pressure drops up to this one need."""
+        spring, per_MPa = self.stiffness
+        fastest = max(self.beside_rad_s, math.sqrt(spring + per_MPa * dp_MPa))
+        flat = self.flat.copy()
+        flat[NAMED.index("STEPS")] = max(math.ceil(fastest * PWM_PERIOD_S / STEP_RAD), 1)
+        return flat
 
     def driven(self, ratio: float) -> "Numbers":
         """Return those of the same plant whose PWM has so many times the voltage when it is on."""
@@ -98,7 +109,7 @@ class Numbers:
             flat[NAMED.index(name)] *= ratio**power
         flat[NAMED.index("BALANCE_0") :][:BALANCE_TERMS] *= ratio
         fine[:, 8:] *= ratio
-        return Numbers(flat, self.coarse * ratio, fine)
+        return replace(self, flat=flat, coarse=self.coarse * ratio, fine=fine)
 
 
 def numbers_of(plant: Plant, compare_max: int) -> Numbers:
@@ -123,7 +134,9 @@ def numbers_of(plant: Plant, compare_max: int) -> Numbers:
     if not linear:
         entries, series = balanced(rates, drive, entries)
     flat = np.concatenate([named, series, entries, parameters, extracted])
-    return Numbers(flat, *response_tables(rates, drive, 2 * compare_max))
+    stiffness = plant.K_et_N_m / plant.m_e_kg, plant.flow_force_N_mm_MPa * 1e3 / plant.m_e_kg
+    beside_rad_s = max(plant.B_e_N_s_m / plant.m_e_kg, float(np.abs(np.linalg.eigvals(by_state)).max()))
+    return Numbers(flat, *response_tables(rates, drive, 2 * compare_max), stiffness, beside_rad_s)
 
 
 @cache
