@@ -150,7 +150,7 @@ def _side_model(
             confidence=options.confidence,
             guard=guard,
             level_L_min=level,
-            unseen_below_L_min=unseen_of_curve(low_flow, guard, curves[guard], level)[0],
+            unseen_below_L_min=unseen_of_curve(low_flow, guard, curves[guard], level).below_L_min,
             zero_flow_L_min=None if options.zero_flow is None else options.zero_flow / L_MIN,
             repeatability=_repeatability(group.between(guarding.column)),
         ),
