@@ -10,8 +10,8 @@ from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.motion import NAMED, Numbers
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.integrator import comparison
-from dzdesign.verify.integrator.windows import windows_of
 from dzdesign.verify.integrator.compiled_calls import compiled_core
+from dzdesign.verify.integrator.windows import windows_of
 from tests.support.synthetic import needs_compiler
 from tests.verify.closed_loop.test_current_in_loop import TEXTS, scenes
 
