@@ -89,15 +89,14 @@ def test_no_corner_overshoots_as_it_is_released_and_none_is_held_down_for_nothin
 
 def test_an_overshoot_that_no_beginning_prevents_is_stated_and_warned_of(example_compensator, wording, monkeypatch):
     """Seeded: with inductances of 0.2 to 3 times the nominal one it was 80 codes, and nothing said so."""
-    loop = replace(example_loop("supply unknown"), release=0)
-    for name, found in (("choose_loop", loop), ("step_responses", ()), ("dither_departure", (0, 0))):
+    given = {"step_responses": (), "dither_departure": (0, 0), "released_overshoot_A": 0.0331}
+    for name, found in {**given, "choose_loop": example_loop("supply unknown")}.items():
         monkeypatch.setattr(current_drive, name, lambda *_, found=found, **__: found)
     step = StepResponse(corner=COIL.nominal, rise_s=2e-3, least_s=1e-3, overshoot=0.05)
     monkeypatch.setattr(current_drive, "worst_step", lambda _: (step, step))
     request = CurrentRequest(circuit=COIL, sensor=SENSORS["supply unknown"], sampling=SAMPLING)
     drive = design_current_drive(request, CONVERTER, 60000)
-    line = sensor_line(request.sensor, CONVERTER)
-    assert drive.release_overshoot_A == pytest.approx(released_overshoot_A(loop, COIL, SAMPLING, line), abs=1e-8)
+    assert drive.release_overshoot_A == 0.0331
     warned = replace(example_compensator, current_drive=drive)
     (text,) = design_warnings(warned)
     assert text in costs_of(warned)

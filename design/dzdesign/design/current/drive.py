@@ -97,11 +97,12 @@ class CurrentDrive:
         """Warn of a current that passes the set point that it is released to; of none say nothing."""
         if not self.release_overshoot_A:
             return ()
+        share = self.release_overshoot_A / self.circuit.rated_A
         return (
             f"as the drive is released the current passes its set point by up to "
-            f"{units.text(self.release_overshoot_A, '.2g A')} ({self.release_overshoot_A / self.circuit.rated_A:.1%} of "
-            "the rated one), however low the output begins: the valve may open by it at zero command; declare narrower "
-            "ranges of inductance, resistance or supply, or measure the supply",
+            f"{units.text(self.release_overshoot_A, '.2g A')} ({share:.1%} of the rated one), however low the output "
+            "begins: the valve may open by it at zero command; declare narrower ranges of inductance, resistance or "
+            "supply, or measure the supply",
         )
 
     def _weak_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
