@@ -8,12 +8,13 @@ import pytest
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.verify.closed_loop import loop as native_loop
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
-from dzdesign.verify.closed_loop.motion import NAMED
+from dzdesign.verify.closed_loop.motion import NAMED, Numbers
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.integrator import comparison, cvodes
 from dzdesign.verify.integrator.compiled_calls import compiled_core
 from dzdesign.verify.integrator.spool import CvodesSpool
 from dzdesign.verify.integrator.switched_coil import SwitchedCoil
+from dzdesign.verify.integrator.windows import windows_of
 from tests.support.synthetic import needs_compiler
 from tests.verify.closed_loop.test_current_in_loop import TEXTS, scenes
 
@@ -28,7 +29,7 @@ def example_plant(example_folder):
 
 def short(scenes_found, kind, seconds=SHORT_S):
     """The window of a kind, shorter than `verify` has it."""
-    return replace(next(each for each in comparison.windows_of(scenes_found) if each.kind == kind), seconds=seconds)
+    return replace(next(each for each in windows_of(scenes_found) if each.kind == kind), seconds=seconds)
 
 
 def compared(folder, compensator, plant, kind="step", seconds=SHORT_S):
@@ -41,7 +42,7 @@ def holds(found, *, is_stand_in=False):
 
 
 @needs_compiler
-@pytest.mark.parametrize("kind", ["ramp", "step", "load step"])
+@pytest.mark.parametrize("kind", ["ramp", "step", "load step", "disturbances"])
 def test_the_plant_of_equations_is_within_a_tenth_of_what_is_allowed(kind, firmware_folder, example_compensator,
                                                                      example_plant):  # fmt: skip
     """Seeded: a parabola through the ripple, as the native step had it, was off by 0.9e-5 of the stroke at 5 MPa."""
@@ -51,7 +52,7 @@ def test_the_plant_of_equations_is_within_a_tenth_of_what_is_allowed(kind, firmw
 
 
 @needs_compiler
-@pytest.mark.parametrize("kind", ["step", "load step"])
+@pytest.mark.parametrize("kind", ["step", "load step", "disturbances"])
 def test_the_stand_in_is_within_rounding(kind, firmware_folder, example_compensator):
     """Seeded: until the period's end the core was shown a new supply as if nothing flowed."""
     found = compared(firmware_folder, example_compensator, None, kind)
@@ -113,7 +114,7 @@ def test_an_integrator_that_gives_up_has_compared_nothing(firmware_folder, examp
 
 def test_verify_compares_two_seconds(whole_windows, firmware_folder, example_compensator):
     """Other tests take less of it: see `short_windows_beside_casadi`."""
-    windows = comparison.windows_of(scenes_of(firmware_folder, example_compensator, None))
+    windows = windows_of(scenes_of(firmware_folder, example_compensator, None))
     assert {each.kind for each in windows} == {"ramp", "step", "load step"}
     assert sum(each.seconds for each in windows) == pytest.approx(2.0)
 
@@ -200,3 +201,34 @@ def test_a_wrong_native_plant_is_seen(fault, firmware_folder, example_compensato
     assert holds(compared(firmware_folder, example_compensator, plant))
     fault(monkeypatch)
     assert holds(compared(firmware_folder, example_compensator, plant)) is False
+
+
+#: What the windows at tested pressures, undisturbed, did not show.
+OF_SCENARIOS = {
+    "no drive is added": text("loop.c", "plant->bias = task->bias_V[k];", "plant->bias = 0.0;"),
+    "another drive is none": lambda monkeypatch: monkeypatch.setattr(Numbers, "driven", lambda numbers, _: numbers),
+    "other oil is none": text("plant_curve.h", "plant->q_max *= table[CURVE_SCALE];", ""),
+    "a sensor that fails does not": text("loop.c", "(shown < 0) ?", "(shown < 9999) ?"),
+    "the pressure behind the edge stays": text("loop.c", "task->back_MPa[k]", "task->back_MPa[0]"),
+    "no noise": text("loop.c", "if (channel->noise > 0.0)", "if (channel->noise > 1e9)"),
+    "no errors of the converter": text("loop.c", " * channel->gain + channel->offset", ""),
+    "no flow in the mean of a record": text("loop.c", "= sum / (double)task->every", "= 0.0 * sum"),
+    "no largest flow of a record": text("loop.c", "= largest;", "= 0.0 * largest;"),
+    "another threshold between the tests": text("plant_curve.h", "entry[BRANCH_SEEN_V] + beyond * room", "u"),
+    "the last threshold beyond the tests": text(
+        "plant_curve.h", "plant->beyond_MPa * plant->curve", "0.0 * plant->curve"
+    ),
+    "the last flow beyond the tests": text("plant_curve.h", "sqrt(dp / fmin(fmax(dp, low), high))", "1.0"),
+}
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", OF_SCENARIOS.values(), ids=OF_SCENARIOS)
+def test_a_loop_that_ignores_what_a_scenario_gives_it_is_seen(
+    fault, firmware_folder, example_compensator, monkeypatch
+):  # fmt: skip
+    """Seeded: with each of them machines, failing sensors and noise changed nothing, so that nothing flowed at zero."""
+    fault(monkeypatch)
+    found = compared(firmware_folder, example_compensator, None, "disturbances")
+    assert holds(found, is_stand_in=True) is False
