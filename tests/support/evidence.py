@@ -13,7 +13,8 @@ LOOP = ClosedLoopResult(
     plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=(), against_integrator=()
 )
 EVIDENCE = Evidence(
-    tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), board_not_compiled="",
+    tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), differing_files={},
+    board_not_compiled="",
     checks=tuple(each.check(holds=True, text="yes") for each in ALWAYS), inputs=(), closed_loop=LOOP, scenarios=(),
     population=None, monte_carlo=None, current_loop=None, mutants=None,
 )  # fmt: skip

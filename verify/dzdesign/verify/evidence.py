@@ -162,6 +162,10 @@ class Evidence(Artefact):
         Names, about("Board files that were filled in since they were generated: not checked.")
     ]
     user_files: Annotated[Names, about("Source and project files of the user's in the folder board/: not checked.")]
+    differing_files: Annotated[
+        Mapping[str, Sha256],
+        about("SHA-256, as verified, of every file of the firmware that its manifest has otherwise, or has not."),
+    ]
     board_not_compiled: Annotated[
         str, about("Why the changed board files were not compiled; empty if they were, or none was changed.")
     ]
