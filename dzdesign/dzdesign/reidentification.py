@@ -46,10 +46,13 @@ class GivenFiles:
         return cls(paths=paths)
 
 
-def identified_again(compensator: "Compensator", given: GivenFiles) -> "Check":
+def identified_again(
+    compensator: "Compensator", given: GivenFiles, identified: "ValveModel | None" = None
+) -> "Check":
     """Tell whether identifying again, from the recordings that a compensator's valve names, gives the same valve.
 
-    Which file is which its hash decides, whatever its name, its folder and the order.
+    Which file is which its hash decides, whatever its name, its folder and the order. What this very run has
+    `identified` from them is compared as it is.
     """
     from dzdesign.verify.requirements import AS_STATED
 
@@ -73,7 +76,7 @@ def identified_again(compensator: "Compensator", given: GivenFiles) -> "Check":
         return _check(holds=False, text="valve.json names two of its files alike; make it again")
     files = {each.source: given.paths[each.sha256] for each in valve.made_from}
     try:
-        found = identify_again(valve.options, valve.record, files)
+        found = identified or identify_again(valve.options, valve.record, files)
     except InputError as error:
         return _check(holds=False, text=f"from the same files nothing can be identified with its options: {error}")
     differing = list(differences(valve, found, rounding=ROUNDING))
@@ -81,10 +84,10 @@ def identified_again(compensator: "Compensator", given: GivenFiles) -> "Check":
     if differing:
         first = differing[0]
         more = f" (and {len(differing) - 1} more)" if len(differing) > 1 else ""
-        stated, follows = _words(first.stated), _words(first.follows)
-        text = f"'{first.place}' of valve.json is {stated}, but {follows} follows {text}{more}"
+        one, other = _words(first.stated), _words(first.follows)
+        text = f"'{first.place}' of valve.json is {one}, but {other} follows {text}{more}"
         return _check(holds=False, text=f"{text}; make it again with `dzdesign identify`")
-    text = f"identified again {text}: every number the same"
+    text = f"identified {'again' if identified is None else 'in this run'} {text}: every number the same"
     if others := len(compensator.lot) - 1 if compensator.lot else 0:
         text += f"; of the lot's other {others} valves {AS_STATED}"
     return _check(holds=True, text=text)

@@ -1,12 +1,12 @@
 """Evidence as small as it may be, for tests of what reads it."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.loop_results import ClosedLoopResult
+from dzdesign.verify.loop_results import ClosedLoopResult, PressureResult
 from dzdesign.verify.requirements import ALWAYS
 
 LOOP = ClosedLoopResult(
@@ -29,3 +29,10 @@ def read_evidence(path: Any) -> Evidence:
     """Return the evidence of a folder or file."""
     path = path / Evidence.FILE_NAME if path.is_dir() else path
     return read_artefact(path.read_bytes(), Evidence, str(path))
+
+
+def pressure_result(**changes: Any) -> PressureResult:
+    """Return what a ramp in closed loop shows that is as good as can be, with other fields."""
+    zero = {field.name: 0.0 for field in fields(PressureResult)}
+    of_it = {"side": "positive", "unseen_below_L_min": None, "allowed_at_zero_L_min": None}
+    return PressureResult(**{**zero, **of_it, **changes})

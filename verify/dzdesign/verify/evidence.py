@@ -211,9 +211,14 @@ class Evidence(Artefact):
 
     @property
     def reservation(self) -> str:
-        """What a good verdict is not about: thresholds that no ramp test was compared with; empty where all were."""
-        compared = any(check.id == RAMPS.id and check.holds for check in self.checks)
-        return "" if compared else AS_STATED
+        """What a good verdict is not about: thresholds that no ramp test was compared with; empty where all were.
+
+        Of a lot setting the recordings are those of one of its valves.
+        """
+        if not any(check.id == RAMPS.id and check.holds for check in self.checks):
+            return AS_STATED
+        others = max((each.lot.valves for each in self.inputs if each.lot), default=1) - 1
+        return f"of the lot's other {others} valves {AS_STATED}" if others else ""
 
     def with_checks(self, *checks: Check) -> "Evidence":
         """Return the evidence with further requirements."""
