@@ -29,7 +29,7 @@ from dzdesign.verify.firmware.compilation import board_compiles, changed_board_f
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
-from dzdesign.verify.firmware.unchanged_files import files_unchanged, user_files
+from dzdesign.verify.firmware.unchanged_files import differing_files, files_unchanged, user_files
 from dzdesign.verify.integrator.comparison import compare_with_integrator
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EXACT_LAW, Check
@@ -118,6 +118,7 @@ def verify(
         target=manifest.target,
         changed_board_files=tuple(changed_board_files(folder, manifest)),
         user_files=tuple(user_files(folder, manifest)),
+        differing_files=differing_files(folder, manifest),
         board_not_compiled=board.not_compiled,
         checks=checks,
         inputs=core.inputs,
