@@ -32,18 +32,18 @@ def short_windows_beside_casadi():
 
     They are whole where a test runs the program, as the pages of docs/ do, and where it asks for `whole_windows`.
     """
-    from dzdesign.verify.integrator import comparison
+    from dzdesign.verify.integrator import windows
 
-    whole_s = comparison.WINDOWS_S
+    whole_s = windows.WINDOWS_S
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(comparison, "WINDOWS_S", 0.3)
+        patch.setattr(windows, "WINDOWS_S", 0.3)
         yield whole_s
 
 
 @pytest.fixture
 def whole_windows(short_windows_beside_casadi, monkeypatch):
     """Compare the plant with CasADi's integrator over all of what `verify` does."""
-    monkeypatch.setattr("dzdesign.verify.integrator.comparison.WINDOWS_S", short_windows_beside_casadi)
+    monkeypatch.setattr("dzdesign.verify.integrator.windows.WINDOWS_S", short_windows_beside_casadi)
 
 
 @pytest.fixture

@@ -115,7 +115,7 @@ def test_an_integrator_that_gives_up_has_compared_nothing(firmware_folder, examp
 def test_verify_compares_two_seconds(whole_windows, firmware_folder, example_compensator):
     """Other tests take less of it: see `short_windows_beside_casadi`."""
     windows = windows_of(scenes_of(firmware_folder, example_compensator, None))
-    assert {each.kind for each in windows} == {"ramp", "step", "load step"}
+    assert {each.kind for each in windows} == {"ramp", "step", "load step", "disturbances"}
     assert sum(each.seconds for each in windows) == pytest.approx(2.0)
 
 
