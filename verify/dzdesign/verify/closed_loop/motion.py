@@ -89,8 +89,8 @@ class Numbers:
     #: (FINE, 12): the same in 0, 1, ... half counts, after the first eight entries of `MAP` for that time, which are
     #: what it does to a state that is there already.
     fine: np.ndarray
-    #: The spool's stiffness over its mass, 1/s², of its spring and of its flow force per MPa; the rate of all that moves
-    #: faster than these, rad/s.
+    #: The spool's stiffness over its mass, 1/s², of its spring and of its flow force per MPa; the fastest rate of all
+    #: else, rad/s.
     stiffness: tuple[float, float]
     beside_rad_s: float
 
