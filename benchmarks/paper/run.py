@@ -1,6 +1,7 @@
 """Benchmark of `dzdesign derive --mutate` and `dzdesign reproduce` as a whole; ``run.py [--quick]``.
 
-CI tries a drawn part of the mutants, and writes some of the figures; here all of them are. Exit status 1 if a limit is missed.
+CI tries a drawn part of the mutants, and writes some of the figures; here all of them are. Exit status 1 if a limit is
+missed.
 """
 
 import sys
