@@ -57,7 +57,7 @@ bench-verify: $(STAMP)
 bench-batch: $(STAMP)
 	$(BIN)/python benchmarks/batch/run.py $(BENCH)
 
-# Every wrong statement about the paper, and every wrong law: minutes. CI tries a drawn part of them.
+# Every wrong statement about the paper, and its reproduction twice: minutes. CI tries a drawn part.
 bench-paper: $(STAMP)
 	$(BIN)/python benchmarks/paper/run.py $(BENCH)
 
