@@ -125,6 +125,12 @@ class TestAReadingThatAgrees:
         model = identified(SHARP, [*at_thresholds(SHARP, 0.002)[1:], confirming(SHARP)])
         assert model.positive.certificate.unseen_below_L_min >= FLOOR and "low-flow" in codes(model)
 
+    def test_in_the_range_of_the_meter_tells_nothing_of_the_bound(self):
+        """Seeded: the reading that confirms the table stood for the one that the test lacked, and nothing said so."""
+        rows = [row for row in at_thresholds(SHARP, 0.002) if row.dp_MPa != 3.0]
+        model = identified(SHARP, [*rows, confirming(SHARP)])
+        assert model.positive.certificate.unseen_below_L_min >= FLOOR and "low-flow" in codes(model)
+
     def test_at_a_lower_pressure_drop_counts_for_more_flow_at_the_test(self):
         rows = at_thresholds(SHARP, 0.002)
         near = [LowFlow(**{**_fields(row), "dp_MPa": 0.96 * row.dp_MPa, "q_L_min": 0.02}) for row in rows]

@@ -212,9 +212,10 @@ def unseen_of_curve(rows: Sequence[LowFlow], guard: Guard, curve: CertifiedCurve
     found, missing = [], []
     for test, (dp, threshold) in enumerate(zip(curve.dp_MPa, curve.u_threshold_V, strict=False)):
         told = [
-            _at_most(row, rows, branch, dp)
+            flow
             for row in rows
-            if row.table in confirmed and row.shows_none_on(branch) and row.is_at(dp)
+            if (flow := _at_most(row, rows, branch, dp)) < level_L_min  # the meter tells as much
+            and row.table in confirmed and row.shows_none_on(branch) and row.is_at(dp)
             and row.u_V >= max(threshold, _continued(row.dp_MPa, nodes, thresholds)) - ROUNDING_V
         ]  # fmt: skip
         if told:
