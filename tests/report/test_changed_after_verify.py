@@ -5,7 +5,7 @@ import pytest
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
-from dzdesign.report import summary
+from dzdesign.report import artefact_folder, summary
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.summary import headline
@@ -79,6 +79,15 @@ def test_what_was_changed_since_is_named_and_no_verdict_stands(verified, change)
     (fault,) = faults_of(verified)
     assert fault.startswith("this folder is not what was verified: firmware/") and named in fault
     assert fault.endswith("run `dzdesign verify` on it again")
+
+
+def test_of_any_number_and_size_of_files_none_is_taken_as_gone(verified, monkeypatch):
+    monkeypatch.setattr(artefact_folder, "LARGEST", 2**12)
+    add(verified / "firmware", "board/tables.c", "/**/" * 2**12)
+    for number in range(artefact_folder.MOST):
+        add(verified / "firmware", f"board/more_{number}.h")
+    put_evidence(verified)
+    assert not [fault for fault in faults_of(verified) if "is gone" in fault]
 
 
 def test_generated_c_that_was_changed_is_named_as_ever(verified):

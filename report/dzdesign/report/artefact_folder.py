@@ -100,10 +100,11 @@ def _files_in(place: Path, root: Path) -> dict[str, bytes]:
             if path.suffix == ".csv" or b'"dzdesign.' in content[:HEAD]:
                 files[path.relative_to(root).as_posix()] = content
     manifest = files.get((place / MANIFEST_NAME).relative_to(root).as_posix())
-    for name in [*list(listed_files(manifest))[:MOST], *_added_in(place, manifest)[:MOST]]:
+    added = _added_in(place, manifest)  # all of them: evidence states the hash of each
+    for name in [*list(listed_files(manifest))[:MOST], *added]:
         path = place / name
         inside = path.resolve().is_relative_to(place)  # a name in a manifest is somebody's text
-        if inside and path.is_file() and path.stat().st_size <= LARGEST:
+        if inside and path.is_file() and (name in added or path.stat().st_size <= LARGEST):
             files[path.relative_to(root).as_posix()] = path.read_bytes()
     return files
 
