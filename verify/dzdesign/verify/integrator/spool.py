@@ -9,13 +9,14 @@ CVODES takes Adams' formulas at a relative tolerance of 1e-12. Against the same 
 metering edge opens.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.integrator.root import root
 
 if TYPE_CHECKING:
     import casadi
@@ -29,6 +30,8 @@ CVODES: dict[str, Any] = {
 MOST_EVENTS = 20
 #: Of a phase, ms: nothing shorter is integrated.
 SHORTEST_MS = 1e-12
+#: Share of a phase to which it is first asked where a spool turns.
+NEAR_TURN = 1e-3
 #: Of an excursion from a stop, mm: a shorter one is none.
 NEAR_MM = 1e-12
 
@@ -86,12 +89,33 @@ def drop_left(plant: Plant, opening_mm: "casadi.SX | float", supply_MPa: "casadi
     return supply_MPa / (1 + plant.droop_MPa_L_min2 * conductance_2)
 
 
+class IntegratorCalls:
+    """An integrator of CasADi, whose numbers stay in place: their way in and out took a third of its time."""
+
+    def __init__(self, integrator: "casadi.Function") -> None:
+        self._begin = np.zeros(integrator.size1_in("x0"))
+        self._given = np.zeros(integrator.size1_in("p"))
+        self._end = np.zeros(integrator.size1_out("xf"))
+        #: The buffer must live as long as the call.
+        self._buffer, self._call = cast(Any, integrator).buffer()
+        for place, numbers in (("x0", self._begin), ("p", self._given)):
+            self._buffer.set_arg(integrator.index_in(place), memoryview(cast(Any, numbers)))
+        self._buffer.set_res(integrator.index_out("xf"), memoryview(cast(Any, self._end)))
+
+    def __call__(self, begin: Sequence[float] | np.ndarray, given: Sequence[float]) -> np.ndarray:
+        """Return the state at the end; one that CVODES gives up is a `RuntimeError`."""
+        self._begin[:] = begin
+        self._given[:] = given
+        self._call()
+        return self._end.copy()
+
+
 class CvodesSpool:
     """Coil and spool of one plant."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
-        self._solve = _integrator(plant)
+        self._solve = IntegratorCalls(_integrator(plant))
         #: Force per volt of command at rest, from Eqs. (19)-(22), N/V: by it a play in V is one in N.
         loop_ohm = plant.R_c_ohm + plant.r_p_ohm + plant.K_a * plant.K_fi_V_A
         self.N_per_V = plant.K_i_N_A * plant.K_a / loop_ohm
@@ -131,11 +155,10 @@ class CvodesSpool:
         return (self._pull(state, acting) > 0.0) == (state.position > 0.0)
 
     def _integrated(self, state: SpoolState, acting: Acting, milliseconds: float, *, free: bool) -> np.ndarray:
-        given = [
+        given = (
             milliseconds, acting.volts, acting.push_N, acting.supply_MPa, float(free), float(not acting.current_held),
-        ]  # fmt: skip
-        found: np.ndarray = np.array(self._solve(x0=state.array(), p=given)["xf"]).ravel()
-        return found
+        )  # fmt: skip
+        return self._solve(state.array(), given)
 
     def _rest(self, state: SpoolState, acting: Acting, left: float) -> float:
         """Stay at a stop until the current lets go, or to the end; return for how long."""
@@ -146,10 +169,11 @@ class CvodesSpool:
             return self._pull(later, acting)
 
         away = 1.0 if state.position <= 0.0 else -1.0
-        taken = left
-        if away * pull_after(left) > 0.0:
-            taken = _root(pull_after, 0.0, left)
-        state.take(self._integrated(state, acting, taken, free=False))
+        taken, end = left, self._integrated(state, acting, left, free=False)
+        if away * self._pull(SpoolState(current=float(end[0]), position=state.position), acting) > 0.0:
+            taken = root(pull_after, 0.0, left)
+            end = self._integrated(state, acting, taken, free=False)
+        state.take(end)
         return taken
 
     def _fly(self, state: SpoolState, acting: Acting, left: float) -> float:
@@ -162,9 +186,12 @@ class CvodesSpool:
             return max(-position, position - self._plant.stroke_mm)
 
         end = after(left)
+        if self._stays_clear(state, acting, end, left):
+            state.take(end)
+            return left
         inside, out = 0.0, left
         if state.speed * end[3] < 0.0:
-            turn = _root(lambda ms: float(after(ms)[3]), 0.0, left)
+            turn = self._turn(after, left)
             inside, out = (0.0, turn) if outside(float(after(turn)[2])) > 0.0 else (turn, left)
         elif state.speed == 0.0 and outside(float(end[2])) > 0.0:
             inside = self._turn_from_rest(after, left)
@@ -175,12 +202,43 @@ class CvodesSpool:
         stop = 0.0 if furthest < 0.0 else self._plant.stroke_mm
         met = inside
         if outside(float(after(inside)[2]) if inside > 0.0 else state.position) < -NEAR_MM:
-            met = _root(lambda ms: float(after(ms)[2]) - stop, inside, out)
+            met = root(lambda ms: float(after(ms)[2]) - stop, inside, out)
         if met > 0.0:
             state.take(after(met))
         state.position, state.speed = stop, 0.0
         state.impacts += 1
         return max(met, SHORTEST_MS)
+
+    def _turn(self, after: Callable[[float], np.ndarray], left: float) -> float:
+        """Return when a speed of unlike signs at both ends turns, roughly where that is clear of both stops."""
+
+        def speed(milliseconds: float) -> float:
+            return float(after(milliseconds)[3])
+
+        # The position is flat there, so that some thousandths of the time tell whether the turn is near a stop.
+        turn = root(speed, 0.0, left, NEAR_TURN * left)
+        _, _, position, speed_left = after(turn)
+        margin_mm = 2 * abs(float(speed_left)) * NEAR_TURN * left + NEAR_MM
+        clear = margin_mm < position < self._plant.stroke_mm - margin_mm
+        return turn if clear else root(speed, 0.0, left)
+
+    def _stays_clear(self, state: SpoolState, acting: Acting, end: np.ndarray, milliseconds: float) -> bool:
+        """Whether no force that may act leads a spool from where it is, and where it comes to, to a stop and back."""
+        plant, seconds = self._plant, 1e-3 * milliseconds
+        # The current runs from one end of the phase to the other without a turn.
+        strongest_N = (
+            plant.K_i_N_A * max(abs(state.current), abs(float(end[0])))
+            + plant.K_et_N_m * 1e-3 * plant.stroke_mm
+            + plant.preload_N
+            + (plant.pressure_force_N_MPa + plant.flow_force_N_mm_MPa * plant.stroke_mm) * acting.supply_MPa
+            + abs(acting.push_N)
+        )
+        fastest = abs(state.speed) + strongest_N / plant.m_e_kg * seconds
+        if plant.B_e_N_s_m > 0.0:
+            fastest = min(fastest, max(abs(state.speed), strongest_N / plant.B_e_N_s_m))
+        reach_mm = fastest * milliseconds
+        low, high = sorted((state.position, float(end[2])))
+        return low - reach_mm > 0.0 and high + reach_mm < plant.stroke_mm
 
     @staticmethod
     def _turn_from_rest(after: Callable[[float], np.ndarray], left: float) -> float:
@@ -188,14 +246,7 @@ class CvodesSpool:
         at_end, begin = float(after(left)[3]), left / 2
         while begin > SHORTEST_MS and float(after(begin)[3]) * at_end >= 0.0:
             begin /= 2
-        return _root(lambda ms: float(after(ms)[3]), begin, left) if begin > SHORTEST_MS else 0.0
-
-
-def _root(value: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function of unlike signs at both ends is zero."""
-    from scipy.optimize import brentq
-
-    return float(brentq(value, low, high, xtol=1e-13, rtol=1e-14))
+        return root(lambda ms: float(after(ms)[3]), begin, left) if begin > SHORTEST_MS else 0.0
 
 
 def _integrator(plant: Plant) -> "casadi.Function":

@@ -12,7 +12,8 @@ import numpy as np
 
 from dzdesign.verify.closed_loop.coil_in_loop import CoilAtSupply
 from dzdesign.verify.integrator.compiled_calls import CompiledController
-from dzdesign.verify.integrator.spool import CVODES, SHORTEST_MS
+from dzdesign.verify.integrator.root import root
+from dzdesign.verify.integrator.spool import CVODES, SHORTEST_MS, IntegratorCalls
 
 if TYPE_CHECKING:
     import casadi
@@ -26,7 +27,7 @@ class SwitchedCoil:
         self._corner, self._circuit, self._sampling = coil.corner, around.circuit, around.sampling
         self._sensor, self._converter = around.sensor, around.converter
         self._full_counts = around.loop.full_counts
-        self._solve = _integrator()
+        self._solve = IntegratorCalls(_integrator())
         self._current = 0.0
         self._compare = 0
         none = self._code(self._sensor.offset_V)
@@ -66,18 +67,15 @@ class SwitchedCoil:
         volts = self._corner.supply_V if on else -self._circuit.freewheel_V
         end = self._integrated(volts, milliseconds)
         if end[0] < 0.0:
-            from scipy.optimize import brentq
-
-            blocks = brentq(lambda ms: float(self._integrated(volts, ms)[0]), 0.0, milliseconds, xtol=1e-13)
+            blocks = root(lambda ms: float(self._integrated(volts, ms)[0]), 0.0, milliseconds)
             end = self._integrated(volts, blocks)
             end[0] = 0.0
         self._current = float(end[0])
         return float(end[1])
 
     def _integrated(self, volts: float, milliseconds: float) -> np.ndarray:
-        given = [milliseconds, volts, self._corner.resistance_ohm, self._corner.inductance_H]
-        found: np.ndarray = np.array(self._solve(x0=[self._current, 0.0], p=given)["xf"]).ravel()
-        return found
+        given = (milliseconds, volts, self._corner.resistance_ohm, self._corner.inductance_H)
+        return self._solve((self._current, 0.0), given)
 
 
 def _integrator() -> "casadi.Function":
