@@ -78,15 +78,17 @@ def compare(window: Window, library: ctypes.CDLL) -> PlantComparison:
 def _span(window: Window, native: LoopRun) -> tuple[int, int, int]:
     """Return the periods in which the reference begins, from which on it is compared, and with which it ends.
 
-    It begins while the spool rests. Behind a slow ramp of the drive, which opens the valve long after that, it begins
-    later, from rest all the same, and is compared once coil and spool have forgotten where they were; by then a rising
-    command has brought the play to its end. A coil's controller remembers, so there it begins with the run.
+    It begins before the first pulse: the play remembers a current that does not move the spool yet. Behind a slow ramp
+    of the drive, which opens the valve long after that, it begins later, from rest all the same, and is compared once
+    coil and spool have forgotten where they were; by then a rising command has brought the play to its end. A coil's
+    controller remembers, so there it begins with the run.
     """
     count, plant = round(window.seconds / PWM_PERIOD_S), window.plant.parameters
     moved = np.flatnonzero(native.position_mm > 0)
     flows = np.flatnonzero(native.q_L_min > native.q_L_min[0] + NO_FLOW_L_MIN)
-    leaves, opens = (int(found[0]) if found.size else 0 for found in (moved, flows))
-    begin = max(leaves - math.ceil(SETTLED / plant.coil_rad_s / PWM_PERIOD_S), 0)
+    pulses = np.flatnonzero(native.compare > 0)
+    leaves, opens, driven = (int(found[0]) if found.size else 0 for found in (moved, flows, pulses))
+    begin = min(leaves, driven)
     late = opens - count // 2
     if window.scene.loop.controls_current:
         return 0, 0, max(late, begin) + count
