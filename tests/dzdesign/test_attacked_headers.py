@@ -85,6 +85,9 @@ BY_COMPILING = {
         lambda folder: edit(folder, HEADER, "UINT32_C(9999)", "(*(volatile uint32_t *)0x40000000u = 1u, 9999u)"),
         "for DZ_TICK_RELOAD, expected a number",
     ),
+    "a value read from memory": (
+        lambda folder: edit(folder, HEADER, "UINT32_C(9999)", "(*(uint32_t *)0x40000000u)"), "expected a number",
+    ),
     "a state without a member": (
         lambda folder: edit(folder, HEADER, "    uint16_t u_adc;\n", ""), "does not compile with your headers",
     ),

@@ -28,6 +28,8 @@ TOKEN = re.compile(r'"(?:\\.|[^"\\])*"|\w+|\S')
 #: A macro of a board file that the user may give another value: a number by itself, which reads and sets nothing.
 VALUE = re.compile(r"^#define (\w+) (\S.*)$", re.MULTILINE)
 NUMBER = re.compile(r"(?:0[xX][0-9a-fA-F]+|\d+)[uUlL]*|uint(?:16|32)_t|unsigned|int|long|<<|>>|[-+*/%()~&|^]|\s+")
+#: In such a number a cast to a pointer, which would read memory.
+POINTER = re.compile(r"\*\s*\)")
 #: Stands before the value of a macro.
 PROBE = "dz_value_of_this_macro"
 #: Headers of the user's that a sentence names.
@@ -198,7 +200,7 @@ def _with_values(users: _Tree, headers: Mapping[str, str]) -> dict[str, str]:
                 probe = Path(folder) / "value.c"
                 probe.write_text(f'#include "{posixpath.basename(header)}"\n{PROBE} {name}\n', encoding="utf-8")
                 value = users.run(str(probe), "-E", "-P").rpartition(PROBE)[2].strip()
-            if NUMBER.sub("", value) or not value:
+            if NUMBER.sub("", value) or POINTER.search(value) or not value:
                 raise RequirementError(f"{header} has '{value[:40]}' for {name}, expected a number")
             given[header] = re.sub(rf"(?m)^#define {name} .*$", f"#define {name} {value}", given[header])
     return given
