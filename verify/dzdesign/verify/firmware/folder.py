@@ -29,6 +29,8 @@ def read_firmware_manifest(folder: Path) -> FirmwareManifest:
 
 def _check_readable(folder: Path) -> None:
     def refuse(error: OSError) -> None:
+        if isinstance(error, FileNotFoundError):
+            return  # said by what reads a file of it
         raise InputError(f"'{error.filename}' can't be read: {reason_of(error)}; change who may read it") from error
 
     for place, _, names in os.walk(folder, onerror=refuse):
