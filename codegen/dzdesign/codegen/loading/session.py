@@ -1,0 +1,139 @@
+"""The PC's side of loading a block: each request is sent until its reply comes, a load until it is done or refused."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from dzdesign.codegen.loading.protocol import (
+    MOST_WORDS,
+    REASON_TEXTS,
+    REPLY,
+    SEQUENCES,
+    DriveState,
+    Frame,
+    FrameReader,
+    Reason,
+    Reply,
+    Request,
+)
+from dzdesign.core.errors import InputError, RequirementError
+
+#: A reply comes within this time, or its request is sent again, so often.
+REPLY_S, TRIES = 0.3, 10
+#: The longest that a drive may say that it is still busy: an erase of flash takes seconds.
+BUSY_S = 60.0
+#: A load that lost its place (the drive's time was over, another sender) begins anew so often.
+LOADS = 5
+#: Reasons for which a load begins anew: what came over the line was not what was sent, or not in its order.
+_LOST = frozenset({Reason.NO_LOAD, Reason.SEQUENCE, Reason.TIME, Reason.ABORTED, Reason.CRC, Reason.INCOMPLETE})
+
+
+class Line(Protocol):
+    """A serial line, and the time by which it is waited for."""
+
+    def write(self, octets: bytes) -> None:
+        """Send octets."""
+
+    def read(self, limit_s: float) -> bytes:
+        """Return what comes first within this time; nothing if nothing does."""
+
+    def now(self) -> float:
+        """Return the time in s, from any moment on."""
+
+
+class NoReplyError(InputError):
+    """The drive did not answer."""
+
+
+class RefusedError(RequirementError):
+    """The drive answered, and refused; `reason` says why, and `detail` what dz_calibration_check() found."""
+
+    def __init__(self, reason: int, detail: int) -> None:
+        self.reason, self.detail = reason, detail
+        texts: dict[int, str] = {**REASON_TEXTS}
+        super().__init__(texts.get(reason, f"reason {reason}, which this dzdesign does not know"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """What a drive says of itself."""
+
+    state: DriveState
+    serial: str
+
+
+class LoadSession:
+    """Requests over one line, numbered from `sequence` on."""
+
+    def __init__(self, line: Line, sequence: int = 0) -> None:
+        self._line, self._reader, self._sequence = line, FrameReader(), sequence
+        #: Requests that were sent again.
+        self.repeats = 0
+
+    def query(self) -> Drive:
+        """Return what the drive says of itself."""
+        frame = self._exchange(Request.QUERY, b"")
+        found = frame.drive_state()
+        if found is None:
+            raise NoReplyError(
+                f"the drive answers {len(frame.payload)} octets that this dzdesign does not know; "
+                "firmware and dzdesign must be of one version"
+            )
+        return Drive(state=found[0], serial=found[1])
+
+    def load(self, block: bytes, crc: int, origin: int, done: Callable[[int], None] = lambda words: None) -> None:
+        """Write a block of whole words; `done` is told how many the drive has.
+
+        A line that lost the load's place is tried again; what the drive refuses is a `RefusedError`.
+        """
+        for attempt in range(LOADS):
+            try:
+                self._load_once(block, crc, origin, done)
+                return
+            except RefusedError as error:
+                if error.reason not in _LOST or attempt == LOADS - 1:
+                    raise
+
+    def abort(self) -> None:
+        """Give up a load that may be under way."""
+        self._exchange(Request.ABORT, b"")
+
+    def _load_once(self, block: bytes, crc: int, origin: int, done: Callable[[int], None]) -> None:
+        words = len(block) // 2
+        announced = words.to_bytes(2, "big") + crc.to_bytes(4, "big") + origin.to_bytes(4, "big")
+        self._ask(Request.BEGIN, announced)
+        for at in range(0, words, MOST_WORDS):
+            piece = block[2 * at : 2 * (at + MOST_WORDS)]
+            done(self._ask(Request.DATA, at.to_bytes(2, "big") + piece).words)
+        self._ask(Request.COMMIT, crc.to_bytes(4, "big"))
+
+    def _ask(self, request: Request, payload: bytes) -> Reply:
+        reply = self._exchange(request, payload).reply()
+        if reply is None or reply.reason != Reason.DONE:
+            raise RefusedError(reply.reason if reply else Reason.TYPE, reply.detail if reply else 0)
+        return reply
+
+    def _exchange(self, request: Request, payload: bytes) -> Frame:
+        """Send a request until its reply comes; busy is no reply yet."""
+        self._sequence = (self._sequence + 1) % SEQUENCES
+        octets = Frame(type=request, sequence=self._sequence, payload=payload).octets()
+        begin, unanswered = self._line.now(), 0
+        while unanswered < TRIES:
+            self._line.write(octets)
+            unanswered += 1
+            for frame in self._frames_until(self._line.now() + REPLY_S):
+                if (frame.type, frame.sequence) != (request | REPLY, self._sequence):
+                    continue
+                reply = frame.reply()
+                if reply is not None and reply.reason == Reason.BUSY:
+                    unanswered = 0  # it lives; the reply itself comes when it is done
+                    continue
+                return frame
+            self.repeats += 1
+            if self._line.now() - begin > BUSY_S:
+                raise RefusedError(Reason.BUSY, 0)
+        raise NoReplyError(f"no answer to {request.name} in {TRIES} tries")
+
+    def _frames_until(self, end: float) -> Iterator[Frame]:
+        while (left := end - self._line.now()) > 0:
+            yield from self._reader.feed(self._line.read(left))
