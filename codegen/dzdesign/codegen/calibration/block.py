@@ -1,0 +1,220 @@
+"""`block_of`: a `Compensator` as the numbers of its calibration block."""
+
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from dzdesign.codegen.calibration.layout import (
+    LENGTH_WORDS,
+    NO_INTERLOCK,
+    NO_RAMP,
+    NODES,
+    PLAY_NODES,
+    RECORD_WORDS,
+    SERIAL_WORDS,
+    SHAPE_BITS,
+    SUPPLY_NODES,
+    CalibrationBlock,
+    CurrentBlock,
+    SideBlock,
+    entries,
+)
+from dzdesign.codegen.calibration.packing import octet_words, text_words
+from dzdesign.codegen.core.integer_form import WORD_BITS, IntegerForm, integer_form
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT
+
+#: Binary places of the beta that dz_beta() returns, and of the numerators' largest denominator.
+BETA_BITS = 15
+ALTERNATIVE = "generate it with --calibration fixed"
+
+Part = TypeVar("Part", SideBlock, CurrentBlock)
+
+
+def block_of(compensator: Compensator, digest: str, *, serial: str = "", record: str = "") -> CalibrationBlock:
+    """Return the block of a compensator whose file has the SHA-256 `digest`.
+
+    What a block has no room for is an `InputError`: a beta of more nodes or finer ones, a play of more nodes, a longer
+    text.
+    """
+    c, signals, functions = compensator, compensator.signals, compensator.drive_functions
+    command, a, b = signals.command, signals.pressure_a, signals.pressure_b
+    interlock = functions.interlock_codes
+    return CalibrationBlock(
+        length=LENGTH_WORDS,
+        shape=shape_of(c),
+        code_max=signals.code_max,
+        compare_max=signals.compare_max,
+        sample_Hz=signals.sample_Hz,
+        tick_Hz=signals.tick_Hz,
+        compensator_sha256=octet_words(bytes.fromhex(digest)),
+        serial=text_words(serial, SERIAL_WORDS, "the serial number"),
+        record=text_words(record, RECORD_WORDS, "the record"),
+        u_max_uV=_displayed(float(c.u_max_V), "full command in V"),
+        a_span_Pa=_displayed(float(a.span_MPa), "the span of sensor A in MPa"),
+        b_span_Pa=_displayed(float(b.span_MPa), "the span of sensor B in MPa"),
+        a_full=a.full_code,
+        b_full=b.full_code,
+        reverse=c.reverse_codes << WEIGHT_SHIFT,
+        command_zero=command.zero_code,
+        command_low=command.valid_codes[0],
+        command_high=command.valid_codes[1],
+        a_zero=a.zero_code,
+        a_low=a.valid_codes[0],
+        a_high=a.valid_codes[1],
+        b_zero=b.zero_code,
+        b_low=b.valid_codes[0],
+        b_high=b.valid_codes[1],
+        weight_b=signals.weight_b,
+        step_shift=_shift(c.beta_step_codes),
+        transition_shift=_shift(c.transition_codes or 1),
+        zero_band=c.zero_band_codes,
+        compare_limit=functions.compare_limit,
+        leave_zero=functions.leave_zero_codes,
+        fault_samples=functions.fault_samples,
+        fault_latch=int(functions.fault_latch),
+        interlock=NO_INTERLOCK if interlock is None else interlock,
+        ramps=int(functions.has_ramp),
+        dither_counts=functions.dither_counts,
+        dither_ticks=functions.dither_ticks,
+        play_codes=functions.play_codes if functions.has_play else 0,
+        play_noise=functions.play_noise_codes if functions.has_play else 0,
+        play_step_shift=_shift(functions.play_step_codes) if functions.has_play else 0,
+        play_shift=_shift(functions.play_codes * c.transition_codes) if functions.has_play else 0,
+        sides=(_side(c, 1), _side(c, -1) if c.negative is not None else _nothing(SideBlock)),
+        current=_nothing(CurrentBlock) if c.current_drive is None else _current(c.current_drive.loop),
+        crc32=0,
+    )
+
+
+def shape_of(compensator: Compensator) -> int:
+    """Return what a compensator's firmware must be compiled for, the bits of `SHAPE_BITS`."""
+    drive = compensator.current_drive
+    holds = {
+        "BIPOLAR": compensator.negative is not None,
+        "FALLING": compensator.signals.command.direction(1) < 0,
+        "SWAPPED": compensator.signals.swapped and compensator.negative is not None,
+        "CURRENT": drive is not None,
+        "SUPPLY": drive is not None and drive.loop.supply is not None,
+    }
+    return sum(holds[name] << place for place, name in enumerate(SHAPE_BITS))
+
+
+def _side(c: Compensator, sign: int) -> SideBlock:
+    """Return the law of one sign of command."""
+    form, side, functions = _with_divisor(integer_form(c, sign)), c.side(sign), c.drive_functions
+    beta_shift = _shift(c.beta_denominator) + _shift(c.beta_step_codes) - BETA_BITS
+    if c.beta_denominator > 1 << BETA_BITS or beta_shift < 0:
+        raise InputError(
+            f"beta stands in 1/{c.beta_denominator} at nodes {c.beta_step_codes} codes apart; a calibration block "
+            f"holds 1/{1 << BETA_BITS} at the finest; {ALTERNATIVE}"
+        )
+    place = 0 if sign > 0 else 1
+    codes = int(c.signals.dp_code(side.certificate.dp_MPa[1]) // 1)
+    steps = (functions.ramp_up[place], functions.ramp_down[place])
+    return SideBlock(
+        scale=form.scale_beta,
+        offset=form.offset,
+        transition=form.transition,
+        tested_to=((codes + 1) << WEIGHT_SHIFT) - 1,
+        quotient_limit=form.largest,
+        reciprocal=form.reciprocal,
+        slope=form.slope % 2**64,
+        linear=form.linear << form.linear_shift,
+        half=form.half,
+        ramp_up=steps[0] or NO_RAMP,
+        ramp_down=steps[1] or NO_RAMP,
+        span=c.signals.command.span(sign),
+        nodes=len(side.law_beta) + 1,
+        high_shift=form.shift - WORD_BITS,
+        reciprocal_shift=form.reciprocal_shift - WORD_BITS,
+        beta_shift=beta_shift,
+        law=_nodes((min(side.law_beta), *side.law_beta), NODES, f"beta of {SIDE_NAMES[sign]} commands"),
+        zero=_nodes((min(side.beta), *side.beta), NODES, f"beta of {SIDE_NAMES[sign]} commands"),
+        play=_nodes(functions.play_counts[place], PLAY_NODES, "the width of the inverse play"),
+    )
+
+
+def _with_divisor(form: IntegerForm) -> IntegerForm:
+    """Return the same law with a reciprocal of 32 bits below the binary point.
+
+    A division by 1 has none, so there the quotient gets one binary place more, which the product takes off again.
+    """
+    if form.divisor > 1:
+        return form
+    twice = 1 if form.shift > WORD_BITS else 2
+    return replace(
+        form,
+        slope=form.slope * twice,
+        offset=form.offset * twice,
+        transition=form.transition * twice,
+        linear=form.linear * twice,
+        half=form.half * twice,
+        shift=form.shift if twice > 1 else form.shift - 1,
+        largest=2 * form.largest + 1,
+        reciprocal=1 << (WORD_BITS - 1),
+        reciprocal_shift=WORD_BITS,
+    )
+
+
+def _current(loop: CurrentLoop) -> CurrentBlock:
+    """Return the current controller."""
+    supply = loop.supply
+    low, high = supply.valid_codes if supply else (0, 0)
+    return CurrentBlock(
+        integral_limit=loop.integral_limit << loop.gain_shift,
+        release=loop.release << loop.gain_shift,
+        compare_limit=loop.compare_limit,
+        rate=loop.rate,
+        samples=loop.samples,
+        current_gain=loop.current_gain,
+        current_shift=loop.current_shift,
+        gain_shift=loop.gain_shift,
+        proportional=loop.proportional,
+        integral=loop.integral,
+        feed_forward=loop.feed_forward,
+        offset_nominal=loop.offset_nominal,
+        offset_low=max(loop.offset_nominal - loop.offset_tolerance, 0),
+        offset_high=loop.offset_nominal + loop.offset_tolerance,
+        offset_shift=loop.offset_shift,
+        short_sum=loop.short_sum,
+        over_sum=loop.over_sum,
+        over_ticks=loop.over_ticks,
+        open_sum=loop.open_sum,
+        open_compare=loop.open_compare,
+        open_ticks=loop.open_ticks,
+        supply_low=low,
+        supply_high=high,
+        supply_shift=_shift(supply.step_codes) if supply else 0,
+        supply=_nodes(supply.nodes if supply else (), SUPPLY_NODES, "the supply's correction"),
+    )
+
+
+def _nothing(kind: type[Part]) -> Part:
+    """Return a part of the block that its firmware does not use: all zero."""
+    nothing: dict[str, Any] = {
+        name: (0,) * entry.count if entry.count > 1 else 0 for name, entry in entries(kind).items()
+    }
+    return kind(**nothing)
+
+
+def _nodes(numbers: tuple[int, ...], room: int, what: str) -> tuple[int, ...]:
+    if len(numbers) > room:
+        raise InputError(
+            f"{what} has {len(numbers)} nodes, of which a calibration block holds {room} at most; {ALTERNATIVE}, or "
+            "design it for a converter of fewer codes"
+        )
+    return (*numbers, *(0,) * (room - len(numbers)))
+
+
+def _shift(power: int) -> int:
+    """Return s of a power of two 2^s."""
+    return power.bit_length() - 1
+
+
+def _displayed(value: float, what: str) -> int:
+    """Return a value in millionths of its unit."""
+    if not 0 <= round(value * 1e6) < 1 << 32:
+        raise InputError(f"{what} is {value:g}; a calibration block shows values below 4294; {ALTERNATIVE}")
+    return round(value * 1e6)

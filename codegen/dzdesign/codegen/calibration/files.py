@@ -1,0 +1,120 @@
+"""The files of a core in block form: of each its template, and what that prints."""
+
+from collections.abc import Iterator, Sequence
+
+from dzdesign.codegen.calibration.built_for import BuiltFor
+from dzdesign.codegen.calibration.layout import (
+    LAYOUT,
+    LENGTH_WORDS,
+    MAGIC,
+    NODE_MASK,
+    NODES,
+    PLAY_MASK,
+    PLAY_NODES,
+    SHAPE_BITS,
+    SUPPLY_MASK,
+    SUPPLY_NODES,
+    CalibrationBlock,
+    CurrentBlock,
+    SideBlock,
+    Words,
+    entries,
+)
+from dzdesign.codegen.core.constants import Define, c_comment, defines
+from dzdesign.codegen.core.files import CoreFile, Values
+from dzdesign.codegen.core.misra import misra_lines
+from dzdesign.core.strict_templates import strict_templates
+
+HERE = "codegen/dzdesign/codegen/calibration/files.py"
+LAYOUT_FILE = "codegen/dzdesign/codegen/calibration/layout.py"
+#: Bits of what dz_calibration_check() finds wrong.
+FINDINGS = {
+    "FORMAT": "no calibration block, or of another layout or length",
+    "CRC": "damaged: the CRC-32 is not that of the block",
+    "FIRMWARE": "of a firmware that was compiled for other wiring, converter or rates",
+    "SIGNALS": "a code of command or pressures outside what the arithmetic bears",
+    "LAW": "a number of the law outside what the arithmetic bears, or a law that falls with the command",
+    "DRIVE": "a number of the drive functions outside what the arithmetic bears",
+    "CURRENT": "a number of the current controller outside what the arithmetic bears",
+}
+#: Structs of the block, in the order in which C needs them, and their names there.
+STRUCTS = {SideBlock: "dz_calibration_side", CurrentBlock: "dz_calibration_current", CalibrationBlock: "dz_calibration"}
+
+
+def calibration_header(built: BuiltFor) -> CoreFile:
+    """Return dz_calibration.h: the struct, and what the firmware is compiled for."""
+    constants = [*_interface(built), *_findings()]
+    values: Values = {
+        "misra_lines": misra_lines("dz_calibration.h"),
+        "interface_defines": defines(constants),
+        "structs": [{"name": name, "members": list(_declarations(kind))} for kind, name in STRUCTS.items()],
+    }
+    return CoreFile(template="dz_calibration.h.jinja", values=values, constants=tuple(constants))
+
+
+def texts(files: dict[str, CoreFile], banner: Sequence[str] = ()) -> dict[str, str]:
+    """Return the text of each file, by name, without a firmware around it."""
+    templates = strict_templates("dzdesign.codegen.calibration", autoescape=False)
+    return {name: templates.get_template(file.template).render(banner=banner, **file.values) for name, file in
+            files.items()}  # fmt: skip
+
+
+def _declarations(kind: type) -> Iterator[str]:
+    """Yield the lines of a struct's members, each with its comment."""
+    own = entries(kind)
+    for name in kind.__dataclass_fields__:  # type: ignore[attr-defined]
+        if name in own:
+            yield from c_comment(_comment(own[name]))
+            yield f"{_declared(name, own[name])};"
+        elif name == "sides":
+            yield from c_comment("Of positive, then of negative commands; all zero where there are none.")
+            yield "struct dz_calibration_side sides[2];"
+        else:
+            yield from c_comment("All zero without current control.")
+            yield "struct dz_calibration_current current;"
+
+
+def _declared(name: str, entry: Words) -> str:
+    count = entry.count * max(entry.bits // 32, 1)
+    return f"{'uint16_t' if entry.bits == 16 else 'uint32_t'} {name}{f'[{count}]' if count > 1 else ''}"
+
+
+def _comment(entry: Words) -> str:
+    text = entry.text[0].upper() + entry.text[1:]
+    return f"{text}{'; low word first' if entry.bits == 64 else ''}{f' ({entry.unit})' if entry.unit else ''}."
+
+
+def _interface(built: BuiltFor) -> list[Define]:
+    """Return what the firmware is compiled for, and the numbers of the layout."""
+
+    def define(symbol: str, value: int, equation: str, engineering: str, literal: str = "plain") -> Define:
+        return Define(symbol=symbol, value=value, equation=equation, engineering=engineering, literal=literal,
+                      generator=LAYOUT_FILE)  # fmt: skip
+
+    magic = int.from_bytes(MAGIC, "little")
+    shape = ", ".join(text for name, text in SHAPE_BITS.items() if built.has(name)) or "one solenoid"
+    return [
+        define("DZ_COMPARE_MAX", built.compare_max, "PWM compare value of u_max", "100 % duty"),
+        define("DZ_ADC_CODE_MAX", built.code_max, "largest code of the converter", "the top of its range"),
+        define("DZ_SAMPLE_HZ", built.sample_Hz, "samples a second", "of the firmware's timer"),
+        define("DZ_TICK_HZ", built.tick_Hz, "PWM periods a second", "of the firmware's timer"),
+        define("DZ_CURRENT_SAMPLES", built.samples, "codes of the current in a sum", "0 without current control"),
+        define("DZ_CALIBRATION_SHAPE", built.shape, "what this firmware is compiled for", shape),
+        define("DZ_CALIBRATION_MAGIC", magic, "first 32 bits of a block", f"octets {MAGIC.decode()}", "uint32"),
+        define("DZ_CALIBRATION_LAYOUT", LAYOUT, "version of the block's layout", "a convention"),
+        define("DZ_CALIBRATION_WORDS", LENGTH_WORDS, "words of 16 bits in a block", f"{2 * LENGTH_WORDS} octets"),
+        define("DZ_CALIBRATION_NODES", NODES, "room for nodes of beta", "the fallback and those of the table"),
+        define("DZ_CALIBRATION_NODE_MASK", NODE_MASK, "largest number of a node that has a next one", "all ones"),
+        define("DZ_CALIBRATION_PLAY_NODES", PLAY_NODES, "room for nodes of the play's width", "each side"),
+        define("DZ_CALIBRATION_PLAY_MASK", PLAY_MASK, "largest number of a node that has a next one", "all ones"),
+        define("DZ_CALIBRATION_SUPPLY_NODES", SUPPLY_NODES, "room for nodes of the supply's correction", "one table"),
+        define("DZ_CALIBRATION_SUPPLY_MASK", SUPPLY_MASK, "largest number of a node that has a next one", "all ones"),
+    ]  # fmt: skip
+
+
+def _findings() -> list[Define]:
+    return [
+        Define(symbol=f"DZ_CALIBRATION_{name}", value=1 << place, equation=f"bit {place} of dz_calibration_check()",
+               engineering=text, rounding="a convention", generator=HERE)
+        for place, (name, text) in enumerate(FINDINGS.items())
+    ]  # fmt: skip
