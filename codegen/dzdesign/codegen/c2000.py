@@ -38,9 +38,10 @@ def c2000_target(
     *,
     converter: Converter,
     sources: tuple[str, ...] = (),
+    block_sources: tuple[str, ...] = (),
     link: Link | None = None,
 ) -> Target:
-    """Return the target whose figures, printed, are `context`; `sources` is the C that only it has."""
+    """Return the target whose figures, printed, are `context`; `sources` is the C that only it has, `block_sources` in block form."""
     return Target(
         name=name,
         description=description,
@@ -50,6 +51,7 @@ def c2000_target(
         tick_Hz=PWM_HZ,
         current_sampling=CURRENT,
         templates={f"{name}/{file}": f"{file}.jinja" for file in (*SOURCES, *sources, *PROJECT_FILES)},
+        block_templates={f"{name}/{file}": f"{file}.jinja" for file in block_sources},
         board=frozenset({f"{name}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
         context={**context, **TOOLS},
         link=link,

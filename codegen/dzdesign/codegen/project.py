@@ -14,6 +14,7 @@ from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.current_files import CURRENT_HEADERS, CURRENT_SOURCES, FAULT_BITS, current_files
 from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core_files
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
+from dzdesign.codegen.loading.files import LOAD_FILES, STORE, load_texts
 from dzdesign.codegen.provenance import constants_of
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.wiring import wiring_of
@@ -137,8 +138,10 @@ def generate(
     return Firmware(files=files, manifest=manifest, compensator=compensator, note=note)
 
 
-def target_files(compensator: Compensator, target: Target, banner: Banner) -> dict[str, str]:
-    """Return the files around the core, path to text."""
+def target_files(
+    compensator: Compensator, target: Target, banner: Banner, *, block: bool = False
+) -> dict[str, str]:
+    """Return the files around the core, path to text; in block form those that take a block over a serial line too."""
     signals = compensator.signals
     current = compensator.current_drive
     levels, full_V = signals.code_max + 1, target.converter.full_V
@@ -160,21 +163,47 @@ def target_files(compensator: Compensator, target: Target, banner: Banner) -> di
         ),
         "core_headers": (*CORE_HEADERS, *(CURRENT_HEADERS if current else ())),
         "current": current,
+        "block": block,
+        "link_sources": link_names(target, ".c") if block else (),
+        "link_headers": link_names(target, ".h") if block else (),
         "current_faults": FAULT_BITS,
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,
         "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }
-    return {
+    files = {
         path: _render(
             f"{PACKAGE}.{target.folder}",
             template,
             board_lines(template) if path in target.board else banner.lines(template),
             values,
         )
-        for path, template in target.templates.items()
+        for path, template in (target.templates | (target.block_templates if block else {})).items()
     }
+    return files | (_load_files(target, banner) if block and target.link else {})
+
+
+def _load_files(target: Target, banner: Banner) -> dict[str, str]:
+    """Return the files that take a block over the target's serial line."""
+    board = board_of_blocks(target)
+
+    def lines(name: str) -> Sequence[str]:
+        template = f"{name}.jinja"
+        return board_lines(template) if f"{target.folder}/{name}" in board else banner.lines(template)
+
+    return {f"{target.folder}/{name}": text for name, text in load_texts(target.tick_Hz, lines).items()}
+
+
+def link_names(target: Target, ending: str) -> tuple[str, ...]:
+    """Return the names of the files of block form beside the target's own, those with this ending."""
+    own = (path.rpartition("/")[2] for path in target.block_templates)
+    return tuple(name for name in (*own, *(LOAD_FILES if target.link else ())) if name.endswith(ending))
+
+
+def board_of_blocks(target: Target) -> frozenset[str]:
+    """Return the files that are the user's to fill in because blocks are loaded: the memory that keeps them."""
+    return frozenset(f"{target.folder}/{name}" for name in STORE) if target.link else frozenset()
 
 
 @cache

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import signal
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.option_readers import number
 from dzdesign.core.options import AnyPath, Option, Text, read_options
+from dzdesign.serial_port import open_port
 from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say
 
@@ -61,7 +61,7 @@ def run(arguments: Arguments, json: bool) -> int:
     scalings = scalings_of(Path(arguments.firmware))
     baud = read["baud"] or scalings.link.baud
     recording, reader = Recording(scalings), FrameReader()
-    with _open_port(arguments.port, baud) as port, _until_interrupted() as stop:
+    with open_port(arguments.port, baud, LOOK_S) as port, _until_interrupted() as stop:
         say(f"listening to {arguments.port} at {baud:g} bit/s; Ctrl-C ends the recording")
         broken = _record(port, recording, reader, stop, read["seconds"])
     if not recording:
@@ -85,21 +85,6 @@ def _until_interrupted() -> Iterator[threading.Event]:
         yield stop
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _open_port(name: str, baud: float) -> "serial.Serial":
-    """Open a serial port for this program alone, or say in one sentence why not."""
-    import serial
-    from serial.tools import list_ports
-
-    try:
-        alone = {"exclusive": True} if sys.platform != "win32" else {}  # Windows knows nothing else
-        return serial.Serial(name, int(baud), timeout=LOOK_S, **alone)
-    except (OSError, ValueError) as error:
-        known = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
-        raise InputError(
-            f"the port '{name}' can't be opened at {baud:g} bit/s ({error}); ports of this machine: {known}"
-        ) from error
 
 
 def _record(

@@ -49,6 +49,11 @@ class Bench:
     stuck: int = 0
     used_unheld: int = 0
 
+    @property
+    def words_of_a_load(self) -> int:
+        """Words that are erased, cleared and then set, and written, with the mark."""
+        return self.drive.slot_octets + len(self.old) // 2 + 1
+
     def exchange(self, kind: Callable[["Bench", random.Random, bytes], str], rng: random.Random) -> None:
         """Have one kind of exchange go on with a new block, and look at what the drive has after it."""
         new = rng.choice([block for block in self.good if block != self.old])
@@ -117,7 +122,7 @@ def supply_lost_at_an_octet(bench: Bench, rng: random.Random, new: bytes) -> str
 
 def supply_lost_at_a_word(bench: Bench, rng: random.Random, new: bytes) -> str:
     """The drive dies as a word is erased or written, and some bits of it have changed."""
-    bench.drive.set(words_left=rng.randrange(3 * len(new) // 2 + 3))
+    bench.drive.set(words_left=rng.randrange(bench.words_of_a_load + 1))
     return load(_session(bench, rng), new)
 
 
@@ -175,7 +180,7 @@ def bad_block(bench: Bench, rng: random.Random, new: bytes) -> str:
 
 
 def hostile_frames(bench: Bench, rng: random.Random, new: bytes) -> str:
-    """Garbage, cut frames, and frames with a right CRC of any type, number, length and content, in a load and without."""
+    """Garbage, cut frames, and frames with a right CRC of any type, number, length and content."""
     line = VirtualLine(bench.drive)
     session = LoadSession(line, rng.randrange(256))
     words = len(new) // 2

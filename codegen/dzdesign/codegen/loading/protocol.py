@@ -72,7 +72,7 @@ class Reason(IntEnum):
     ABORTED = 14
 
 
-REASON_TEXTS = {
+REASON_TEXTS: dict[int, str] = {
     Reason.DONE: "done",
     Reason.BUSY: "the request before this one is still being done",
     Reason.NO_LOAD: "no load is under way",
@@ -89,6 +89,13 @@ REASON_TEXTS = {
     Reason.TIME: "the time was over",
     Reason.ABORTED: "the load was given up by its sender",
 }
+
+
+def reason_text(reason: int) -> str:
+    """Return what a reason means; a drive's newer firmware may have others."""
+    return REASON_TEXTS.get(reason, f"reason {reason}, which this dzdesign does not know")
+
+
 #: In place of a slot: the block that the firmware was linked with, and none.
 LINKED, NO_BLOCK = 2, 0xFFFF
 #: Flags of a drive's state.

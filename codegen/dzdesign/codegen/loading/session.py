@@ -1,20 +1,20 @@
 """The PC's side of loading a block: each request is sent until its reply comes, a load until it is done or refused."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from dzdesign.codegen.calibration.files import FINDINGS
 from dzdesign.codegen.loading.protocol import (
     MOST_WORDS,
-    REASON_TEXTS,
     REPLY,
     SEQUENCES,
     DriveState,
     Frame,
     FrameReader,
     Reason,
-    Reply,
     Request,
+    reason_text,
 )
 from dzdesign.core.errors import InputError, RequirementError
 
@@ -25,6 +25,7 @@ BUSY_S = 60.0
 #: A load that lost its place (the drive's time was over, another sender) begins anew so often.
 LOADS = 5
 #: Reasons for which a load begins anew: what came over the line was not what was sent, or not in its order.
+CRC_FINDING = 1 << list(FINDINGS).index("CRC")
 _LOST = frozenset({Reason.NO_LOAD, Reason.SEQUENCE, Reason.TIME, Reason.ABORTED, Reason.CRC, Reason.INCOMPLETE})
 
 
@@ -50,8 +51,9 @@ class RefusedError(RequirementError):
 
     def __init__(self, reason: int, detail: int) -> None:
         self.reason, self.detail = reason, detail
-        texts: dict[int, str] = {**REASON_TEXTS}
-        super().__init__(texts.get(reason, f"reason {reason}, which this dzdesign does not know"))
+        #: Whether the line made of the block what was not sent, or lost the load's place: it may be tried again.
+        self.is_of_the_line = reason in _LOST or (reason == Reason.CHECK and bool(detail & CRC_FINDING))
+        super().__init__(reason_text(reason))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,37 +83,48 @@ class LoadSession:
             )
         return Drive(state=found[0], serial=found[1])
 
-    def load(self, block: bytes, crc: int, origin: int, done: Callable[[int], None] = lambda words: None) -> None:
-        """Write a block of whole words; `done` is told how many the drive has.
+    def loading(self, block: bytes, crc: int, origin: int) -> Iterator[Request]:
+        """Write a block of whole words, and yield each request that was done.
 
-        A line that lost the load's place is tried again; what the drive refuses is a `RefusedError`.
+        A load that lost its place on the line begins anew; what the drive refuses is a `RefusedError`.
         """
         for attempt in range(LOADS):
             try:
-                self._load_once(block, crc, origin, done)
+                yield from self._once(block, crc, origin)
                 return
             except RefusedError as error:
-                if error.reason not in _LOST or attempt == LOADS - 1:
+                if not error.is_of_the_line or attempt == LOADS - 1:
                     raise
+
+    def load(self, block: bytes, crc: int, origin: int) -> None:
+        """Write a block as `loading` does."""
+        for _ in self.loading(block, crc, origin):
+            pass
+
+    @staticmethod
+    def requests_of(block: bytes) -> int:
+        """Return how many requests a block takes if none is sent twice."""
+        return 2 + -(-len(block) // (2 * MOST_WORDS))
 
     def abort(self) -> None:
         """Give up a load that may be under way."""
         self._exchange(Request.ABORT, b"")
 
-    def _load_once(self, block: bytes, crc: int, origin: int, done: Callable[[int], None]) -> None:
+    def _once(self, block: bytes, crc: int, origin: int) -> Iterator[Request]:
         words = len(block) // 2
         announced = words.to_bytes(2, "big") + crc.to_bytes(4, "big") + origin.to_bytes(4, "big")
-        self._ask(Request.BEGIN, announced)
+        yield self._ask(Request.BEGIN, announced)
         for at in range(0, words, MOST_WORDS):
-            piece = block[2 * at : 2 * (at + MOST_WORDS)]
-            done(self._ask(Request.DATA, at.to_bytes(2, "big") + piece).words)
-        self._ask(Request.COMMIT, crc.to_bytes(4, "big"))
+            yield self._ask(Request.DATA, at.to_bytes(2, "big") + block[2 * at : 2 * (at + MOST_WORDS)])
+        yield self._ask(Request.COMMIT, crc.to_bytes(4, "big"))
 
-    def _ask(self, request: Request, payload: bytes) -> Reply:
+    def _ask(self, request: Request, payload: bytes) -> Request:
         reply = self._exchange(request, payload).reply()
-        if reply is None or reply.reason != Reason.DONE:
-            raise RefusedError(reply.reason if reply else Reason.TYPE, reply.detail if reply else 0)
-        return reply
+        if reply is None:
+            raise NoReplyError(f"the answer to {request.name} is too short")
+        if reply.reason != Reason.DONE:
+            raise RefusedError(reply.reason, reply.detail)
+        return request
 
     def _exchange(self, request: Request, payload: bytes) -> Frame:
         """Send a request until its reply comes; busy is no reply yet."""
