@@ -15,25 +15,27 @@ SLOTS, LINKED = 2, 2
 OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
 
 
-def build_drive(compiler: str, files: Mapping[str, str], folder: Path, *, program: bool = False) -> Path:
+def build_drive(
+    compiler: str, files: Mapping[str, str], folder: Path, *more: str, program: bool = False
+) -> Path:
     """Compile the load code, the block's check and the bench around them, as a library or as a program."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
-    strict = [folder / name for name in files if name.endswith(".c") and name not in ("dz_store.c", "dz_telemetry.c")]
-    (folder / "drive.c").write_text((HERE / "drive.c").read_text("utf-8"), encoding="utf-8")
+    own = folder / "drive.c"
+    own.write_text((HERE / "drive.c").read_text("utf-8"), encoding="utf-8")
     objects = []
-    for source in (*strict, folder / "drive.c"):
-        objects.append(source.with_suffix(".o"))
+    for source in (*(folder / name for name in files if name.endswith(".c") and name != "dz_store.c"), own):
+        objects.append(str(source.with_suffix(".o")))
         bench = ["-D_GNU_SOURCE", "-Wno-conversion", *(["-DDRIVE_PROGRAM"] if program else [])]
-        options = [*OPTIONS, *(bench if source.name == "drive.c" else [])]
-        compile_(compiler, *options, "-fPIC", f"-I{folder}", "-c", str(source), "-o", str(objects[-1]))
+        options = [*OPTIONS, *(bench if source == own else []), *more]
+        _compile(compiler, *options, "-fPIC", f"-I{folder}", "-c", str(source), "-o", objects[-1])
     result = folder / ("drive" if program else "drive.so")
-    compile_(compiler, *(() if program else ("-shared",)), *map(str, objects), "-o", str(result))
+    _compile(compiler, *(() if program else ("-shared",)), *more, *objects, "-o", str(result))
     return result
 
 
-def compile_(*command: str) -> None:
+def _compile(*command: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
