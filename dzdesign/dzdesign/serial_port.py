@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     import serial
 
 
+#: The longest that a write may wait for the port.
+WRITE_S = 1.0
+
+
 def open_port(name: str, baud: float, look_s: float) -> "serial.Serial":
     """Open a serial port whose reads take at most `look_s`, or say in one sentence why not."""
     import serial
@@ -17,7 +21,7 @@ def open_port(name: str, baud: float, look_s: float) -> "serial.Serial":
 
     try:
         alone = {"exclusive": True} if sys.platform != "win32" else {}  # Windows knows nothing else
-        return serial.Serial(name, int(baud), timeout=look_s, write_timeout=look_s, **alone)
+        return serial.Serial(name, int(baud), timeout=look_s, write_timeout=WRITE_S, **alone)
     except (OSError, ValueError) as error:
         known = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
         raise InputError(
@@ -40,8 +44,7 @@ class PortLine:
             raise _broken(error) from error
 
     def read(self, limit_s: float) -> bytes:
-        """Return what comes first within this time; nothing if nothing does."""
-        self._port.timeout = limit_s
+        """Return what comes first within this time, or within the port's own, which is not changed for each look."""
         try:
             octets: bytes = self._port.read(max(self._port.in_waiting, 1))
         except OSError as error:

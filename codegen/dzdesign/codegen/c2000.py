@@ -41,7 +41,10 @@ def c2000_target(
     block_sources: tuple[str, ...] = (),
     link: Link | None = None,
 ) -> Target:
-    """Return the target whose figures, printed, are `context`; `sources` is the C that only it has, `block_sources` in block form."""
+    """Return the target whose figures, printed, are `context`.
+
+    `sources` is the C that only it has, `block_sources` what it has besides in block form.
+    """
     return Target(
         name=name,
         description=description,

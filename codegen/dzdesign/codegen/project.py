@@ -179,7 +179,7 @@ def target_files(
             board_lines(template) if path in target.board else banner.lines(template),
             values,
         )
-        for path, template in (target.templates | (target.block_templates if block else {})).items()
+        for path, template in {**target.templates, **(target.block_templates if block else {})}.items()
     }
     return files | (_load_files(target, banner) if block and target.link else {})
 

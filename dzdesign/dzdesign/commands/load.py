@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock
     from dzdesign.codegen.loading.session import Drive, LoadSession
 
-#: The longest that a write to the port takes.
-LOOK_S = 1.0
+#: The longest that a look at the line takes: shorter than an answer is waited for.
+LOOK_S = 0.02
 EXAMPLES = ("dzdesign load valve.hex --port COM5", "dzdesign load --port COM5")
 
 

@@ -165,7 +165,7 @@ def test_bad_input_is_one_sentence_and_status_2(drive, tmp_path, capsys, monkeyp
 
 
 def test_a_port_that_breaks_is_a_sentence(drive):
-    with open_port(drive.port, BAUD, 1.0) as port:
+    with open_port(drive.port, BAUD, 0.1) as port:
         line = PortLine(port)
         os.dup2(os.open(os.devnull, os.O_RDWR), drive.master)  # the other end is gone
         with pytest.raises(RequirementError, match="the port broke"):

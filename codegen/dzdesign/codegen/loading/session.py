@@ -36,7 +36,7 @@ class Line(Protocol):
         """Send octets."""
 
     def read(self, limit_s: float) -> bytes:
-        """Return what comes first within this time; nothing if nothing does."""
+        """Return what comes within at most this time, or nothing."""
 
     def now(self) -> float:
         """Return the time in s, from any moment on."""
