@@ -29,6 +29,7 @@ int drive_dead;           /* the supply is gone */
 long drive_octets_left = -1, drive_words_left = -1; /* until it goes; below zero: never */
 int drive_driving;        /* the output is in use */
 int drive_command = 0;    /* the command is not zero */
+int drive_new_command = 0; /* it is not the zero command of a block that is not in use */
 int drive_never_holds;    /* the interrupt does not come */
 int drive_bad_word = -1;  /* a word of the memory that takes nothing */
 unsigned drive_uses, drive_wrong_uses; /* times that a block was taken into use; while the output was not held */
@@ -111,7 +112,10 @@ uint16_t dz_store_write(uint16_t slot, uint16_t at, const uint16_t *words, uint1
 
 uint16_t dz_load_refusal(const struct dz_calibration *block)
 {
-    (void)block;
+    if ((drive_new_command != 0) && (block != used))
+    {
+        return DZ_LOAD_REASON_COMMAND;
+    }
     if ((drive_driving != 0) && (hold == 0u))
     {
         return DZ_LOAD_REASON_DRIVING;
@@ -137,7 +141,7 @@ void drive_power_on(unsigned seed, unsigned busy_polls)
 {
     drive_dead = 0;
     drive_octets_left = drive_words_left = -1;
-    drive_driving = drive_command = drive_never_holds = 0;
+    drive_driving = drive_command = drive_new_command = drive_never_holds = 0;
     drive_bad_word = -1;
     random_state = seed;
     busy = busy_left = (uint16_t)busy_polls;

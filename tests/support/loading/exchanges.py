@@ -50,6 +50,11 @@ class Bench:
     used_unheld: int = 0
 
     @property
+    def violations(self) -> int:
+        """Return how often something happened that must not."""
+        return self.invalid_accepted + self.old_lost + self.wrongly_done + self.stuck + self.used_unheld
+
+    @property
     def words_of_a_load(self) -> int:
         """Words that are erased, cleared and then set, and written, with the mark."""
         return self.drive.slot_octets + len(self.old) // 2 + 1
@@ -122,6 +127,15 @@ def supply_lost_at_an_octet(bench: Bench, rng: random.Random, new: bytes) -> str
 
 def supply_lost_at_a_word(bench: Bench, rng: random.Random, new: bytes) -> str:
     """The drive dies as a word is erased or written, and some bits of it have changed."""
+    bench.drive.set(words_left=rng.randrange(bench.words_of_a_load + 1))
+    return load(_session(bench, rng), new)
+
+
+def supply_lost_in_a_second_load(bench: Bench, rng: random.Random, new: bytes) -> str:
+    """After a load without a restart: the block of the first one is the old one now."""
+    first = rng.choice([block for block in bench.good if block not in (bench.old, new)])
+    if load(_session(bench, rng), first) == "done":
+        bench.old = first
     bench.drive.set(words_left=rng.randrange(bench.words_of_a_load + 1))
     return load(_session(bench, rng), new)
 
@@ -223,6 +237,7 @@ KINDS = (
     frames_out_of_order,
     supply_lost_at_an_octet,
     supply_lost_at_a_word,
+    supply_lost_in_a_second_load,
     sender_lost,
     drive_in_use,
     bad_block,
