@@ -11,7 +11,7 @@ import pytest
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import STRUCTS, calibration_header, texts
-from dzdesign.codegen.calibration.layout import LENGTH_WORDS, MAGIC, CalibrationBlock, members, words_of
+from dzdesign.codegen.calibration.layout import LENGTH_WORDS, MAGIC, NODE_MASK, CalibrationBlock, members, words_of
 from dzdesign.codegen.calibration.packing import pack, text_of, unpack
 from dzdesign.core.errors import DzdesignError, InputError
 from tests.support.core_variants import variant
@@ -93,27 +93,16 @@ def test_what_is_no_block_is_refused(block, damage, named):
 
 def test_what_a_block_has_no_room_for_is_refused():
     compensator = variant("default", "wide")
-    finer = replace(compensator, beta_denominator=2 * compensator.beta_denominator)
-    many = replace(
-        compensator,
-        beta_step_codes=16,
-        sides=replace(
-            compensator.sides,
-            positive=replace(
-                compensator.positive,
-                beta=(100,) * (compensator.signals.largest_difference(1) // 16 + 2),
-                transition_beta=(100,) * (compensator.signals.largest_difference(1) // 16 + 2),
-            ),
-        ),
-    )
-    for refused, digest_and_texts, named in (
-        (finer, {}, "beta"),
+    nodes = (100,) * (compensator.signals.largest_difference(1) // 16 + 2)
+    positive = replace(compensator.positive, beta=nodes, transition_beta=nodes)
+    many = replace(compensator, beta_step_codes=16, sides=replace(compensator.sides, positive=positive))
+    for refused, texts_given, named in (
         (many, {}, "nodes"),
         (compensator, {"serial": "x" * 25}, "25 octets"),
         (compensator, {"record": "a\nb"}, "printed"),
     ):
         with pytest.raises(InputError, match=named):
-            block_of(refused, DIGEST, **digest_and_texts)
+            block_of(refused, DIGEST, **texts_given)
 
 
 def test_a_number_that_does_not_fit_is_no_block(block):
@@ -127,11 +116,12 @@ def test_unlike_sensors_and_sides_stand_in_the_block(block):
     signals = compensator.signals
     assert block.weight_b == signals.weight_b != 4096 and block.shape == 0b101
     for place, sign in enumerate(signals.signs):
-        side = block.sides[place]
-        nodes = compensator.side(sign).beta
-        assert side.zero[1 : 1 + len(nodes)] == nodes and side.zero[0] == min(nodes)
-        assert side.nodes == len(nodes) + 1 and not any(side.zero[side.nodes :])
-        assert side.span == signals.command.span(sign)
-        # The core's beta of full pressure drop is the compensator's, to the last bit.
-        beta = Fraction(side.law[side.nodes - 1] << block.step_shift, 2 ** (side.beta_shift + 15))
-        assert beta == Fraction(compensator.side(sign).law_beta[-1], compensator.beta_denominator)
+        side, law, zero = block.sides[place], compensator.side(sign).law_beta, compensator.side(sign).beta
+        unit = Fraction(1, side.beta_unit)
+        for node, (of_law, at_zero) in enumerate(zip(law, zero, strict=True)):
+            found = (side.nodes[2 * node] * unit, side.nodes[2 * node + 1] * unit)
+            assert found == tuple(Fraction(beta, compensator.beta_denominator) for beta in (of_law, at_zero))
+        assert side.node_count == len(law) and not any(side.nodes[2 * len(law) : 2 * NODE_MASK])
+        fallback = [min(table) * side.beta_unit // compensator.beta_denominator for table in (law, zero)]
+        assert side.nodes[2 * NODE_MASK :] == (*fallback, *fallback)
+        assert (side.span, side.room) == (signals.command.span(sign), side.span - compensator.zero_band_codes)

@@ -1,6 +1,7 @@
 """`block_of`: a `Compensator` as the numbers of its calibration block."""
 
-from dataclasses import replace
+from fractions import Fraction
+from math import floor
 from typing import Any, TypeVar
 
 from dzdesign.codegen.calibration.layout import (
@@ -19,14 +20,15 @@ from dzdesign.codegen.calibration.layout import (
     entries,
 )
 from dzdesign.codegen.calibration.packing import octet_words, text_words
-from dzdesign.codegen.core.integer_form import WORD_BITS, IntegerForm, integer_form
+from dzdesign.codegen.core.integer_form import INT32_MAX, WORD_BITS, IntegerForm, exact_factors, integer_form
+from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT
 
-#: Binary places of the beta that dz_beta() returns, and of the numerators' largest denominator.
-BETA_BITS = 15
+#: Nodes that stand for pressures that can't be right.
+FALLBACKS = 2
 ALTERNATIVE = "generate it with --calibration fixed"
 
 Part = TypeVar("Part", SideBlock, CurrentBlock)
@@ -56,6 +58,7 @@ def block_of(compensator: Compensator, digest: str, *, serial: str = "", record:
         b_span_Pa=_displayed(float(b.span_MPa), "the span of sensor B in MPa"),
         a_full=a.full_code,
         b_full=b.full_code,
+        balance=((a.zero_code << WEIGHT_SHIFT) - b.zero_code * signals.weight_b) % 2**32,
         reverse=c.reverse_codes << WEIGHT_SHIFT,
         command_zero=command.zero_code,
         command_low=command.valid_codes[0],
@@ -67,8 +70,8 @@ def block_of(compensator: Compensator, digest: str, *, serial: str = "", record:
         b_low=b.valid_codes[0],
         b_high=b.valid_codes[1],
         weight_b=signals.weight_b,
-        step_shift=_shift(c.beta_step_codes),
-        transition_shift=_shift(c.transition_codes or 1),
+        beta_step=c.beta_step_codes,
+        transition_codes=c.transition_codes or 1,
         zero_band=c.zero_band_codes,
         compare_limit=functions.compare_limit,
         leave_zero=functions.leave_zero_codes,
@@ -103,59 +106,60 @@ def shape_of(compensator: Compensator) -> int:
 
 def _side(c: Compensator, sign: int) -> SideBlock:
     """Return the law of one sign of command."""
-    form, side, functions = _with_divisor(integer_form(c, sign)), c.side(sign), c.drive_functions
-    beta_shift = _shift(c.beta_denominator) + _shift(c.beta_step_codes) - BETA_BITS
-    if c.beta_denominator > 1 << BETA_BITS or beta_shift < 0:
-        raise InputError(
-            f"beta stands in 1/{c.beta_denominator} at nodes {c.beta_step_codes} codes apart; a calibration block "
-            f"holds 1/{1 << BETA_BITS} at the finest; {ALTERNATIVE}"
-        )
+    form, side, functions, command = integer_form(c, sign), c.side(sign), c.drive_functions, c.signals.command
     place = 0 if sign > 0 else 1
-    codes = int(c.signals.dp_code(side.certificate.dp_MPa[1]) // 1)
-    steps = (functions.ramp_up[place], functions.ramp_down[place])
+    codes = floor(c.signals.dp_code(side.certificate.dp_MPa[1]))
+    unit = form.scale_beta * c.beta_denominator
+    factor, shift = beta_factor(unit * c.beta_step_codes, max(form.table) * c.beta_step_codes)
     return SideBlock(
-        scale=form.scale_beta,
         offset=form.offset,
+        slope=form.slope % 2**32,
         transition=form.transition,
-        tested_to=((codes + 1) << WEIGHT_SHIFT) - 1,
-        quotient_limit=form.largest,
-        reciprocal=form.reciprocal,
-        slope=form.slope % 2**64,
         linear=form.linear << form.linear_shift,
-        half=form.half,
-        ramp_up=steps[0] or NO_RAMP,
-        ramp_down=steps[1] or NO_RAMP,
-        span=c.signals.command.span(sign),
-        nodes=len(side.law_beta) + 1,
-        high_shift=form.shift - WORD_BITS,
-        reciprocal_shift=form.reciprocal_shift - WORD_BITS,
-        beta_shift=beta_shift,
-        law=_nodes((min(side.law_beta), *side.law_beta), NODES, f"beta of {SIDE_NAMES[sign]} commands"),
-        zero=_nodes((min(side.beta), *side.beta), NODES, f"beta of {SIDE_NAMES[sign]} commands"),
+        **_division(form, functions.compare_limit),
+        tested_to=((codes + 1) << WEIGHT_SHIFT) - 1,
+        beta_unit=unit,
+        beta_factor=factor,
+        ramp_up=functions.ramp_up[place] or NO_RAMP,
+        ramp_down=functions.ramp_down[place] or NO_RAMP,
+        nodes=_beta_nodes(form, SIDE_NAMES[sign]),
+        node_count=len(side.beta),
+        beta_shift=shift,
+        span=command.span(sign),
+        room=command.span(sign) - c.zero_band_codes,
+        band_end=command.zero_code + command.direction(sign) * c.zero_band_codes,
         play=_nodes(functions.play_counts[place], PLAY_NODES, "the width of the inverse play"),
     )
 
 
-def _with_divisor(form: IntegerForm) -> IntegerForm:
-    """Return the same law with a reciprocal of 32 bits below the binary point.
+def _beta_nodes(form: IntegerForm, side: str) -> tuple[int, ...]:
+    """Return the nodes as pairs, that of the law and that at zero command, and at the end twice the smallest."""
+    law, zero = form.table, form.zero_table or form.table
+    room = NODES - FALLBACKS
+    if len(law) > NODES:
+        raise InputError(
+            f"beta of {side} commands has {len(law) - FALLBACKS} nodes, of which a calibration block holds {room} at "
+            f"most; {ALTERNATIVE}, or design it for a converter of fewer codes"
+        )
+    pairs = [*zip(law[:-FALLBACKS], zero[:-FALLBACKS], strict=True)]
+    pairs += [(0, 0)] * (room - len(pairs)) + [(law[-1], zero[-1])] * FALLBACKS
+    return tuple(number for pair in pairs for number in pair)
 
-    A division by 1 has none, so there the quotient gets one binary place more, which the product takes off again.
-    """
-    if form.divisor > 1:
-        return form
-    twice = 1 if form.shift > WORD_BITS else 2
-    return replace(
-        form,
-        slope=form.slope * twice,
-        offset=form.offset * twice,
-        transition=form.transition * twice,
-        linear=form.linear * twice,
-        half=form.half * twice,
-        shift=form.shift if twice > 1 else form.shift - 1,
-        largest=2 * form.largest + 1,
-        reciprocal=1 << (WORD_BITS - 1),
-        reciprocal_shift=WORD_BITS,
-    )
+
+def _division(form: IntegerForm, compare_limit: int) -> dict[str, int]:
+    """Return what brings the sum's upper 32 bits to counts: half a count, the largest quotient, and the reciprocal."""
+    divisor = form.divisor << (form.shift - WORD_BITS)
+    if divisor == 1:  # 2^32 is no reciprocal of 32 bits: a count more, times 2^32 - 1, is a count less
+        return {"half": form.half + (1 << WORD_BITS), "quotient_limit": compare_limit + 1,
+                "reciprocal": (1 << WORD_BITS) - 1, "reciprocal_shift": 0}  # fmt: skip
+    # The sum stays below 2^63, so no quotient is larger, whatever the limit.
+    largest = min((compare_limit + 1) * divisor - 1, INT32_MAX)
+    shifts = range(WORD_BITS, 2 * WORD_BITS)
+    reciprocal, shift = next(exact_factors(Fraction(1, divisor), largest, shifts), (0, WORD_BITS))
+    if not reciprocal:
+        raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}; {ALTERNATIVE}")
+    return {"half": form.half, "quotient_limit": largest, "reciprocal": reciprocal,
+            "reciprocal_shift": shift - WORD_BITS}  # fmt: skip
 
 
 def _current(loop: CurrentLoop) -> CurrentBlock:

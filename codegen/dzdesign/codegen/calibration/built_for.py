@@ -17,6 +17,8 @@ class BuiltFor:
     compare_max: int
     sample_Hz: int
     tick_Hz: int
+    #: Codes between two nodes of beta, a power of two.
+    beta_step: int
     #: Codes of the current in a sum; 0 without current control.
     samples: int
 
@@ -34,5 +36,6 @@ def built_for(compensator: Compensator) -> BuiltFor:
         compare_max=signals.compare_max,
         sample_Hz=signals.sample_Hz,
         tick_Hz=signals.tick_Hz,
+        beta_step=compensator.beta_step_codes,
         samples=drive.loop.samples if drive else 0,
     )

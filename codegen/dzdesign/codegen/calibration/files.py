@@ -21,9 +21,12 @@ from dzdesign.codegen.calibration.layout import (
     entries,
 )
 from dzdesign.codegen.core.constants import Define, c_comment, defines
+from dzdesign.codegen.core.drive_constants import status_constants
 from dzdesign.codegen.core.files import CoreFile, Values
 from dzdesign.codegen.core.misra import misra_lines
+from dzdesign.codegen.core.signal_constants import difference_place
 from dzdesign.core.strict_templates import strict_templates
+from dzdesign.design.signals import WEIGHT_SHIFT
 
 HERE = "codegen/dzdesign/codegen/calibration/files.py"
 LAYOUT_FILE = "codegen/dzdesign/codegen/calibration/layout.py"
@@ -52,6 +55,46 @@ def calibration_header(built: BuiltFor) -> CoreFile:
     return CoreFile(template="dz_calibration.h.jinja", values=values, constants=tuple(constants))
 
 
+def block_law_files(built: BuiltFor) -> dict[str, CoreFile]:
+    """Return dz_comp.c and dz_comp.h."""
+    bits, numbers = status_constants(), _law_numbers(built)
+    header: Values = {
+        "misra_lines": misra_lines("dz_comp.h"),
+        "status_defines": defines(bits),
+        "bipolar": built.has("BIPOLAR"),
+        "swapped": built.has("SWAPPED"),
+    }
+    source: Values = {"misra_lines": misra_lines(), "law_defines": defines(numbers), "sides": _sides(built)}
+    return {
+        "dz_comp.c": CoreFile(template="dz_comp_block.c.jinja", values=source, constants=tuple(numbers)),
+        "dz_comp.h": CoreFile(template="dz_comp_block.h.jinja", values=header, constants=tuple(bits)),
+    }
+
+
+def _sides(built: BuiltFor) -> list[Values]:
+    """Return the C that depends on the sign of command: ending of the names, and which way the signals count."""
+    rises, falls = "u - side->band_end", "side->band_end - u"
+    forward, back = (falls, rises) if built.has("FALLING") else (rises, falls)
+    swapped = "0u - " if built.has("SWAPPED") else ""
+    positive = {"s": "", "text": "positive", "from_band": forward, "turn": "", "pad": ""}
+    negative = {"s": "_negative", "text": "negative", "from_band": back, "turn": swapped, "pad": " " * 9}
+    return [positive, negative] if built.has("BIPOLAR") else [positive]
+
+
+def _law_numbers(built: BuiltFor) -> list[Define]:
+    return [
+        Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1, equation="the power of two in "
+               "DZ_BETA_STEP", engineering=f"1/{built.beta_step}", generator=HERE),
+        Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of sensor A",
+               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down", generator=HERE),
+        Define(symbol="LARGEST_SHIFT", value=31, equation="largest shift of a word of 32 bits", engineering="all ones",
+               generator=HERE),
+        Define(symbol="LARGEST_WIDE_SHIFT", value=63, equation="largest shift of 64 bits", engineering="all ones",
+               generator=HERE),
+        difference_place(),
+    ]  # fmt: skip
+
+
 def texts(files: dict[str, CoreFile], banner: Sequence[str] = ()) -> dict[str, str]:
     """Return the text of each file, by name, without a firmware around it."""
     templates = strict_templates("dzdesign.codegen.calibration", autoescape=False)
@@ -75,6 +118,8 @@ def _declarations(kind: type) -> Iterator[str]:
 
 
 def _declared(name: str, entry: Words) -> str:
+    if entry.pairs:
+        return f"struct dz_calibration_node {name}[{entry.count // 2}]"
     count = entry.count * max(entry.bits // 32, 1)
     return f"{'uint16_t' if entry.bits == 16 else 'uint32_t'} {name}{f'[{count}]' if count > 1 else ''}"
 
@@ -98,6 +143,7 @@ def _interface(built: BuiltFor) -> list[Define]:
         define("DZ_ADC_CODE_MAX", built.code_max, "largest code of the converter", "the top of its range"),
         define("DZ_SAMPLE_HZ", built.sample_Hz, "samples a second", "of the firmware's timer"),
         define("DZ_TICK_HZ", built.tick_Hz, "PWM periods a second", "of the firmware's timer"),
+        define("DZ_BETA_STEP", built.beta_step, "codes of pressure drop between two nodes of beta", "a power of two"),
         define("DZ_CURRENT_SAMPLES", built.samples, "codes of the current in a sum", "0 without current control"),
         define("DZ_CALIBRATION_SHAPE", built.shape, "what this firmware is compiled for", shape),
         define("DZ_CALIBRATION_MAGIC", magic, "first 32 bits of a block", f"octets {MAGIC.decode()}", "uint32"),

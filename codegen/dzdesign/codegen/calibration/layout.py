@@ -11,8 +11,9 @@ from typing import Annotated, NamedTuple, get_type_hints
 
 #: Octets of `magic` in a file, and the version of this layout.
 MAGIC, LAYOUT = b"DZC1", 1
-#: Nodes of beta that a side has room for: the fallback, then one a segment's end; the core masks a node's number.
-NODES, NODE_MASK = 130, 127
+#: Nodes of beta that a side has room for, the two of the fallback behind those of the table; the core masks a node's
+#: number, and pressures that can't be right give the mask itself.
+NODES, NODE_MASK = 129, 127
 #: Nodes of the play's width, and of the supply's correction.
 PLAY_NODES, PLAY_MASK = 17, 15
 SUPPLY_NODES, SUPPLY_MASK = 66, 63
@@ -39,6 +40,8 @@ class Words:
     count: int = 1
     text: str
     unit: str = ""
+    #: True of numbers that stand in pairs: in C an array of `struct dz_calibration_node`.
+    pairs: bool = False
     #: Key of compensator.json; empty for what no single key holds.
     key: str = ""
 
@@ -56,24 +59,25 @@ def _one(text: str, unit: str = "", key: str = "", bits: int = 16) -> Words:
 class SideBlock:
     """The law of one sign of command, and what of the drive functions differs between the signs."""
 
-    scale: Annotated[int, _one("factor from interpolated nodes to the law's unit of beta", bits=32)]
     offset: Annotated[int, _one("coefficient of beta in the sum", key="sides.*.u_min0_over_u_max", bits=32)]
+    slope: Annotated[int, _one("coefficient of beta times command in the sum, two's complement", bits=32)]
     transition: Annotated[
         int, _one("coefficient of (beta - beta at zero command) for each code missing to the transition's end", bits=32)
     ]
-    tested_to: Annotated[
-        int, _one("largest tested pressure drop", "1/4096 code of A", "sides.*.certificate.dp_MPa", bits=32)
+    linear: Annotated[
+        int, _one("coefficient of the command alone in the sum", key="sides.*.drive_range_over_u_max", bits=64)
     ]
+    half: Annotated[int, _one("half a count in the sum: rounds to nearest", bits=64)]
     quotient_limit: Annotated[
         int, _one("largest quotient: the one whose compare value is the limit", key="drive_functions.compare_limit",
                   bits=32)
     ]
     reciprocal: Annotated[int, _one("factor from the quotient to counts, over 2^(32 + reciprocal_shift)", bits=32)]
-    slope: Annotated[int, _one("coefficient of beta times command in the sum, two's complement", bits=64)]
-    linear: Annotated[
-        int, _one("coefficient of the command alone in the sum", key="sides.*.drive_range_over_u_max", bits=64)
+    tested_to: Annotated[
+        int, _one("largest tested pressure drop", "1/4096 code of A", "sides.*.certificate.dp_MPa", bits=32)
     ]
-    half: Annotated[int, _one("half a count in the sum: rounds to nearest", bits=64)]
+    beta_unit: Annotated[int, _one("what stands for beta = 1 in a node, for display", key="beta_denominator", bits=32)]
+    beta_factor: Annotated[int, _one("factor from interpolated nodes to beta times 2^15, over 2^beta_shift", bits=32)]
     ramp_up: Annotated[
         int, _one("largest change of the command a sample, away from zero", "1/65536 code", "drive_functions.ramp_up",
                   32)
@@ -81,27 +85,24 @@ class SideBlock:
     ramp_down: Annotated[
         int, _one("the same, back to zero", "1/65536 code", "drive_functions.ramp_down", 32)
     ]
-    span: Annotated[int, _one("codes from zero to full command", "codes", "signals.command")]
-    nodes: Annotated[int, _one("nodes in use, the fallback included")]
-    high_shift: Annotated[int, _one("from the sum's upper 32 bits to the quotient: a shift to the right")]
+    nodes: Annotated[
+        tuple[int, ...],
+        Words(bits=32, count=2 * NODES, pairs=True, text="for each node beta that the law follows, then the "
+              "certified beta at zero command; a node every beta_step codes from no pressure drop on, and the last two "
+              "the smallest of all, used where the pressures can't be right", unit="1/beta_unit", key="sides.*.beta"),
+    ]
+    node_count: Annotated[int, _one("nodes of the table in use")]
     reciprocal_shift: Annotated[int, _one("shift to the right behind the product with reciprocal, beyond 32")]
-    beta_shift: Annotated[int, _one("from interpolated nodes to beta times 2^15: a shift to the right")]
-    law: Annotated[
-        tuple[int, ...],
-        Words(count=NODES, text="beta that the law follows: the smallest node, used where the pressures can't be "
-              "right, then one every 2^step_shift codes of the pressure drop from zero on",
-              unit="2^-(beta_shift + 15 - step_shift)", key="sides.*.transition_beta"),
-    ]
-    zero: Annotated[
-        tuple[int, ...],
-        Words(count=NODES, text="the same of the certified beta, at zero command", key="sides.*.beta",
-              unit="2^-(beta_shift + 15 - step_shift)"),
-    ]
+    beta_shift: Annotated[int, _one("shift to the right behind the product with beta_factor")]
+    span: Annotated[int, _one("codes from zero to full command", "codes", "signals.command")]
+    room: Annotated[int, _one("codes from the zero band's end to full command", "codes", "signals.command")]
+    band_end: Annotated[int, _one("code at the zero band's end", "codes", "zero_band_codes")]
     play: Annotated[
         tuple[int, ...],
         Words(count=PLAY_NODES, text="width of the inverse play every 2^play_step_shift codes of command from zero on",
               unit="counts", key="drive_functions.play_counts"),
-    ]  # fmt: skip
+    ]
+    spare: Annotated[int, _one("0")] = 0  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,6 +199,10 @@ class CalibrationBlock:
     b_span_Pa: Annotated[int, _one("span of sensor B, for display", "Pa", "signals.pressure_b.span_MPa", 32)]
     a_full: Annotated[int, _one("code of sensor A at its span, for display", "codes", "signals.pressure_a.full_code")]
     b_full: Annotated[int, _one("code of sensor B at its span, for display", "codes", "signals.pressure_b.full_code")]
+    balance: Annotated[
+        int, _one("what the difference of the codes is without pressures: a_zero times 4096 less b_zero times "
+                  "weight_b, modulo 2^32", "1/4096 code of A", bits=32)
+    ]
     reverse: Annotated[
         int, _one("a pressure drop less than minus this is a failed sensor", "1/4096 code of A", "reverse_codes", 32)
     ]
@@ -211,10 +216,8 @@ class CalibrationBlock:
     b_low: Annotated[int, _one("least valid code of sensor B", "codes", "signals.pressure_b.valid_codes")]
     b_high: Annotated[int, _one("largest valid code of sensor B", "codes", "signals.pressure_b.valid_codes")]
     weight_b: Annotated[int, _one("weight of a code of sensor B", "1/4096 code of A", "signals.pressure_b.span_MPa")]
-    step_shift: Annotated[int, _one("codes between two nodes of beta, a power of two", key="beta_step_codes")]
-    transition_shift: Annotated[
-        int, _one("codes of command of the transition, a power of two; 0: none", key="transition_codes")
-    ]
+    beta_step: Annotated[int, _one("codes of pressure drop between two nodes of beta", "codes of A", "beta_step_codes")]
+    transition_codes: Annotated[int, _one("codes of command of the transition; 1: none", "codes", "transition_codes")]
     zero_band: Annotated[int, _one("codes of command that count as zero", "codes", "zero_band_codes")]
     compare_limit: Annotated[int, _one("largest compare value", "counts", "drive_functions.compare_limit")]
     leave_zero: Annotated[
