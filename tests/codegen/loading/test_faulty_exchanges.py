@@ -9,8 +9,8 @@ from tests.support.loading.bench import session
 from tests.support.loading.exchanges import KINDS, load
 from tests.support.loading.files import blocks
 
-#: An exchange has some 2000 octets, and erases and writes some 2500 words; the benchmark tries each.
-OCTETS_APART, WORDS_APART = 23, 17
+#: An exchange has some 3000 octets, and erases and writes some 4000 words; the benchmark tries each.
+OCTETS_APART, WORDS_APART = 37, 29
 
 
 def check(bench) -> None:
@@ -43,7 +43,7 @@ def start(bench) -> None:
 def test_the_supply_may_go_at_any_octet(bench):
     old, new = blocks()[1:3]
     start(bench)
-    for octets in range(0, 2100, OCTETS_APART):
+    for octets in range(0, 3 * len(new) // 2, OCTETS_APART):
         bench.drive.power_on(seed=octets)
         bench.drive.set(octets_left=octets)
         ended = load(session(bench.drive), new)

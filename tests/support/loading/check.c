@@ -23,6 +23,6 @@ uint16_t dz_calibration_check(const struct dz_calibration *block)
                             : 0u);
     wrong |= (uint16_t)((block->crc32 != ~crc) ? DZ_CALIBRATION_CRC : 0u);
     wrong |= (uint16_t)((block->shape != DZ_CALIBRATION_SHAPE) ? DZ_CALIBRATION_FIRMWARE : 0u);
-    wrong |= (uint16_t)((block->sides[0].nodes > DZ_CALIBRATION_NODES) ? DZ_CALIBRATION_LAW : 0u);
+    wrong |= (uint16_t)((block->sides[0].span > DZ_ADC_CODE_MAX) ? DZ_CALIBRATION_LAW : 0u);
     return wrong;
 }

@@ -5,12 +5,13 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from dzdesign.codegen.calibration.layout import members
 from dzdesign.codegen.loading.protocol import MOST_PAYLOAD, SYNC, Frame, Request
 from dzdesign.codegen.loading.session import LoadSession, NoReplyError, RefusedError
 from tests.support.loading.bench import Drive, Faults, VirtualLine
 
 #: Octets before `compensator_sha256` in a block.
-SHA_AT = 20
+SHA_AT = 2 * next(member.at for member in members() if member.path == "compensator_sha256")
 
 
 def crc_of_block(block: bytes) -> int:

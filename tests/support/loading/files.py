@@ -50,7 +50,7 @@ def blocks() -> tuple[bytes, ...]:
 def refused_blocks() -> tuple[bytes, ...]:
     """Return blocks whose CRC is right and that dz_calibration_check() refuses."""
     sound = block_of(compensator(), "5a" * 32, serial="refused")
-    sides = (replace(sound.sides[0], nodes=0xFFFF), sound.sides[1])
+    sides = (replace(sound.sides[0], span=0xFFFF), sound.sides[1])
     return (pack(replace(sound, sides=sides)), pack(replace(sound, shape=sound.shape ^ 1)))
 
 

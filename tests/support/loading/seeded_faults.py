@@ -77,7 +77,7 @@ def is_found(fault: Fault, folder: Path, exchanges: int = 25) -> bool:
 
 
 def violations(bench: Bench, exchanges: int, seed: int = 3) -> int:
-    """Return how often the drive did what it must not, in so many exchanges of each kind and in what is tried beside."""
+    """Return how often the drive did what it must not, in so many exchanges of each kind, and beside."""
     rng = random.Random(seed)
     for _ in range(exchanges):
         for kind in KINDS:
