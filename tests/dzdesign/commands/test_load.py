@@ -1,18 +1,23 @@
 """`dzdesign load` over a pseudo-terminal, against the firmware's own code in a program whose supply can go."""
 
+import contextlib
 import json
 import os
 import subprocess
+import threading
+import tty
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 from intelhex import IntelHex
 
+from dzdesign.codegen.calibration.packing import unpack
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
 from dzdesign.serial_port import PortLine, open_port
 from tests.support.loading.bench import SLOTS, build_drive
+from tests.support.loading.device import Device, build_device, firmware_files
 from tests.support.loading.files import COMPILER, blocks, drive_files, refused_blocks
 
 pytestmark = [
@@ -172,3 +177,34 @@ def test_a_port_that_breaks_is_a_sentence(drive):
         os.dup2(os.open(os.devnull, os.O_RDWR), drive.master)  # the other end is gone
         with pytest.raises(RequirementError, match="the port broke"):
             line.read(0.1)
+
+
+@pytest.mark.slow
+def test_the_whole_firmware_takes_a_block_from_the_command(tmp_path_factory, tmp_path, capsys):
+    """Interrupt, main loop, telemetry and all, on the model of the device; its time goes by about as fast as ours."""
+    device = Device(build_device(firmware_files(), tmp_path_factory.mktemp("device")), OLD)
+    device.tell(f"command {unpack(OLD).command_zero}")
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    over = threading.Event()
+
+    def go_on() -> None:
+        while not over.wait(0.003):
+            with contextlib.suppress(BlockingIOError):
+                device.tell(f"send {os.read(master, 4096).hex()}")
+            device.run(10)
+            os.write(master, device.take())
+
+    running = threading.Thread(target=go_on)
+    running.start()
+    try:
+        status, held, _ = load(capsys, block_file(tmp_path, name="valve.hex"), "--port", os.ttyname(slave))
+        assert status == 0 and held["serial"] == "SN-1" and held["crc32"] == crc_of(NEW)
+        assert not held["kept_without_supply"] and held["last_load"] is None
+    finally:
+        over.set()
+        running.join(20)
+        device.end()
+        os.close(master)
+        os.close(slave)

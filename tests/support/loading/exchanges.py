@@ -95,6 +95,20 @@ class Bench:
             self.wrongly_done += 1
 
 
+class DyingLine(VirtualLine):
+    """A line whose sender dies after so many octets."""
+
+    def __init__(self, drive: Drive, left: int) -> None:
+        super().__init__(drive)
+        self.left = left
+
+    def write(self, octets: bytes) -> None:
+        super().write(octets[: self.left])
+        self.left -= len(octets)
+        if self.left <= 0:
+            raise BrokenPipeError
+
+
 def _session(bench: Bench, rng: random.Random, there: Faults | None = None, back: Faults | None = None) -> LoadSession:
     return LoadSession(VirtualLine(bench.drive, there, back), rng.randrange(256))
 
@@ -144,17 +158,8 @@ def supply_lost_in_a_second_load(bench: Bench, rng: random.Random, new: bytes) -
 def sender_lost(bench: Bench, rng: random.Random, new: bytes) -> str:
     """The PC's program dies; what it sent last may be cut."""
 
-    class DyingLine(VirtualLine):
-        left = rng.randrange(2 * len(new))
-
-        def write(self, octets: bytes) -> None:
-            super().write(octets[: self.left])
-            self.left -= len(octets)
-            if self.left <= 0:
-                raise BrokenPipeError
-
     try:
-        return load(LoadSession(DyingLine(bench.drive), rng.randrange(256)), new)
+        return load(LoadSession(DyingLine(bench.drive, rng.randrange(2 * len(new))), rng.randrange(256)), new)
     except BrokenPipeError:
         VirtualLine(bench.drive).read(1.0)
         return "sender lost"
