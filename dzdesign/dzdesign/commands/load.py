@@ -154,7 +154,7 @@ def _advice(error: Any) -> str:
     from dzdesign.codegen.loading.protocol import Reason
 
     if error.reason == Reason.DRIVING:
-        return "; a block is loaded at rest only: bring the command to zero, or hold the trip input low, and load again"
+        return "; a block is loaded at rest only: wait until the ramp has run out, or hold the trip input low"
     if error.reason == Reason.COMMAND:
         return "; bring it to zero, as this block and the drive's count zero, and load again"
     if error.reason == Reason.CHECK:

@@ -127,7 +127,7 @@ def test_a_drive_whose_supply_goes_keeps_a_whole_block(drive, tmp_path, capsys, 
     assert load(capsys, block_file(tmp_path), "--port", drive.port)[1]["crc32"] == crc_of(NEW)
 
 
-@pytest.mark.parametrize(("words", "said"), [(("driving", 1), "in use"), (("command", 1), "not zero")])
+@pytest.mark.parametrize(("words", "said"), [(("driving", 1), "still drives"), (("command", 1), "not zero")])
 def test_a_drive_that_is_not_at_rest_refuses(drive, tmp_path, capsys, words, said):
     drive.start(*words)
     status, _, error = load(capsys, block_file(tmp_path), "--port", drive.port)

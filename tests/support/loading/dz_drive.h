@@ -9,6 +9,7 @@ struct dz_drive
     uint16_t status;
     uint16_t law;
     int16_t side;
+    int32_t ramped;
 };
 void dz_drive_init(const struct dz_calibration *block, struct dz_drive *drive);
 void dz_drive_sample(const struct dz_calibration *block, struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,

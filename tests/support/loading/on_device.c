@@ -24,6 +24,8 @@
 #define TURNS 8u
 #define OCTETS_A_PERIOD 5u
 #define QUEUE 65536u
+#define UNIT 65536 /* of the ramp, in a code */
+#define STEP 20    /* codes a sample */
 
 struct dz_calibration dz_block;
 
@@ -35,7 +37,7 @@ static void leave(void) { longjmp(out_of_main, 1); }
 
 static void count_service(void) { services++; }
 
-/* The drive follows its block's serial number, and is never asked while no block may be read. */
+/* The drive follows its block's serial number, its ramp can be seen but does nothing, and is never asked while no block may be read. */
 static uint16_t read(const struct dz_calibration *block)
 {
     wrong_reads += ((block == NULL) || (dz_hold_wanted != 0u)) ? 1u : 0u;
@@ -52,11 +54,13 @@ void dz_drive_sample(const struct dz_calibration *block, struct dz_drive *drive,
                      uint16_t p_b_adc)
 {
     const int32_t asked = (int32_t)u_adc - (int32_t)block->command_zero;
+    const int32_t to_go = asked - drive->ramped / UNIT;
 
     (void)p_a_adc;
     (void)p_b_adc;
     drive->law = (uint16_t)((labs((long)asked) > block->interlock) ? read(block) : 0u);
     drive->side = (int16_t)((asked < 0) ? -1 : 1);
+    drive->ramped += UNIT * ((to_go > STEP) ? STEP : (to_go < -STEP) ? -STEP : to_go);
 }
 
 void dz_drive_tick(const struct dz_calibration *block, struct dz_drive *drive)

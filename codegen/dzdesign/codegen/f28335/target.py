@@ -19,7 +19,9 @@ from dzdesign.codegen.c2000 import (
     within,
 )
 from dzdesign.codegen.calibration.layout import NO_INTERLOCK
+from dzdesign.codegen.loading.protocol import LOAD_S
 from dzdesign.codegen.telemetry.frame import BITS_PER_OCTET, CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.target_inputs import Converter
 
 CRYSTAL_HZ = 30_000_000
@@ -139,6 +141,8 @@ def serial_line() -> dict[str, str]:
         "fifo_octets": str(FIFO_OCTETS),
         "fifo_ms": printed(FIFO_OCTETS * BITS_PER_OCTET / baud * 1000),
         "no_interlock": str(NO_INTERLOCK),
+        "load_s": f"{LOAD_S:g}",
+        "ramp_shift": str(RAMP_UNIT.bit_length() - 1),
         "frame_hz": str(frame_hz),
         "frame_ms": printed(FRAME_BITS / baud * 1000),
         "frame_crc_octets": str(FRAME_OCTETS - 2 - CRC_OCTETS),
