@@ -60,7 +60,8 @@ def run(arguments: Arguments, json: bool) -> int:
     check_file_may_be_written(output)
     if output.exists() and output.stat().st_size:
         raise InputError(f"'{output}' exists, and a recording is not to be had again; choose another name with -o")
-    scalings = scalings_of(Path(arguments.firmware), None if arguments.compensator is None else Path(arguments.compensator))
+    given = arguments.compensator
+    scalings = scalings_of(Path(arguments.firmware), None if given is None else Path(given))
     baud = read["baud"] or scalings.link.baud
     recording, reader = Recording(scalings), FrameReader()
     with open_port(arguments.port, baud, LOOK_S) as port, _until_interrupted() as stop:
