@@ -18,6 +18,7 @@ from dzdesign.codegen.c2000 import (
     pwm_timing,
     within,
 )
+from dzdesign.codegen.target import FlashSector
 from dzdesign.codegen.telemetry.frame import CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
 from dzdesign.design.target_inputs import Converter
 
@@ -151,5 +152,6 @@ TARGET = c2000_target(
     {**timing(), **converter(), **serial_line(), **frame_context()},
     converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
     sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
+    sector=FlashSector(region="FLASHB", page=1, file="F28335.cmd"),
     link=LINK,
 )

@@ -62,6 +62,7 @@ STATUS_BITS = {
     0x0008: "crystal or PLL not as expected",
     0x0010: "current not converted in time",
     0x0020: "current sensor, open load, short or over-current",
+    0x0040: "calibration block not valid",
     0x0100: "command outside its valid range",
     0x0200: "pressure A outside its valid range",
     0x0400: "pressure B outside its valid range",
