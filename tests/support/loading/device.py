@@ -4,13 +4,14 @@ import subprocess
 from pathlib import Path
 
 from dzdesign.codegen.banner import Banner
+from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
 from tests.support.f28335_device import HERE as DEVICE
 from tests.support.loading.bench import HERE
-from tests.support.loading.files import COMPILER, compensator, drive_files
+from tests.support.loading.files import COMPILER, DIGEST, compensator, drive_files
 
 PERIOD_S = 1 / TARGET.tick_Hz
 SOURCES = ("dz_hardware.c", "dz_isr.c", "dz_telemetry.c", "dz_frame.c", "dz_active.c", "dz_calibration.c", "dz_store.c")
@@ -19,7 +20,7 @@ LOADING = ("dz_load.c", "dz_load_requests.c", "dz_load_reply.c", "dz_load_frame.
 
 def firmware_files(*, real_core: bool = False) -> dict[str, str]:
     """Return the target's files in block form, by name, with stand-ins of law and drive or with the generated ones."""
-    rendered = target_files(compensator(), TARGET, Banner(digest="1234567890abcdef"), block=True)
+    rendered = target_files(compensator(), TARGET, Banner(digest=DIGEST), block_of(compensator(), DIGEST))
     files = {path.rpartition("/")[2]: text for path, text in rendered.items()} | drive_files()
     if real_core:
         files |= texts(block_core_files(built_for(compensator())))

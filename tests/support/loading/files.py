@@ -18,6 +18,7 @@ from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.loading.bench import Drive, build_drive
 from tests.support.loading.exchanges import Bench
 
+DIGEST = "1234567890abcdef" * 4
 BLOCK_OCTETS = 2 * LENGTH_WORDS
 COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), "")
 _OURS = ("dz_load", "dz_slots", "dz_store", "dz_frame")
@@ -32,7 +33,7 @@ def compensator() -> Compensator:
 @cache
 def drive_files() -> dict[str, str]:
     """Return the generated files of the loading, and of what it calls, by name."""
-    target = target_files(compensator(), TARGET, Banner(digest="1234567890abcdef"), block=True)
+    target = target_files(compensator(), TARGET, Banner(digest=DIGEST), block_of(compensator(), DIGEST))
     files = {path.rpartition("/")[2]: text for path, text in target.items()}
     files = {name: text for name, text in files.items() if name.startswith(_OURS)}
     core = texts(block_core_files(built_for(compensator())))
