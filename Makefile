@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-c2000ware bench-identify bench-isr bench-paper bench-verify
+.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-c2000ware bench-identify bench-isr bench-loading bench-paper bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -52,6 +52,10 @@ bench-c2000ware: $(STAMP)
 # Minutes, most of them for mutants; `make bench-verify BENCH=--quick` tries a part of those.
 bench-verify: $(STAMP)
 	$(BIN)/python benchmarks/verify/run.py $(BENCH)
+
+# Loading calibration blocks, 10 000 faulty exchanges: some minutes.
+bench-loading: $(STAMP)
+	$(BIN)/python benchmarks/loading/run.py $(BENCH)
 
 # 1000 valves: a quarter of an hour of two cores; `make bench-batch BENCH=--quick` tries 60.
 bench-batch: $(STAMP)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from fractions import Fraction
 
-from dzdesign.codegen.target import Target
+from dzdesign.codegen.target import FlashSector, Target
 from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError
 from dzdesign.design.current.circuit import CurrentSampling
@@ -38,9 +38,14 @@ def c2000_target(
     *,
     converter: Converter,
     sources: tuple[str, ...] = (),
+    block_sources: tuple[str, ...] = (),
+    sector: FlashSector,
     link: Link | None = None,
 ) -> Target:
-    """Return the target whose figures, printed, are `context`; `sources` is the C that only it has."""
+    """Return the target whose figures, printed, are `context`.
+
+    `sources` is the C that only it has, `block_sources` what it has besides in block form.
+    """
     return Target(
         name=name,
         description=description,
@@ -50,8 +55,10 @@ def c2000_target(
         tick_Hz=PWM_HZ,
         current_sampling=CURRENT,
         templates={f"{name}/{file}": f"{file}.jinja" for file in (*SOURCES, *sources, *PROJECT_FILES)},
+        block_templates={f"{name}/{file}": f"{file}.jinja" for file in block_sources},
         board=frozenset({f"{name}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
         context={**context, **TOOLS},
+        sector=sector,
         link=link,
     )
 

@@ -19,7 +19,19 @@ ARITHMETICS = ("wide", "narrow")
 RENDERER_NAMES = frozenset(
     {"banner", "project", "signals", "u_max_V", "drive", "limited", "at_zero", "bipolar", "wiring", "lot_setting"}
     | {"core_sources", "core_headers", "firmware_origin", "current", "current_faults"}
+    | {"link_sources", "link_headers"}
+    | {"block", "block_files", "block_sources", "block_headers", "block_lines", "command_zero", "offset_ticks"}
+    | {"sector", "region", "region_page", "region_file"}
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlashSector:
+    """A memory range of a vendor's linker file, its page, and that file."""
+
+    region: str
+    page: int
+    file: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +55,8 @@ class Target:
     tick_Hz: int = 2500
     #: Output path in the firmware folder to the template, in the target's ``templates/`` or in those that all share.
     templates: Mapping[str, str]
+    #: The same for files that only a firmware of block form has.
+    block_templates: Mapping[str, str] = field(default_factory=dict)
     #: Every value that a template prints, already a string.
     context: Mapping[str, str]
     #: One of `ARITHMETICS`.
@@ -56,6 +70,8 @@ class Target:
     current_sampling: CurrentSampling | None = None
     #: Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     board: frozenset[str] = frozenset()
+    #: Where a calibration block has a flash sector of its own: the memory range of the vendor's linker file.
+    sector: FlashSector | None = None
     #: The serial line of its telemetry, if it sends any.
     link: Link | None = None
 
@@ -67,7 +83,7 @@ class Target:
         for label, number in (("compare_max", self.compare_max), ("converter.code_max", self.converter.code_max)):
             if not 0 < number <= 0xFFFF:
                 raise DzdesignError(f"target {self.name}: {label} must fit 16 bits unsigned, got {number}")
-        for path in self.templates:
+        for path in (*self.templates, *self.block_templates):
             parts = PurePosixPath(path)
             if parts.is_absolute() or ".." in parts.parts or "\\" in path:
                 raise DzdesignError(
@@ -83,6 +99,7 @@ class Target:
         if taken := sorted(RENDERER_NAMES & self.context.keys()):
             raise DzdesignError(f"target {self.name}: context names {taken} belong to the renderer")
         object.__setattr__(self, "templates", MappingProxyType(dict(self.templates)))
+        object.__setattr__(self, "block_templates", MappingProxyType(dict(self.block_templates)))
         object.__setattr__(self, "context", MappingProxyType(dict(self.context)))
 
     @property

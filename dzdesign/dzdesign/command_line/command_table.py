@@ -38,6 +38,7 @@ COMMANDS = {
     "demo": Command(SETUP, "run the whole pipeline on the bundled example"),
     "simulate": Command(SETUP, "ramp tests of a simulated valve, marked as such"),
     "monitor": Command(SETUP, "telemetry of a running firmware in, a ramp file out"),
+    "load": Command(SETUP, "a calibration block into a drive, over its serial line"),
     "doctor": Command(SETUP, "show which compilers, simulators and packages are there, and how to get the rest"),
     "schema": Command(SETUP, "the JSON Schema of an artefact: its keys, what they mean, their units"),
     "completion": Command(SETUP, "print the script by which a shell completes commands, options and targets"),

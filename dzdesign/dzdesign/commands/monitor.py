@@ -3,7 +3,6 @@
 import contextlib
 import os
 import signal
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.option_readers import number
 from dzdesign.core.options import AnyPath, Option, Text, read_options
+from dzdesign.serial_port import open_port
 from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say
 
@@ -43,6 +43,8 @@ class Arguments:
     """File to write."""
     firmware: Annotated[AnyPath, Option("DIR")] = "firmware"
     """Folder made by `dzdesign codegen`, with the scalings."""
+    compensator: Annotated[AnyPath | None, Option("FILE")] = None
+    """compensator.json of the calibration block that was loaded since (default: the firmware's own)."""
     baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=POSITIVE))] = None
     """Bits per second (default: what the firmware sends)."""
     seconds: Annotated[Text, Option("S", read=number("a positive number such as 60", between=POSITIVE))] = None
@@ -58,10 +60,11 @@ def run(arguments: Arguments, json: bool) -> int:
     check_file_may_be_written(output)
     if output.exists() and output.stat().st_size:
         raise InputError(f"'{output}' exists, and a recording is not to be had again; choose another name with -o")
-    scalings = scalings_of(Path(arguments.firmware))
+    given = arguments.compensator
+    scalings = scalings_of(Path(arguments.firmware), None if given is None else Path(given))
     baud = read["baud"] or scalings.link.baud
     recording, reader = Recording(scalings), FrameReader()
-    with _open_port(arguments.port, baud) as port, _until_interrupted() as stop:
+    with open_port(arguments.port, baud, LOOK_S) as port, _until_interrupted() as stop:
         say(f"listening to {arguments.port} at {baud:g} bit/s; Ctrl-C ends the recording")
         broken = _record(port, recording, reader, stop, read["seconds"])
     if not recording:
@@ -85,21 +88,6 @@ def _until_interrupted() -> Iterator[threading.Event]:
         yield stop
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _open_port(name: str, baud: float) -> "serial.Serial":
-    """Open a serial port for this program alone, or say in one sentence why not."""
-    import serial
-    from serial.tools import list_ports
-
-    try:
-        alone = {"exclusive": True} if sys.platform != "win32" else {}  # Windows knows nothing else
-        return serial.Serial(name, int(baud), timeout=LOOK_S, **alone)
-    except (OSError, ValueError) as error:
-        known = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
-        raise InputError(
-            f"the port '{name}' can't be opened at {baud:g} bit/s ({error}); ports of this machine: {known}"
-        ) from error
 
 
 def _record(
@@ -133,7 +121,9 @@ def _other_firmware(origin: int, recording: "Recording") -> str:
     text = f"the frames are of the compensator whose SHA-256 begins with {origin:04x}, not {own:04x}"
     if recording:
         return text
-    raise InputError(f"{text} as in --firmware; give the folder that the device was built from")
+    raise InputError(
+        f"{text} as given; give the folder that the device was built from, or --compensator of the block loaded since"
+    )
 
 
 def _nothing(port: str, baud: float, reader: "FrameReader") -> InputError:

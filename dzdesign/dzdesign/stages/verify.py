@@ -136,7 +136,7 @@ def _firmware_folder(firmware: "Firmware | AnyPath") -> Iterator[Path]:
         return
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "firmware"
-        write_folder(folder, firmware.files, firmware.manifest)
+        write_folder(folder, firmware.contents, firmware.manifest)
         yield folder
 
 

@@ -132,6 +132,10 @@ struct SCI_REGS
     uint16_t SCILBAUD;
     REGISTER(SCICTL2_REG, uint16_t TXINTENA : 1; uint16_t RXBKINTENA : 1; uint16_t rsvd1 : 4; uint16_t TXEMPTY : 1;
              uint16_t TXRDY : 1;) SCICTL2;
+    REGISTER(SCIRXST_REG, uint16_t rsvd : 1; uint16_t RXWAKE : 1; uint16_t PE : 1; uint16_t OE : 1; uint16_t FE : 1;
+             uint16_t BRKDT : 1; uint16_t RXRDY : 1; uint16_t RXERROR : 1;) SCIRXST;
+    REGISTER(SCIRXBUF_REG, uint16_t RXDT : 8; uint16_t rsvd : 6; uint16_t SCIFFPE : 1; uint16_t SCIFFFE : 1;)
+    OCTETS_IN[1];
     uint16_t SCITXBUF;
     REGISTER(SCIFFTX_REG, uint16_t TXFFIL : 5; uint16_t TXFFIENA : 1; uint16_t TXFFINTCLR : 1; uint16_t TXFFINT : 1;
              uint16_t TXFFST : 5; uint16_t TXFIFOXRESET : 1; uint16_t SCIFFENA : 1; uint16_t SCIRST : 1;) SCIFFTX;
@@ -221,6 +225,9 @@ extern volatile unsigned int IER, IFR;
 /* Every access goes through the model: a write to SCITXBUF moves an octet, TXFFST counts those that wait. */
 #define SciaRegs (*device_scia())
 volatile struct SCI_REGS *device_scia(void);
+/* A read takes an octet out of the FIFO. */
+#define SCIRXBUF OCTETS_IN[device_octet_in()]
+unsigned device_octet_in(void);
 extern Uint16 RamfuncsLoadStart, RamfuncsLoadEnd, RamfuncsRunStart;
 
 #define EALLOW device_eallow()

@@ -4,7 +4,9 @@
 
 #include "DSP28x_Project.h"
 #include "device.h"
+#ifndef DEVICE_WITHOUT_CORE
 #include "dz_drive.h"
+#endif
 
 #define FIFO_OCTETS 16u
 #define NOT_WRITTEN 0xFFFFu /* in SCITXBUF: no octet since the last look */
@@ -42,6 +44,9 @@ static unsigned soca_count, int_count, sequencer, samples, period_begins;
 static volatile struct SCI_REGS scia;
 static uint8_t fifo[FIFO_OCTETS];
 static unsigned fifo_count, shifted_counts;
+static uint8_t in_fifo[FIFO_OCTETS];
+static unsigned in_count;
+unsigned device_octets_missed;
 
 static struct protected_registers protected_now(void)
 {
@@ -152,9 +157,60 @@ static void take_octet(void)
     scia.SCIFFTX.bit.TXFFST = (uint16_t)(fifo_count & 0x1Fu);
 }
 
+/* A software reset clears the receiver's errors; while its FIFO is held in reset it is empty. */
+static void settle_receiver(void)
+{
+    if (scia.SCICTL1.bit.SWRESET == 0u)
+    {
+        scia.SCIRXST.all = 0u;
+    }
+    if (scia.SCIFFRX.bit.RXFIFORESET == 0u)
+    {
+        in_count = 0u;
+    }
+    scia.SCIFFRX.bit.RXFFST = (uint16_t)(in_count & 0x1Fu);
+    scia.SCICTL2.bit.TXEMPTY = (uint16_t)((fifo_count == 0u) ? 1u : 0u);
+}
+
+void device_receive(uint8_t octet)
+{
+    const int runs = (scia.SCICTL1.bit.SWRESET != 0u) && (scia.SCICTL1.bit.RXENA != 0u) &&
+                     (scia.SCIFFTX.bit.SCIRST != 0u) && (scia.SCIFFTX.bit.SCIFFENA != 0u) &&
+                     (scia.SCIFFRX.bit.RXFIFORESET != 0u) && (GpioCtrlRegs.GPAMUX2.bit.GPIO28 == 1u);
+
+    settle_receiver();
+    if (runs && (scia.SCIRXST.bit.RXERROR == 0u) && (in_count < FIFO_OCTETS))
+    {
+        in_fifo[in_count] = octet;
+        in_count++;
+    }
+    else
+    {
+        device_octets_missed++;
+    }
+}
+
+void device_break(void)
+{
+    scia.SCIRXST.bit.BRKDT = 1u;
+    scia.SCIRXST.bit.RXERROR = 1u;
+}
+
+unsigned device_octet_in(void)
+{
+    scia.OCTETS_IN[0].all = (uint16_t)((in_count > 0u) ? in_fifo[0] : 0xFFu);
+    if (in_count > 0u)
+    {
+        in_count--;
+        memmove(in_fifo, in_fifo + 1, in_count);
+    }
+    return 0u;
+}
+
 volatile struct SCI_REGS *device_scia(void)
 {
     take_octet();
+    settle_receiver();
     return &scia;
 }
 
@@ -261,6 +317,11 @@ void MemCopy(Uint16 *source, Uint16 *source_end, Uint16 *destination)
              : "MemCopy of something else");
 }
 
+int device_side = 1;
+unsigned device_drive_samples, device_drive_ticks;
+int device_command = -1;
+
+#ifndef DEVICE_WITHOUT_CORE
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
     return (uint16_t)(u_adc + 10u * p_a_adc + 100u * p_b_adc);
@@ -279,9 +340,6 @@ uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
     return (uint16_t)(dz_status(u_adc, p_a_adc, p_b_adc) ^ 8u);
 }
-
-int device_side = 1;
-unsigned device_drive_samples, device_drive_ticks;
 
 void dz_drive_init(struct dz_drive *drive)
 {
@@ -303,6 +361,7 @@ void dz_drive_tick(struct dz_drive *drive)
     drive->compare_b = (uint16_t)((drive->side < 0) ? drive->law : 0u);
     device_drive_ticks++;
 }
+#endif
 
 /* Codes of ADCINA0, A1, A2 in the n-th sample: 100 (n modulo 41), 1, 2; A4 is the supply; others give nonsense. */
 static uint16_t code_of(unsigned channel, char event)
@@ -312,6 +371,10 @@ static uint16_t code_of(unsigned channel, char event)
     if (channel == 4u)
     {
         return device_supply_code();
+    }
+    if ((device_command >= 0) && (channel == 0u))
+    {
+        return (uint16_t)device_command;
     }
     if ((command_half != 0u) && (channel <= 2u))
     {

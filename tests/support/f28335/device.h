@@ -33,6 +33,15 @@ extern uint8_t device_line[DEVICE_LINE_OCTETS];
 extern unsigned device_line_count, device_line_lost;
 extern unsigned device_line_blocked; /* 1: the transmitter stands still */
 
+/* SCI-A's other direction: an octet comes, or the line is pulled low for long. Octets that found the FIFO full, or the
+ * receiver not ready, are counted. */
+void device_receive(uint8_t octet);
+void device_break(void);
+extern unsigned device_octets_missed;
+
+/* The code of the command; below zero it is that of the event. */
+extern int device_command;
+
 /* Calls of the stand-in drive since it was at rest. */
 extern int device_side;
 extern unsigned device_drive_samples, device_drive_ticks;

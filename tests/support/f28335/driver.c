@@ -56,7 +56,7 @@ static void show_registers(void)
     SHOW("LOSPCP", SysCtrlRegs.LOSPCP.all);
     SHOW("SCICCR", SciaRegs.SCICCR.all);
     SHOW("SCICTL1", SciaRegs.SCICTL1.all);
-    SHOW("SCICTL2", SciaRegs.SCICTL2.all);
+    SHOW("SCICTL2", SciaRegs.SCICTL2.all & 0x3Fu); /* without what the transmitter says of itself */
     SHOW("SCIHBAUD", SciaRegs.SCIHBAUD);
     SHOW("SCILBAUD", SciaRegs.SCILBAUD);
     SHOW("SCIFFTX", SciaRegs.SCIFFTX.all);

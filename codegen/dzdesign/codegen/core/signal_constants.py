@@ -62,7 +62,7 @@ class SignalConstants:
                 engineering=f"bit {self.word_bits - 1} of {self.word_bits}",
                 generator=HERE,
             ),
-            _difference_place(),
+            difference_place(),
         ]  # fmt: skip
 
     def _signal(
@@ -175,7 +175,7 @@ class SignalConstants:
         ]  # fmt: skip
 
 
-def _difference_place() -> Define:
+def difference_place() -> Define:
     """Return the place of a status bit, by which the one above it is shifted down to be masked with it."""
     place = list(STATUS_BITS).index("DIFFERENCE")
     return Define(

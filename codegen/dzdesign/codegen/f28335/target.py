@@ -18,7 +18,11 @@ from dzdesign.codegen.c2000 import (
     pwm_timing,
     within,
 )
-from dzdesign.codegen.telemetry.frame import CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
+from dzdesign.codegen.calibration.layout import NO_INTERLOCK
+from dzdesign.codegen.loading.protocol import LOAD_S
+from dzdesign.codegen.target import FlashSector
+from dzdesign.codegen.telemetry.frame import BITS_PER_OCTET, CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.target_inputs import Converter
 
 CRYSTAL_HZ = 30_000_000
@@ -31,6 +35,7 @@ ADC_TRIGGER_ADCCLKS, ADC_RESULT_ADCCLKS = Fraction(5, 2), 4
 ADC_SPAN_V = 3
 LOSPCP, LSPCLK_MAX_HZ = 1, 75_000_000
 LINK = Link(tick_Hz=PWM_HZ, frame_ticks=25, baud=115_200)  # section 4.1 of the paper records at 100 Hz
+FIFO_OCTETS = 16
 BAUD_ERROR_MAX = Fraction(2, 100)  # what a receiver bears, with as much again for its own clock
 LINE_LOAD_MAX = Fraction(1, 2)
 # Bound of what the main loop spends on one frame: tests/codegen/telemetry/test_frame.py holds it on an AVR, whose
@@ -134,6 +139,11 @@ def serial_line() -> dict[str, str]:
         "baud_real": str(round(baud)),
         "baud_error": f"{float(100 * error):+.2f}",
         "frame_ticks": str(LINK.frame_ticks),
+        "fifo_octets": str(FIFO_OCTETS),
+        "fifo_ms": printed(FIFO_OCTETS * BITS_PER_OCTET / baud * 1000),
+        "no_interlock": str(NO_INTERLOCK),
+        "load_s": f"{LOAD_S:g}",
+        "ramp_shift": str(RAMP_UNIT.bit_length() - 1),
         "frame_hz": str(frame_hz),
         "frame_ms": printed(FRAME_BITS / baud * 1000),
         "frame_crc_octets": str(FRAME_OCTETS - 2 - CRC_OCTETS),
@@ -151,5 +161,7 @@ TARGET = c2000_target(
     {**timing(), **converter(), **serial_line(), **frame_context()},
     converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
     sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
+    block_sources=("dz_active.c", "dz_active.h"),
+    sector=FlashSector(region="FLASHB", page=1, file="F28335.cmd"),
     link=LINK,
 )

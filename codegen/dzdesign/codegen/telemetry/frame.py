@@ -62,6 +62,7 @@ STATUS_BITS = {
     0x0008: "crystal or PLL not as expected",
     0x0010: "current not converted in time",
     0x0020: "current sensor, open load, short or over-current",
+    0x0040: "no valid calibration block",
     0x0100: "command outside its valid range",
     0x0200: "pressure A outside its valid range",
     0x0400: "pressure B outside its valid range",
@@ -73,6 +74,8 @@ STATUS_BITS = {
 }
 #: The output is in use; without it the trip zone holds the pin low, whatever the compare value.
 STATUS_RELEASED = 0x0080
+#: A firmware of block form has no block that it accepts.
+STATUS_CALIBRATION = 0x0040
 PAYLOAD_OCTETS = sum(number.bits // 8 for number in NUMBERS.values())
 FRAME_OCTETS = HEADER_OCTETS + PAYLOAD_OCTETS + CRC_OCTETS
 FRAME_BITS = FRAME_OCTETS * BITS_PER_OCTET
@@ -170,6 +173,7 @@ def frame_context() -> dict[str, str]:
         "crc_polynomial": f"0x{CRC_POLYNOMIAL:04X}",
         "crc_start": f"0x{CRC_START:04X}",
         "status_released": f"0x{STATUS_RELEASED:04X}",
+        "status_calibration": f"0x{STATUS_CALIBRATION:04X}",
     }
 
 

@@ -1,7 +1,10 @@
 """The generated core as a black box: compiled by itself for a machine, and every input tried there."""
 
 import copy
+import ctypes
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +12,17 @@ import numpy as np
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
+from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of
+from dzdesign.verify.toolchain.host_compiler import load_library
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
 #: Source of each sign of command, and what its functions' names end with.
 SOURCES = {1: ("dz_comp.c", ""), -1: ("dz_comp_negative.c", "_negative")}
 
+#: Of a core in block form: the source of both signs, and in programs/ what binds it to a block.
+BLOCK_SOURCE, BOUND = "dz_comp.c", "bound_block.c"
+#: The core's functions that a check calls, dz_comp() and so on.
+CALLED = ("comp", "status", "beta")
 #: The check in C, of programs/.
 CHECK = ("every_input.c", "other_codes.c", "every_input.h", "march.h")
 
@@ -42,9 +51,19 @@ class CompiledCore:
     """One side of the core."""
 
     def __init__(self, folder: Path, sign: int = 1) -> None:
-        self._name, self._ending = SOURCES[sign]
-        self.sources = {name: _read(folder / "core" / name) for name in (self._name, "dz_comp.h")}
-        self.sha256 = sha256_of(b"".join(self.sources.values()))
+        self.name, self._ending = SOURCES[sign]
+        #: Octets of the calibration block; None of a core with the numbers of its valve in it.
+        self.block = block_of(folder)
+        headers = ["dz_comp.h"]
+        if self.block is not None:
+            self.name = BLOCK_SOURCE
+            headers.append(BLOCK_HEADER)
+        self.sources = {name: _read(folder / "core" / name) for name in (self.name, *headers)}
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the core's sources, and of its block."""
+        return sha256_of(b"".join([*self.sources.values(), self.block or b""]))
 
     def edited(self, name: str, text: bytes) -> "CompiledCore":
         """Return the core with another text in one of its files."""
@@ -52,29 +71,68 @@ class CompiledCore:
         other.sources = {**self.sources, name: text}
         return other
 
+    def with_block(self, block: bytes) -> "CompiledCore":
+        """Return the same core with another calibration block."""
+        other = copy.copy(self)
+        other.block = block
+        return other
+
     def compiled(self, machine: Machine = HOST) -> Path:
         """Return the core's object for a machine: compiled alone, so that nothing of it is inlined into the check."""
-        return machine.compile(self._name, self.sources, machine.core_flags, f"the core {self._name}")
+        return machine.compile(self.name, self.sources, machine.core_flags, f"the core {self.name}")
 
     def check(self, prepared: bytes, machine: Machine = HOST, *, sample: bool = False) -> Findings:
         """Try what was prepared on a machine; a core that does not compile, crashes or hangs: `RequirementError`."""
         core = self.compiled(machine)
-        called = (f"-DDZ_{name.upper()}=dz_{name}{self._ending}" for name in ("status", "beta"))
-        flags = (*machine.check_flags, f"-DDZ_CORE=dz_comp{self._ending}", *called)
+        names = [f"dz_{name}{self._ending}" for name in CALLED]
+        objects, held = [core], self.block is not None and not machine.section
+        if self.block is not None:
+            objects.append(self._adapter(machine, names, held))
+            names = [f"dz_bound_{name}" for name in CALLED]
+        flags = (*machine.check_flags, *_defines(held, ("DZ_CORE", "DZ_STATUS", "DZ_BETA"), names))
         check = {name: _read(PROGRAMS / name) for name in (*CHECK, machine.main)} | machine.headers
         units = [name for name in check if name.endswith(".c")]
-        objects = [core, *(machine.compile(name, check, flags, "the check") for name in units)]
+        objects += [machine.compile(name, check, flags, "the check") for name in units]
         arguments = []
         if machine.section:
-            text = f'{machine.section}\n.balign 8\n.global dz_prepared\ndz_prepared:\n.incbin "prepared.bin"\n'
-            tables = {"prepared.S": text.encode(), "prepared.bin": prepared}
-            objects.append(machine.compile("prepared.S", tables, machine.check_flags, "the prepared inputs"))
+            objects.append(_embedded(machine, "prepared", machine.section, prepared))
+            if self.block is not None:
+                objects.append(_embedded(machine, "block", machine.block_section, self.block))
         else:
-            file = stored(prepared)
-            arguments = [str(file), *(["sample"] if sample else [])]
-        program = machine.link(objects, f"the core {self._name} ({machine.name})")
-        printed = machine.run(program, arguments, f"the core {self._name}")
-        return _findings(printed, sha256_of(core.read_bytes()), f"the core {self._name} on the {machine.name}")
+            blocks = [str(stored(self.block))] if self.block is not None else []
+            arguments = [str(stored(prepared)), *(["sample"] if sample else []), *blocks]
+        program = machine.link(objects, f"the core {self.name} ({machine.name})")
+        printed = machine.run(program, arguments, f"the core {self.name}")
+        return _findings(printed, sha256_of(core.read_bytes()), f"the core {self.name} on the {machine.name}")
+
+    def _adapter(self, machine: Machine, names: Sequence[str], held: bool) -> Path:
+        """Return the object that binds the core's functions of a side to a block."""
+        sources = {**self.sources, BOUND: _read(PROGRAMS / BOUND)}
+        flags = (*machine.check_flags, *_defines(held, ("DZ_COMP", "DZ_STATUS", "DZ_BETA"), names))
+        return machine.compile(BOUND, sources, flags, "the adapter of the block")
+
+
+def loaded_core(folder: Path, sign: int) -> tuple[Callable[..., int], Callable[..., int]]:
+    """Return dz_comp() and dz_status() of one side, loaded; of a core in block form bound to its block."""
+    core, (_, ending) = CompiledCore(folder, sign), SOURCES[sign]
+    texts = {name: text.decode(errors="surrogateescape") for name, text in core.sources.items()}
+    library = load_library(texts, f"the core {core.name}")
+    block = () if core.block is None else (ctypes.create_string_buffer(core.block, len(core.block)),)
+    comp, status = (partial(getattr(library, f"dz_{what}{ending}"), *block) for what in ("comp", "status"))
+    return comp, status
+
+
+def _defines(held: bool, macros: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the flags that name the functions to call; `held` is a block that comes from a file."""
+    called = (f"-D{macro}={name}" for macro, name in zip(macros, names, strict=True))
+    return (*called, *(["-DDZ_HELD"] if held else []))
+
+
+def _embedded(machine: Machine, name: str, section: str, content: bytes) -> Path:
+    """Return an object that holds some octets as the symbol dz_<name>."""
+    text = f'{section}\n.balign 8\n.global dz_{name}\ndz_{name}:\n.incbin "{name}.bin"\n'
+    files = {f"{name}.S": text.encode(), f"{name}.bin": content}
+    return machine.compile(f"{name}.S", files, machine.check_flags, f"the {name}")
 
 
 def _read(path: Path) -> bytes:

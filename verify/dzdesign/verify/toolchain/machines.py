@@ -47,6 +47,8 @@ class Machine:
     link_flags: tuple[str, ...] = ()
     #: Of the prepared inputs in the program; empty: they are a file that it reads.
     section: str = ""
+    #: The same of a calibration block, which the core reads as any data.
+    block_section: str = ""
     #: What runs the program: its path is added.
     runner: tuple[str, ...] = ()
     #: Program to the Debian package that has it.
@@ -124,6 +126,7 @@ CORTEX_M4 = Machine(
     start_up="start_cortex_m4.h",
     link_flags=(*_M4, "-nostartfiles", "-nostdlib", "-T", "{programs}/cortex_m4.ld", "-Wl,--gc-sections", "-lgcc"),
     section='.section .rodata, "a", %progbits',
+    block_section='.section .rodata, "a", %progbits',
     runner=(
         "qemu-system-arm", "-M", "mps2-an386", "-cpu", "cortex-m4", "-nographic", "-monitor", "none", "-serial", "none",
         "-semihosting-config", "enable=on,target=native", "-kernel",
@@ -143,6 +146,8 @@ AVR = Machine(
     start_up="start_avr.h",
     link_flags=(*_AVR, "-Wl,--gc-sections"),
     section='.section .progmem.data, "a", @progbits',
+    # With what copies it from flash to RAM at the start, which the compiler asks for and the assembler does not.
+    block_section='.global __do_copy_data\n.section .data, "aw", @progbits',
     runner=("simavr", "-m", CHIP, "-f", str(CLOCK_HZ)),
     needs={"avr-gcc": "gcc-avr avr-libc", "simavr": "simavr"},
     small=True,

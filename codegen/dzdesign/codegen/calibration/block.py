@@ -1,0 +1,233 @@
+"""`block_of`: a `Compensator` as the numbers of its calibration block."""
+
+from fractions import Fraction
+from math import floor
+from typing import Any, TypeVar
+
+from dzdesign.codegen.calibration.acceptance import refusals
+from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
+from dzdesign.codegen.calibration.layout import (
+    LENGTH_WORDS,
+    NO_INTERLOCK,
+    NO_RAMP,
+    NODES,
+    PLAY_NODES,
+    RECORD_WORDS,
+    SERIAL_WORDS,
+    SUPPLY_NODES,
+    CalibrationBlock,
+    CurrentBlock,
+    SideBlock,
+    entries,
+)
+from dzdesign.codegen.calibration.packing import octet_words, text_words
+from dzdesign.codegen.core.integer_form import INT32_MAX, WORD_BITS, IntegerForm, exact_factors, integer_form
+from dzdesign.codegen.telemetry.frame import beta_factor
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT, WEIGHT_UNIT, Signals
+
+#: Nodes that stand for pressures that can't be right.
+FALLBACKS = 2
+#: Largest number of 16 bits.
+MOST = 0xFFFF
+ALTERNATIVE = "generate it with --calibration fixed"
+
+Part = TypeVar("Part", SideBlock, CurrentBlock)
+
+
+def block_of(compensator: Compensator, digest: str, *, serial: str = "", record: str = "") -> CalibrationBlock:
+    """Return the block of a compensator whose file has the SHA-256 `digest`.
+
+    More nodes of beta or of the play than a block has room for, a longer text, and numbers that its own firmware would
+    refuse are an `InputError`.
+    """
+    built = built_for(compensator)
+    block = _numbers(compensator, built, digest, serial, record)
+    if refused := refusals(block, built):
+        rules = "; ".join(f"{name}: {', '.join(rules)}" for name, rules in refused.items())
+        raise InputError(f"the firmware would refuse this compensator's calibration block ({rules}); {ALTERNATIVE}")
+    return block
+
+
+def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str, record: str) -> CalibrationBlock:
+    """Return the block, whatever its firmware says of it."""
+    c, signals, functions = compensator, compensator.signals, compensator.drive_functions
+    command, a, b = signals.command, signals.pressure_a, signals.pressure_b
+    interlock = functions.interlock_codes
+    return CalibrationBlock(
+        length=LENGTH_WORDS,
+        shape=built.shape,
+        code_max=signals.code_max,
+        compare_max=signals.compare_max,
+        sample_Hz=signals.sample_Hz,
+        tick_Hz=signals.tick_Hz,
+        compensator_sha256=octet_words(bytes.fromhex(digest)),
+        serial=text_words(serial, SERIAL_WORDS, "the serial number"),
+        record=text_words(record, RECORD_WORDS, "the record"),
+        u_max_uV=_displayed(float(c.u_max_V), "full command in V"),
+        a_span_Pa=_displayed(float(a.span_MPa), "the span of sensor A in MPa"),
+        b_span_Pa=_displayed(float(b.span_MPa), "the span of sensor B in MPa"),
+        a_full=a.full_code,
+        b_full=b.full_code,
+        balance=((a.zero_code << WEIGHT_SHIFT) - b.zero_code * signals.weight_b) % 2**32,
+        reverse=c.reverse_codes << WEIGHT_SHIFT,
+        command_zero=command.zero_code,
+        command_low=command.valid_codes[0],
+        command_high=command.valid_codes[1],
+        a_zero=a.zero_code,
+        a_low=a.valid_codes[0],
+        a_high=a.valid_codes[1],
+        b_zero=b.zero_code,
+        b_low=b.valid_codes[0],
+        b_high=b.valid_codes[1],
+        weight_b=_weight(signals),
+        beta_step=c.beta_step_codes,
+        transition_codes=c.transition_codes or 1,
+        zero_band=c.zero_band_codes,
+        compare_limit=functions.compare_limit,
+        leave_zero=functions.leave_zero_codes,
+        fault_samples=functions.fault_samples,
+        fault_latch=int(functions.fault_latch),
+        interlock=NO_INTERLOCK if interlock is None else interlock,
+        ramps=int(functions.has_ramp),
+        dither_counts=functions.dither_counts,
+        dither_ticks=functions.dither_ticks,
+        play_codes=functions.play_codes if functions.has_play else 0,
+        play_noise=functions.play_noise_codes if functions.has_play else 0,
+        play_step_shift=_shift(functions.play_step_codes) if functions.has_play else 0,
+        play_shift=_shift(functions.play_codes * c.transition_codes) if functions.has_play else 0,
+        sides=(_side(c, 1), _side(c, -1) if c.negative is not None else _nothing(SideBlock)),
+        current=_nothing(CurrentBlock) if c.current_drive is None else current_block(c.current_drive.loop),
+        crc32=0,
+    )
+
+
+def _side(c: Compensator, sign: int) -> SideBlock:
+    """Return the law of one sign of command."""
+    form, side, functions, command = integer_form(c, sign), c.side(sign), c.drive_functions, c.signals.command
+    place = 0 if sign > 0 else 1
+    codes = floor(c.signals.dp_code(side.certificate.dp_MPa[1]))
+    unit = form.scale_beta * c.beta_denominator
+    factor, shift = beta_factor(unit * c.beta_step_codes, max(form.table) * c.beta_step_codes)
+    return SideBlock(
+        offset=form.offset,
+        slope=form.slope % 2**32,
+        transition=form.transition,
+        linear=form.linear << form.linear_shift,
+        **_division(form, functions.compare_limit),
+        tested_to=((codes + 1) << WEIGHT_SHIFT) - 1,
+        beta_unit=unit,
+        beta_factor=factor,
+        ramp_up=functions.ramp_up[place] or NO_RAMP,
+        ramp_down=functions.ramp_down[place] or NO_RAMP,
+        nodes=_beta_nodes(form, SIDE_NAMES[sign]),
+        node_count=len(side.beta),
+        beta_shift=shift,
+        span=command.span(sign),
+        room=command.span(sign) - c.zero_band_codes,
+        band_end=command.zero_code + command.direction(sign) * c.zero_band_codes,
+        play=_nodes(functions.play_counts[place], PLAY_NODES, "the width of the inverse play"),
+    )
+
+
+def _beta_nodes(form: IntegerForm, side: str) -> tuple[int, ...]:
+    """Return the nodes as pairs, that of the law and that at zero command, and at the end twice the smallest."""
+    law, zero = form.table, form.zero_table or form.table
+    room = NODES - FALLBACKS
+    if len(law) > NODES:
+        raise InputError(
+            f"beta of {side} commands has {len(law) - FALLBACKS} nodes, of which a calibration block holds {room} at "
+            f"most; {ALTERNATIVE}, or design it for a converter of fewer codes"
+        )
+    pairs = [*zip(law[:-FALLBACKS], zero[:-FALLBACKS], strict=True)]
+    pairs += [(0, 0)] * (room - len(pairs)) + [(law[-1], zero[-1])] * FALLBACKS
+    return tuple(number for pair in pairs for number in pair)
+
+
+def _division(form: IntegerForm, compare_limit: int) -> dict[str, int]:
+    """Return what brings the sum's upper 32 bits to counts: half a count, the largest quotient, and the reciprocal."""
+    divisor = form.divisor << (form.shift - WORD_BITS)
+    if divisor == 1:  # 2^32 is no reciprocal of 32 bits: a count more, times 2^32 - 1, is a count less
+        return {"half": form.half + (1 << WORD_BITS), "quotient_limit": compare_limit + 1,
+                "reciprocal": (1 << WORD_BITS) - 1, "reciprocal_shift": 0}  # fmt: skip
+    # The sum stays below 2^63, so no quotient is larger, whatever the limit.
+    largest = min((compare_limit + 1) * divisor - 1, INT32_MAX)
+    shifts = range(WORD_BITS, 2 * WORD_BITS)
+    reciprocal, shift = next(exact_factors(Fraction(1, divisor), largest, shifts), (0, WORD_BITS))
+    if not reciprocal:
+        raise InputError(f"no 32-bit reciprocal divides by {divisor} exactly up to {largest}; {ALTERNATIVE}")
+    return {"half": form.half, "quotient_limit": largest, "reciprocal": reciprocal,
+            "reciprocal_shift": shift - WORD_BITS}  # fmt: skip
+
+
+def _weight(signals: Signals) -> int:
+    if signals.weight_b > MOST:
+        raise InputError(
+            f"a code of sensor B weighs {signals.weight_b / WEIGHT_UNIT:.3g} of sensor A; a calibration block holds "
+            f"{MOST / WEIGHT_UNIT:.3g} at most; {ALTERNATIVE}"
+        )
+    return signals.weight_b
+
+
+def current_block(loop: CurrentLoop) -> CurrentBlock:
+    """Return the current controller."""
+    supply = loop.supply
+    low, high = supply.valid_codes if supply else (0, 0)
+    return CurrentBlock(
+        integral_limit=loop.integral_limit << loop.gain_shift,
+        release=loop.release << loop.gain_shift,
+        compare_limit=loop.compare_limit,
+        rate=loop.rate,
+        samples=loop.samples,
+        current_gain=loop.current_gain,
+        current_shift=loop.current_shift,
+        gain_shift=loop.gain_shift,
+        proportional=loop.proportional,
+        integral=loop.integral,
+        feed_forward=loop.feed_forward,
+        offset_nominal=loop.offset_nominal,
+        offset_low=max(loop.offset_nominal - loop.offset_tolerance, 0),
+        offset_high=loop.offset_nominal + loop.offset_tolerance,
+        offset_shift=loop.offset_shift,
+        short_sum=loop.short_sum,
+        over_sum=loop.over_sum,
+        over_ticks=loop.over_ticks,
+        open_sum=loop.open_sum,
+        open_compare=loop.open_compare,
+        open_ticks=loop.open_ticks,
+        supply_low=low,
+        supply_high=high,
+        supply_shift=_shift(supply.step_codes) if supply else 0,
+        supply=_nodes(supply.nodes if supply else (), SUPPLY_NODES, "the supply's correction"),
+    )
+
+
+def _nothing(kind: type[Part]) -> Part:
+    """Return a part of the block that its firmware does not use: all zero."""
+    nothing: dict[str, Any] = {
+        name: (0,) * entry.count if entry.count > 1 else 0 for name, entry in entries(kind).items()
+    }
+    return kind(**nothing)
+
+
+def _nodes(numbers: tuple[int, ...], room: int, what: str) -> tuple[int, ...]:
+    if len(numbers) > room:
+        raise InputError(
+            f"{what} has {len(numbers)} nodes, of which a calibration block holds {room} at most; {ALTERNATIVE}, or "
+            "design it for a converter of fewer codes"
+        )
+    return (*numbers, *(0,) * (room - len(numbers)))
+
+
+def _shift(power: int) -> int:
+    """Return s of a power of two 2^s."""
+    return power.bit_length() - 1
+
+
+def _displayed(value: float, what: str) -> int:
+    """Return a value in millionths of its unit."""
+    if not 0 <= round(value * 1e6) < 1 << 32:
+        raise InputError(f"{what} is {value:g}; a calibration block shows values below 4294; {ALTERNATIVE}")
+    return round(value * 1e6)

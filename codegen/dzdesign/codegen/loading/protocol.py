@@ -1,0 +1,224 @@
+"""The frames by which a PC writes a calibration block into a drive; their C is printed from here.
+
+    sync (2)   type (1)   sequence (1)   length (1)   payload (length)   CRC (2)
+
+Octets; numbers of more than one octet come with the most significant first, but the words of a block are the octets of
+its file, least significant first. The CRC is that of the telemetry's frame, over type, sequence, length and payload.
+Each request is answered by a reply with the same sequence number; the PC sends the next one only after it.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated
+
+from dzdesign.codegen.telemetry.frame import CRC_OCTETS, Number, crc_of
+
+SYNC = 0xC33C
+HEADER_OCTETS = 5
+#: Type of a reply: that of its request with this bit.
+REPLY = 0x80
+#: Words of the block in one request.
+MOST_WORDS = 32
+MOST_PAYLOAD = 2 + 2 * MOST_WORDS
+FRAME_OCTETS = HEADER_OCTETS + MOST_PAYLOAD + CRC_OCTETS
+SEQUENCES = 1 << 8
+#: Within a frame two octets are at most this far apart; a load without a request for this time is over.
+OCTET_S, LOAD_S = 0.1, 2.0
+#: An interrupt holds the output low within this time.
+HOLD_S = 0.02
+#: Octets of the serial number that a drive states.
+SERIAL_OCTETS = 24
+_SYNC = struct.pack(">H", SYNC)
+
+
+class Request(IntEnum):
+    """What the PC asks for."""
+
+    BEGIN = 1
+    DATA = 2
+    COMMIT = 3
+    ABORT = 4
+    QUERY = 5
+
+
+REQUEST_TEXTS = {
+    Request.BEGIN: "length of the block in words (2), its CRC-32 (4), start of its compensator's SHA-256 (4)",
+    Request.DATA: f"words before these (2), then 1 to {MOST_WORDS} words of the block",
+    Request.COMMIT: "the block's CRC-32 again (4)",
+    Request.ABORT: "nothing; the load under way is given up",
+    Request.QUERY: "nothing; the reply goes on with the drive's block and state",
+}
+
+
+class Reason(IntEnum):
+    """Why a request was not done; DONE if it was."""
+
+    DONE = 0
+    BUSY = 1
+    NO_LOAD = 2
+    SEQUENCE = 3
+    LENGTH = 4
+    DRIVING = 5
+    COMMAND = 6
+    STORE = 7
+    CRC = 8
+    CHECK = 9
+    INCOMPLETE = 10
+    TYPE = 11
+    ORIGIN = 12
+    TIME = 13
+    ABORTED = 14
+
+
+REASON_TEXTS: dict[int, str] = {
+    Reason.DONE: "done",
+    Reason.BUSY: "the request before this one is still being done",
+    Reason.NO_LOAD: "no load is under way",
+    Reason.SEQUENCE: "another sequence number, or another place in the block, was due",
+    Reason.LENGTH: "the length is not that of a block of this firmware, or of this request",
+    Reason.DRIVING: "the drive still drives: its ramp has not run out",
+    Reason.COMMAND: "the command is not zero",
+    Reason.STORE: "the memory did not take the words",
+    Reason.CRC: "the block's CRC-32 is not the one that was announced",
+    Reason.CHECK: "dz_calibration_check() refuses the block",
+    Reason.INCOMPLETE: "words of the block are missing",
+    Reason.TYPE: "the type of request is not known",
+    Reason.ORIGIN: "the block belongs to another compensator than was announced",
+    Reason.TIME: "the time was over",
+    Reason.ABORTED: "the load was given up by its sender",
+}
+
+
+def reason_text(reason: int) -> str:
+    """Return what a reason means; a drive's newer firmware may have others."""
+    return REASON_TEXTS.get(reason, f"reason {reason}, which this dzdesign does not know")
+
+
+#: In place of a slot: the block that the firmware was linked with, and none.
+LINKED, NO_BLOCK = 2, 0xFFFF
+#: Flags of a drive's state.
+VOLATILE, LOADING = 0x0001, 0x0002
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reply:
+    """What every reply begins with; names are those in C too."""
+
+    reason: Annotated[int, Number(bits=8, text="0: done, else why not")]
+    expected: Annotated[int, Number(bits=8, text="sequence number that the next request of a load must have")]
+    words: Annotated[int, Number(bits=16, text="words of the block that the drive has")]
+    detail: Annotated[int, Number(bits=16, text="bits of dz_calibration_check(), if it refused")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveState:
+    """What the reply to a query goes on with."""
+
+    block: Annotated[int, Number(bits=16, text="in use: slot 0 or 1, 2: the linked one, 65535: none")]
+    flags: Annotated[int, Number(bits=16, text="1: a loaded block is lost without supply, 2: a load is under way")]
+    refusal: Annotated[int, Number(bits=16, text="why a load would be refused now, 0: it would not")]
+    ended: Annotated[int, Number(bits=16, text="why the last load ended, 0: it was done, or there was none")]
+    bad_frames: Annotated[int, Number(bits=16, text="frames that were cut, damaged or too long, modulo 65536")]
+    layout: Annotated[int, Number(bits=16, text="layout version of blocks that this firmware takes")]
+    length: Annotated[int, Number(bits=16, text="their length in words")]
+    shape: Annotated[int, Number(bits=16, text="their shape")]
+    crc: Annotated[int, Number(bits=32, text="CRC-32 of the block in use")]
+    origin: Annotated[int, Number(bits=32, text="start of its compensator's SHA-256")]
+
+
+REPLY_NUMBERS: dict[str, Number] = {name: hint.__metadata__[0] for name, hint in Reply.__annotations__.items()}
+STATE_NUMBERS: dict[str, Number] = {name: hint.__metadata__[0] for name, hint in DriveState.__annotations__.items()}
+_LETTERS = {8: "B", 16: "H", 32: "I"}
+_REPLY = struct.Struct(">" + "".join(_LETTERS[number.bits] for number in REPLY_NUMBERS.values()))
+_STATE = struct.Struct(">" + "".join(_LETTERS[number.bits] for number in STATE_NUMBERS.values()))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """A frame of either direction."""
+
+    type: int
+    sequence: int
+    payload: bytes
+
+    def octets(self) -> bytes:
+        """Return the frame as it goes over the line."""
+        covered = bytes((self.type, self.sequence, len(self.payload))) + self.payload
+        return _SYNC + covered + crc_of(covered).to_bytes(CRC_OCTETS, "big")
+
+    def reply(self) -> Reply | None:
+        """Return what the frame says as a reply; None if it is too short for one."""
+        if len(self.payload) < _REPLY.size:
+            return None
+        return Reply(**dict(zip(REPLY_NUMBERS, _REPLY.unpack_from(self.payload), strict=True)))
+
+    def drive_state(self) -> tuple[DriveState, str] | None:
+        """Return the drive's state and its block's serial number; None if the frame is no reply to a query."""
+        if len(self.payload) != _REPLY.size + _STATE.size + SERIAL_OCTETS:
+            return None
+        numbers = _STATE.unpack_from(self.payload, _REPLY.size)
+        serial = self.payload[-SERIAL_OCTETS:].rstrip(b"\0").decode("utf-8", "replace")
+        return DriveState(**dict(zip(STATE_NUMBERS, numbers, strict=True))), serial
+
+
+class FrameReader:
+    """Finds frames in a stream of octets, whatever lies between them, telemetry too."""
+
+    def __init__(self) -> None:
+        self._held = bytearray()
+
+    def feed(self, octets: bytes) -> Iterator[Frame]:
+        """Yield the frames that are complete with these octets; a bad one is passed over by one octet."""
+        held = self._held
+        held += octets
+        while True:
+            start = held.find(_SYNC)
+            if start < 0:
+                del held[: len(held) - held.endswith(_SYNC[:1])]
+                return
+            del held[:start]
+            if len(held) < HEADER_OCTETS:
+                return
+            end = HEADER_OCTETS + held[4] + CRC_OCTETS
+            if len(held) < end and held[4] <= MOST_PAYLOAD:
+                return
+            if held[4] > MOST_PAYLOAD or crc_of(held[2:end]):
+                del held[:1]
+                continue
+            frame = Frame(type=held[2], sequence=held[3], payload=bytes(held[HEADER_OCTETS : end - CRC_OCTETS]))
+            del held[:end]
+            yield frame
+
+
+def protocol_context(tick_Hz: int) -> dict[str, object]:
+    """Return what the C of a drive prints of the protocol, for a tick of so many a second."""
+    puts = []
+    for name, number in STATE_NUMBERS.items():
+        puts.append(f"    at = dz_put_{number.bits}(octets, at, state->{name});")
+    return {
+        "sync_high": f"0x{SYNC >> 8:02X}",
+        "sync_low": f"0x{SYNC & 0xFF:02X}",
+        "header_octets": HEADER_OCTETS,
+        "crc_octets": CRC_OCTETS,
+        "frame_octets": FRAME_OCTETS,
+        "most_payload": MOST_PAYLOAD,
+        "most_words": MOST_WORDS,
+        "reply_bit": f"0x{REPLY:02X}",
+        "requests": [(request.name, int(request), REQUEST_TEXTS[request]) for request in Request],
+        "reasons": [(reason.name, int(reason), REASON_TEXTS[reason]) for reason in Reason],
+        "reply_numbers": REPLY_NUMBERS,
+        "state_numbers": STATE_NUMBERS,
+        "state_puts": "\n".join(puts),
+        "octet_ticks": round(OCTET_S * tick_Hz),
+        "load_ticks": round(LOAD_S * tick_Hz),
+        "hold_ticks": round(HOLD_S * tick_Hz),
+        "octet_ms": round(1000 * OCTET_S),
+        "load_s": f"{LOAD_S:g}",
+        "serial_octets": SERIAL_OCTETS,
+        "linked": LINKED,
+        "no_block": f"0x{NO_BLOCK:04X}",
+        "volatile_flag": f"0x{VOLATILE:04X}",
+        "loading_flag": f"0x{LOADING:04X}",
+    }

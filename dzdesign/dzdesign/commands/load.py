@@ -1,0 +1,214 @@
+"""`dzdesign load`: a calibration block into a running drive over its serial line, or what the drive holds."""
+
+import contextlib
+import os
+import secrets
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from dzdesign.core.errors import DzdesignError, InputError, RequirementError, one_line
+from dzdesign.core.option_readers import number
+from dzdesign.core.options import AnyPath, Option, Text, read_options
+from dzdesign.serial_port import PortLine, open_port
+from dzdesign.terminal.page import print_json
+from dzdesign.terminal.progress import say, with_bar
+
+if TYPE_CHECKING:
+    from dzdesign.codegen.calibration.layout import CalibrationBlock
+    from dzdesign.codegen.loading.session import Drive, LoadSession
+
+#: The longest that a look at the line takes: shorter than an answer is waited for.
+LOOK_S = 0.02
+EXAMPLES = ("dzdesign load valve.hex --port COM5", "dzdesign load --port COM5")
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Arguments of `load`."""
+
+    block: Annotated[AnyPath | None, Option("BLOCK")] = None
+    """Calibration block: a .hex, .bin or .txt file of `dzdesign calibration` (default: ask what the drive holds)."""
+    _: KW_ONLY
+    port: Annotated[str, Option("PORT")]
+    """Serial port, such as COM5 or /dev/ttyUSB0."""
+    baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=(0.0, 1e9)))] = None
+    """Bits per second (default: those of f28335's firmware)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Block:
+    """A block to load: where it is from, its octets, and what they say."""
+
+    source: str
+    octets: bytes
+    numbers: "CalibrationBlock"
+
+    @property
+    def origin(self) -> int:
+        return int.from_bytes(self.sha256[:4], "big")
+
+    @property
+    def sha256(self) -> bytes:
+        from dzdesign.codegen.calibration.packing import octets_of
+
+        return octets_of(self.numbers.compensator_sha256)
+
+
+def run(arguments: Arguments, json: bool) -> int:
+    """Load a block and read back what the drive holds; what the drive refuses is a `RequirementError`."""
+    from dzdesign.codegen.loading.session import LoadSession
+    from dzdesign.codegen.project import DEFAULT_TARGET, target_named
+
+    block = None if arguments.block is None else _block_of(Path(arguments.block))
+    link = target_named(DEFAULT_TARGET).link
+    baud = read_options(arguments, ["baud"])["baud"] or (link.baud if link else 0)
+    with open_port(arguments.port, baud, LOOK_S) as port:
+        session = LoadSession(PortLine(port), secrets.randbelow(256))
+        drive = _asked(session, arguments.port, baud)
+        if block is not None:
+            drive = _load(session, block, drive, arguments.port)
+    if json:
+        print_json(_document(drive, session))
+    else:
+        _print(block, drive, session)
+    return 0
+
+
+def _block_of(path: Path) -> _Block:
+    from dzdesign.codegen.calibration.block_files import octets_in_file
+    from dzdesign.codegen.calibration.packing import unpack
+
+    octets = octets_in_file(path)
+    return _Block(source=os.fspath(path), octets=octets, numbers=unpack(octets, f"'{path}'"))
+
+
+def _asked(session: "LoadSession", port: str, baud: float) -> "Drive":
+    from dzdesign.codegen.loading.session import NoReplyError
+
+    try:
+        return session.query()
+    except NoReplyError as error:
+        raise InputError(
+            f"'{port}' at {baud:g} bit/s: {error}; check the wiring of GPIO28 and GPIO29, --baud, and that the drive "
+            "runs a firmware of `codegen --calibration block`"
+        ) from error
+
+
+def _load(session: "LoadSession", block: _Block, drive: "Drive", port: str) -> "Drive":
+    """Load the block and return what the drive says then."""
+    from dzdesign.codegen.loading.session import NoReplyError, RefusedError
+
+    _check_fit(block, drive)
+    say(f"loading {block.source} into the drive on {port}")
+    requests = session.loading(block.octets, block.numbers.crc32, block.origin)
+    try:
+        for _ in with_bar(requests, f"loading {block.source}", session.requests_of(block.octets)):
+            pass
+        return _verified(session, block)
+    except RefusedError as error:
+        raise RequirementError(f"the drive refuses {block.source}: {error}{_advice(error)}") from error
+    except NoReplyError as error:
+        raise RequirementError(
+            f"the drive on {port} stopped answering ({error}); it holds its old block, or all of the new one if only "
+            f"the last answer was lost: `dzdesign load --port {port}` asks"
+        ) from error
+    except KeyboardInterrupt:
+        with contextlib.suppress(DzdesignError):
+            session.abort()
+        raise
+
+
+def _check_fit(block: _Block, drive: "Drive") -> None:
+    """Refuse what the drive's firmware is not compiled for, before anything is erased."""
+    from dzdesign.codegen.calibration.layout import SHAPE_BITS
+
+    ours, state = block.numbers, drive.state
+    if (ours.layout, ours.length) != (state.layout, state.length):
+        raise RequirementError(
+            f"{block.source} has layout {ours.layout} in {ours.length} words, the drive's firmware takes layout "
+            f"{state.layout} in {state.length}; firmware and dzdesign must be of one version"
+        )
+    if ours.shape != state.shape:
+        differs = [text for place, text in enumerate(SHAPE_BITS.values()) if (ours.shape ^ state.shape) >> place & 1]
+        raise RequirementError(
+            f"{block.source} is for another kind of drive than the firmware was generated for: they differ in "
+            f"'{', '.join(differs)}'; generate firmware and block from designs with the same wiring and outputs"
+        )
+
+
+def _verified(session: "LoadSession", block: _Block) -> "Drive":
+    """Ask the drive what it holds now, which must be the block."""
+    drive = session.query()
+    if (drive.state.crc, drive.state.origin) != (block.numbers.crc32, block.origin) or drive.state.block > 1:
+        raise RequirementError(
+            f"after loading the drive uses a block of CRC-32 {drive.state.crc:08x}, expected "
+            f"{block.numbers.crc32:08x} of {block.source}; load it again"
+        )
+    return drive
+
+
+def _advice(error: Any) -> str:
+    """Return what to do about a refusal, after its reason."""
+    from dzdesign.codegen.calibration.files import FINDINGS
+    from dzdesign.codegen.loading.protocol import Reason
+
+    if error.reason == Reason.DRIVING:
+        return "; a block is loaded at rest only: wait until the ramp has run out, or hold the trip input low"
+    if error.reason == Reason.COMMAND:
+        return "; bring it to zero, as this block and the drive's count zero, and load again"
+    if error.reason == Reason.CHECK:
+        found = [text for place, text in enumerate(FINDINGS.values()) if error.detail >> place & 1]
+        return f" ({'; '.join(found) or 'for no reason that this dzdesign knows'}); the drive keeps its old block"
+    if error.reason == Reason.STORE:
+        return "; the drive keeps its old block; see the functions of dz_store.c in its firmware"
+    return "; the drive keeps its old block; load it again"
+
+
+def _place(drive: "Drive") -> str:
+    from dzdesign.codegen.loading.protocol import LINKED, NO_BLOCK
+
+    places = {LINKED: "linked with the firmware", NO_BLOCK: "none: the output stays off"}
+    return places.get(drive.state.block, f"loaded, copy {drive.state.block}")
+
+
+def _document(drive: "Drive", session: "LoadSession") -> dict[str, Any]:
+    from dzdesign.codegen.loading.protocol import NO_BLOCK, VOLATILE
+
+    state = drive.state
+    return {
+        "block": None if state.block == NO_BLOCK else _place(drive),
+        "serial": drive.serial,
+        "crc32": f"{state.crc:08x}",
+        "compensator_sha256_begins": f"{state.origin:08x}",
+        "layout": state.layout,
+        "kept_without_supply": not state.flags & VOLATILE,
+        "refuses_now": _reason(state.refusal),
+        "last_load": _reason(state.ended),
+        "bad_frames": state.bad_frames,
+        "repeated_requests": session.repeats,
+    }
+
+
+def _reason(reason: int) -> str | None:
+    from dzdesign.codegen.loading.protocol import reason_text
+
+    return reason_text(reason) if reason else None
+
+
+def _print(block: _Block | None, drive: "Drive", session: "LoadSession") -> None:
+    from dzdesign.codegen.loading.protocol import NO_BLOCK, VOLATILE
+
+    state = drive.state
+    if block is not None:
+        print(one_line(f"Loaded and read back: {block.source}; {session.repeats} requests were sent twice"))
+    print(f"Block in use: {_place(drive)}")
+    if state.block != NO_BLOCK:
+        print(f"Serial number: {one_line(drive.serial) or 'none'}")
+        print(f"CRC-32 {state.crc:08x}; SHA-256 of its compensator.json begins with {state.origin:08x}")
+    if state.refusal:
+        print(f"A block would be refused now: {_reason(state.refusal)}")
+    if state.ended:
+        print(f"The last load ended early: {_reason(state.ended)}")
+    if state.flags & VOLATILE:
+        print("This firmware keeps loaded blocks in RAM: without supply they are lost (dz_store.h says what to add)")

@@ -1,0 +1,130 @@
+"""Faults seeded in the C of the loading, each of which the exchanges must find, and how they are tried."""
+
+import multiprocessing
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from tests.support.loading.bench import SLOTS, Drive, session
+from tests.support.loading.exchanges import KINDS, Bench, load
+from tests.support.loading.files import blocks, drive_files, new_bench
+from tests.support.loading.request_checks import CHECKS
+
+
+class Fault(NamedTuple):
+    """A piece of a generated file, and what stands there instead."""
+
+    file: str
+    old: str
+    new: str
+
+
+FAULTS = (
+    Fault("dz_load.c", "else if (wrong != 0u)", "else if (wrong == 0xFFFFu)"),
+    Fault("dz_load.c", "if (block->crc32 != load->crc)", "if (wrong == 0xFFFFu)"),
+    Fault("dz_load.c", "dz_load_origin(block) != load->origin", "wrong == 0xFFFFu"),
+    Fault("dz_load.c", "load->count * sizeof load->data[0]) == 0", "0u) == 0"),
+    Fault("dz_load.c", "(slot->mark == mark)", "(mark != 0u)"),
+    Fault("dz_load.c", "load->block = &slot->block;", ""),
+    Fault("dz_load.c", "load->used = load->slot;", ""),
+    Fault("dz_load.c", "dz_load_use(load->block);", ""),
+    Fault("dz_load.c", "else if (refusal != 0u)", "else if (refusal > 99u)"),
+    Fault("dz_load.c", "if (dz_load_hold(1u) != 0u)", "if (refusal == 0u)"),
+    Fault("dz_load.c", "else if (waited > DZ_LOAD_HOLD_TICKS)", "else if (waited > 0xFFFEu)"),
+    Fault("dz_load.c", "else if (waited > DZ_LOAD_TICKS)", "else if (waited > 0xFFFEu)"),
+    Fault("dz_load.c", "load->words = (uint16_t)(load->words + load->count);", "load->words = load->count;"),
+    Fault("dz_load.c", "DZ_LOAD_STEP_MARKING, ticks);", "DZ_LOAD_STEP_RECEIVING, ticks);"),
+    Fault("dz_load.c", "(dz_slots_are_marked() == 0u) && ", ""),
+    Fault("dz_load_requests.c", "(count > (DZ_CALIBRATION_WORDS - load->words))", "(count > DZ_CALIBRATION_WORDS)"),
+    Fault("dz_load_requests.c", "AT_PAYLOAD) != load->words)", "AT_PAYLOAD) == 0xFFFEu)"),
+    Fault("dz_load_requests.c", "[DZ_LOAD_AT_SEQUENCE] != load->expected)", "[DZ_LOAD_AT_SEQUENCE] > 0xFFu)"),
+    Fault("dz_load_requests.c", "else if (is_repeated(load) != 0u)", "else if (is_repeated(load) > 1u)"),
+    Fault("dz_load_requests.c", "load->words != DZ_CALIBRATION_WORDS)", "load->words > DZ_CALIBRATION_WORDS)"),
+    Fault("dz_load_requests.c", "reason = refusal;", "reason = DZ_LOAD_REASON_DONE;"),
+    Fault("dz_load_requests.c", "dz_slots_next(load->used);", "load->used % 2u;"),
+    Fault("dz_load_requests.c", "        load->words = 0u;\n", ""),
+    Fault("dz_load_requests.c", "!= BEGIN_OCTETS) ||", "> 0xFFu) ||"),
+    Fault("dz_load_requests.c", "!= COMMIT_OCTETS)", "> 0xFFu)"),
+    Fault("dz_load_requests.c", "(uint16_t)(octets[at + 1u] << 8)", "(uint16_t)(octets[at] << 8)"),
+    Fault("dz_load_frame.c", "> DZ_LOAD_MOST_PAYLOAD))", "> 0xFFFFu))"),
+    Fault("dz_load_frame.c", "receiver->count) == 0u)", "receiver->count) != 0x10000uL)"),
+    Fault("dz_load_frame.c", "(apart > DZ_LOAD_OCTET_TICKS)", "(apart > 0xFFFEu)"),
+    Fault("dz_slots.c", "(is_marked(slot) != 0u) && (", "("),
+    Fault("dz_slots.c", "&& (dz_calibration_check(&dz_store_slot(slot)->block) == 0u)", ""),
+    Fault("dz_slots.c", "(ahead != 0u) && (ahead < HALF)", "ahead >= HALF"),
+    Fault("dz_slots.c", "(mark == mark_of(mark))", "(mark != 0xFFFFu)"),
+    Fault("dz_slots.c", "(used == 0u) ? 1u : 0u", "(used == 1u) ? 1u : 0u"),
+    Fault("dz_slots.c", "(count & COUNT) + 1u", "(count & COUNT) + 0u"),
+    Fault("dz_slots.c", "(uint16_t)((count & COUNT) + 1u)", "(uint16_t)(((count & COUNT) + 1u) % 100u)"),
+)  # fmt: skip
+
+
+def is_found(fault: Fault, folder: Path, exchanges: int = 25) -> bool:
+    """Tell whether the exchanges find a fault; a drive that crashes is found too."""
+    text = drive_files()[fault.file]
+    if text.count(fault.old) != 1:
+        raise ValueError(f"{fault.file} has '{fault.old}' {text.count(fault.old)} times")
+    faulty = {fault.file: text.replace(fault.old, fault.new)}
+    bench = new_bench(folder, faulty, "-Wno-error", "-w", "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error")
+    trial = multiprocessing.get_context("fork").Process(target=_try, args=(bench, exchanges))
+    trial.start()
+    trial.join(120)
+    if trial.is_alive():
+        trial.kill()
+        trial.join()
+    return trial.exitcode != 0
+
+
+def violations(bench: Bench, exchanges: int, seed: int = 3) -> int:
+    """Return how often the drive did what it must not, in so many exchanges of each kind, and beside."""
+    rng = random.Random(seed)
+    for _ in range(exchanges):
+        for kind in KINDS:
+            bench.exchange(kind, rng)
+    found = bench.violations
+    found += sum(end.endswith("wrongly") for _, end in bench.ends)
+    return found + _marks(bench) + _goes_round(bench) + sum(not _holds(check, bench) for check in CHECKS)
+
+
+def _try(bench: Bench, exchanges: int) -> None:
+    raise SystemExit(1 if violations(bench, exchanges) else 0)
+
+
+def _holds(check: Callable[[Drive], None], bench: Bench) -> bool:
+    try:
+        check(bench.drive)
+    except (AssertionError, ValueError):  # the latter: no reply, or two
+        return False
+    return True
+
+
+def _marks(bench: Bench) -> int:
+    """Cut marks, a block without a mark, and a marked one that went bad."""
+    drive, (old, new) = bench.drive, blocks()[1:3]
+    bad = bytearray(old)
+    bad[700] ^= 4
+    found = 0
+    for slots, wanted in (
+        ((old + b"\x01\xfe", new + b"\x02\xff"), old),
+        ((old + b"\x01\xfe", new + b"\x03\xfd"), old),
+        ((old + b"\xff\xff", new + b"\xff\xff"), blocks()[0]),
+        ((bytes(bad) + b"\x05\xfa", b"\xff" * drive.slot_octets), None),
+        ((bytes(bad) + b"\x05\xfa", new + b"\x04\xfb"), new),
+    ):
+        drive.erase()
+        for slot in range(SLOTS):
+            drive.write_slot(slot, slots[slot])
+        found += drive.power_on() != wanted
+    return found
+
+
+def _goes_round(bench: Bench) -> int:
+    """Three hundred loads: the count of the marks goes round."""
+    drive, found = bench.drive, 0
+    drive.erase()
+    drive.power_on()
+    for number in range(300):
+        block = blocks()[number % 2]
+        found += load(session(drive), block) != "done" or drive.power_on() != block
+    return found
