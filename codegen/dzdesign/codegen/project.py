@@ -16,6 +16,7 @@ from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.provenance import constants_of
 from dzdesign.codegen.target import Target, folder_of
+from dzdesign.codegen.vectors.vectors_file import vectors_text
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
@@ -23,7 +24,7 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
+from dzdesign.design.firmware_manifest import VECTORS_NAME, FirmwareManifest, FirmwareOrigin
 from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.design.target_inputs import Converter
 
@@ -94,13 +95,17 @@ def targets() -> tuple[Target, ...]:
 
 
 def generate(
-    compensator: Compensator, target_name: str | None = None, compensator_bytes: bytes | None = None
+    compensator: Compensator,
+    target_name: str | None = None,
+    compensator_bytes: bytes | None = None,
+    vectors: int = 0,
 ) -> Firmware:
     """Generate the C project of a compensator for the target of that name, by default the one that it was designed for.
 
     `compensator_bytes` is the file that the compensator was read from; without it the document as it would be written.
-    An unknown target is an `InputError`; so is one whose converter or PWM differs from those that the compensator was
-    designed for, and a compensator that says of its target what is not so.
+    With `vectors` there are so many test vectors in vectors.csv. An unknown target is an `InputError`; so is one whose
+    converter or PWM differs from those that the compensator was designed for, a compensator that says of its target
+    what is not so, and a number of vectors that can't hit every node, corner and fault.
     """
     designed_for = compensator.target
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
@@ -119,6 +124,8 @@ def generate(
         path: _render(PACKAGE, file.template, banner.lines(file.template), file.values) for path, file in core.items()
     }
     files |= {**target_files(compensator, target, banner), "compensator.json": document.decode()}
+    if vectors:
+        files[VECTORS_NAME] = vectors_text(compensator, vectors)
     manifest = FirmwareManifest(
         tool=THIS_TOOL,
         made_from=(SourceFile(source="compensator.json", sha256=digest),),
@@ -131,6 +138,7 @@ def generate(
             valve_json=compensator.valve_json_sha256,
             ramp_tests=compensator.valve.made_from,
         ),
+        vectors=vectors,
         constants=constants_of(compensator, {path: file.constants for path, file in core.items()}),
         files={path: sha256_of(text.encode()) for path, text in files.items()},
     )
