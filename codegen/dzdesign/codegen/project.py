@@ -13,6 +13,7 @@ from dzdesign.codegen.banner import Banner, banner_of, board_lines
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.current_files import CURRENT_HEADERS, CURRENT_SOURCES, FAULT_BITS, current_files
 from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core_files
+from dzdesign.codegen.core_costs import MEASURED, STAND_IN
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.provenance import constants_of
 from dzdesign.codegen.target import Target, folder_of
@@ -172,6 +173,8 @@ def target_files(compensator: Compensator, target: Target, banner: Banner) -> di
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,
+        "core_cost": MEASURED.get(target.name, MEASURED[STAND_IN]),
+        "cost_is_of_another": target.name not in MEASURED,
         "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }
     return {
