@@ -2,15 +2,16 @@
 
 import shutil
 from functools import cache
+from types import SimpleNamespace
 
 import pytest
 
 from dzdesign.codegen.core_costs import MEASURED
-from dzdesign.core.errors import RequirementError
+from dzdesign.verify.analysis import machine_code
 from dzdesign.verify.analysis.core_cost import core_cost
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
 from tests.support.attacked_firmware import edit
-from tests.support.golden_firmware import FULL, GOLDENS
+from tests.support.golden_firmware import FULL, GOLDENS, INPUT
 
 pytestmark = pytest.mark.slow  # simulators
 
@@ -61,10 +62,16 @@ def test_what_is_added_to_the_core_is_counted(target, machine, measured, tmp_pat
     assert after.stack_bytes >= 200 and after.counts[0][0] > before.counts[0][1]
 
 
-def test_what_does_not_run_is_said(tmp_path):
+def test_the_check_of_machine_code_says_what_the_core_takes(measured, tmp_path, monkeypatch):
     if missing := CORTEX_M4.missing():
         pytest.skip(missing)
     shutil.copytree(GOLDENS / "cortex-m4", tmp_path / "fw")
+    shutil.copy(GOLDENS / INPUT, tmp_path / "fw")
+    monkeypatch.setattr(machine_code, "MACHINES", (CORTEX_M4,))
+    monkeypatch.setattr(machine_code, "_words", lambda _: "all inputs")
+    monkeypatch.setattr(machine_code, "check_on_machine", lambda *_: SimpleNamespace(holds=True))
+    (check,) = machine_code.machine_code_checks(tmp_path / "fw", (None,))
+    assert check.holds and check.text == f"all inputs; {measured(GOLDENS, 'cortex-m4').words}"
     (tmp_path / "fw" / "core" / "dz_drive.c").unlink()
-    with pytest.raises(RequirementError, match="measuring program"):
-        core_cost(tmp_path / "fw", CORTEX_M4)
+    (check,) = machine_code.machine_code_checks(tmp_path / "fw", (None,))
+    assert check.holds and "memory and time were not measured: the measuring program" in check.text
