@@ -38,7 +38,9 @@ def regenerated(folder: Path, include: Sequence[Path] = ()) -> "Check":
         return REGENERATED.check(holds=None, text=reason)
     content = read_bytes(folder / "compensator.json", "compensator")
     try:
-        firmware = generate(read_compensator(folder), manifest.target, content, manifest.calibration)
+        firmware = generate(
+            read_compensator(folder), manifest.target, content, manifest.calibration, manifest.vectors
+        )
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
     expected = firmware.manifest

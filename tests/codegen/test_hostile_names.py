@@ -218,6 +218,7 @@ def place(tmp_path):
         core=("core/a.c",),
         board=(),
         origin=FirmwareOrigin(compensator_json=digest, valve_json=digest, ramp_tests=()),
+        vectors=0,
         constants=(),
         files={},
     )

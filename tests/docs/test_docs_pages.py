@@ -124,6 +124,15 @@ def test_the_runner_updates_what_a_page_shows(tmp_path):
     assert page.read_text() == "text\n```console\n$ echo new\nnew\n$ true\n```\nmore\n"
 
 
+def test_a_file_in_c_that_a_page_shows_is_there_when_its_commands_run(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("`one.c` is all\nthat is needed:\n\n```c\nint one;\n```\n\nOf `two.c`:\n\n```c\nint two;\n```\n\n"
+                    "```console\n$ cat one.c; ls *.c\nint one;\none.c\n```\n")  # fmt: skip
+    assert try_page(page, tmp_path, update=False) == []
+    page.write_text(page.read_text().replace("int one;\n```", "int other;\n```"))
+    assert len(try_page(page, tmp_path, update=False)) == 1
+
+
 @pytest.mark.parametrize(
     ("shown", "printed", "same"),
     [

@@ -29,7 +29,7 @@ def firmware_of(example_valve, example_compensator, tmp_path_factory):
         own = example_compensator
         if target == "f280049c":  # another converter
             own = design(example_valve, options_of({}, target_named(target).inputs()))
-        write_firmware(generate(own, target), root / target)
+        write_firmware(generate(own, target, vectors=700 if target == "host" else 0), root / target)
     return root
 
 
@@ -95,6 +95,22 @@ def test_a_fault_in_the_c_is_named_however_it_is_hidden(verify, fault, hidden):
         assert "NOT CHECKED  the files are those" in said and "dzdesign 0.0.9" in said and "make the firmware" in said
     else:
         assert "DOES NOT HOLD" in said and name in said
+
+
+@pytest.mark.parametrize("hidden", ["", "by its hash", "by a version"])
+def test_a_changed_test_vector_is_named_however_it_is_hidden(verify, hidden):
+    def attack(folder):
+        text = (folder / "vectors.csv").read_text()
+        row = next(line for line in text.splitlines()[1:] if line.endswith(",0,32768"))
+        compare = row.split(",")[3]
+        edit(folder, "vectors.csv", f"{row}\n", f"{row.replace(compare, str(int(compare) + 1))}\n")
+        if hidden:
+            seal(folder, lambda manifest: hidden == "by a version" and manifest["tool"].update(version="0.0.9"))
+
+    status, said = verify("host", attack)
+    assert status == 1 and "DOES NOT HOLD  the test vectors are the exactly rounded law's: vectors.csv: line" in said
+    elsewhere = {"": "missing: vectors.csv", "by its hash": "otherwise than generated now: vectors.csv"}
+    assert elsewhere.get(hidden, "dzdesign 0.0.9") in said
 
 
 # ---- the project file ----

@@ -3,9 +3,10 @@
 A fenced block ``console`` holds commands, each after ``$ `` (continued after a backslash), and their output. It is
 run by bash in the page's folder, all of a page in order. Shown is standard output; progress goes to standard error
 and is left out, but for an exit status of 2 the error's line is shown. A command that does not end with 0 says so in
-a comment: ``# exit status 1``. In the output a line ``...`` stands for any lines, and ``…`` for any part of one line
-(a hash, a list of compilers); blanks at the end of a line do not count. Nothing else is normalised: what a page shows
-has no times and no folders of this machine.
+a comment: ``# exit status 1``. A block ``c`` below a paragraph that begins with a file's name in backticks is that
+file: it is written into the folder before any command runs. In the output a line ``...`` stands for any lines, and
+``…`` for any part of one line (a hash, a list of compilers); blanks at the end of a line do not count. Nothing else is
+normalised: what a page shows has no times and no folders of this machine.
 """
 
 import os
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+FILE = re.compile(r"^`([\w.]+\.[ch])` (?:(?!\n\n).)*\n\n```c\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 STATUS = re.compile(r"#\s*exit status (\d+)\s*$")
 
 
@@ -103,6 +105,8 @@ def try_page(page: Path, folder: Path, update: bool) -> list[str]:
     text = page.read_text(encoding="utf-8")
     wrong: list[str] = []
     outputs: dict[str, str] = {}
+    for name, content in FILE.findall(text):
+        (folder / name).write_text(content, encoding="utf-8")
     for command in commands_of(text):
         status, printed = run(command, folder)
         outputs[command.shown] = printed

@@ -19,10 +19,12 @@ from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.current_files import CURRENT_HEADERS, CURRENT_SOURCES, FAULT_BITS, current_files
 from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, CoreFile, Values, core_files
+from dzdesign.codegen.core_costs import MEASURED, STAND_IN
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.loading.files import LOAD_FILES, STORE, load_texts
 from dzdesign.codegen.provenance import constants_of
 from dzdesign.codegen.target import Target, folder_of
+from dzdesign.codegen.vectors.vectors_file import vectors_text
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
@@ -30,7 +32,7 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import BLOCK_FILE, Calibration, FirmwareManifest, FirmwareOrigin
+from dzdesign.design.firmware_manifest import BLOCK_FILE, VECTORS_NAME, Calibration, FirmwareManifest, FirmwareOrigin
 from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.design.target_inputs import Converter
 
@@ -116,13 +118,15 @@ def generate(
     target_name: str | None = None,
     compensator_bytes: bytes | None = None,
     calibration: Calibration = "fixed",
+    vectors: int = 0,
 ) -> Firmware:
     """Generate the C project of a compensator for the target of that name, by default the one that it was designed for.
 
     `compensator_bytes` is the file that the compensator was read from; without it the document as it would be written.
     With `calibration` "fixed" the numbers of the valve stand in the core, with "block" in a block of data beside it.
-    An unknown target is an `InputError`; so is one whose converter or PWM differs from those that the compensator was
-    designed for, and a compensator that says of its target what is not so.
+    With `vectors` there are so many test vectors in vectors.csv. An unknown target is an `InputError`; so is one whose
+    converter or PWM differs from those that the compensator was designed for, a compensator that says of its target
+    what is not so, and a number of vectors that can't hit every node, corner and fault.
     """
     designed_for = compensator.target
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))
@@ -147,6 +151,8 @@ def generate(
     }
     files |= {**target_files(compensator, target, banner, block), "compensator.json": document.decode()}
     octets = pack(block) if block else b""
+    if vectors:
+        files[VECTORS_NAME] = vectors_text(compensator, vectors)
     manifest = FirmwareManifest(
         tool=THIS_TOOL,
         made_from=(SourceFile(source="compensator.json", sha256=digest),),
@@ -160,6 +166,7 @@ def generate(
             valve_json=compensator.valve_json_sha256,
             ramp_tests=compensator.valve.made_from,
         ),
+        vectors=vectors,
         constants=constants_of(compensator, {path: file.constants for path, file in core.items()}),
         files={path: sha256_of(text.encode()) for path, text in files.items()}
         | ({BLOCK_FILE: sha256_of(octets)} if octets else {}),
@@ -208,6 +215,8 @@ def target_files(
         "wiring": wiring_of(compensator, Converter(full_V=full_V, levels=levels)),
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,
+        "core_cost": MEASURED.get(target.name, MEASURED[STAND_IN]),
+        "cost_is_of_another": target.name not in MEASURED,
         "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }
     in_block_form = {**block_templates(target, block), **(target.block_templates if block else {})}

@@ -18,6 +18,8 @@ Calibration = Literal["fixed", "block"]
 FORMS: tuple[Calibration, ...] = get_args(Calibration)
 BLOCK_FILE = "calibration.bin"
 Text = Annotated[str, Meta(min_length=1)]
+#: Test vectors, beside compensator.json.
+VECTORS_NAME = "vectors.csv"
 #: A number of the C fits 64 bits with sign: every sum of the core is proved to.
 Number = Annotated[int, Meta(ge=-(2**31), le=2**63 - 1)]
 
@@ -94,5 +96,8 @@ class FirmwareManifest(Artefact):
         ),
     ]
     origin: Annotated[FirmwareOrigin, Meta(description="Hashes of everything it was made from.")]
+    vectors: Annotated[
+        int, Meta(description="Test vectors in vectors.csv: N of `codegen --vectors N`; 0: none.", ge=0, le=99999)
+    ]
     constants: Annotated[tuple[FirmwareConstant, ...], Meta(description="In the order of the files.")]
     files: Annotated[Mapping[Text, Sha256], Meta(description="File to the SHA-256 of its bytes, as generated.")]

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, parse_document, read_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.core.options import AnyPath, Option, Text, flag_of
+from dzdesign.core.option_readers import whole_number
+from dzdesign.core.options import AnyPath, Option, Text, flag_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.stages.design import TARGETS, design_options
 
@@ -32,6 +33,9 @@ class GenerateArguments(DesignChoices):
     """Microcontroller (default: that of the design; of a VALVE.json f28335)."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
     """Where the numbers of the valve stand: fixed in the core (default), or in a block of data that it is handed."""
+    vectors: Annotated[int | str, Option("N", read=whole_number("a whole number up to 99999", digits=5))] = "0"
+    """Number of test vectors in vectors.csv: codes and the exact law's answers at every node, corner and fault, then at
+    random codes."""
     replace: Annotated[bool, Option()] = False
     """Write over the firmware of another design in the folder."""
 
@@ -42,8 +46,8 @@ def generate(arguments: GenerateArguments) -> "Firmware":
     Raises
     ------
     InputError
-        If the file can't be read, a number in it does not follow, the target counts otherwise, or the folder holds the
-        firmware of another design.
+        If the file can't be read, a number in it does not follow, the target counts otherwise, the vectors are too few,
+        or the folder holds the firmware of another design.
     """
     from dzdesign.codegen.project import DEFAULT_TARGET, target_named, write_firmware
     from dzdesign.codegen.project import generate as generate_project
@@ -62,20 +66,22 @@ def generate(arguments: GenerateArguments) -> "Firmware":
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), schema_of(FirmwareManifest))
     given = arguments.compensator
+    vectors: int = read_options(arguments, ["vectors"])["vectors"]
     if isinstance(given, Compensator):
-        firmware = generate_project(_proven(given, "the compensator", arguments), arguments.target, calibration=form)
+        proven = _proven(given, "the compensator", arguments)
+        firmware = generate_project(proven, arguments.target, calibration=form, vectors=vectors)
     else:
         source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
         document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
         if document["schema"] == VALVE_SCHEMA:
             valve = read_artefact(content, ValveModel, source)
             compensator = design_valve(valve, design_options(arguments, target), content)
-            firmware = generate_project(compensator, target, calibration=form)
+            firmware = generate_project(compensator, target, calibration=form, vectors=vectors)
         else:
             compensator = read_artefact(content, Compensator, source)
             refuse_without_options(compensator, source)
             proven = _proven(compensator, f"'{source}'", arguments)
-            firmware = generate_project(proven, arguments.target, content, form)
+            firmware = generate_project(proven, arguments.target, content, form, vectors)
     if arguments.output is None:
         return firmware
     return write_firmware(firmware, Path(arguments.output), over_another=arguments.replace)

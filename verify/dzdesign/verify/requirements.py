@@ -46,6 +46,8 @@ ABOVE_TESTS = Requirement(id="above-tests", title="above the tests the drive at 
 LOT = Requirement(id="over-compensation-of-lot", title="no over-compensation of any valve of the lot")
 PRESSURE_DIFFERENCE = Requirement(id="pressure-difference", title="depends on the pressures by their difference only")
 FALLBACK = Requirement(id="fallback", title="codes outside their signal's valid range fall back")
+#: Of a firmware that has them.
+VECTORS = Requirement(id="vectors", title="the test vectors are the exactly rounded law's")
 DRIVE = Requirement(id="drive", title="the drive follows its model")
 PLANT_OPENS = Requirement(id="plant-opens", title="the plant of the closed loop opens")
 PLANT_IS_THE_VALVE = Requirement(id="plant-is-the-valve", title="the plant opens where the identified valve does")

@@ -24,6 +24,7 @@ from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.exhaustive.input_map import InputMap, map_inputs
 from dzdesign.verify.exhaustive.lot_check import lot_checked
+from dzdesign.verify.exhaustive.stored_vectors import vectors_follow
 from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
 from dzdesign.verify.firmware.compilation import board_compiles, changed_board_files, check_include, compiles_strictly
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
@@ -102,6 +103,7 @@ def verify(
     checks = (
         files_unchanged(folder, manifest),
         manifest_follows(folder, manifest, compensator),
+        *vectors_follow(folder, manifest, compensator),
         *core.checks,
         *current.checks,
         *loop.checks,

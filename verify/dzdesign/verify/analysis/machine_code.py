@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.verify.analysis.core_cost import core_cost
 from dzdesign.verify.current.current_checks import controller_on_machine
 from dzdesign.verify.evidence import InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
@@ -66,10 +67,17 @@ def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Ch
         except RequirementError as error:
             checks.append(MACHINE_CODE.check(name=name, holds=False, text=str(error)))
             continue
-        checks.append(
-            MACHINE_CODE.check(name=name, holds=all(each.holds for each in done), text="; ".join(map(_words, done)))
-        )
+        text = "; ".join([*map(_words, done), _cost(folder, machine)])
+        checks.append(MACHINE_CODE.check(name=name, holds=all(each.holds for each in done), text=text))
     return checks
+
+
+def _cost(folder: Path, machine: Machine) -> str:
+    """Return what the core takes there: a figure, and no requirement."""
+    try:
+        return core_cost(folder, machine).words
+    except RequirementError as error:
+        return f"memory and time were not measured: {error}"
 
 
 def _words(done: MachineCheck) -> str:

@@ -1,0 +1,77 @@
+"""The figures in the READMEs are what the compiler and the simulator give, and the measuring sees what is added."""
+
+import shutil
+from functools import cache
+from types import SimpleNamespace
+
+import pytest
+
+from dzdesign.codegen.core_costs import MEASURED
+from dzdesign.verify.analysis import machine_code
+from dzdesign.verify.analysis.core_cost import core_cost
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
+from tests.support.attacked_firmware import edit
+from tests.support.golden_firmware import FULL, GOLDENS, INPUT
+
+pytestmark = pytest.mark.slow  # simulators
+
+
+def of_machine(target, machine):
+    return pytest.param(
+        target, machine, id=target,
+        marks=pytest.mark.skipif(bool(machine.missing()), reason=f"{machine.name}: {machine.missing()}"),
+    )  # fmt: skip
+
+
+on_both = pytest.mark.parametrize(("target", "machine"), [of_machine("cortex-m4", CORTEX_M4), of_machine("avr", AVR)])
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Figures of a golden firmware, measured once."""
+    machines = {"cortex-m4": CORTEX_M4, "avr": AVR}
+    return cache(lambda root, target: core_cost(root / target, machines[target]))
+
+
+@on_both
+@pytest.mark.parametrize("root", [GOLDENS, FULL], ids=["default", "everything"])
+def test_the_figures_of_the_readme_are_measured(target, machine, root, measured):
+    found, stated = measured(root, target), MEASURED[target]
+    if found.compiler != stated.compiler:
+        pytest.skip(f"the READMEs' figures are of {stated.compiler}, this is {found.compiler}")
+    figures = stated.default if root == GOLDENS else stated.everything
+    assert found.machine == stated.processor and f" {stated.unit} a call" in found.words
+    for name in ("flash_bytes", "ram_bytes", "valve_bytes", "stack_bytes"):
+        assert getattr(found, name) == getattr(figures, name), name
+    assert tuple(most for _, most in found.counts) == figures.most
+
+
+@on_both
+def test_what_is_added_to_the_core_is_counted(target, machine, measured, tmp_path):
+    before = measured(GOLDENS, target)
+    shutil.copytree(GOLDENS / target, tmp_path / "fw")
+    tick = "void dz_drive_tick(struct dz_drive *drive)\n{\n"
+    law = "uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)\n{\n"
+    ten = r"nop\n" * 10
+    added = f'volatile uint32_t seen = 5u;\n{tick}    __asm volatile("{ten}");\n'
+    edit(tmp_path / "fw", "core/dz_drive.c", tick, added)
+    edit(tmp_path / "fw", "core/dz_comp.c", law, f"{law}    volatile uint8_t kept[200] = {{1u}};\n")
+    after = core_cost(tmp_path / "fw", machine)
+    assert after.counts[2][1] == before.counts[2][1] + 10 and after.counts[1] == before.counts[1]
+    assert after.ram_bytes == before.ram_bytes + 4 and after.flash_bytes >= before.flash_bytes + 24
+    assert after.stack_bytes >= 200 and after.counts[0][0] > before.counts[0][1]
+
+
+def test_the_check_of_machine_code_says_what_the_core_takes(measured, tmp_path, monkeypatch):
+    if missing := CORTEX_M4.missing():
+        pytest.skip(missing)
+    shutil.copytree(GOLDENS / "cortex-m4", tmp_path / "fw")
+    shutil.copy(GOLDENS / INPUT, tmp_path / "fw")
+    monkeypatch.setattr(machine_code, "MACHINES", (CORTEX_M4,))
+    monkeypatch.setattr(machine_code, "_words", lambda _: "all inputs")
+    monkeypatch.setattr(machine_code, "check_on_machine", lambda *_: SimpleNamespace(holds=True))
+    (check,) = machine_code.machine_code_checks(tmp_path / "fw", (None,))
+    assert check.holds and check.text == f"all inputs; {measured(GOLDENS, 'cortex-m4').words}"
+    (tmp_path / "fw" / "core" / "dz_drive.c").unlink()
+    (check,) = machine_code.machine_code_checks(tmp_path / "fw", (None,))
+    assert check.holds and "memory and time were not measured: the measuring program" in check.text

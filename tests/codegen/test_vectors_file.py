@@ -1,0 +1,265 @@
+"""vectors.csv: it hits every node, corner and fault; the compiled core and verify's own law agree, wrong ones do not.
+
+The reader in C is that of the documentation's page.
+"""
+
+import re
+import subprocess
+from dataclasses import replace
+
+import pytest
+
+from dzdesign.codegen.project import generate
+from dzdesign.codegen.vectors.choosing import required_codes
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.errors import InputError
+from dzdesign.design.side_law import Sides
+from dzdesign.regeneration import regenerated
+from dzdesign.verify.exhaustive.stored_vectors import vectors_follow
+from dzdesign.verify.firmware.unchanged_files import files_unchanged
+from dzdesign.verify.toolchain.host_compiler import host_compiler, load_library, words_of
+from tests.support.attacked_firmware import edit
+from tests.support.documented_commands import FILE
+from tests.support.golden_firmware import FULL, golden_compensator
+from tests.support.paths import ROOT
+from tests.support.synthetic import needs_compiler
+
+READER = dict(FILE.findall((ROOT / "docs" / "howto" / "core-only.md").read_text("utf-8")))["check_vectors.c"]
+#: A command of one sign; two solenoids, unlike sensors and the pressures turned round; one table, without a transition.
+DEFAULT, FULL_SET, ONE_TABLE = NAMES = ("default", "everything switched on", "no transition")
+#: Of each sign: its file, what its functions' names end with, and its first column.
+SIDES = {1: ("dz_comp.c", "", 3), -1: ("dz_comp_negative.c", "_negative", 6)}
+
+
+def fewest(compensator) -> int:
+    """How many vectors are required."""
+    return len({codes for group in required_codes(compensator).values() for codes in group})
+
+
+def without_transition(compensator):
+    """The same law from one table: no zero band, no transition."""
+    side = replace(compensator.positive, transition_beta=None)
+    functions = replace(compensator.drive_functions, leave_zero_codes=0)
+    return replace(
+        compensator, transition_codes=0, zero_band_codes=0, sides=Sides(positive=side), drive_functions=functions
+    )
+
+
+@pytest.fixture(scope="module")
+def firmwares():
+    """Firmware with no more vectors than are required."""
+    default = golden_compensator("host")
+    compensators = (default, golden_compensator("host", FULL), without_transition(default))
+    made = (generate(each, "host", vectors=fewest(each)) for each in compensators)
+    return dict(zip(NAMES, made, strict=True))
+
+
+def table(firmware):
+    """The columns' names, and the rows."""
+    names, *lines = firmware.files["vectors.csv"].splitlines()
+    return names.split(","), [tuple(map(int, line.split(","))) for line in lines]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_node_corner_and_fault_is_among_the_fewest(name, firmwares):
+    compensator = firmwares[name].compensator
+    signals, limit = compensator.signals, compensator.drive_functions.compare_limit
+    _, rows = table(firmwares[name])
+    assert len(rows) == len(set(rows)) == firmwares[name].manifest.vectors
+    low_a, high_a = signals.pressure_a.valid_codes
+    low_b, high_b = signals.pressure_b.valid_codes
+    for sign in signals.signs:
+        column = SIDES[sign][2]
+        sound = [row for row in rows if low_a <= row[1] <= high_a and low_b <= row[2] <= high_b]
+        by_drop = {}
+        for row in sound:
+            away = signals.command.direction(sign) * (row[0] - signals.command.zero_code)
+            by_drop.setdefault(signals.difference(row[1], row[2], sign), {})[away] = row[column]
+        largest, step = signals.largest_difference(sign), compensator.beta_step_codes
+        nodes = {node + by for node in range(0, largest + 1, step) for by in (-1, 0, 1)}
+        for drop in (drop for drop in nodes if drop <= largest):
+            assert 0 in by_drop[drop] and any(away >= max(compensator.transition_end, 1) for away in by_drop[drop])
+        reverse, span = compensator.reverse_codes, signals.command.span(sign)
+        tested_to = int(signals.dp_code(compensator.side(sign).certificate.dp_MPa[1]))
+        assert {-reverse - 1, -reverse, tested_to, tested_to + 1, largest} <= set(by_drop)
+        corners = {compensator.zero_band_codes, compensator.transition_end, span}
+        around = {corner + by for corner in corners for by in (-1, 0, 1)}
+        beyond = signals.command.zero_code + signals.command.direction(sign) * (span + 1)
+        for drop in (0, tested_to, largest):
+            assert {away for away in around if away <= span or 0 <= beyond <= 65535} - {-1} <= set(by_drop[drop])
+        for drop in (0, tested_to, largest):
+            reached = [away for away in range(span + 1) if by_drop[drop].get(away) == limit]
+            assert not reached or by_drop[drop][reached[0] - 1] < limit
+        assert name != FULL_SET or reached  # the others stay below it
+        bits = {row[column + 1] for row in rows}
+        assert {0, 1, 2, 4, 6, 7, 8, 16} <= bits
+    for place, signal in enumerate((signals.command, signals.pressure_a, signals.pressure_b)):
+        low, high = signal.valid_codes
+        tried = {row[place] for row in rows}
+        assert {code for code in (low - 1, low, high, high + 1, signals.code_max + 1, 65535) if code >= 0} <= tried
+    ends = {(row[1], row[2]) for row in rows}
+    assert {(a, b) for a in (low_a, high_a) for b in (low_b, high_b)} <= ends
+
+
+def test_more_vectors_begin_with_the_same_ones_and_have_sound_random_codes(firmwares):
+    fewer, compensator = firmwares[DEFAULT].files["vectors.csv"], firmwares[DEFAULT].compensator
+    more = generate(compensator, "host", vectors=fewest(compensator) + 200).files["vectors.csv"]
+    assert more.startswith(fewer)
+    rest = [tuple(map(int, line.split(","))) for line in more[len(fewer) :].splitlines()]
+    assert len(set(rest)) == 200 and all(row[4] in (0, 16) for row in rest)
+    assert len({row[0] for row in rest}) > 150 < len({row[1] - row[2] for row in rest})
+
+
+def test_too_few_vectors_are_refused_with_how_many_are_needed(wording):
+    compensator = golden_compensator("host")
+    with wording.refusal(InputError, "vectors file: too few"):
+        generate(compensator, "host", vectors=fewest(compensator) - 1)
+    assert "vectors.csv" not in generate(compensator, "host").files
+
+
+# ---- the compiled core ----
+
+
+def read_by_the_page(tmp_path, firmware, sign) -> tuple[int, str]:
+    """Compile one side's core and the page's reader, and run it."""
+    file, ending, first = SIDES[sign]
+    names, rows = table(firmware)
+    assert names[first].startswith("compare") and names[first + 2].startswith("beta")
+    reader = re.sub(r"\bdz_(comp|status|beta)\(", rf"dz_\1{ending}(", READER)
+    lines = [f"{{{','.join(map(str, (*row[:3], *row[first : first + 3])))}}},\n" for row in rows]
+    sources = {"check.c": reader, "vectors.inc": "".join(lines)}
+    sources |= {name: firmware.files[f"core/{name}"] for name in (file, "dz_comp.h")}
+    for each, text in sources.items():
+        (tmp_path / each).write_text(text, encoding="utf-8")
+    command = [*words_of(host_compiler()), "-std=c99", "-Werror", "check.c", file, "-o", "check"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "check"], capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout
+
+
+@needs_compiler
+@pytest.mark.parametrize(("name", "sign"), [(DEFAULT, 1), (FULL_SET, 1), (FULL_SET, -1), (ONE_TABLE, 1)])
+def test_the_compiled_core_gives_every_vector(name, sign, firmwares, tmp_path):
+    status, said = read_by_the_page(tmp_path, firmwares[name], sign)
+    assert (status, said) == (0, f"{firmwares[name].manifest.vectors} vectors, 0 wrong\n")
+
+
+#: What is wrong, and how the C says it: a pattern, and what stands in its place.
+FAULTS = {
+    "a node of the law's table": (r"(law_segment\[\d+\] = \{(?:[^\n]*\n){9} *\{UINT32_C\()\d", r"\g<1>9"),
+    "a slope of the law's table": (r"(law_segment\[\d+\] = \{(?:[^\n]*\n){9} *\{UINT32_C\(\d+\), -?)", r"\g<1>1"),
+    "the law's smallest beta": (r"(law_segment\[\d+\] = \{\s*\{UINT32_C\()\d", r"\g<1>2"),
+    "a node of the table at zero": (r"(zero_segment\[\d+\] = \{(?:[^\n]*\n){9} *\{UINT32_C\()\d", r"\g<1>9"),
+    "the smallest beta at zero": (r"(zero_segment\[\d+\] = \{\s*\{UINT32_C\()\d", r"\g<1>2"),
+    "code of zero command": (r"(?<=COMMAND_ZERO )2048u", "2049u"),
+    "least valid command": (r"(?<=COMMAND_LOW )0u", "1u"),
+    "largest valid command": (r"(?<=COMMAND_HIGH )4095u", "4096u"),
+    "least valid pressure A": (r"(#define PRESSURE_A_LOW) (\d+)u", r"\1 (\2u - 1u)"),
+    "largest valid pressure A": (r"(#define PRESSURE_A_HIGH) (\d+)u", r"\1 (\2u + 1u)"),
+    "least valid pressure B": (r"(#define PRESSURE_B_LOW) (\d+)u", r"\1 (\2u + 1u)"),
+    "largest valid pressure B": (r"(#define PRESSURE_B_HIGH) (\d+)u", r"\1 (\2u - 1u)"),
+    "weight of sensor B": (r"(#define PRESSURE_B_WEIGHT) (\d+)u", r"\1 (\2u + 1u)"),
+    "no pressure": (r"(#define PRESSURE_A_ZERO) (\d+)u", r"\1 (\2u + 1u)"),
+    "a failed difference": (r"(#define REVERSE) (\d+)u", r"\1 (\2u - 4096u)"),
+    "the highest tested drop": (r"(#define TESTED_TO) (\d+)u", r"\1 (\2u + 4096u)"),
+    "width of the zero band": (r"(#define ZERO_BAND) (\d+)u", r"\1 (\2u - 1u)"),
+    "width of the transition": (r"(#define TRANSITION_CODES) (\d+)u", r"\1 (\2u - 1u)"),
+    "the output's limit": (r"(#define QUOTIENT_LIMIT) (UINT32_C\(\d+\))", r"\1 (\2 + UINT32_C(2047))"),
+    "rounding": (r"(#define HALF) UINT64_C\(\d+\)", r"\1 UINT64_C(0)"),
+    "the law's slope": (r"(#define FACTOR_SLOPE) (\(-INT32_C\(\d+\)\))", r"\1 (\2 + 1)"),
+    "the shift of the segments": (r"(#define STEP_SHIFT) 6u", r"\1 7u"),
+    "pressures turned round": (r"return \(uint32_t\)\(a - b\);", "return (uint32_t)(b - a);"),
+    "an invalid command is not let go": (r"(law_of\(towards, difference, failed\)) & \(uint32_t\)~let_go", r"\1"),
+    "the status of sensor B": (r"\(\(b >> WORD_TOP\) \* DZ_STATUS_PRESSURE_B\)", "0u"),
+    "beta for a display": (r"(?<=return \(uint16_t\)\(\(beta \* BETA_FACTOR\) >> )BETA_SHIFT", "(BETA_SHIFT + 1u)"),
+}  # fmt: skip
+
+
+@needs_compiler
+def test_every_kind_of_fault_is_caught_by_the_fewest_vectors(firmwares):
+    """The core once more for each fault, in one file: what a file may have once gets a number."""
+    firmware = firmwares[FULL_SET]
+    core, (_, rows) = firmware.files["core/dz_comp.c"], table(firmware)
+    once = {*re.findall(r"^(?:static )?(?:inline )?\w+ (\w+)\(", core, re.MULTILINE), "segment"}
+    undefined = "".join(f"#undef {symbol}\n" for symbol in re.findall(r"^#define (\w+)", core, re.MULTILINE))
+    cores = ""
+    for place, (fault, (pattern, instead)) in enumerate({"none": ("$", ""), **FAULTS}.items()):
+        wrong, count = re.subn(pattern, instead, core, count=1)
+        assert count == 1, f"{fault} has no place in the C"
+        cores += re.sub(rf"\b({'|'.join(once)})\b(?!\.h)", rf"\g<1>_{place}", wrong) + undefined
+    library = load_library({"cores.c": cores, "dz_comp.h": firmware.files["core/dz_comp.h"]}, "cores", ["-O0", "-w"])
+    caught = []
+    for place in range(1 + len(FAULTS)):
+        comp, status, beta = (getattr(library, f"dz_{name}_{place}") for name in ("comp", "status", "beta"))
+        found = ((comp(*row[:3]), status(*row[:3]), beta(*row[1:3])) for row in rows)
+        answers = [tuple(value & 0xFFFF for value in each) for each in found]  # of 16 bits
+        caught.append(answers != [row[3:6] for row in rows])
+    assert [fault for fault, seen in zip(("none", *FAULTS), caught, strict=True) if not seen] == ["none"]
+
+
+# ---- verify ----
+
+
+@pytest.fixture
+def checked(firmwares, tmp_path):
+    """What verify's own law says of a firmware's vectors, edited, under a manifest with other words."""
+
+    def check(name, old="", new="", **changes):
+        path, firmware = tmp_path / "vectors.csv", firmwares[name]
+        path.write_text(firmware.files["vectors.csv"], encoding="utf-8", newline="")
+        edit(tmp_path, "vectors.csv", old, new)
+        (found,) = vectors_follow(tmp_path, replace(firmware.manifest, **changes), firmware.compensator)
+        return found
+
+    return check
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_verify_has_the_same_values_from_its_own_law(name, checked):
+    assert checked(name).holds
+
+
+def test_every_changed_answer_fails(firmwares, checked):
+    for name, columns in ((DEFAULT, range(3, 6)), (FULL_SET, range(6, 9))):
+        row = firmwares[name].files["vectors.csv"].splitlines()[3]
+        for column in columns:
+            values = row.split(",")
+            values[column] = str(int(values[column]) + 1)
+            found = checked(name, f"{row}\n", f"{','.join(values)}\n")
+            assert found.holds is False and "vectors.csv: line 4 has" in found.text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("compare_counts", "compare", "line 1"),
+        ("\n0,", "\n 0,", "line 2"),
+        ("\n0,", "\n00,", "line 2"),
+        ("\n0,", "\n0.0,", "line 2"),
+        ("\n0,", "\n0;", "line 2"),
+        ("\n0,", "\n-0,", "line 2"),
+        ("\n0,", "\n0,0,", "line 2"),
+        ("\n0,", "\n\n0,", "rows, the manifest says"),
+    ],
+)
+def test_what_is_no_table_of_whole_numbers_fails(checked, old, new, place):
+    found = checked(DEFAULT, old, new)
+    assert found.holds is False and place in found.text
+
+
+def test_a_manifest_that_promises_other_vectors_fails(firmwares, checked, tmp_path):
+    for vectors in (0, 5):
+        assert f"the manifest says {vectors}" in checked(DEFAULT, vectors=vectors).text
+    firmware = firmwares[DEFAULT]
+    (tmp_path / "vectors.csv").unlink()
+    assert vectors_follow(tmp_path, firmware.manifest, firmware.compensator)[0].holds is False
+    assert vectors_follow(tmp_path, replace(firmware.manifest, vectors=0, files={}), firmware.compensator) == ()
+
+
+def test_a_firmware_is_generated_again_with_its_vectors(firmwares, tmp_path):
+    firmware = firmwares[DEFAULT]
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    assert regenerated(tmp_path / "fw").holds and files_unchanged(tmp_path / "fw", firmware.manifest).holds
+    edit(tmp_path / "fw", "vectors.csv", "\n0,", "\n1,")
+    assert "vectors.csv" in regenerated(tmp_path / "fw").text
+    assert "vectors.csv" in files_unchanged(tmp_path / "fw", firmware.manifest).text
