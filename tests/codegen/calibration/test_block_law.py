@@ -6,37 +6,24 @@ import pytest
 
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.built_for import built_for
-from dzdesign.codegen.calibration.files import block_law_files, calibration_header, texts
+from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.packing import pack
-from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.core.documents import sha256_of
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
+from tests.support.block_cores import block_folder
 from tests.support.core_variants import variant
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
 
 
-def folder_of(compensator, folder):
-    """The core in block form, and the block, as a firmware folder has them."""
-    built, document = built_for(compensator), to_json_bytes(compensator)
-    (folder / "core").mkdir(parents=True)
-    files = {"dz_calibration.h": calibration_header(built), **block_law_files(built)}
-    for name, text in texts(files).items():
-        (folder / "core" / name).write_text(text, encoding="utf-8")
-    (folder / "compensator.json").write_bytes(document)
-    (folder / "calibration.bin").write_bytes(pack(block_of(compensator, sha256_of(document))))
-    return folder
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["default", "bipolar, all options", "target law, no transition"])
 def test_every_input_gives_what_the_law_does(name, tmp_path):
     compensator = variant(name, "wide")
-    folder = folder_of(compensator, tmp_path / "fw")
+    folder = block_folder(compensator, tmp_path / "fw")
     for sign in compensator.signals.signs:
         result = check_all_inputs(folder, sign)
         assert result.holds and result.inputs > 20_000_000, result
@@ -44,7 +31,7 @@ def test_every_input_gives_what_the_law_does(name, tmp_path):
 
 def test_a_core_is_compiled_once_and_a_wrong_number_is_seen(tmp_path):
     compensator = variant("bipolar, all options", "wide")
-    folder = folder_of(compensator, tmp_path / "fw")
+    folder = block_folder(compensator, tmp_path / "fw")
     block = block_of(compensator, "0" * 64)
     core = CompiledCore(folder, -1)
     sample = PreparedInputs(ExactLaw(compensator, -1)).sample()
@@ -69,4 +56,4 @@ def test_a_core_is_compiled_once_and_a_wrong_number_is_seen(tmp_path):
 def test_the_same_firmware_serves_other_valves():
     first, second = (variant(name, "wide") for name in ("default", "no transition"))
     assert built_for(first) == built_for(second)
-    assert texts(block_law_files(built_for(first))) == texts(block_law_files(built_for(second)))
+    assert texts(block_core_files(built_for(first))) == texts(block_core_files(built_for(second)))

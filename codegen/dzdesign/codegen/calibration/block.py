@@ -4,6 +4,8 @@ from fractions import Fraction
 from math import floor
 from typing import Any, TypeVar
 
+from dzdesign.codegen.calibration.acceptance import refusals
+from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
 from dzdesign.codegen.calibration.layout import (
     LENGTH_WORDS,
     NO_INTERLOCK,
@@ -12,7 +14,6 @@ from dzdesign.codegen.calibration.layout import (
     PLAY_NODES,
     RECORD_WORDS,
     SERIAL_WORDS,
-    SHAPE_BITS,
     SUPPLY_NODES,
     CalibrationBlock,
     CurrentBlock,
@@ -25,10 +26,12 @@ from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.loop import CurrentLoop
-from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT
+from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT, WEIGHT_UNIT, Signals
 
 #: Nodes that stand for pressures that can't be right.
 FALLBACKS = 2
+#: Largest number of 16 bits.
+MOST = 0xFFFF
 ALTERNATIVE = "generate it with --calibration fixed"
 
 Part = TypeVar("Part", SideBlock, CurrentBlock)
@@ -37,15 +40,25 @@ Part = TypeVar("Part", SideBlock, CurrentBlock)
 def block_of(compensator: Compensator, digest: str, *, serial: str = "", record: str = "") -> CalibrationBlock:
     """Return the block of a compensator whose file has the SHA-256 `digest`.
 
-    What a block has no room for is an `InputError`: a beta of more nodes or finer ones, a play of more nodes, a longer
-    text.
+    What a block has no room for is an `InputError`: more nodes of beta or of the play, a longer text; so is one that its
+    own firmware would refuse.
     """
+    built = built_for(compensator)
+    block = _numbers(compensator, built, digest, serial, record)
+    if refused := refusals(block, built):
+        rules = "; ".join(f"{name}: {', '.join(rules)}" for name, rules in refused.items())
+        raise InputError(f"the firmware would refuse this compensator's calibration block ({rules}); {ALTERNATIVE}")
+    return block
+
+
+def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str, record: str) -> CalibrationBlock:
+    """Return the block, whatever its firmware says of it."""
     c, signals, functions = compensator, compensator.signals, compensator.drive_functions
     command, a, b = signals.command, signals.pressure_a, signals.pressure_b
     interlock = functions.interlock_codes
     return CalibrationBlock(
         length=LENGTH_WORDS,
-        shape=shape_of(c),
+        shape=built.shape,
         code_max=signals.code_max,
         compare_max=signals.compare_max,
         sample_Hz=signals.sample_Hz,
@@ -69,7 +82,7 @@ def block_of(compensator: Compensator, digest: str, *, serial: str = "", record:
         b_zero=b.zero_code,
         b_low=b.valid_codes[0],
         b_high=b.valid_codes[1],
-        weight_b=signals.weight_b,
+        weight_b=_weight(signals),
         beta_step=c.beta_step_codes,
         transition_codes=c.transition_codes or 1,
         zero_band=c.zero_band_codes,
@@ -86,22 +99,9 @@ def block_of(compensator: Compensator, digest: str, *, serial: str = "", record:
         play_step_shift=_shift(functions.play_step_codes) if functions.has_play else 0,
         play_shift=_shift(functions.play_codes * c.transition_codes) if functions.has_play else 0,
         sides=(_side(c, 1), _side(c, -1) if c.negative is not None else _nothing(SideBlock)),
-        current=_nothing(CurrentBlock) if c.current_drive is None else _current(c.current_drive.loop),
+        current=_nothing(CurrentBlock) if c.current_drive is None else current_block(c.current_drive.loop),
         crc32=0,
     )
-
-
-def shape_of(compensator: Compensator) -> int:
-    """Return what a compensator's firmware must be compiled for, the bits of `SHAPE_BITS`."""
-    drive = compensator.current_drive
-    holds = {
-        "BIPOLAR": compensator.negative is not None,
-        "FALLING": compensator.signals.command.direction(1) < 0,
-        "SWAPPED": compensator.signals.swapped and compensator.negative is not None,
-        "CURRENT": drive is not None,
-        "SUPPLY": drive is not None and drive.loop.supply is not None,
-    }
-    return sum(holds[name] << place for place, name in enumerate(SHAPE_BITS))
 
 
 def _side(c: Compensator, sign: int) -> SideBlock:
@@ -162,7 +162,16 @@ def _division(form: IntegerForm, compare_limit: int) -> dict[str, int]:
             "reciprocal_shift": shift - WORD_BITS}  # fmt: skip
 
 
-def _current(loop: CurrentLoop) -> CurrentBlock:
+def _weight(signals: Signals) -> int:
+    if signals.weight_b > MOST:
+        raise InputError(
+            f"a code of sensor B weighs {signals.weight_b / WEIGHT_UNIT:.3g} of sensor A; a calibration block holds "
+            f"{MOST / WEIGHT_UNIT:.3g} at most; {ALTERNATIVE}"
+        )
+    return signals.weight_b
+
+
+def current_block(loop: CurrentLoop) -> CurrentBlock:
     """Return the current controller."""
     supply = loop.supply
     low, high = supply.valid_codes if supply else (0, 0)

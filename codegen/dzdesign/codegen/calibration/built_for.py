@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from dzdesign.codegen.calibration.block import shape_of
 from dzdesign.codegen.calibration.layout import SHAPE_BITS
 from dzdesign.design.compensator import Compensator
 
@@ -39,3 +38,16 @@ def built_for(compensator: Compensator) -> BuiltFor:
         beta_step=compensator.beta_step_codes,
         samples=drive.loop.samples if drive else 0,
     )
+
+
+def shape_of(compensator: Compensator) -> int:
+    """Return what a compensator's firmware must be compiled for, the bits of `SHAPE_BITS`."""
+    drive = compensator.current_drive
+    holds = {
+        "BIPOLAR": compensator.negative is not None,
+        "FALLING": compensator.signals.command.direction(1) < 0,
+        "SWAPPED": compensator.signals.swapped and compensator.negative is not None,
+        "CURRENT": drive is not None,
+        "SUPPLY": drive is not None and drive.loop.supply is not None,
+    }
+    return sum(holds[name] << place for place, name in enumerate(SHAPE_BITS))

@@ -7,6 +7,7 @@ from dzdesign.codegen.calibration.layout import (
     LAYOUT,
     LENGTH_WORDS,
     MAGIC,
+    NO_INTERLOCK,
     NODE_MASK,
     NODES,
     PLAY_MASK,
@@ -20,15 +21,21 @@ from dzdesign.codegen.calibration.layout import (
     Words,
     entries,
 )
+from dzdesign.codegen.calibration.limits import NAMED, OF_CURRENT, largest_node
 from dzdesign.codegen.core.constants import Define, c_comment, defines
-from dzdesign.codegen.core.drive_constants import status_constants
+from dzdesign.codegen.core.current_files import current_fault_bits
+from dzdesign.codegen.core.drive_constants import drive_status_constants, status_constants
 from dzdesign.codegen.core.files import CoreFile, Values
+from dzdesign.codegen.core.integer_form import INT32_MAX
 from dzdesign.codegen.core.misra import misra_lines
 from dzdesign.codegen.core.signal_constants import difference_place
 from dzdesign.core.strict_templates import strict_templates
+from dzdesign.design.current.loop import CORRECTION_SHIFT
+from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import WEIGHT_SHIFT
 
 HERE = "codegen/dzdesign/codegen/calibration/files.py"
+LIMITS_FILE = "codegen/dzdesign/codegen/calibration/limits.py"
 LAYOUT_FILE = "codegen/dzdesign/codegen/calibration/layout.py"
 #: Bits of what dz_calibration_check() finds wrong.
 FINDINGS = {
@@ -40,8 +47,21 @@ FINDINGS = {
     "DRIVE": "a number of the drive functions outside what the arithmetic bears",
     "CURRENT": "a number of the current controller outside what the arithmetic bears",
 }
+#: Of the drive's status word: the bit of a block that was refused.
+CALIBRATION_PLACE = 8
 #: Structs of the block, in the order in which C needs them, and their names there.
 STRUCTS = {SideBlock: "dz_calibration_side", CurrentBlock: "dz_calibration_current", CalibrationBlock: "dz_calibration"}
+
+
+def block_core_files(built: BuiltFor) -> dict[str, CoreFile]:
+    """Return every file of the core in block form, by its name: they depend on no valve."""
+    return {
+        "dz_calibration.h": calibration_header(built),
+        "dz_calibration.c": check_file(built),
+        **block_law_files(built),
+        **block_drive_files(built),
+        **block_current_files(built),
+    }
 
 
 def calibration_header(built: BuiltFor) -> CoreFile:
@@ -71,6 +91,82 @@ def block_law_files(built: BuiltFor) -> dict[str, CoreFile]:
     }
 
 
+def block_drive_files(built: BuiltFor) -> dict[str, CoreFile]:
+    """Return dz_drive.c and dz_drive.h."""
+    outside = _drive_interface(built)
+    inside = [
+        _limit("RAMP_UNIT", RAMP_UNIT, "uint32", "unit of the ramped command, a code of command"),
+        _limit("NO_INTERLOCK", NO_INTERLOCK, "plain", "the drive waits for no zero command"),
+        _limit("LARGEST_NUMBER", INT32_MAX, "uint32", "largest word that stands for a number above zero"),
+        _limit("LARGEST_SHIFT", 31, "plain", "largest shift of a word of 32 bits"),
+        _limit("PLAY_SHIFT_MASK", 15, "plain", "mask of play_step_shift"),
+    ]
+    words: Values = {"bipolar": built.has("BIPOLAR"), "rises": not built.has("FALLING")}
+    header = {**words, "misra_lines": misra_lines("dz_drive.h"), "interface_defines": defines(outside),
+              "ramp_unit": RAMP_UNIT, "sample_Hz": built.sample_Hz}  # fmt: skip
+    source = {**words, "misra_lines": misra_lines(), "drive_defines": defines(inside)}
+    return {
+        "dz_drive.c": CoreFile(template="dz_drive_block.c.jinja", values=source, constants=tuple(inside)),
+        "dz_drive.h": CoreFile(template="dz_drive_block.h.jinja", values=header, constants=tuple(outside)),
+    }
+
+
+def _drive_interface(built: BuiltFor) -> list[Define]:
+    ticks = built.tick_Hz // built.sample_Hz
+    return [
+        Define(symbol="DZ_DRIVE_TICKS_PER_SAMPLE", value=ticks, equation="PWM periods from one sample to the next",
+               engineering=f"{built.tick_Hz} periods and {built.sample_Hz} samples a second", generator=HERE),
+        *drive_status_constants(),
+        Define(symbol="DZ_STATUS_CALIBRATION", value=1 << CALIBRATION_PLACE, rounding="a convention", generator=HERE,
+               equation=f"bit {CALIBRATION_PLACE} of the drive's status word",
+               engineering="dz_calibration_check() refused the block: the output is released"),
+    ]  # fmt: skip
+
+
+def block_current_files(built: BuiltFor) -> dict[str, CoreFile]:
+    """Return dz_current.c and dz_current.h; nothing without current control."""
+    if not built.has("CURRENT"):
+        return {}
+    bits, inside = current_fault_bits(), [_limit("SHIFT_MASK", 15, "plain", "mask of a shift")]
+    if built.has("SUPPLY"):
+        inside += [
+            _limit("CORRECTION_SHIFT", CORRECTION_SHIFT, "plain", "binary places of the correction"),
+            _limit("CORRECTION_HALF", 1 << (CORRECTION_SHIFT - 1), "plain", "half a PWM count: rounds to nearest"),
+        ]
+    words: Values = {"supply": built.has("SUPPLY"), "samples": built.samples}
+    header = {**words, "misra_lines": misra_lines("dz_current.h"), "interface_defines": defines(bits)}
+    source = {**words, "misra_lines": misra_lines(), "current_defines": defines(inside)}
+    return {
+        "dz_current.c": CoreFile(template="dz_current_block.c.jinja", values=source, constants=tuple(inside)),
+        "dz_current.h": CoreFile(template="dz_current_block.h.jinja", values=header, constants=tuple(bits)),
+    }
+
+
+def check_file(built: BuiltFor) -> CoreFile:
+    """Return dz_calibration.c, which blocks the core may use."""
+    named = NAMED + (OF_CURRENT if built.has("CURRENT") else ())
+    limits = [
+        *_shifts(built),
+        _limit("LARGEST_NODE", largest_node(built.beta_step), "uint32", "largest node: times DZ_BETA_STEP below 2^31"),
+        *(_limit(*each) for each in named),
+    ]
+    values: Values = {
+        "misra_lines": misra_lines(),
+        "limit_defines": defines(limits),
+        "rises": not built.has("FALLING"),
+        "bipolar": built.has("BIPOLAR"),
+        "swapped": built.has("SWAPPED"),
+        "current": built.has("CURRENT"),
+        "supply": built.has("SUPPLY"),
+    }
+    return CoreFile(template="dz_calibration.c.jinja", values=values, constants=tuple(limits))
+
+
+def _limit(symbol: str, value: int, literal: str, text: str) -> Define:
+    return Define(symbol=symbol, value=value, literal=literal, equation=text, engineering=f"{value}",
+                  generator=LIMITS_FILE)  # fmt: skip
+
+
 def _sides(built: BuiltFor) -> list[Values]:
     """Return the C that depends on the sign of command: ending of the names, and which way the signals count."""
     rises, falls = "u - side->band_end", "side->band_end - u"
@@ -83,15 +179,23 @@ def _sides(built: BuiltFor) -> list[Values]:
 
 def _law_numbers(built: BuiltFor) -> list[Define]:
     return [
-        Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1, equation="the power of two in "
-               "DZ_BETA_STEP", engineering=f"1/{built.beta_step}", generator=HERE),
-        Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of sensor A",
-               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down", generator=HERE),
+        *_shifts(built),
+        _limit("LARGEST_NUMBER", INT32_MAX, "uint32", "largest word that stands for a number above zero"),
         Define(symbol="LARGEST_SHIFT", value=31, equation="largest shift of a word of 32 bits", engineering="all ones",
                generator=HERE),
         Define(symbol="LARGEST_WIDE_SHIFT", value=63, equation="largest shift of 64 bits", engineering="all ones",
                generator=HERE),
         difference_place(),
+    ]  # fmt: skip
+
+
+def _shifts(built: BuiltFor) -> list[Define]:
+    """Return from weighted codes to codes, and from these to nodes."""
+    return [
+        Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of sensor A",
+               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down", generator=HERE),
+        Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1, generator=HERE,
+               equation="the power of two in DZ_BETA_STEP", engineering=f"1/{built.beta_step}"),
     ]  # fmt: skip
 
 

@@ -58,18 +58,22 @@ def current_texts(loop: CurrentLoop, banner: Sequence[str] = ()) -> dict[str, st
 
 def current_interface(loop: CurrentLoop) -> list[Define]:
     """Return what a caller must know: `#define`s of dz_current.h."""
-    bits = [
-        Define(symbol=f"DZ_CURRENT_{name}", value=1 << place, equation=f"bit {place} of the faults",
-               engineering=text, rounding="a convention", generator=HERE)
-        for place, (name, text) in enumerate(FAULT_BITS.items())
-    ]  # fmt: skip
     return [
         Define(symbol="DZ_CURRENT_SAMPLES", value=loop.samples, equation="codes of the current in a sum",
                engineering="equally far apart in a PWM period", data=("current_drive.loop.samples",), generator=LOOP),
         Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << loop.offset_shift,
                equation="sums that the offset is the mean of", engineering="with the output off",
                data=("current_drive.loop.offset_shift",), generator=LOOP),
-        *bits,
+        *current_fault_bits(),
+    ]  # fmt: skip
+
+
+def current_fault_bits() -> list[Define]:
+    """Return the bits of the controller's word of faults: a convention, from no datum."""
+    return [
+        Define(symbol=f"DZ_CURRENT_{name}", value=1 << place, equation=f"bit {place} of the faults",
+               engineering=text, rounding="a convention", generator=HERE)
+        for place, (name, text) in enumerate(FAULT_BITS.items())
     ]  # fmt: skip
 
 

@@ -65,11 +65,16 @@ def drive_interface_constants(compensator: Compensator) -> list[Define]:
                  engineering=compensator.valve.recorded_units.text(0.0, "g V"),
                  rounding="the converter's code, rounded down",
                  data=("signals.command.zero_code",), generator=SIGNALS),
-        *(
-            Define(symbol=f"DZ_STATUS_{name}", value=1 << place, equation=f"bit {place} of the drive's status word",
-                     engineering=text, rounding="a convention", generator=HERE)
-            for name, (place, text) in DRIVE_BITS.items()
-        ),
+        *drive_status_constants(),
+    ]  # fmt: skip
+
+
+def drive_status_constants() -> list[Define]:
+    """Return the bits that the drive adds to the status word: a convention, from no datum."""
+    return [
+        Define(symbol=f"DZ_STATUS_{name}", value=1 << place, equation=f"bit {place} of the drive's status word",
+                 engineering=text, rounding="a convention", generator=HERE)
+        for name, (place, text) in DRIVE_BITS.items()
     ]  # fmt: skip
 
 

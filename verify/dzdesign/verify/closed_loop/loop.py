@@ -17,6 +17,7 @@ from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
+from dzdesign.verify.toolchain.bound_block import core_sources
 from dzdesign.verify.toolchain.host_compiler import load_library
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
@@ -122,8 +123,7 @@ class ClosedLoop:
         elif not (firmware / "core" / "dz_drive.h").is_file():
             raise InputError(f"'{firmware}' has no core/dz_drive.h; give the folder that `dzdesign codegen` made")
         else:
-            for path in sorted((firmware / "core").glob("*.[ch]")):
-                sources[path.name] = path.read_text(encoding="utf-8")
+            sources |= core_sources(firmware)
         #: Of a drive by current the coil, at a supply.
         self.coil = nominal_coil(compensator) if firmware and compensator else None
         sources |= coil_sources(self.coil)

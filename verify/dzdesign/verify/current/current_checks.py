@@ -31,6 +31,7 @@ from dzdesign.verify.requirements import (
     MACHINE_CODE,
     Check,
 )
+from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, bound_files
 from dzdesign.verify.toolchain.machines import Machine
 
 #: States that every verification compares: a second's work.
@@ -59,7 +60,10 @@ class CurrentChecks:
 def read_controller(folder: Path) -> dict[str, str]:
     """Return the C of a firmware's current controller, by file; one that is not there is a `RequirementError`."""
     try:
-        return {name: (folder / "core" / name).read_text(encoding="utf-8") for name in CORE}
+        core = {name: (folder / "core" / name).read_text(encoding="utf-8") for name in CORE}
+        if bound := bound_files(folder):
+            core |= {BLOCK_HEADER: (folder / "core" / BLOCK_HEADER).read_text(encoding="utf-8"), **bound}
+        return core
     except (OSError, UnicodeDecodeError) as error:
         raise RequirementError(f"the current controller's C can't be read: {error}; run codegen again") from error
 

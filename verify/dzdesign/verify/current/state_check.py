@@ -90,9 +90,8 @@ def tick_macro(loop: CurrentLoop) -> str:
 
 def program_files(loop: CurrentLoop, core: Mapping[str, str], *mains: str) -> dict[str, str]:
     """Return the sources of a program over the states, with the controller's own among them."""
-    own = {name: core[name] for name in ("dz_current.c", "dz_current.h")}
     names = ("current_states.c", "current_states.h", *mains)
-    own |= {"edges.h": edges_of(loop), "tick.h": tick_macro(loop)}
+    own = {**core, "edges.h": edges_of(loop), "tick.h": tick_macro(loop)}
     return own | {name: (PROGRAMS / name).read_text("utf-8") for name in names}
 
 
@@ -181,7 +180,11 @@ def hashes_on(
     sources = {name: text.encode() for name, text in program_files(loop, core, main).items()} | machine.headers
     counts = {"BLOCKS": -(-states // BLOCK), "BLOCK": min(states, BLOCK), "OFFSETS": OFFSETS, "SEED": seed}
     defined = tuple(f"-D{name}=UINT32_C({count})" for name, count in counts.items())
-    objects = [machine.compile("dz_current.c", sources, machine.core_flags, "the current controller")]
+    objects = [
+        machine.compile(name, sources, machine.core_flags, "the current controller")
+        for name in core
+        if name.endswith(".c")
+    ]
     objects += [
         machine.compile(name, sources, (*machine.check_flags, *defined), "the states")
         for name in ("current_states.c", main)

@@ -13,6 +13,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
 from dzdesign.verify.exhaustive.fault_model import Memory, every_memory
 from dzdesign.verify.requirements import DRIVE, Check
+from dzdesign.verify.toolchain.bound_block import bound_files
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, stored
 
 #: Codes of command, pressure A and pressure B.
@@ -215,6 +216,7 @@ class CompiledDrive:
 
     def __init__(self, folder: Path) -> None:
         self.sources = {path.name: path.read_bytes() for path in sorted((folder / "core").glob("*.[ch]"))}
+        self._bound = {name: text.encode() for name, text in bound_files(folder).items()}
 
     def edited(self, name: str, text: bytes) -> "CompiledDrive":
         """Return the drive with another text in one of its files."""
@@ -224,16 +226,17 @@ class CompiledDrive:
 
     def objects(self) -> list[Path]:
         """Return the objects, each compiled by itself."""
-        headers = {name: text for name, text in self.sources.items() if name.endswith(".h")}
+        sources = {**self._bound, **self.sources}
+        headers = {name: text for name, text in sources.items() if name.endswith(".h")}
         return [
             HOST.compile(name, {**headers, name: text}, HOST.core_flags, f"the firmware's {name}")
-            for name, text in self.sources.items()
+            for name, text in sources.items()
             if name.endswith(".c")
         ]
 
     def check(self, prepared: PreparedDrive) -> DriveCheck:
         """Run the drive beside its model; a drive that does not compile, crashes or hangs is a `RequirementError`."""
-        main = {name: text for name, text in self.sources.items() if name.endswith(".h")}
+        main = {name: text for name, text in {**self._bound, **self.sources}.items() if name.endswith(".h")}
         main["drive.c"] = (PROGRAMS / "drive.c").read_bytes()
         objects = [*self.objects(), HOST.compile("drive.c", main, HOST.check_flags, "the check of the drive")]
         file = stored(prepared.content)

@@ -6,12 +6,13 @@ from pathlib import Path
 
 from dzdesign.verify.closed_loop.coil_in_loop import CoilAtSupply
 from dzdesign.verify.current.state_check import tick_macro
+from dzdesign.verify.toolchain.bound_block import core_sources
 from dzdesign.verify.toolchain.host_compiler import load_library
 
 
 def compiled_core(firmware: Path, coil: CoilAtSupply | None) -> ctypes.CDLL:
     """Return the core of a firmware folder, compiled, with the functions of programs/core_calls.c."""
-    sources = {path.name: path.read_text(encoding="utf-8") for path in sorted((firmware / "core").glob("*.[ch]"))}
+    sources = core_sources(firmware)
     text = files(__package__).joinpath("programs").joinpath("core_calls.c").read_text(encoding="utf-8")
     options: tuple[str, ...] = ()
     if coil is not None:

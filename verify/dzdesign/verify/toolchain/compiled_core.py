@@ -10,14 +10,14 @@ import numpy as np
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
+from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
 #: Source of each sign of command, and what its functions' names end with.
 SOURCES = {1: ("dz_comp.c", ""), -1: ("dz_comp_negative.c", "_negative")}
 
-#: Of a core in block form: its header, the source of both signs, its block in the firmware's folder, and in programs/
-#: what binds the one to the other.
-BLOCK_HEADER, BLOCK_SOURCE, BLOCK_FILE, BOUND = "dz_calibration.h", "dz_comp.c", "calibration.bin", "bound_block.c"
+#: Of a core in block form: the source of both signs, and in programs/ what binds it to a block.
+BLOCK_SOURCE, BOUND = "dz_comp.c", "bound_block.c"
 #: The core's functions that a check calls, dz_comp() and so on.
 CALLED = ("comp", "status", "beta")
 #: The check in C, of programs/.
@@ -50,10 +50,10 @@ class CompiledCore:
     def __init__(self, folder: Path, sign: int = 1) -> None:
         self._name, self._ending = SOURCES[sign]
         #: Octets of the calibration block; None of a core with the numbers of its valve in it.
-        self.block: bytes | None = None
+        self.block = block_of(folder)
         headers = ["dz_comp.h"]
-        if (folder / "core" / BLOCK_HEADER).exists():
-            self._name, self.block = BLOCK_SOURCE, _read(folder / BLOCK_FILE)
+        if self.block is not None:
+            self._name = BLOCK_SOURCE
             headers.append(BLOCK_HEADER)
         self.sources = {name: _read(folder / "core" / name) for name in (self._name, *headers)}
 

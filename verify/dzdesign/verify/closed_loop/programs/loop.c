@@ -3,6 +3,10 @@
 #include <stdint.h>
 
 #include "dz_drive.h"
+
+#ifdef DZ_CALIBRATION_H
+#include "bound.h"
+#endif
 #include "plant_coil.h"
 
 #define RECORDED 8

@@ -7,6 +7,10 @@
 #include <stdint.h>
 
 #include "dz_current.h"
+
+#ifdef DZ_CALIBRATION_H
+#include "bound.h"
+#endif
 #include "tick.h"
 
 #define MOST_SAMPLES 16

@@ -6,6 +6,10 @@
 
 #include "dz_current.h"
 
+#ifdef DZ_CALIBRATION_H
+#include "bound.h"
+#endif
+
 /* A period: what stood before, what came in, what stands after. */
 struct period
 {

@@ -8,6 +8,10 @@
 #include "tick.h"
 #endif
 
+#ifdef DZ_CALIBRATION_H
+#include "bound.h"
+#endif
+
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
 #else

@@ -6,6 +6,10 @@
 
 #include "dz_drive.h"
 
+#ifdef DZ_CALIBRATION_H
+#include "bound.h"
+#endif
+
 #define FIELDS 14
 
 static long wrong_field(const struct dz_drive *drive, const int32_t *expected)

@@ -8,6 +8,10 @@
 
 #include "__fc_builtin.h"
 #include "dz_drive.h"
+
+#ifdef DZ_CALIBRATION_H
+#include "bound.h"
+#endif
 #include "pieces.h"
 
 static uint16_t from_to(uint32_t first, uint32_t end)

@@ -1,0 +1,166 @@
+"""Which blocks a firmware accepts, in integers of any length: what dz_calibration_check() must say of each.
+
+Written from what the arithmetic must bear, not from the C: that differs where 64 bits are few. Every rule is an
+inequality of exact integers, so that a test can compare both on any block.
+"""
+
+from collections.abc import Iterator
+
+from dzdesign.codegen.calibration.built_for import BuiltFor
+from dzdesign.codegen.calibration.layout import (
+    LAYOUT,
+    LENGTH_WORDS,
+    MAGIC,
+    NO_INTERLOCK,
+    NODE_MASK,
+    PLAY_NODES,
+    SUPPLY_NODES,
+    CalibrationBlock,
+    CurrentBlock,
+    SideBlock,
+)
+from dzdesign.codegen.calibration.limits import (
+    LARGEST_CODES,
+    LARGEST_CURRENT_SHIFT,
+    LARGEST_DROP,
+    LARGEST_GAIN_SHIFT,
+    LARGEST_NOISE,
+    LARGEST_OFFSET_SHIFT,
+    LARGEST_PLAY,
+    LARGEST_STEP_SHIFT,
+    LARGEST_TESTED,
+    largest_node,
+)
+from dzdesign.codegen.core.integer_form import INT32_MAX, INT64_MAX
+from dzdesign.design.current.loop import LARGEST_ERROR, LARGEST_GAIN
+from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
+from dzdesign.design.signals import WEIGHT_SHIFT
+
+U16 = 0xFFFF
+#: Rules of one group: what each is, and whether it holds.
+Rules = Iterator[tuple[str, bool]]
+
+
+def refusals(block: CalibrationBlock, built: BuiltFor) -> dict[str, tuple[str, ...]]:
+    """Return what a firmware refuses of a block whose CRC is right: the rules that fail, by group; empty: accepted."""
+    groups = {
+        "FORMAT": _format(block),
+        "FIRMWARE": _firmware(block, built),
+        "SIGNALS": _signals(block, built),
+        "LAW": _law(block, built),
+        "DRIVE": _drive(block, built),
+        "CURRENT": _current(block.current, built) if built.has("CURRENT") else iter(()),
+    }
+    found = {name: tuple(rule for rule, holds in rules if not holds) for name, rules in groups.items()}
+    return {name: failed for name, failed in found.items() if failed}
+
+
+def _format(block: CalibrationBlock) -> Rules:
+    yield "magic", block.magic == int.from_bytes(MAGIC, "little")
+    yield "layout", block.layout == LAYOUT
+    yield "length", block.length == LENGTH_WORDS
+    yield "unused words are 0", not (block.reserved or block.spare or any(side.spare for side in block.sides))
+
+
+def _firmware(block: CalibrationBlock, built: BuiltFor) -> Rules:
+    for name in ("shape", "code_max", "compare_max", "sample_Hz", "tick_Hz", "beta_step"):
+        yield name, getattr(block, name) == getattr(built, name)
+
+
+def _signals(block: CalibrationBlock, built: BuiltFor) -> Rules:
+    for name in ("command", "a", "b"):
+        low, zero, high = (getattr(block, f"{name}_{end}") for end in ("low", "zero", "high"))
+        yield f"codes of {name}", low <= zero <= high <= built.code_max and low < high
+    no_pressure = (block.a_zero << WEIGHT_SHIFT) - block.b_zero * block.weight_b
+    yield "balance", block.balance == no_pressure % 2**32
+    yield "weight of sensor B", block.weight_b >= 1
+    yield "reverse", block.reverse <= LARGEST_DROP
+    yield "pressure drops", all(drop <= LARGEST_DROP for drop in _drops(block))
+
+
+def _drops(block: CalibrationBlock) -> tuple[int, int]:
+    """Return the largest A less B, and the largest B less A, of valid codes."""
+    forward = ((block.a_high - block.a_zero) << WEIGHT_SHIFT) + (block.b_zero - block.b_low) * block.weight_b
+    turned = ((block.a_zero - block.a_low) << WEIGHT_SHIFT) + (block.b_high - block.b_zero) * block.weight_b
+    return forward, turned
+
+
+def _law(block: CalibrationBlock, built: BuiltFor) -> Rules:
+    yield "limit of the output", block.compare_limit <= built.compare_max
+    rises = not built.has("FALLING")
+    forward, turned = _drops(block)
+    yield from _side(block, block.sides[0], built, rises, forward)
+    if built.has("BIPOLAR"):
+        yield from _side(block, block.sides[1], built, not rises, turned if built.has("SWAPPED") else forward)
+
+
+def _side(block: CalibrationBlock, side: SideBlock, built: BuiltFor, rises: bool, drop: int) -> Rules:
+    zero, band, codes = block.command_zero, block.zero_band, block.transition_codes
+    law, at_zero = side.nodes[::2], side.nodes[1::2]
+    used = [node for node in range(len(law)) if node < side.node_count or node >= NODE_MASK]
+    yield "nodes", drop // (built.beta_step << WEIGHT_SHIFT) + 2 <= side.node_count <= NODE_MASK
+    yield "beta at zero command above the law's", all(low <= high for low, high in zip(at_zero, law, strict=True))
+    yield "beta in use is above 0 and no less than the fallback's", all(
+        1 <= at_zero[node] >= at_zero[NODE_MASK] and law[node] >= law[NODE_MASK] for node in used
+    )
+    yield "one fallback", side.nodes[2 * NODE_MASK : 2 * NODE_MASK + 2] == side.nodes[2 * NODE_MASK + 2 :]
+    yield "largest node", max(law) <= largest_node(built.beta_step)
+    yield "span", 1 <= side.span <= (block.command_high - zero if rises else zero - block.command_low)
+    yield "end of the zero band", side.band_end == (zero + band if rises else zero - band)
+    yield "zero band and transition", side.room == side.span - band and 1 <= codes <= side.room
+    slope = side.slope - 2**32 if side.slope > INT32_MAX else side.slope
+    beta, command = max(law) * built.beta_step, side.span * codes
+    factor = max(side.offset, side.offset + slope * command)
+    yield "command", 1 <= command <= INT32_MAX
+    yield "factor of beta", abs(slope) * command <= INT32_MAX and factor <= INT32_MAX
+    yield "transition", side.transition * codes <= side.offset
+    yield "sum", beta * factor + command * side.linear + side.half <= INT64_MAX
+    yield "rises with the command", side.linear + min(slope, 0) * beta >= 0
+    counts = side.quotient_limit * side.reciprocal >> (32 + side.reciprocal_shift)
+    yield "largest quotient", side.quotient_limit <= INT32_MAX and counts <= block.compare_limit
+    yield "shifts", side.reciprocal_shift <= 31 and side.beta_shift <= 63
+    yield "beta as it is shown", beta * side.beta_factor >> side.beta_shift <= U16 and side.beta_unit >= 1
+    yield "tested pressure drop", side.tested_to <= LARGEST_TESTED
+
+
+def _drive(block: CalibrationBlock, built: BuiltFor) -> Rules:
+    sides = block.sides if built.has("BIPOLAR") else block.sides[:1]
+    longest = max(block.command_high - block.command_zero, block.command_zero - block.command_low)
+    band = block.zero_band
+    yield "leave_zero", (band + 1 if band else 0) <= block.leave_zero <= LARGEST_CODES
+    yield "fault_samples", 1 <= block.fault_samples <= MOST_FAULT_SAMPLES
+    yield "fault_latch", block.fault_latch <= 1
+    yield "interlock", block.interlock <= LARGEST_CODES or block.interlock == NO_INTERLOCK
+    yield "dither_ticks", 1 <= block.dither_ticks <= LARGEST_CODES
+    yield "ramps", block.ramps <= 1
+    if block.ramps:
+        yield "ramped command", longest <= LARGEST_CODES
+        yield "ramps", all(1 <= step <= INT32_MAX for side in sides for step in (side.ramp_up, side.ramp_down))
+    if block.play_codes:
+        travel = block.play_codes * block.transition_codes
+        yield "travel of the play", block.play_codes <= LARGEST_PLAY and travel == 1 << block.play_shift
+        yield "command of the play", longest <= LARGEST_CODES
+        yield "noise of the play", block.play_noise <= LARGEST_NOISE
+        yield "step of the play", block.play_step_shift <= LARGEST_STEP_SHIFT
+        for side in sides:
+            yield "nodes of the play", (side.span >> block.play_step_shift) + 2 <= PLAY_NODES
+            yield "width of the play", max(side.play) * travel <= INT32_MAX
+
+
+def _current(current: CurrentBlock, built: BuiltFor) -> Rules:
+    c = current
+    yield "samples", c.samples == built.samples
+    yield "limit of the current controller", c.compare_limit <= built.compare_max
+    yield "rate and ticks", min(c.rate, c.over_ticks, c.open_ticks) >= 1
+    yield "shifts", 1 <= c.current_shift <= LARGEST_CURRENT_SHIFT and 1 <= c.gain_shift <= LARGEST_GAIN_SHIFT
+    yield "gains", max(c.proportional, c.integral, c.feed_forward) <= LARGEST_GAIN and c.current_gain >= 1
+    largest = (c.short_sum * c.current_gain + (1 << c.current_shift >> 1)) >> c.current_shift
+    yield "largest current", largest <= LARGEST_ERROR
+    yield "integral", c.release <= c.integral_limit <= U16 << c.gain_shift
+    yield "offset", c.offset_low <= c.offset_nominal <= c.offset_high and c.offset_shift <= LARGEST_OFFSET_SHIFT
+    yield "sums", 0 < c.open_sum < c.over_sum < c.short_sum
+    if built.has("SUPPLY"):
+        last = ((c.supply_high - c.supply_low) >> c.supply_shift) + 1
+        yield "codes of the supply", c.supply_low < c.supply_high
+        yield "correction", c.supply_shift <= LARGEST_STEP_SHIFT and last < SUPPLY_NODES
+        yield "nodes of the correction", all(node >= 1 for node in c.supply[: max(last, 0) + 1])
