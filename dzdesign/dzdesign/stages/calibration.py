@@ -98,11 +98,12 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
     form = _format_of(output, arguments.format)
     if output is not None:
         _check_output(output, form)
-    compensator, digest = _derived(arguments.compensator)
-    target = _target_of(compensator, arguments.target)
-    place = _place(target, arguments.address, OCTETS)
     if arguments.address is not None and form not in WITH_ADDRESS:
         raise InputError(f"--address is given, but a file of format {form} states none; leave it out")
+    compensator, digest, source = _given(arguments.compensator)
+    target = _target_of(compensator, arguments.target)
+    place = _place(target, arguments.address, OCTETS)
+    _refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
     serial, record = (_entry(compensator, name, getattr(arguments, name)) for name in ("serial", "record"))
     octets = pack(block_of(compensator, digest, serial=serial, record=record))
     made = CalibrationImage(
@@ -207,19 +208,16 @@ def _given(given: "Compensator | AnyPath") -> tuple["Compensator", str, str]:
     return read_artefact(content, Compensator, os.fspath(path)), sha256_of(content), f"'{path}'"
 
 
-def _derived(given: "Compensator | AnyPath") -> tuple["Compensator", str]:
-    """Return a compensator whose numbers follow from its valve and options, and the SHA-256 of its file."""
-    from dzdesign.design.compensator import Compensator
+def _refuse_underived(compensator: "Compensator", source: str, *, of_file: bool) -> None:
+    """Refuse a compensator whose numbers do not follow from its valve and options."""
     from dzdesign.design.redesign_check import prove_derived, refuse_without_options
 
-    compensator, digest, source = _given(given)
-    if not isinstance(given, Compensator):
+    if of_file:
         refuse_without_options(compensator, source.strip("'"))
     try:
         prove_derived(compensator)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
-    return compensator, digest
 
 
 def _target_of(compensator: "Compensator", given: str | None) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from dzdesign.core.errors import InputError
 
-#: Intel HEX has addresses of 32 bits; TI-TXT is read with as many.
+#: Addresses of 32 bits, which TI-TXT counts in octets on every target.
 ADDRESSES = 1 << 32
 #: Numbers of 32 bits must begin where the processor can read them.
 ALIGNED_OCTETS = 4
@@ -20,7 +20,7 @@ class Place:
 
     def at(self, address: int, octets: int) -> "Place":
         """Return the same memory at another address, where so many octets must have room in every format."""
-        last, step = ADDRESSES // self.unit_octets - octets // self.unit_octets, ALIGNED_OCTETS // self.unit_octets
+        last, step = (ADDRESSES - octets) // self.unit_octets, ALIGNED_OCTETS // self.unit_octets
         if not 0 <= address <= last or address % step:
             unit = "words of 16 bits" if self.unit_octets > 1 else "octets"
             raise InputError(
