@@ -1,6 +1,7 @@
 """`calibration`: Compensator -> the calibration block of one valve as a file, and back."""
 
 import os
+from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Where the names of the formats stand.
 FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
+#: Formats that hold a block.
+READABLE = ("hex", "bin", "txt")
 COMPENSATOR_NAME = "compensator.json"
 
 
@@ -30,11 +33,11 @@ class CalibrationArguments:
     """compensator.json, whose numbers are derived again first."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
-    """File to write: .hex is Intel HEX, .bin the octets alone, .txt TI-TXT."""
+    """File to write: .hex is Intel HEX, .bin the octets alone, .txt TI-TXT, .a2l the layout for XCP tools."""
     format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
-    """hex, bin or txt, for a file of another ending (default: by the file's ending)."""
+    """hex, bin, txt or a2l, for a file of another ending (default: by the file's ending)."""
     target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
-    """Microcontroller whose addresses hex and txt state (default: that of the design)."""
+    """Microcontroller whose addresses the file states (default: that of the design)."""
     address: Annotated[Text, Option("N", example="0x330000")] = None
     """Where the block begins, in units of the target: words of 16 bits on f28335 and f280049c, else octets (default:
     0x330000 for f28335, 0x98000 for f280049c, else 0)."""
@@ -53,7 +56,7 @@ class ReadCalibrationArguments:
     compensator: Annotated["Compensator | AnyPath | None", Option("COMPENSATOR.json")] = None
     """compensator.json, or a firmware folder that holds one, to compare the block with."""
     _: KW_ONLY
-    format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
+    format: Annotated[Text, Option("NAME", choices=READABLE)] = None
     """hex, bin or txt, of a file of another ending (default: by the file's ending)."""
 
 
@@ -133,7 +136,7 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
     from dzdesign.core.recorded_units import AS_COMPUTED
 
     path = Path(arguments.file)
-    block = unpack(octets_in_file(path, _known_format(arguments.format)), f"'{path}'")
+    block = unpack(octets_in_file(path, _known_format(arguments.format, READABLE)), f"'{path}'")
     reading = reading_of(block, f"'{path}'")
     if arguments.compensator is None:
         return ReadCalibration(reading=reading, compared_with="", belongs=None, difference="", units=AS_COMPUTED)
@@ -148,11 +151,9 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
     )
 
 
-def _known_format(name: str | None) -> str | None:
-    from dzdesign.codegen.calibration.block_images import FORMATS as KNOWN
-
-    if name is not None and name not in KNOWN:
-        raise InputError(f"--format is {quoted(name)}{nearest(name, KNOWN)}, expected one of {', '.join(KNOWN)}")
+def _known_format(name: str | None, known: Iterable[str]) -> str | None:
+    if name is not None and name not in known:
+        raise InputError(f"--format is {quoted(name)}{nearest(name, known)}, expected one of {', '.join(known)}")
     return name
 
 
@@ -161,7 +162,7 @@ def _format_of(output: Path | None, given: str | None) -> str:
     from dzdesign.codegen.calibration.block_images import FORMATS as KNOWN
 
     ending = output.suffix.lower().removeprefix(".") if output is not None else ""
-    if _known_format(given) is None:
+    if _known_format(given, KNOWN) is None:
         if output is None:
             return "bin"
         if ending not in KNOWN:
@@ -177,6 +178,7 @@ def _format_of(output: Path | None, given: str | None) -> str:
 
 def _check_output(output: Path, form: str) -> None:
     """Refuse to write over what is no calibration block: a recording may end with .txt too."""
+    from dzdesign.codegen.calibration.a2l import HEAD
     from dzdesign.codegen.calibration.block_files import octets_in_file
     from dzdesign.codegen.calibration.layout import MAGIC
 
@@ -184,7 +186,10 @@ def _check_output(output: Path, form: str) -> None:
     if not output.exists() or not output.stat().st_size:
         return
     try:
-        is_block = octets_in_file(output, form).startswith(MAGIC)
+        if form in READABLE:
+            is_block = octets_in_file(output, form).startswith(MAGIC)
+        else:
+            is_block = read_bytes(output, "calibration file").startswith(HEAD.encode())
     except InputError:
         is_block = False
     if not is_block:

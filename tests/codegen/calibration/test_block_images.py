@@ -21,7 +21,7 @@ PLACES = {
 
 
 @pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", sorted(FORMATS.keys() - {"a2l"}))
 def test_a_file_gives_the_octets_back(name, place, tmp_path):
     for file in (tmp_path / f"block.{name}", tmp_path / "block.other"):
         file.write_bytes(image_of(OCTETS, name, place))

@@ -163,18 +163,20 @@ def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(block, tmp_pa
         ["--read", "valve.hex", "-o", "new.hex"],
         ["--read", "valve.hex", "--serial", "8"],
         ["--read", "valve.hex", "--format", "txt"],
+        ["--read", "valve.hex", "--format", "a2l"],
         ["--read", "nothing.hex"],
         ["--read", "compensator.json"],
         ["--read", "valve.hex", "valve.txt"],
     ],
     ids=" ".join,
 )
-def test_bad_usage_is_one_sentence_and_writes_nothing(written, words, monkeypatch, capsys, unproven):
+def test_bad_usage_is_one_sentence_and_writes_nothing(written, words, monkeypatch, capsys, unproven, wording):
     monkeypatch.chdir(written)
     before = sorted(os.listdir())
     assert main(["calibration", *words]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1 and sorted(os.listdir()) == before
+    wording(f"calibration: {' '.join(words)}", said.err)
 
 
 def test_only_a_block_is_written_over(written, tmp_path, monkeypatch, capsys, unproven):
@@ -196,6 +198,10 @@ def test_only_a_block_is_written_over(written, tmp_path, monkeypatch, capsys, un
     assert main([*words, "-o", "link.hex"]) == 0 and (tmp_path / "other.hex").read_bytes() == kept
     assert not (tmp_path / "link.hex").is_symlink() and (tmp_path / "link.hex").read_bytes() == first
     assert not [name for name in os.listdir() if name.startswith(".")]
+    (tmp_path / "tool.a2l").write_text("ASAP2_VERSION 1 71\n/begin PROJECT other")
+    assert main([*words, "-o", "tool.a2l"]) == 2
+    for _ in range(2):
+        assert main([*words, "-o", "new.a2l"]) == 0 and main(["calibration", "--read", "new.a2l"]) == 2
     capsys.readouterr()
 
 
@@ -208,6 +214,16 @@ def test_address_target_and_ending_can_be_chosen(written, tmp_path, capsys, unpr
     assert main([*words, "-o", str(tmp_path / "a.image"), "--format", "hex", "--serial", "V-7"]) == 0
     assert (tmp_path / "a.image").read_bytes() == (written / "valve.hex").read_bytes()
     assert main(["calibration", "--read", str(tmp_path / "a.image"), "--format", "hex", "-q"]) == 0
+
+
+def test_an_options_file_for_all_commands_is_taken(written, tmp_path, capsys, unproven):
+    """Its [record] is the table of `identify`, and no text of a block."""
+    options = tmp_path / "dzdesign.toml"
+    options.write_text('target = "f28335"\naddress = 0x320000\n[record]\nserial = "4711"\n')
+    words = [str(written / "compensator.json"), "-o", str(tmp_path / "valve.hex"), "--json", "--config", str(options)]
+    assert main(["calibration", *words]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["address"], said["serial"], said["record"]) == ("0x320000", "", "")
 
 
 def test_serial_and_record_come_from_the_test_record_unless_given(unproven):

@@ -1,4 +1,4 @@
-"""The octets of a calibration block as files: raw (.bin), Intel HEX (.hex) and TI-TXT (.txt).
+"""The octets of a calibration block as files: raw (.bin), Intel HEX (.hex) and TI-TXT (.txt); its layout as A2L.
 
 A C28x has no address for an octet, and its tools count so (SPRU513, hex conversion utility): Intel HEX of
 ``hex2000 --romwidth=16 --intel`` has addresses of 16-bit words, and of each word the high octet first; TI-TXT, which
@@ -8,6 +8,7 @@ addresses. Every other target counts octets.
 
 from collections.abc import Callable, Iterator, Mapping
 
+from dzdesign.codegen.calibration.a2l import a2l_text
 from dzdesign.codegen.calibration.places import Place
 
 #: Octets of a row, where each has an address and where each word has one: those of the usual tools.
@@ -60,10 +61,16 @@ def _ti_txt(octets: bytes, place: Place) -> bytes:
     return "\n".join((f"@{place.address * place.unit_octets:04X}", *rows, "q", "")).encode()
 
 
-#: Name of a format, which is also the ending of its files, to what writes it.
-FORMATS: Mapping[str, Callable[[bytes, Place], bytes]] = {"hex": _intel_hex, "bin": _raw, "txt": _ti_txt}
+def _a2l(octets: bytes, place: Place) -> bytes:
+    return a2l_text(place).encode()
+
+
+#: Name of a format, which is also the ending of its files, to what writes it; A2L has the layout, and not the octets.
+FORMATS: Mapping[str, Callable[[bytes, Place], bytes]] = {
+    "hex": _intel_hex, "bin": _raw, "txt": _ti_txt, "a2l": _a2l,
+}  # fmt: skip
 #: Those whose files state addresses.
-WITH_ADDRESS = ("hex", "txt")
+WITH_ADDRESS = ("hex", "txt", "a2l")
 
 
 def image_of(octets: bytes, name: str, place: Place) -> bytes:
