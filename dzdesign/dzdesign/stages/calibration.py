@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
 #: Formats that hold a block.
 READABLE = ("hex", "bin", "txt")
+#: Entries of a block that do not follow from a compensator.
+OF_NO_COMPENSATOR = ("serial", "record", "crc32")
 COMPENSATOR_NAME = "compensator.json"
 
 
@@ -265,12 +267,11 @@ def _difference(
 ) -> str:
     """Say why a block is not that of a compensator: another file, or numbers that do not follow from it."""
     from dzdesign.codegen.calibration.block import block_of
-    from dzdesign.codegen.calibration.packing import pack, unpack
 
     if reading.compensator_sha256 != digest:
         return f"its compensator.json has the SHA-256 {digest}, the block names {reading.compensator_sha256}"
-    follows = unpack(pack(block_of(compensator, digest, serial=reading.serial, record=reading.record)))
-    differ = [name for name in block.__dataclass_fields__ if getattr(block, name) != getattr(follows, name)]
-    if differ := [name for name in differ if name != "crc32"] or differ:
+    numbers = [name for name in block.__dataclass_fields__ if name not in OF_NO_COMPENSATOR]
+    follows = block_of(compensator, digest)
+    if differ := [name for name in numbers if getattr(block, name) != getattr(follows, name)]:
         return f"it names this compensator, but numbers differ from those that follow from it: {', '.join(differ)}"
     return ""

@@ -132,11 +132,11 @@ def test_a_damaged_block_is_one_sentence(block, tmp_path, form, damage, named, c
     assert named in said.err or (not octets and "0 runs" in said.err)
 
 
-def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(block, tmp_path, capsys):
+def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, block, tmp_path, capsys):
     wrong = bytearray(block)
     wrong[52:64] = b"\x1b[2Jx\n\xff\xfey\0zz"
     (tmp_path / "valve.bin").write_bytes(wrong[:-4] + zlib.crc32(wrong[:-4]).to_bytes(4, "little"))
-    assert main(["calibration", "--read", str(tmp_path / "valve.bin")]) == 0
+    assert main(["calibration", "--read", str(tmp_path / "valve.bin"), str(written)]) == 0
     out = capsys.readouterr().out
     assert "\x1b" not in out and "[2Jx" in out.splitlines()[0]
 
