@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields
 from typing import Any, get_type_hints
 
+from dzdesign.codegen.calibration.layout import SHAPE_BITS, Member, members
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
 from dzdesign.commands.schema import SCHEMAS, schema_document
@@ -15,7 +16,10 @@ from dzdesign.identify.data_quality.catalogue import catalogue
 API = (
     (
         "dzdesign.api",
-        ("identify", "design", "generate", "verify", "plan", "init", "simulate", "assess", "report", "batch"),
+        (
+            "identify", "design", "generate", "calibration", "read_calibration", "verify", "plan", "init", "simulate",
+            "assess", "report", "batch",
+        ),
     ),
     ("dzdesign.identify.planning.results", ("SeriesPlan", "SeriesRow")),
     ("dzdesign.initial_options.proposal", ("Proposal",)),
@@ -31,6 +35,8 @@ API = (
     ("dzdesign.design.designing", ("design",)),
     ("dzdesign.design.compensator", ("Compensator", "SideLaw")),
     ("dzdesign.codegen.project", ("generate", "Firmware")),
+    ("dzdesign.stages.calibration", ("CalibrationImage", "ReadCalibration")),
+    ("dzdesign.codegen.calibration.reading", ("CalibrationReading", "SideReading", "NodeReading", "DriveReading")),
     ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),
     ("dzdesign.verify.evidence", ("Evidence",)),
@@ -131,6 +137,27 @@ def _kind(value: dict[str, Any], nullable: bool) -> str:
     return " or ".join([*kinds, *(["null"] if nullable and "null" not in kinds else [])])
 
 
+def calibration() -> str:
+    """Return the layout of a calibration block: a row for each member, those of a second side by their place alone."""
+    lines = ["| word | octet | member | size | what it is | unit | in compensator.json |", f"|{7 * '---|'}"]
+    second = "sides[1]."
+    for member in members():
+        if not member.path.startswith(second):
+            lines.append(_member(member))
+        elif member.path == second + "offset":
+            lines.append(f"| {member.at} | {2 * member.at} | `sides[1]` | | as `sides[0]`, of negative commands | | |")
+    lines += ["", "Bits of `shape`:", "", "| bit | meaning |", "|---|---|"]
+    return "\n".join([*lines, *(f"| {bit} | {text} |" for bit, text in enumerate(SHAPE_BITS.values()))])
+
+
+def _member(member: Member) -> str:
+    entry = member.entry
+    size = f"{entry.bits} bits" + (f" × {entry.count}" if entry.count > 1 else "")
+    key = f"`{entry.key}`" if entry.key else ""
+    text = entry.text[0].upper() + entry.text[1:]
+    return f"| {member.at} | {2 * member.at} | `{member.path}` | {size} | {text} | {entry.unit} | {key} |"
+
+
 def api() -> str:
     """Return directives for the documented names of each module."""
     parts = []
@@ -172,4 +199,7 @@ def key_lines(artefact: type) -> list[str]:
 
 
 #: What a page asks for by ``<!-- made: NAME -->``.
-MADE: dict[str, Callable[[], str]] = {"commands": commands, "files": files, "warnings": warnings, "api": api}
+MADE: dict[str, Callable[[], str]] = {
+    "commands": commands, "files": files, "warnings": warnings, "api": api,
+    "calibration": calibration,
+}  # fmt: skip

@@ -3,7 +3,8 @@
 Each takes paths or the result of the stage before it, options in the words of the command line ("1 MPa", "0.1 s"), and
 returns a frozen result, which `print` sums up and a notebook shows as a table. With ``output`` it also writes the file
 or folder that the command of the same stage writes, byte for byte. Nothing is printed. What is heavy is imported when a
-stage is called. `plan`, `init`, `simulate`, `assess`, `report` and `batch` are the commands of those names.
+stage is called. `plan`, `init`, `simulate`, `assess`, `report`, `batch` and `calibration` are the
+commands of those names, `read_calibration` is `calibration --read`.
 
 >>> from dzdesign import api
 >>> valve = api.identify("ramps/*.csv", meter_lag="0.1 s")         # doctest: +SKIP
@@ -19,6 +20,7 @@ from dzdesign.core.result_display import display_by
 from dzdesign.keywords import with_keywords
 from dzdesign.stages import assess as assess_stage
 from dzdesign.stages import batch as batch_stage
+from dzdesign.stages import calibration as calibration_stage
 from dzdesign.stages import design as design_stage
 from dzdesign.stages import generate as generate_stage
 from dzdesign.stages import identify as identify_stage
@@ -31,7 +33,8 @@ from dzdesign.terminal.notebook import heading_of, html_of, text_of
 
 __all__ = [
     "DzdesignError", "InputError", "RequirementError",
-    "assess", "batch", "design", "generate", "identify", "init", "plan", "report", "simulate", "verify",
+    "assess", "batch", "calibration", "design", "generate", "identify", "init", "plan", "read_calibration", "report",
+    "simulate", "verify",
 ]  # fmt: skip
 
 display_by(heading=heading_of, text=text_of, html=html_of)
@@ -41,6 +44,8 @@ plan = with_keywords(plan_stage.PlanArguments, plan_stage.plan)
 identify = with_keywords(identify_stage.IdentifyArguments, identify_stage.identify)
 design = with_keywords(design_stage.DesignArguments, design_stage.design)
 generate = with_keywords(generate_stage.GenerateArguments, generate_stage.generate)
+calibration = with_keywords(calibration_stage.CalibrationArguments, calibration_stage.calibration)
+read_calibration = with_keywords(calibration_stage.ReadCalibrationArguments, calibration_stage.read_calibration)
 verify = with_keywords(verify_stage.VerifyArguments, verify_stage.verify)
 simulate = with_keywords(simulate_stage.SimulateArguments, simulate_stage.simulate)
 assess = with_keywords(assess_stage.AssessArguments, assess_stage.assess)

@@ -1,10 +1,12 @@
 """Files that hold the octets of a calibration block: raw (.bin), Intel HEX (.hex) and TI-TXT (.txt)."""
 
 import io
+import itertools
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
+from dzdesign.codegen.calibration.block_images import swapped
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.input_files import read_bytes
 
@@ -13,12 +15,12 @@ MOST_OCTETS = 1 << 18
 _REMEDY = "write the block again with `dzdesign calibration`"
 
 
-def octets_in_file(path: Path) -> bytes:
-    """Return the octets that a file of a block holds, wherever it places them; the ending of its name tells the format.
+def octets_in_file(path: Path, form: str | None = None) -> bytes:
+    """Return the octets that a file of a block holds, wherever it places them; by default its ending tells the format.
 
     A file that can't be read, has an error, or holds more than one run of octets is an `InputError`.
     """
-    read = READERS.get(path.suffix.lower())
+    read = READERS[f".{form}"] if form else READERS.get(path.suffix.lower())
     if read is None:
         known = ", ".join(READERS)
         raise InputError(f"'{path}' ends with '{path.suffix}'{nearest(path.suffix, READERS)}; expected one of {known}")
@@ -33,18 +35,51 @@ def _raw(content: bytes, name: str) -> bytes:
 
 
 def _intel_hex(content: bytes, name: str) -> bytes:
-    from intelhex import IntelHex, IntelHexError
-
     text = _text(content, name)
     if not re.search(r"^:00000001FF\s*\Z", text, re.MULTILINE | re.IGNORECASE):
         raise InputError(f"{name}: the file does not end with the record :00000001FF, so it is cut; {_REMEDY}")
-    image = IntelHex()
-    try:
-        image.loadhex(io.StringIO(text))
-    except (IntelHexError, ValueError) as error:
-        raise InputError(f"{name}: not Intel HEX: {error}; {_REMEDY}") from error
-    runs = image.segments()
-    return _one_run(((begin, bytes(image.tobinarray(start=begin, size=end - begin))) for begin, end in runs), name)
+    rows = sorted(_hex_rows(text, name))
+    if len(rows) > 1 and _follow(rows, 2) and all(len(octets) % 2 == 0 for _, octets in rows):
+        return swapped(b"".join(octets for _, octets in rows))  # of words, as hex2000 --romwidth=16 writes them
+    return _one_run(_runs(rows), name)
+
+
+def _hex_rows(text: str, name: str) -> Iterator[tuple[int, bytes]]:
+    """Yield address and octets of each record of data; addresses may be of octets or of words."""
+    from intelhex import IntelHex, IntelHexError
+
+    end = ":00000001FF"
+    extended = ""
+    lines = [(row, line.strip()) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
+    for row, line in lines[:-1]:
+        if line.upper() == end:
+            raise InputError(f"{name}, row {row}: something follows the record {end}; {_REMEDY}")
+        record = IntelHex()  # of each record a file of its own: rows of words overlap where octets are counted
+        try:
+            record.loadhex(io.StringIO("\n".join((extended, line, end))))
+        except (IntelHexError, ValueError) as error:
+            raise InputError(f"{name}, row {row}: not Intel HEX: {error}; {_REMEDY}") from error
+        extended = line if line[7:9] in ("02", "04") else extended
+        if len(record):
+            yield record.minaddr(), bytes(record.tobinarray())
+
+
+def _follow(rows: list[tuple[int, bytes]], unit_octets: int) -> bool:
+    """Tell whether each row begins where the one before it ends, if an address is of so many octets."""
+    return all(
+        (after - before) * unit_octets == len(octets) for (before, octets), (after, _) in itertools.pairwise(rows)
+    )
+
+
+def _runs(rows: list[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
+    """Return rows joined where they follow each other."""
+    runs: list[tuple[int, bytearray]] = []
+    for at, octets in rows:
+        if runs and at == runs[-1][0] + len(runs[-1][1]):
+            runs[-1][1].extend(octets)
+        else:
+            runs.append((at, bytearray(octets)))
+    return [(at, bytes(octets)) for at, octets in runs]
 
 
 def _ti_txt(content: bytes, name: str) -> bytes:

@@ -67,7 +67,7 @@ def text_words(text: str, words: int, what: str) -> tuple[int, ...]:
     """
     octets = text.encode()
     if len(octets) > 2 * words:
-        raise InputError(f"{what} '{text}' has {len(octets)} octets in UTF-8, expected at most {2 * words}")
+        raise InputError(f"{what} '{text}' has {len(octets)} octets in UTF-8, expected at most {2 * words}; shorten it")
     if not text.isprintable():
         raise InputError(f"{what} {text!r} has characters that can't be printed, expected a plain text")
     return octet_words(octets.ljust(2 * words, b"\0"))

@@ -1,0 +1,42 @@
+"""Where a calibration block lies in a target's memory, and how that target's tools count addresses."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from dzdesign.core.errors import InputError
+
+#: Addresses of 32 bits, which TI-TXT counts in octets on every target.
+ADDRESSES = 1 << 32
+#: Numbers of 32 bits must begin where the processor can read them.
+ALIGNED_OCTETS = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """An address, in the units of the target: octets, or words of 16 bits on a C28x, where no octet has an address."""
+
+    address: int = 0
+    unit_octets: int = 1
+
+    def at(self, address: int, octets: int) -> "Place":
+        """Return the same memory at another address, where so many octets must have room in every format."""
+        last, step = (ADDRESSES - octets) // self.unit_octets, ALIGNED_OCTETS // self.unit_octets
+        if not 0 <= address <= last or address % step:
+            unit = "words of 16 bits" if self.unit_octets > 1 else "octets"
+            raise InputError(
+                f"--address is {address:#x}, expected a multiple of {step} up to {last - last % step:#x}, in {unit}"
+            )
+        return Place(address=address, unit_octets=self.unit_octets)
+
+
+#: The flash sectors that the linker files of TI keep for data: FLASHB of F28335.cmd, and sector 8 of bank 1 of
+#: 28004x_generic_flash_lnk.cmd, which can be erased while the firmware runs from bank 0.
+SECTORS: Mapping[str, Place] = {
+    "f28335": Place(address=0x33_0000, unit_octets=2),
+    "f280049c": Place(address=0x09_8000, unit_octets=2),
+}
+
+
+def place_of(target: str) -> Place:
+    """Return where a target's block lies; address 0, in octets, where the target has no sector for it."""
+    return SECTORS.get(target, Place())

@@ -1,0 +1,277 @@
+"""`calibration`: Compensator -> the calibration block of one valve as a file, and back."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, sha256_of, write_file
+from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.options import AnyPath, Option, Text
+from dzdesign.stages.design import TARGETS
+
+if TYPE_CHECKING:
+    from dzdesign.codegen.calibration.layout import CalibrationBlock
+    from dzdesign.codegen.calibration.places import Place
+    from dzdesign.codegen.calibration.reading import CalibrationReading
+    from dzdesign.core.recorded_units import RecordedUnits
+    from dzdesign.design.compensator import Compensator
+
+#: Where the names of the formats stand.
+FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
+#: Formats that hold a block.
+READABLE = ("hex", "bin", "txt")
+#: Entries of a block that do not follow from a compensator.
+OF_NO_COMPENSATOR = ("serial", "record", "crc32")
+COMPENSATOR_NAME = "compensator.json"
+
+
+@dataclass(frozen=True)
+class CalibrationArguments:
+    """Arguments of `calibration`."""
+
+    compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
+    """compensator.json, whose numbers are derived again first."""
+    _: KW_ONLY
+    output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
+    """File to write: .hex is Intel HEX, .bin the octets alone, .txt TI-TXT, .a2l the layout for XCP tools."""
+    format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
+    """hex, bin, txt or a2l, for a file of another ending (default: by the file's ending)."""
+    target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
+    """Microcontroller whose addresses the file states (default: that of the design)."""
+    address: Annotated[Text, Option("N", example="0x330000")] = None
+    """Where the block begins, in units of the target: words of 16 bits on f28335 and f280049c, else octets (default:
+    0x330000 for f28335, 0x98000 for f280049c, else 0)."""
+    serial: Annotated[Text, Option("TEXT")] = None
+    """Serial number, at most 24 octets (default: the entry serial of the test record)."""
+    record: Annotated[Text, Option("TEXT")] = None
+    """What the valve is filed under, at most 48 octets (default: the entry record of the test record)."""
+
+
+@dataclass(frozen=True)
+class ReadCalibrationArguments:
+    """Arguments of `read_calibration`, on the command line `calibration --read`."""
+
+    file: Annotated[AnyPath, Option("FILE")]
+    """File that `calibration` wrote."""
+    compensator: Annotated["Compensator | AnyPath | None", Option("COMPENSATOR.json")] = None
+    """compensator.json, or a firmware folder that holds one, to compare the block with."""
+    _: KW_ONLY
+    format: Annotated[Text, Option("NAME", choices=READABLE)] = None
+    """hex, bin or txt, of a file of another ending (default: by the file's ending)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationImage:
+    """A calibration block as the content of a file; `address` counts in the target's units, None where it has none."""
+
+    content: bytes
+    block: "CalibrationBlock"
+    format: str
+    target: str
+    address: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadCalibration:
+    """What a block says, and whether it is that of the compensator beside it: None where none was given."""
+
+    reading: "CalibrationReading"
+    compared_with: str
+    belongs: bool | None
+    #: Why it is not.
+    difference: str
+    #: Of the recordings, where the compensator that it belongs to is known.
+    units: "RecordedUnits"
+
+
+def calibration(arguments: CalibrationArguments) -> CalibrationImage:
+    """Write the calibration block of a compensator for one valve; the same input gives the same octets.
+
+    Raises
+    ------
+    InputError
+        If the compensator can't be read, a number in it does not follow, a block has no room for it, or the file can't
+        be written or is somebody's own.
+    """
+    from dzdesign.codegen.calibration.block import block_of
+    from dzdesign.codegen.calibration.block_images import WITH_ADDRESS, image_of
+    from dzdesign.codegen.calibration.packing import OCTETS, pack, unpack
+
+    output = None if arguments.output is None else Path(arguments.output)
+    form = _format_of(output, arguments.format)
+    if output is not None:
+        _check_output(output, form)
+    if arguments.address is not None and form not in WITH_ADDRESS:
+        raise InputError(f"--address is given, but a file of format {form} states none; leave it out")
+    compensator, digest, source = _given(arguments.compensator)
+    target = _target_of(compensator, arguments.target)
+    place = _place(target, arguments.address, OCTETS)
+    _refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
+    serial, record = (_entry(compensator, name, getattr(arguments, name)) for name in ("serial", "record"))
+    octets = pack(block_of(compensator, digest, serial=serial, record=record))
+    made = CalibrationImage(
+        content=image_of(octets, form, place),
+        block=unpack(octets),
+        format=form,
+        target=target,
+        address=place.address if form in WITH_ADDRESS else None,
+    )
+    if output is not None:
+        write_file(output, made.content)
+    return made
+
+
+def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
+    """Read a calibration block back, in engineering units, and compare it with a compensator.
+
+    Raises
+    ------
+    InputError
+        If the file is no calibration block, is damaged, or holds numbers that no firmware accepts. That it is not the
+        block of the compensator is no error: see ``belongs``.
+    """
+    from dzdesign.codegen.calibration.block_files import octets_in_file
+    from dzdesign.codegen.calibration.packing import unpack
+    from dzdesign.codegen.calibration.reading import reading_of
+    from dzdesign.core.recorded_units import AS_COMPUTED
+
+    path = Path(arguments.file)
+    block = unpack(octets_in_file(path, _known_format(arguments.format, READABLE)), f"'{path}'")
+    reading = reading_of(block, f"'{path}'")
+    if arguments.compensator is None:
+        return ReadCalibration(reading=reading, compared_with="", belongs=None, difference="", units=AS_COMPUTED)
+    compensator, digest, source = _given(arguments.compensator)
+    difference = _difference(block, reading, compensator, digest)
+    return ReadCalibration(
+        reading=reading,
+        compared_with=source,
+        belongs=not difference,
+        difference=difference,
+        units=AS_COMPUTED if difference else compensator.valve.recorded_units,
+    )
+
+
+def _known_format(name: str | None, known: Iterable[str]) -> str | None:
+    if name is not None and name not in known:
+        raise InputError(f"--format is {quoted(name)}{nearest(name, known)}, expected one of {', '.join(known)}")
+    return name
+
+
+def _format_of(output: Path | None, given: str | None) -> str:
+    """Return the format that is asked for; a file whose ending says another could not be read back."""
+    from dzdesign.codegen.calibration.block_images import FORMATS as KNOWN
+
+    ending = output.suffix.lower().removeprefix(".") if output is not None else ""
+    if _known_format(given, KNOWN) is None:
+        if output is None:
+            return "bin"
+        if ending not in KNOWN:
+            raise InputError(
+                f"'{output}' ends with '{output.suffix}'{nearest(ending, KNOWN)}, expected "
+                f"{', '.join(f'.{name}' for name in KNOWN)}; choose another -o, or say --format"
+            )
+        return ending
+    if ending in KNOWN and ending != given:
+        raise InputError(f"'{output}' ends with '.{ending}', but --format is {given}; leave one of them out")
+    return str(given)
+
+
+def _check_output(output: Path, form: str) -> None:
+    """Refuse to write over what is no calibration block: a recording may end with .txt too."""
+    from dzdesign.codegen.calibration.a2l import HEAD
+    from dzdesign.codegen.calibration.block_files import octets_in_file
+    from dzdesign.codegen.calibration.layout import MAGIC
+
+    check_file_may_be_written(output)
+    if not output.exists() or not output.stat().st_size:
+        return
+    try:
+        if form in READABLE:
+            is_block = octets_in_file(output, form).startswith(MAGIC)
+        else:
+            is_block = read_bytes(output, "calibration file").startswith(HEAD.encode())
+    except InputError:
+        is_block = False
+    if not is_block:
+        raise InputError(
+            f"'{output}' exists and is no calibration block of dzdesign, so it is left alone; choose another name "
+            "with -o"
+        )
+
+
+def _given(given: "Compensator | AnyPath") -> tuple["Compensator", str, str]:
+    """Return a compensator, the SHA-256 of its file, and how that is called; of a folder the file in it."""
+    from dzdesign.core.artefact_reading import read_artefact
+    from dzdesign.core.artefact_types import to_json_bytes
+    from dzdesign.design.compensator import Compensator
+
+    if isinstance(given, Compensator):
+        return given, sha256_of(to_json_bytes(given)), "the compensator"
+    path = Path(given)
+    path = path / COMPENSATOR_NAME if path.is_dir() else path
+    content = read_bytes(path, "compensator file")
+    return read_artefact(content, Compensator, os.fspath(path)), sha256_of(content), f"'{path}'"
+
+
+def _refuse_underived(compensator: "Compensator", source: str, *, of_file: bool) -> None:
+    """Refuse a compensator whose numbers do not follow from its valve and options."""
+    from dzdesign.design.redesign_check import prove_derived, refuse_without_options
+
+    if of_file:
+        refuse_without_options(compensator, source.strip("'"))
+    try:
+        prove_derived(compensator)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+
+
+def _target_of(compensator: "Compensator", given: str | None) -> str:
+    """Return the target whose firmware takes the block; one that counts otherwise is refused as `codegen` does."""
+    from dzdesign.codegen.project import DEFAULT_TARGET, target_named
+
+    designed_for = compensator.target
+    target = target_named(given or (designed_for.name if designed_for else DEFAULT_TARGET))
+    target.check_signals(compensator.signals)
+    if designed_for:
+        target.check_designed_for(designed_for)
+    if compensator.current_drive is not None:
+        target.check_current_control(compensator.current_drive.sampling)
+    return target.name
+
+
+def _place(target: str, address: str | None, octets: int) -> "Place":
+    from dzdesign.codegen.calibration.places import place_of
+
+    place = place_of(target)
+    if address is None:
+        return place
+    try:
+        return place.at(int(address, 0), octets)
+    except ValueError as error:
+        raise InputError(f"--address is {quoted(address)}, expected a whole number such as 0x330000") from error
+
+
+def _entry(compensator: "Compensator", name: str, given: str | None) -> str:
+    """Return a text of the block: as given, or that entry of the test record; one setting for a lot is of no valve."""
+    if given is not None:
+        return given
+    if compensator.lot:
+        return ""
+    return next((text for key, text in compensator.valve.record.items() if key.casefold() == name), "")
+
+
+def _difference(
+    block: "CalibrationBlock", reading: "CalibrationReading", compensator: "Compensator", digest: str
+) -> str:
+    """Say why a block is not that of a compensator: another file, or numbers that do not follow from it."""
+    from dzdesign.codegen.calibration.block import block_of
+
+    if reading.compensator_sha256 != digest:
+        return f"its compensator.json has the SHA-256 {digest}, the block names {reading.compensator_sha256}"
+    numbers = [name for name in block.__dataclass_fields__ if name not in OF_NO_COMPENSATOR]
+    follows = block_of(compensator, digest)
+    if differ := [name for name in numbers if getattr(block, name) != getattr(follows, name)]:
+        return f"it names this compensator, but numbers differ from those that follow from it: {', '.join(differ)}"
+    return ""

@@ -1,0 +1,94 @@
+"""A block as Intel HEX, TI-TXT and octets: where each octet lies, read by a reader of the formats' documents alone."""
+
+import pytest
+
+from dzdesign.codegen.calibration.block_files import octets_in_file
+from dzdesign.codegen.calibration.block_images import FORMATS, image_of
+from dzdesign.codegen.calibration.places import SECTORS, Place, place_of
+from dzdesign.codegen.project import TARGET_NAMES
+from dzdesign.core.errors import InputError
+from tests.support.block_reader import hex_memory, ti_txt_memory
+
+OCTETS = bytes(range(256)) * 10 + b"last"
+PLACES = {
+    "f28335": place_of("f28335"),
+    "f280049c": place_of("f280049c"),
+    "octets from 0": place_of("host"),
+    "words over a segment's end": Place(address=0x31_FFFE, unit_octets=2),
+    "octets over a segment's end": Place(address=0x0800_FFF4),
+    "last words": Place(address=2**31 - len(OCTETS) // 2, unit_octets=2),
+}
+
+
+@pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
+@pytest.mark.parametrize("name", sorted(FORMATS.keys() - {"a2l"}))
+def test_a_file_gives_the_octets_back(name, place, tmp_path):
+    for file in (tmp_path / f"block.{name}", tmp_path / "block.other"):
+        file.write_bytes(image_of(OCTETS, name, place))
+        assert octets_in_file(file, None if file.suffix == f".{name}" else name) == OCTETS
+
+
+@pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
+def test_each_octet_lies_at_its_address(place):
+    expected = {place.address * place.unit_octets + at: octet for at, octet in enumerate(OCTETS)}
+    assert hex_memory(image_of(OCTETS, "hex", place).decode(), of_words=place.unit_octets == 2) == expected
+    assert ti_txt_memory(image_of(OCTETS, "txt", place).decode()) == expected
+
+
+def test_a_c28x_has_words_of_which_the_high_octet_comes_first():
+    """As `hex2000 --romwidth=16 --intel` writes 0x2211, 0x4433 at word 0x330000; TI-TXT is of octets."""
+    place = PLACES["f28335"]
+    assert image_of(bytes.fromhex("11223344"), "hex", place).decode().split() == [
+        ":020000040033C7", ":040000002211443352", ":00000001FF",
+    ]  # fmt: skip
+    assert image_of(bytes.fromhex("11223344"), "txt", place) == b"@660000\n11 22 33 44\nq\n"
+    second = image_of(bytes(64), "hex", place).decode().split()[2]
+    assert second.startswith(":20001000"), "the second row of 32 octets is 16 words further"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda rows: [*rows[:3], rows[3][:-1] + ("1" if rows[3][-1] == "0" else "0"), *rows[4:]],
+        lambda rows: [*rows[:3], *rows[4:]],
+        lambda rows: [*rows[:3], rows[2], *rows[3:]],
+        lambda rows: [*rows[:3], ":00000001FF", *rows[3:]],
+        lambda rows: [*rows[:3], rows[3][:20], *rows[4:]],
+        lambda rows: rows[:-1],
+    ],
+)
+def test_a_hex_file_of_words_with_an_error_is_refused(change, tmp_path):
+    rows = image_of(OCTETS, "hex", PLACES["f28335"]).decode().split()
+    (tmp_path / "a.hex").write_text("\n".join(change(rows)) + "\n")
+    with pytest.raises(InputError, match=r"a\.hex"):
+        octets_in_file(tmp_path / "a.hex")
+
+
+def test_rows_may_come_in_any_order(tmp_path):
+    first, *rows, end = image_of(OCTETS, "hex", PLACES["f28335"]).decode().split()
+    (tmp_path / "a.hex").write_text("\n".join([first, *reversed(rows), end]) + "\n")
+    assert octets_in_file(tmp_path / "a.hex") == OCTETS
+
+
+@pytest.mark.parametrize(
+    ("place", "address", "right"),
+    [
+        (Place(unit_octets=2), 2**31 - 4, False),
+        (Place(unit_octets=2), 0x33_0001, False),
+        (Place(unit_octets=2), 2**31 - 6, True),
+        (Place(), 0x0800_0002, False),
+        (Place(), -4, False),
+        (Place(), 2**32 - 12, True),
+        (Place(), 2**32 - 8, False),
+    ],
+)
+def test_an_address_has_room_behind_it_in_every_format(place, address, right):
+    if right:
+        assert place.at(address, 12) == Place(address=address, unit_octets=place.unit_octets)
+        return
+    with pytest.raises(InputError, match="--address is"):
+        place.at(address, 12)
+
+
+def test_the_sectors_are_of_targets():
+    assert set(SECTORS) < set(TARGET_NAMES) and place_of("host") == Place()
