@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that al
 
 from above_tests import print_above  # noqa: E402
 from all_inputs import print_inputs  # noqa: E402
+from calibration_blocks import print_blocks  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
 from current_valve import print_current_valve  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
@@ -34,6 +35,7 @@ PARTS = {
     "current": (print_current_loop, 0),
     "current-valve": (print_current_valve, 0),
     "above": (print_above, 0),
+    "blocks": (print_blocks, 24),
 }
 
 

@@ -261,6 +261,10 @@ void MemCopy(Uint16 *source, Uint16 *source_end, Uint16 *destination)
              : "MemCopy of something else");
 }
 
+int device_side = 1;
+unsigned device_drive_samples, device_drive_ticks;
+
+#ifndef REAL_CORE
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
     return (uint16_t)(u_adc + 10u * p_a_adc + 100u * p_b_adc);
@@ -279,9 +283,6 @@ uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
     return (uint16_t)(dz_status(u_adc, p_a_adc, p_b_adc) ^ 8u);
 }
-
-int device_side = 1;
-unsigned device_drive_samples, device_drive_ticks;
 
 void dz_drive_init(struct dz_drive *drive)
 {
@@ -303,6 +304,7 @@ void dz_drive_tick(struct dz_drive *drive)
     drive->compare_b = (uint16_t)((drive->side < 0) ? drive->law : 0u);
     device_drive_ticks++;
 }
+#endif
 
 /* Codes of ADCINA0, A1, A2 in the n-th sample: 100 (n modulo 41), 1, 2; A4 is the supply; others give nonsense. */
 static uint16_t code_of(unsigned channel, char event)
