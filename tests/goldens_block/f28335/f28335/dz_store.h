@@ -13,7 +13,8 @@
  *   return late, and serve the watchdog meanwhile.
  *
  * Flash of the TMS320F28335, with the Flash API of TI (SPRC848 and its manual SPNU422, from TI):
- * - a sector a slot, which nothing else of the program lies in: erase is Flash_Erase(), write is Flash_Program();
+ * - a sector a slot, which nothing else of the program lies in, the linked block neither (dz_calibration.cmd): erase is
+ *   Flash_Erase(), write is Flash_Program();
  * - the API runs from RAM and turns the flash off: whatever runs meanwhile must lie in RAM too. dz_isr() does, and while
  *   the output is held it calls nothing that lies in flash and reads no block;
  * - Flash_CallbackPtr, called by the API meanwhile, is the place of ServiceDog(), both in RAM: an erase takes seconds. */
