@@ -30,7 +30,9 @@ def page_of_a_file(monkeypatch):
 def short_windows_beside_casadi():
     """Compare the plant with CasADi's integrator over 0.3 s, not 2 s: a third of what `verify` costs a test.
 
-    They are whole where a test runs the program, as the pages of docs/ do, and where it asks for `whole_windows`.
+    They are whole in another process, which takes nothing of this patch: where a test runs the program, as the pages of
+    docs/ do, and of `batch --verify` with two or more `--jobs`. In this process, `batch --jobs 1` too, they are whole
+    where a test asks for `whole_windows`.
     """
     from dzdesign.verify.integrator import windows
 

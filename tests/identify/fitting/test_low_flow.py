@@ -306,6 +306,11 @@ class TestAReadingThatNoRampAgreesWith:
         with wording.refusal(InputError):
             identified(SHARP, [SHARP.reading(5.0, 7.0)])
 
+    def test_beside_the_only_tested_pressure_drop_is_refused(self, wording, monkeypatch):
+        monkeypatch.setitem(RAMPS, SHARP, RAMPS[SHARP][:1])
+        with wording.refusal(InputError):
+            identified(SHARP, [SHARP.reading(5.0, 7.0)])
+
     def test_of_a_side_without_a_ramp_is_refused(self, wording):
         row = SHARP.reading(5.0, 3.0)
         with wording.refusal(InputError):

@@ -122,7 +122,11 @@ class PlantComparison:
     ]
     q_largest_L_min: Annotated[Flow, about("That largest flow, by the integrator.")]
     unlike_compare_values: Annotated[
-        Count, about("PWM periods in which the two loops' compare values differ, and samples of a pressure's code.")
+        Count,
+        about(
+            "PWM periods in which the two loops' compare values differ, those of a direct command under the drive's "
+            "dither too, and samples of a pressure's code."
+        ),
     ]
     codes_at_border: Annotated[
         Count, about("Pressures so close to the border of two codes that the plant's code was taken.")

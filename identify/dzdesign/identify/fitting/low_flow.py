@@ -105,10 +105,11 @@ def _tested(group: DescribedTests, rows: Sequence[LowFlow]) -> np.ndarray:
     dp = np.array([(item.dp or 0.0) / MPA for item in group.tests])
     for row in rows:
         if not dp[0] * (1 - SAME_PRESSURE) <= row.dp_MPa <= dp[-1] * (1 + SAME_PRESSURE):
+            expected = "{high:.3g MPa}" if dp[0] == dp[-1] else "{low:.3g #MPa} to {high:.3g MPa}"
             raise InputError(
                 worded(
-                    "{source}: its pressure drop is {at:.3g MPa}, expected {low:.3g #MPa} to {high:.3g MPa} as in the "
-                    "ramp tests; measure it there, or record a ramp at its pressure drop",
+                    "{source}: its pressure drop is {at:.3g MPa}, expected " + expected + " as in the ramp tests; "
+                    "measure it there, or record a ramp at its pressure drop",
                     source=row.source, at=row.dp_MPa, low=dp[0], high=dp[-1],
                 )
             )  # fmt: skip

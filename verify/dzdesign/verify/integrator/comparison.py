@@ -15,6 +15,7 @@ from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, PERIODS_PER_RECORD, 
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.integrator.compiled_calls import compiled_core
+from dzdesign.verify.integrator.direct_drive import unlike_direct_values
 from dzdesign.verify.integrator.reference_loop import ReferenceLoop, ReferenceRun
 from dzdesign.verify.integrator.windows import Window, course_of, windows_of
 from dzdesign.verify.loop_results import PlantComparison
@@ -55,7 +56,8 @@ def _compared(firmware: Path, windows: Sequence[Window]) -> Iterator[PlantCompar
 def compare(window: Window, library: ctypes.CDLL) -> PlantComparison:
     """Run one window in both loops, from rest, and return what is between them.
 
-    The native loop runs twice: with a record for each period, and as the ramps of the closed loop have it.
+    The native loop runs twice: with a record for each period, and as the ramps of the closed loop have it; and in the
+    step with a direct command once more, where that has a wave about it.
     """
     scene, loop, records = window.scene, window.loop, course_of(window)
     course = records.by_period()
@@ -72,7 +74,8 @@ def compare(window: Window, library: ctypes.CDLL) -> PlantComparison:
         window.plant, library, scene.compensator.signals, scene.sign, loop.coil,
         without_dither=loop.wave()[2], drive=window.drive,
     ).run(course, window.errors, np.stack([native.code_a, native.code_b], axis=1).astype(int), begin, end)  # fmt: skip
-    return _result(window, native, coarse, reference, begin, slice(first, end))
+    unlike = unlike_direct_values(window, library, course, native) if window.kind == "step" else 0
+    return _result(window, native, coarse, reference, begin, slice(first, end), unlike)
 
 
 def _span(window: Window, native: LoopRun) -> tuple[int, int, int]:
@@ -106,7 +109,7 @@ def _forgets(plant: Plant) -> int:
 
 
 def _result(
-    window: Window, native: LoopRun, coarse: LoopRun, reference: ReferenceRun, begin: int, part: slice
+    window: Window, native: LoopRun, coarse: LoopRun, reference: ReferenceRun, begin: int, part: slice, direct: int
 ) -> PlantComparison:
     stroke_mm, since = window.plant.parameters.stroke_mm, slice(part.start - begin, None)
     flows = reference.q_L_min[since]
@@ -121,7 +124,7 @@ def _result(
         coarse.q_largest_L_min[records] - of_record.max(axis=1),
     )
     flow = max(float(np.abs(each).max()) for each in apart)
-    unlike = int(np.count_nonzero(native.compare[part] != reference.compare[since]))
+    unlike = direct + int(np.count_nonzero(native.compare[part] != reference.compare[since]))
     return PlantComparison(
         kind=window.kind,
         side=window.scene.side,
