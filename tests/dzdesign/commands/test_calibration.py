@@ -21,6 +21,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.recorded_units import CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.lot.valves import LotValve
 from tests.support.block_reader import hex_memory, members_of, ti_txt_memory
 from tests.support.core_variants import variant
 from tests.support.paths import ROOT
@@ -237,6 +238,11 @@ def test_serial_and_record_come_from_the_test_record_unless_given(unproven):
     assert (by_record["serial"], by_record["record"]) == ("4711 №".encode(), b"lot 12")
     assert (given["serial"], given["record"]) == (b"8", b"shelf 3")
     assert (none["serial"], none["record"]) == (b"", b"")
+    # One setting for a lot is designed from one valve, whose number is not that of the others.
+    sides = {1: compensator.valve.sides["positive"]}
+    lot = tuple(LotValve.of(name, "0" * 64, sides, {1: "closing"}) for name in ("V-1", "V-2"))
+    of_lot = members_of(pack(api.calibration(replace(compensator, lot=lot)).block))
+    assert (of_lot["serial"], of_lot["record"]) == (b"", b"")
     with pytest.raises(api.InputError, match="at most 24; shorten it"):
         api.calibration(compensator, serial="x" * 25)
 
