@@ -34,7 +34,7 @@ def regenerated(folder: Path) -> "Check":
         return REGENERATED.check(holds=None, text=reason)
     content = read_bytes(folder / "compensator.json", "compensator")
     try:
-        firmware = generate(read_compensator(folder), manifest.target, content)
+        firmware = generate(read_compensator(folder), manifest.target, content, manifest.calibration)
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
     expected = firmware.manifest

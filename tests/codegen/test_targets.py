@@ -71,8 +71,9 @@ def test_a_target_says_its_own_name_and_uses_every_template(name):
     folder = CODEGEN / target.folder / "templates"
     own = {path.name for path in folder.iterdir()}
     shared = {path.name for place in ("templates", "core/templates") for path in (CODEGEN / place).iterdir()}
-    assert own <= set(target.templates.values()) <= own | shared
-    for path in target.templates:
+    used = {**target.templates, **target.block_templates}
+    assert own <= set(used.values()) <= own | shared
+    for path in used:
         assert PurePosixPath(path).parts[0] == target.folder and ".." not in path
 
 

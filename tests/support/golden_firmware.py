@@ -25,6 +25,8 @@ from tests.support.paths import TESTS
 
 GOLDENS = TESTS / "goldens"
 FULL = TESTS / "goldens_full"
+#: One firmware in block form, of the second set's compensator.
+BLOCK_GOLDENS = TESTS / "goldens_block"
 FULL_TARGETS = ("avr", "cortex-m4", "f28335")
 #: Not compared: it is what goes in.
 INPUT = "compensator.json"
@@ -80,6 +82,21 @@ def golden_files(target_name: str, root: Path = GOLDENS) -> dict[str, str]:
     return files
 
 
+def golden_block_files() -> dict[str, str]:
+    """Generate the f28335's firmware in block form from the second set's compensator; the block as C is among them."""
+    compensator = golden_compensator("f28335", FULL)
+    files = dict(generate(compensator, "f28335", to_json_bytes(compensator), "block").files)
+    del files[INPUT]
+    return files
+
+
+def _write(folder: Path, files: Mapping[str, str]) -> None:
+    for name, text in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8", newline="\n")
+
+
 def differences(folder: Path, files: Mapping[str, str]) -> str:
     """Return what a person wants to know about files that are not those of the folder; empty if they are."""
     kept = {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*")) if path.is_file()}
@@ -108,7 +125,6 @@ def update() -> None:
             if folder.is_dir() and folder.name != "schemas":
                 shutil.rmtree(folder)
         for target in names:
-            for name, text in golden_files(target, root).items():
-                path = root / target / name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(text, encoding="utf-8", newline="\n")
+            _write(root / target, golden_files(target, root))
+    shutil.rmtree(BLOCK_GOLDENS, ignore_errors=True)
+    _write(BLOCK_GOLDENS / "f28335", golden_block_files())

@@ -50,6 +50,10 @@ class Banner:
     #: Of a lot setting: the recordings are those of one of its valves.
     lot: LotInWords | None = None
 
+    def of_any_valve(self, template: str) -> tuple[str, ...]:
+        """Return the lines of a file that is the same whatever the calibration block."""
+        return (*self.lines(template)[:1], "The same for every valve: the numbers come from a calibration block.")
+
     def lines(self, template: str) -> tuple[str, ...]:
         """Return the lines of the file that a template makes."""
         lines = [

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from fractions import Fraction
 
-from dzdesign.codegen.target import Target
+from dzdesign.codegen.target import FlashSector, Target
 from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError
 from dzdesign.design.current.circuit import CurrentSampling
@@ -39,6 +39,7 @@ def c2000_target(
     converter: Converter,
     sources: tuple[str, ...] = (),
     block_sources: tuple[str, ...] = (),
+    sector: FlashSector,
     link: Link | None = None,
 ) -> Target:
     """Return the target whose figures, printed, are `context`.
@@ -57,6 +58,7 @@ def c2000_target(
         block_templates={f"{name}/{file}": f"{file}.jinja" for file in block_sources},
         board=frozenset({f"{name}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
         context={**context, **TOOLS},
+        sector=sector,
         link=link,
     )
 

@@ -10,9 +10,15 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from dzdesign.codegen.banner import Banner, banner_of, board_lines
+from dzdesign.codegen.calibration.block import block_of
+from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.files import block_core_files
+from dzdesign.codegen.calibration.in_project import block_templates, block_values
+from dzdesign.codegen.calibration.layout import CalibrationBlock
+from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.current_files import CURRENT_HEADERS, CURRENT_SOURCES, FAULT_BITS, current_files
-from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, Values, core_files
+from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, CoreFile, Values, core_files
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.loading.files import LOAD_FILES, STORE, load_texts
 from dzdesign.codegen.provenance import constants_of
@@ -24,7 +30,7 @@ from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
+from dzdesign.design.firmware_manifest import BLOCK_FILE, Calibration, FirmwareManifest, FirmwareOrigin
 from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.design.target_inputs import Converter
 
@@ -56,6 +62,13 @@ class Firmware(ShownInNotebooks):
     manifest: FirmwareManifest
     compensator: Compensator
     note: str = ""
+    #: Octets of the calibration block; empty of a firmware with the numbers of its valve in it.
+    block: bytes = b""
+
+    @property
+    def contents(self) -> Mapping[str, str | bytes]:
+        """What is written, path to content: the files, and the calibration block."""
+        return {**self.files, **({BLOCK_FILE: self.block} if self.block else {})}
 
 
 def write_firmware(firmware: Firmware, folder: Path, *, over_another: bool = False) -> Firmware:
@@ -65,10 +78,14 @@ def write_firmware(firmware: Firmware, folder: Path, *, over_another: bool = Fal
     be written, or holds files that would be lost, is an `InputError`; so is one with the firmware of another design,
     unless it is to be written over.
     """
-    if not over_another:
-        refuse_another_design(Path(folder), firmware.compensator)
+
+    def check() -> None:
+        if not over_another:
+            refuse_another_design(Path(folder), firmware.compensator)
+
+    check()  # of two at once, the other one may have written since
     earlier = target_in(Path(folder))
-    kept = write_folder(folder, firmware.files, firmware.manifest)
+    kept = write_folder(folder, firmware.contents, firmware.manifest, check)
     notes = [firmware.note] if firmware.note else []
     if earlier not in ("", firmware.manifest.target):
         gone = f"the firmware for {earlier} in '{folder}' was replaced by this one for {firmware.manifest.target}"
@@ -95,11 +112,15 @@ def targets() -> tuple[Target, ...]:
 
 
 def generate(
-    compensator: Compensator, target_name: str | None = None, compensator_bytes: bytes | None = None
+    compensator: Compensator,
+    target_name: str | None = None,
+    compensator_bytes: bytes | None = None,
+    calibration: Calibration = "fixed",
 ) -> Firmware:
     """Generate the C project of a compensator for the target of that name, by default the one that it was designed for.
 
     `compensator_bytes` is the file that the compensator was read from; without it the document as it would be written.
+    With `calibration` "fixed" the numbers of the valve stand in the core, with "block" in a block of data beside it.
     An unknown target is an `InputError`; so is one whose converter or PWM differs from those that the compensator was
     designed for, and a compensator that says of its target what is not so.
     """
@@ -111,37 +132,50 @@ def generate(
     note = target.check_designed_for(designed_for) if designed_for else ""
     document = compensator_bytes or to_json_bytes(compensator)
     digest = sha256_of(document)
-    core = {f"core/{name}": file for name, file in core_files(compensator, target.arithmetic).items()}
     if (drive := compensator.current_drive) is not None:
         target.check_current_control(drive.sampling)
-        core |= {f"core/{name}": file for name, file in current_files(drive.loop).items()}
-    banner = banner_of(compensator, digest)
+    banner, block = banner_of(compensator, digest), None
+    if calibration == "block":
+        block = block_of(compensator, digest)
+        core = _in_core(block_core_files(built_for(compensator)))
+        first_lines = banner.of_any_valve
+    else:
+        core = _in_core(core_files(compensator, target.arithmetic) | (current_files(drive.loop) if drive else {}))
+        first_lines = banner.lines
     files = {
-        path: _render(PACKAGE, file.template, banner.lines(file.template), file.values) for path, file in core.items()
+        path: _render(PACKAGE, file.template, first_lines(file.template), file.values) for path, file in core.items()
     }
-    files |= {**target_files(compensator, target, banner), "compensator.json": document.decode()}
+    files |= {**target_files(compensator, target, banner, block), "compensator.json": document.decode()}
+    octets = pack(block) if block else b""
     manifest = FirmwareManifest(
         tool=THIS_TOOL,
         made_from=(SourceFile(source="compensator.json", sha256=digest),),
         target=target.name,
+        calibration=calibration,
         law=compensator.law,
         core=tuple(sorted(core)),
-        board=tuple(sorted(target.board)),
+        board=tuple(sorted(target.board | (board_of_blocks(target) if block else frozenset()))),
         origin=FirmwareOrigin(
             compensator_json=digest,
             valve_json=compensator.valve_json_sha256,
             ramp_tests=compensator.valve.made_from,
         ),
         constants=constants_of(compensator, {path: file.constants for path, file in core.items()}),
-        files={path: sha256_of(text.encode()) for path, text in files.items()},
+        files={path: sha256_of(text.encode()) for path, text in files.items()}
+        | ({BLOCK_FILE: sha256_of(octets)} if octets else {}),
     )
-    return Firmware(files=files, manifest=manifest, compensator=compensator, note=note)
+    return Firmware(files=files, manifest=manifest, compensator=compensator, note=note, block=octets)
+
+
+def _in_core(files: Mapping[str, CoreFile]) -> dict[str, CoreFile]:
+    """Return files of the core by their paths in the firmware."""
+    return {f"core/{name}": file for name, file in files.items()}
 
 
 def target_files(
-    compensator: Compensator, target: Target, banner: Banner, *, block: bool = False
+    compensator: Compensator, target: Target, banner: Banner, block: CalibrationBlock | None = None
 ) -> dict[str, str]:
-    """Return the files around the core, path to text; in block form those that take a block over a serial line too."""
+    """Return the files around the core, path to text; with a block those that hold it and load another."""
     signals = compensator.signals
     current = compensator.current_drive
     levels, full_V = signals.code_max + 1, target.converter.full_V
@@ -157,13 +191,17 @@ def target_files(
         "limited": compensator.drive_functions.compare_limit < signals.compare_max,
         "at_zero": {sign: zero_command(compensator, sign) for sign in signals.signs},
         "core_sources": (
-            *(CORE_SOURCES[sign] for sign in signals.signs),
+            *(("dz_calibration.c", "dz_comp.c") if block else [CORE_SOURCES[sign] for sign in signals.signs]),
             "dz_drive.c",
             *(CURRENT_SOURCES if current else ()),
         ),
-        "core_headers": (*CORE_HEADERS, *(CURRENT_HEADERS if current else ())),
+        "core_headers": (
+            *(("dz_calibration.h",) if block else ()),
+            *CORE_HEADERS,
+            *(CURRENT_HEADERS if current else ()),
+        ),
+        **block_values(compensator, block, target),
         "current": current,
-        "block": block,
         "link_sources": link_names(target, ".c") if block else (),
         "link_headers": link_names(target, ".h") if block else (),
         "current_faults": FAULT_BITS,
@@ -172,6 +210,7 @@ def target_files(
         "lot_setting": banner.lot,
         "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }
+    in_block_form = {**block_templates(target, block), **(target.block_templates if block else {})}
     files = {
         path: _render(
             f"{PACKAGE}.{target.folder}",
@@ -179,7 +218,7 @@ def target_files(
             board_lines(template) if path in target.board else banner.lines(template),
             values,
         )
-        for path, template in {**target.templates, **(target.block_templates if block else {})}.items()
+        for path, template in {**target.templates, **in_block_form}.items()
     }
     return files | (_load_files(target, banner) if block and target.link else {})
 
@@ -190,7 +229,7 @@ def _load_files(target: Target, banner: Banner) -> dict[str, str]:
 
     def lines(name: str) -> Sequence[str]:
         template = f"{name}.jinja"
-        return board_lines(template) if f"{target.folder}/{name}" in board else banner.lines(template)
+        return board_lines(template) if f"{target.folder}/{name}" in board else banner.of_any_valve(template)
 
     return {f"{target.folder}/{name}": text for name, text in load_texts(target.tick_Hz, lines).items()}
 
@@ -209,7 +248,7 @@ def board_of_blocks(target: Target) -> frozenset[str]:
 @cache
 def _environment(package: str) -> "jinja2.Environment":
     """Return the renderer of a package's templates, then of the shared ones; kept, with what it has compiled."""
-    packages = dict.fromkeys((package, f"{PACKAGE}.core", PACKAGE))
+    packages = dict.fromkeys((package, f"{PACKAGE}.core", f"{PACKAGE}.calibration", PACKAGE))
     return strict_templates(*packages, autoescape=False)  # C and make, not HTML
 
 

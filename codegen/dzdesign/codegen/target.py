@@ -19,8 +19,19 @@ ARITHMETICS = ("wide", "narrow")
 RENDERER_NAMES = frozenset(
     {"banner", "project", "signals", "u_max_V", "drive", "limited", "at_zero", "bipolar", "wiring", "lot_setting"}
     | {"core_sources", "core_headers", "firmware_origin", "current", "current_faults"}
-    | {"block", "link_sources", "link_headers"}
+    | {"link_sources", "link_headers"}
+    | {"block", "block_files", "block_sources", "block_headers", "block_lines", "command_zero", "offset_ticks"}
+    | {"sector", "region", "region_page", "region_file"}
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlashSector:
+    """A memory range of a vendor's linker file, its page, and that file."""
+
+    region: str
+    page: int
+    file: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +70,8 @@ class Target:
     current_sampling: CurrentSampling | None = None
     #: Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     board: frozenset[str] = frozenset()
+    #: Where a calibration block has a flash sector of its own: the memory range of the vendor's linker file.
+    sector: FlashSector | None = None
     #: The serial line of its telemetry, if it sends any.
     link: Link | None = None
 

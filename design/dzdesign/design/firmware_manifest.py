@@ -5,16 +5,35 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, get_args
 
 from msgspec import Meta
 
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import Artefact, Sha256, SourceFile
+from dzdesign.core.errors import InputError, nearest
 
+#: Where the numbers of the valve stand, and the file of a calibration block in the firmware's folder.
+Calibration = Literal["fixed", "block"]
+FORMS: tuple[Calibration, ...] = get_args(Calibration)
+BLOCK_FILE = "calibration.bin"
 Text = Annotated[str, Meta(min_length=1)]
 #: A number of the C fits 64 bits with sign: every sum of the core is proved to.
 Number = Annotated[int, Meta(ge=-(2**31), le=2**63 - 1)]
+
+
+def form_named(name: str | None) -> Calibration:
+    """Return the form of that name, without one the first; an unknown name is an `InputError`.
+
+    Examples
+    --------
+    >>> form_named(None), form_named("block")
+    ('fixed', 'block')
+    """
+    for form in FORMS:
+        if name in (form, None):
+            return form
+    raise InputError(f"--calibration: '{name}' is unknown{nearest(name or '', FORMS)}; known: {', '.join(FORMS)}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +77,13 @@ class FirmwareManifest(Artefact):
         "dzdesign.firmware/1"
     )
     target: Annotated[Text, Meta(description="Microcontroller, as `codegen --list-targets` names it.")]
+    calibration: Annotated[
+        Calibration,
+        Meta(
+            description="fixed: the numbers of the valve stand in the core; block: in a calibration block, which the "
+            f"core is handed, {BLOCK_FILE}."
+        ),
+    ]
     law: Annotated[Text, Meta(description="Name of the law, as compensator.json has it.")]
     core: Annotated[tuple[Text, ...], Meta(description="Files that are free of hardware.", min_length=1)]
     board: Annotated[

@@ -43,6 +43,8 @@ class Arguments:
     """File to write."""
     firmware: Annotated[AnyPath, Option("DIR")] = "firmware"
     """Folder made by `dzdesign codegen`, with the scalings."""
+    compensator: Annotated[AnyPath | None, Option("FILE")] = None
+    """compensator.json of the calibration block that was loaded since (default: the firmware's own)."""
     baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=POSITIVE))] = None
     """Bits per second (default: what the firmware sends)."""
     seconds: Annotated[Text, Option("S", read=number("a positive number such as 60", between=POSITIVE))] = None
@@ -58,7 +60,8 @@ def run(arguments: Arguments, json: bool) -> int:
     check_file_may_be_written(output)
     if output.exists() and output.stat().st_size:
         raise InputError(f"'{output}' exists, and a recording is not to be had again; choose another name with -o")
-    scalings = scalings_of(Path(arguments.firmware))
+    given = arguments.compensator
+    scalings = scalings_of(Path(arguments.firmware), None if given is None else Path(given))
     baud = read["baud"] or scalings.link.baud
     recording, reader = Recording(scalings), FrameReader()
     with open_port(arguments.port, baud, LOOK_S) as port, _until_interrupted() as stop:
@@ -118,7 +121,9 @@ def _other_firmware(origin: int, recording: "Recording") -> str:
     text = f"the frames are of the compensator whose SHA-256 begins with {origin:04x}, not {own:04x}"
     if recording:
         return text
-    raise InputError(f"{text} as in --firmware; give the folder that the device was built from")
+    raise InputError(
+        f"{text} as given; give the folder that the device was built from, or --compensator of the block loaded since"
+    )
 
 
 def _nothing(port: str, baud: float, reader: "FrameReader") -> InputError:

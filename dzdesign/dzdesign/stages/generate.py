@@ -11,6 +11,9 @@ from dzdesign.core.options import AnyPath, Option, Text, flag_of
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.stages.design import TARGETS, design_options
 
+#: Forms of the core, the default first.
+FORMS = "dzdesign.design.firmware_manifest:FORMS"
+
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
@@ -27,6 +30,8 @@ class GenerateArguments(DesignChoices):
     """Folder to write, with the C project."""
     target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
     """Microcontroller (default: that of the design; of a VALVE.json f28335)."""
+    calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
+    """Where the numbers of the valve stand: fixed in the core (default), or in a block of data that it is handed."""
     replace: Annotated[bool, Option()] = False
     """Write over the firmware of another design in the folder."""
 
@@ -47,29 +52,30 @@ def generate(arguments: GenerateArguments) -> "Firmware":
     from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.designing import design as design_valve
-    from dzdesign.design.firmware_manifest import FirmwareManifest
+    from dzdesign.design.firmware_manifest import FirmwareManifest, form_named
     from dzdesign.design.redesign_check import refuse_without_options
     from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.identify.valve.model import ValveModel
 
-    target = arguments.target or DEFAULT_TARGET
+    target, form = arguments.target or DEFAULT_TARGET, form_named(arguments.calibration)
     target_named(target)
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), schema_of(FirmwareManifest))
     given = arguments.compensator
     if isinstance(given, Compensator):
-        firmware = generate_project(_proven(given, "the compensator", arguments), arguments.target)
+        firmware = generate_project(_proven(given, "the compensator", arguments), arguments.target, calibration=form)
     else:
         source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
         document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
         if document["schema"] == VALVE_SCHEMA:
             valve = read_artefact(content, ValveModel, source)
             compensator = design_valve(valve, design_options(arguments, target), content)
-            firmware = generate_project(compensator, target)
+            firmware = generate_project(compensator, target, calibration=form)
         else:
             compensator = read_artefact(content, Compensator, source)
             refuse_without_options(compensator, source)
-            firmware = generate_project(_proven(compensator, f"'{source}'", arguments), arguments.target, content)
+            proven = _proven(compensator, f"'{source}'", arguments)
+            firmware = generate_project(proven, arguments.target, content, form)
     if arguments.output is None:
         return firmware
     return write_firmware(firmware, Path(arguments.output), over_another=arguments.replace)

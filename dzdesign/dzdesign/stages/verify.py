@@ -15,6 +15,7 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
+    from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.evidence import MutationScore
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
@@ -56,8 +57,12 @@ class VerifyArguments:
     """Also prove by Frama-C that nothing overflows a 16-bit int."""
 
 
-def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification":
+def verify(
+    arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
+) -> "Verification":
     """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
+
+    What this very run has `identified` from the given ramps is not identified again.
 
     Raises
     ------
@@ -93,8 +98,8 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
                 include=[Path(place) for place in paths_of(arguments.include)], say=stage, watch=stage.each,
             )  # fmt: skip
         if recordings:
-            with stage_progress("identifying again"):
-                added.append(identified_again(read_compensator(folder), recordings))
+            with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
+                added.append(identified_again(read_compensator(folder), recordings, identified))
         more, mutants = _further_checks(arguments, folder, verification)
         verification = verification.with_checks(regenerated(folder), *added, *more)
         if mutants:
@@ -130,7 +135,7 @@ def _firmware_folder(firmware: "Firmware | AnyPath") -> Iterator[Path]:
         return
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "firmware"
-        write_folder(folder, firmware.files, firmware.manifest)
+        write_folder(folder, firmware.contents, firmware.manifest)
         yield folder
 
 

@@ -225,7 +225,7 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
     common = f", lot setting of {valves} valves" if valves else ""
     place = f", in {folder}" if folder else ""
     put_line(console, f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}{place}:")
-    for name in firmware.files:
+    for name in firmware.contents:
         put_line(console, f"  {name}")
 
 

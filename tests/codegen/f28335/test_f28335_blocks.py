@@ -179,10 +179,10 @@ def test_the_watchdog_is_served_in_each_period_of_a_load(start):
     assert after["services"] - before["services"] == periods > 1000
 
 
-def test_a_block_with_another_zero_is_refused_where_this_command_is_not_its_zero(start):
+def test_a_block_whose_zero_command_is_another_is_refused(start):
     device = start()
-    at_command(device, ZERO)
-    other = pack(replace(unpack(blocks()[1]), command_zero=ZERO + INTERLOCK + 1))
+    at_command(device, ZERO + 1)
+    other = pack(replace(unpack(blocks()[1]), interlock=0))
     with pytest.raises(RefusedError) as caught:
         LoadSession(DeviceLine(device)).load(other, crc_of_block(other), origin_of_block(other))
     assert caught.value.reason == Reason.COMMAND and device.run(6)["used"] == LINKED

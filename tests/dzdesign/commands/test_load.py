@@ -181,8 +181,8 @@ def test_a_port_that_breaks_is_a_sentence(drive):
 
 @pytest.mark.slow
 def test_the_whole_firmware_takes_a_block_from_the_command(tmp_path_factory, tmp_path, capsys):
-    """Interrupt, main loop, telemetry and all, on the model of the device; its time goes by about as fast as ours."""
-    device = Device(build_device(firmware_files(), tmp_path_factory.mktemp("device")), OLD)
+    """Interrupt, main loop, core, telemetry, on the model of the device; its time goes by about as fast as ours."""
+    device = Device(build_device(firmware_files(real_core=True), tmp_path_factory.mktemp("device")), OLD)
     device.tell(f"command {unpack(OLD).command_zero}")
     master, slave = os.openpty()
     tty.setraw(slave)

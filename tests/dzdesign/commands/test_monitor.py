@@ -16,6 +16,7 @@ import pytest
 
 from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_RELEASED, Frame
 from dzdesign.codegen.telemetry.recording import COLUMNS, scalings_of
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.support.f28335_device import COMPILER, HERE, needs_compiler
@@ -287,3 +288,12 @@ def test_a_firmware_without_telemetry_is_refused(bench, monkeypatch):
     monkeypatch.setattr(telemetry_record, "target_named", lambda name: replace(TARGET, link=None))
     with pytest.raises(InputError, match="no telemetry"):
         scalings_of(bench.firmware)
+
+
+def test_a_loaded_block_has_the_scalings_of_its_own_compensator(bench, tmp_path):
+    text = (bench.firmware / "compensator.json").read_text("utf-8")
+    other = tmp_path / "other.json"
+    other.write_text(text + "\n", encoding="utf-8")
+    found = scalings_of(bench.firmware, other)
+    assert found.origin != bench.origin and found.origin == int(sha256_of(other.read_bytes())[:4], 16)
+    assert found.link == scalings_of(bench.firmware).link

@@ -4,22 +4,29 @@ import subprocess
 from pathlib import Path
 
 from dzdesign.codegen.banner import Banner
+from dzdesign.codegen.calibration.block import block_of
+from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
 from tests.support.f28335_device import HERE as DEVICE
-from tests.support.loading.files import COMPILER, HERE, compensator, drive_files
+from tests.support.loading.bench import HERE
+from tests.support.loading.files import COMPILER, DIGEST, compensator, drive_files
 
 PERIOD_S = 1 / TARGET.tick_Hz
 SOURCES = ("dz_hardware.c", "dz_isr.c", "dz_telemetry.c", "dz_frame.c", "dz_active.c", "dz_calibration.c", "dz_store.c")
 LOADING = ("dz_load.c", "dz_load_requests.c", "dz_load_reply.c", "dz_load_frame.c", "dz_slots.c")
 
 
-def firmware_files() -> dict[str, str]:
-    """Return the target's files in block form, with the stand-ins of the core, by name."""
-    rendered = target_files(compensator(), TARGET, Banner(digest="1234567890abcdef"), block=True)
+def firmware_files(*, real_core: bool = False) -> dict[str, str]:
+    """Return the target's files in block form, by name, with stand-ins of law and drive or with the generated ones."""
+    rendered = target_files(compensator(), TARGET, Banner(digest=DIGEST), block_of(compensator(), DIGEST))
     files = {path.rpartition("/")[2]: text for path, text in rendered.items()} | drive_files()
-    stand_ins = {name: (HERE / name).read_text("utf-8") for name in ("dz_comp.h", "dz_drive.h")}
-    return files | stand_ins | {"dz_block.h": '#include "dz_calibration.h"\nextern struct dz_calibration dz_block;\n'}
+    if real_core:
+        files |= texts(block_core_files(built_for(compensator())))
+    else:
+        files |= {name: (HERE / name).read_text("utf-8") for name in ("dz_comp.h", "dz_drive.h")}
+    return files | {"dz_block.h": '#include "dz_calibration.h"\nextern struct dz_calibration dz_block;\n'}
 
 
 def build_device(files: dict[str, str], folder: Path) -> Path:
@@ -28,8 +35,10 @@ def build_device(files: dict[str, str], folder: Path) -> Path:
         (folder / name).write_text(text, encoding="utf-8", newline="\n")
     program = folder / "on_device"
     sources = [folder / name for name in (*SOURCES, *LOADING)]
-    sources += [DEVICE / "device.c", DEVICE / "current.c", HERE / "on_device.c"]
+    core = [folder / name for name in ("dz_comp.c", "dz_drive.c") if name in files]
+    sources += [*core, DEVICE / "device.c", DEVICE / "current.c", HERE / "on_device.c"]
     command = [COMPILER, "-std=c99", "-Wall", "-Wextra", "-Werror", "-DDEVICE_WITHOUT_CORE"]
+    command += ["-DREAL_CORE"] if core else []
     command += [f"-I{folder}", f"-I{DEVICE}", *map(str, sources), "-lm", "-o", str(program)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -2,6 +2,7 @@
 #ifndef DZ_DRIVE_H
 #define DZ_DRIVE_H
 #include "dz_comp.h"
+#define DZ_STATUS_CALIBRATION 256u
 struct dz_drive
 {
     uint16_t compare_a;

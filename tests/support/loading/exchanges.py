@@ -209,15 +209,15 @@ def hostile_frames(bench: Bench, rng: random.Random, new: bytes) -> str:
         if kind == 0:
             line.write(rng.randbytes(rng.randrange(1, 100)))
         elif kind == 1:
-            octets = bytearray(_any_frame(rng, words).octets())
+            octets = bytearray(any_frame(rng, words).octets())
             octets[4] = rng.choice((0, 255, MOST_PAYLOAD, MOST_PAYLOAD + 1, rng.randrange(256)))
             line.write(bytes(octets))
         elif kind == 2:
-            line.write(_any_frame(rng, words).octets()[: rng.randrange(1, 70)])
+            line.write(any_frame(rng, words).octets()[: rng.randrange(1, 70)])
         elif kind == 3:
             line.write(SYNC.to_bytes(2, "big") * rng.randrange(1, 40))
         else:
-            line.write(_any_frame(rng, words).octets())
+            line.write(any_frame(rng, words).octets())
         if rng.random() < 0.1:
             line.read(1.0)
     for _ in range(100):
@@ -225,7 +225,7 @@ def hostile_frames(bench: Bench, rng: random.Random, new: bytes) -> str:
     return load(session, new)
 
 
-def _any_frame(rng: random.Random, words: int) -> Frame:
+def any_frame(rng: random.Random, words: int) -> Frame:
     kind = rng.choice((*Request, rng.randrange(256)))
     sizes = (0, 1, 2, 3, 4, 10, MOST_PAYLOAD, rng.randrange(MOST_PAYLOAD + 1))
     payload = rng.randbytes(rng.choice(sizes))

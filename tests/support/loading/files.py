@@ -8,7 +8,7 @@ from pathlib import Path
 from dzdesign.codegen.banner import Banner
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.built_for import built_for
-from dzdesign.codegen.calibration.files import calibration_header, texts
+from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import LENGTH_WORDS
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.f28335.target import TARGET
@@ -18,7 +18,7 @@ from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.loading.bench import Drive, build_drive
 from tests.support.loading.exchanges import Bench
 
-HERE = Path(__file__).parent
+DIGEST = "1234567890abcdef" * 4
 BLOCK_OCTETS = 2 * LENGTH_WORDS
 COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), "")
 _OURS = ("dz_load", "dz_slots", "dz_store", "dz_frame")
@@ -33,11 +33,11 @@ def compensator() -> Compensator:
 @cache
 def drive_files() -> dict[str, str]:
     """Return the generated files of the loading, and of what it calls, by name."""
-    target = target_files(compensator(), TARGET, Banner(digest="1234567890abcdef"), block=True)
+    target = target_files(compensator(), TARGET, Banner(digest=DIGEST), block_of(compensator(), DIGEST))
     files = {path.rpartition("/")[2]: text for path, text in target.items()}
     files = {name: text for name, text in files.items() if name.startswith(_OURS)}
-    header = texts({"dz_calibration.h": calibration_header(built_for(compensator()))})
-    return files | header | {"dz_calibration.c": (HERE / "check.c").read_text("utf-8")}
+    core = texts(block_core_files(built_for(compensator())))
+    return files | {name: core[name] for name in ("dz_calibration.c", "dz_calibration.h")}
 
 
 @cache

@@ -37,6 +37,7 @@ static void leave(void) { longjmp(out_of_main, 1); }
 
 static void count_service(void) { services++; }
 
+#ifndef REAL_CORE
 /* The drive follows its block's serial number, its ramp can be seen but does nothing, and is never asked while no block may be read. */
 static uint16_t read(const struct dz_calibration *block)
 {
@@ -92,6 +93,8 @@ uint16_t dz_beta_negative(const struct dz_calibration *block, uint16_t p_a_adc, 
 {
     return dz_status(block, 0u, p_a_adc, p_b_adc);
 }
+
+#endif
 
 static unsigned take_hex(const char *text, uint8_t *octets, unsigned most)
 {

@@ -40,8 +40,8 @@ Part = TypeVar("Part", SideBlock, CurrentBlock)
 def block_of(compensator: Compensator, digest: str, *, serial: str = "", record: str = "") -> CalibrationBlock:
     """Return the block of a compensator whose file has the SHA-256 `digest`.
 
-    What a block has no room for is an `InputError`: more nodes of beta or of the play, a longer text; so is one that its
-    own firmware would refuse.
+    More nodes of beta or of the play than a block has room for, a longer text, and numbers that its own firmware would
+    refuse are an `InputError`.
     """
     built = built_for(compensator)
     block = _numbers(compensator, built, digest, serial, record)

@@ -79,7 +79,7 @@ def block_law_files(built: BuiltFor) -> dict[str, CoreFile]:
     """Return dz_comp.c and dz_comp.h."""
     bits, numbers = status_constants(), _law_numbers(built)
     header: Values = {
-        "misra_lines": misra_lines("dz_comp.h"),
+        "misra_lines": misra_lines(),
         "status_defines": defines(bits),
         "bipolar": built.has("BIPOLAR"),
         "swapped": built.has("SWAPPED"),
@@ -102,7 +102,7 @@ def block_drive_files(built: BuiltFor) -> dict[str, CoreFile]:
         _limit("PLAY_SHIFT_MASK", 15, "plain", "mask of play_step_shift"),
     ]
     words: Values = {"bipolar": built.has("BIPOLAR"), "rises": not built.has("FALLING")}
-    header = {**words, "misra_lines": misra_lines("dz_drive.h"), "interface_defines": defines(outside),
+    header = {**words, "misra_lines": misra_lines("dz_drive.h, block form"), "interface_defines": defines(outside),
               "ramp_unit": RAMP_UNIT, "sample_Hz": built.sample_Hz}  # fmt: skip
     source = {**words, "misra_lines": misra_lines(), "drive_defines": defines(inside)}
     return {
@@ -134,7 +134,7 @@ def block_current_files(built: BuiltFor) -> dict[str, CoreFile]:
             _limit("CORRECTION_HALF", 1 << (CORRECTION_SHIFT - 1), "plain", "half a PWM count: rounds to nearest"),
         ]
     words: Values = {"supply": built.has("SUPPLY"), "samples": built.samples}
-    header = {**words, "misra_lines": misra_lines("dz_current.h"), "interface_defines": defines(bits)}
+    header = {**words, "misra_lines": misra_lines(), "interface_defines": defines(bits)}
     source = {**words, "misra_lines": misra_lines(), "current_defines": defines(inside)}
     return {
         "dz_current.c": CoreFile(template="dz_current_block.c.jinja", values=source, constants=tuple(inside)),

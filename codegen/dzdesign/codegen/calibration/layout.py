@@ -181,15 +181,13 @@ class CalibrationBlock:
     magic: Annotated[int, _one("octets DZC1", bits=32)] = int.from_bytes(MAGIC, "little")
     layout: Annotated[int, _one("version of this layout")] = LAYOUT
     length: Annotated[int, _one("length of the block, CRC included", "words")]
-    shape: Annotated[int, _one("what the firmware must be compiled for, DZ_SHAPE_...")]
+    shape: Annotated[int, _one("what the firmware must be compiled for")]
     code_max: Annotated[int, _one("largest code of the converter", "codes", "signals.code_max")]
     compare_max: Annotated[int, _one("PWM compare value of full drive", "counts", "signals.compare_max")]
     sample_Hz: Annotated[int, _one("samples a second", "Hz", "signals.sample_Hz")]
     tick_Hz: Annotated[int, _one("PWM periods a second", "Hz", "signals.tick_Hz")]
     reserved: Annotated[int, _one("0")] = 0
-    compensator_sha256: Annotated[
-        tuple[int, ...], Words(count=SHA256_WORDS, text="SHA-256 of compensator.json, 32 octets")
-    ]
+    compensator_sha256: Annotated[tuple[int, ...], Words(count=SHA256_WORDS, text="SHA-256 of compensator.json")]
     serial: Annotated[tuple[int, ...], Words(count=SERIAL_WORDS, text="serial number, up to 24 octets of UTF-8")]
     record: Annotated[
         tuple[int, ...], Words(count=RECORD_WORDS, text="what the valve is filed under, up to 48 octets of UTF-8")

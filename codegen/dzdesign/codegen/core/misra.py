@@ -14,6 +14,10 @@ DEVIATIONS = {
     "interface's limits are for those who call the core; not every firmware needs all of them.",
     "dz_drive.h": "deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, DZ_DRIVE_COMMAND_ZERO, "
     "DZ_STATUS_LATCHED: they are for those who call the drive; not every firmware needs all of them.",
+    "dz_calibration.h": "deviation from rule 2.5 (advisory) in DZ_CURRENT_SAMPLES, DZ_CALIBRATION_SUPPLY_NODES, "
+    "DZ_CALIBRATION_SUPPLY_MASK, DZ_CALIBRATION_CURRENT: they are for current control; not every firmware has it.",
+    "dz_drive.h, block form": "deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, "
+    "DZ_STATUS_CALIBRATION: they are for those who call the drive; not every firmware needs all of them.",
     "dz_current.h": "deviation from rule 2.5 (advisory) in DZ_CURRENT_SAMPLES: it is for those who take the codes.",
 }
 

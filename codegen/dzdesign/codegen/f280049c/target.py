@@ -17,6 +17,7 @@ from dzdesign.codegen.c2000 import (
     pwm_timing,
     within,
 )
+from dzdesign.codegen.target import FlashSector
 from dzdesign.design.target_inputs import Converter, peak_noise_codes
 
 SYSCLK_HZ = 100_000_000  # DEVICE_SYSCLK_FREQ of device.h: 20 MHz crystal, times 10, over 2
@@ -85,4 +86,5 @@ TARGET = c2000_target(
         gain_codes=GAIN_CODES,
         noise_codes=peak_noise_codes(SNR_DB, 2**ADC_BITS),
     ),
+    sector=FlashSector(region="FLASH_BANK1_SEC8", page=0, file="28004x_generic_flash_lnk.cmd"),
 )

@@ -20,6 +20,7 @@ from dzdesign.codegen.c2000 import (
 )
 from dzdesign.codegen.calibration.layout import NO_INTERLOCK
 from dzdesign.codegen.loading.protocol import LOAD_S
+from dzdesign.codegen.target import FlashSector
 from dzdesign.codegen.telemetry.frame import BITS_PER_OCTET, CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.target_inputs import Converter
@@ -161,5 +162,6 @@ TARGET = c2000_target(
     converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
     sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
     block_sources=("dz_active.c", "dz_active.h"),
+    sector=FlashSector(region="FLASHB", page=1, file="F28335.cmd"),
     link=LINK,
 )

@@ -41,15 +41,19 @@ class Scalings:
         return int(self.sha256[:4], 16)
 
 
-def scalings_of(folder: Path) -> Scalings:
-    """Return the scalings of a firmware folder; one that is no firmware or sends no telemetry is an `InputError`."""
+def scalings_of(folder: Path, compensator_file: Path | None = None) -> Scalings:
+    """Return the scalings of a firmware folder; one that is no firmware or sends no telemetry is an `InputError`.
+
+    A firmware into which another calibration block was loaded has the scalings of that block's `compensator_file`.
+    """
     path = folder / MANIFEST_NAME
     manifest = read_artefact(read_bytes(path, "firmware manifest"), FirmwareManifest, str(path))
     target = target_named(manifest.target)
     if target.link is None:
         raise InputError(f"the target {target.name} of '{folder}' sends no telemetry; f28335 does")
-    content = read_bytes(folder / "compensator.json", "compensator file")
-    compensator = read_artefact(content, Compensator, str(folder / "compensator.json"))
+    source = compensator_file or folder / "compensator.json"
+    content = read_bytes(source, "compensator file")
+    compensator = read_artefact(content, Compensator, str(source))
     return Scalings(link=target.link, compensator=compensator, sha256=sha256_of(content))
 
 

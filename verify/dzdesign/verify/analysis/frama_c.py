@@ -19,19 +19,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import UNDEFINED_BEHAVIOUR, Check
+from dzdesign.verify.toolchain.bound_block import block_of
 from dzdesign.verify.toolchain.compiled_core import SOURCES
 from dzdesign.verify.toolchain.machines import PROGRAMS
 
 PROGRAM = "frama-c"
 #: A shift of a negative number to the right is each compiler's own; overflow of unsigned words is the core's tool.
 OPTIONS = (
-    "-machdep", "x86_16", "-eva", "-eva-slevel", "100", "-eva-no-show-progress", "-eva-no-results",
+    "-eva", "-eva-slevel", "100", "-eva-no-show-progress", "-eva-no-results",
     "-warn-right-shift-negative",
 )  # fmt: skip
+#: `int` of 16 bits, as of TI's C28x; and where the block form is asked, of 32 too.
+SHORT_INT, BOTH_WIDTHS = "x86_16", ("x86_16", "x86_64")
 TIMEOUT_S = 1800
 CODES = 65536
 
@@ -55,6 +59,8 @@ class Proof:
     functions: tuple[str, ...]
     #: Not excluded by any of the analyses; none: there is no undefined behaviour.
     alarms: tuple[Alarm, ...]
+    #: Machines whose widths of `int` and `long` were taken.
+    widths: tuple[str, ...] = (SHORT_INT,)
 
 
 def proof_check(folder: Path) -> Check:
@@ -72,7 +78,9 @@ def proof_check(folder: Path) -> Check:
     else:
         text = f"{', '.join(proof.functions)}: none, for all 2^48 triples of codes"
         text += ", and one step of the drive from any state in its range"
-    return UNDEFINED_BEHAVIOUR.check(holds=not proof.alarms, text=f"{text}; Frama-C {proof.version}, -machdep x86_16")
+        text += "" if block_of(folder) is None else "; any octets of a calibration block"
+    widths = " and ".join(proof.widths)
+    return UNDEFINED_BEHAVIOUR.check(holds=not proof.alarms, text=f"{text}; Frama-C {proof.version}, -machdep {widths}")
 
 
 def prove(folder: Path, rows: int | None = None) -> Proof:
@@ -84,6 +92,8 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
 
     Frama-C that fails or takes longer than `TIMEOUT_S` is a `RequirementError`.
     """
+    if block_of(folder) is not None:
+        return prove_any_block(folder)
     compensator = read_compensator(folder)
     sources = sorted(path.name for path in (folder / "core").glob("*.[ch]"))
     alarms: set[Alarm] = set()
@@ -103,6 +113,28 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
             alarms |= _of_side(work, [each for each in sources if each.endswith(".c")], len(tried))
             functions += [f"dz_{function}{ending}" for function in ("comp", "beta", "status")]
     return Proof(version=_version(), functions=tuple(functions), alarms=tuple(sorted(alarms)))
+
+
+def prove_any_block(folder: Path, machines: tuple[str, ...] = BOTH_WIDTHS) -> Proof:
+    """Analyse a core in block form, and its check of blocks, for any octets of a block, any codes and any state."""
+    signals, drive = read_compensator(folder).signals, read_compensator(folder).current_drive
+    with tempfile.TemporaryDirectory(prefix="dzdesign-proof-") as name:
+        work = Path(name)
+        for path in [*(folder / "core").glob("*.[ch]"), PROGRAMS / "proof_block.c"]:
+            shutil.copyfile(path, work / path.name)
+        sources = sorted(path.name for path in work.glob("dz_*.c"))
+        defines = ["-DBIPOLAR"] if len(signals.signs) > 1 else []
+        defines += ["-DWITH_CURRENT"] if drive else []
+        defines += ["-DWITH_SUPPLY"] if drive and drive.loop.supply else []
+        mains = ["law", "check", "drive", *(["current"] if drive else [])]
+        runs = [(machine, main) for machine in machines for main in mains]
+        what = " ".join(defines)
+        with ThreadPoolExecutor(max(1, min(os.cpu_count() or 1, 8))) as pool:
+            found = list(pool.map(lambda run: _analysed(work, "proof_block.c", sources, run[0], run[1], what), runs))
+    functions = ("dz_comp", "dz_beta", "dz_status", "dz_calibration_check")
+    return Proof(
+        version=_version(), functions=functions, alarms=tuple(sorted(set().union(*found))), widths=machines
+    )
 
 
 def _of_side(work: Path, sources: list[str], rows: int) -> set[Alarm]:
@@ -170,9 +202,14 @@ def _braces(numbers: Iterable[int]) -> str:
 
 def _alarms(work: Path, sources: list[str], main: str, first: int, end: int) -> set[Alarm]:
     """Run one analysis and return what it could not exclude in the core's C."""
-    report = work / f"{main}_{first}.csv"
+    return _analysed(work, "proof.c", sources, SHORT_INT, main, f"-DPART_FIRST={first}u -DPART_END={end}u")
+
+
+def _analysed(work: Path, program: str, sources: list[str], machine: str, main: str, defines: str) -> set[Alarm]:
+    """Analyse from one entry point of a program on, with the widths of a machine."""
+    report = work / f"{machine}_{main}_{defines.count('=') and sha256_of(defines.encode())[:8]}.csv"
     command = [
-        PROGRAM, *OPTIONS, f"-cpp-extra-args=-DPART_FIRST={first}u -DPART_END={end}u", "-main", main, "proof.c",
+        PROGRAM, "-machdep", machine, *OPTIONS, f"-cpp-extra-args={defines}", "-main", main, program,
         *sources, "-then", "-report-csv", report.name,
     ]  # fmt: skip
     try:

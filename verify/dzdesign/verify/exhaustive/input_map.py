@@ -13,8 +13,7 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, differences
 from dzdesign.verify.exhaustive.zero_command import Staircase, counted_dither, guarded_bounds, pressure_drops
 from dzdesign.verify.loop_results import Side
-from dzdesign.verify.toolchain.compiled_core import SOURCES
-from dzdesign.verify.toolchain.host_compiler import load_library
+from dzdesign.verify.toolchain.compiled_core import loaded_core
 
 #: Columns of the grid over the converter's codes; rows over all differences, and over the tested ones.
 COMMANDS, WIDE_ROWS, TESTED_ROWS = 46, 36, 54
@@ -38,13 +37,7 @@ class InputMap:
 def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
     """Call one side of the compiled core over the grid."""
     exact = ExactLaw(compensator, sign)
-    name, ending = SOURCES[sign]
-    texts = {
-        file: (folder / "core" / file).read_text(encoding="utf-8", errors="surrogateescape")
-        for file in (name, "dz_comp.h")
-    }
-    library = load_library(texts, f"the core {name}")
-    core, status = (getattr(library, f"dz_{what}{ending}") for what in ("comp", "status"))
+    core, status = loaded_core(folder, sign)
     found = differences(exact)
     bounds = Staircase(guarded_bounds(compensator, sign))
     steps = pressure_drops(exact, found, bounds.dp_MPa).steps_of(bounds)

@@ -17,6 +17,8 @@ DEFINE = re.compile(rf"^#define[ \t]+(?P<name>\w+)[ \t]+(?:{NUMBER}|(?P<other>\S
 TABLE = re.compile(r"\bconst\b[^;={]*?(?P<name>\w+)\[\d*\][^;={]*=\s*\{(?P<rows>[^;]*)\}\s*;")
 ROW = re.compile(r"\{([^{}]*)\}")
 BANNER = re.compile(r"Compensator SHA-256: (\w+)")
+#: In the target's folder: the calibration block as C.
+BLOCK_SOURCE = "dz_block.c"
 Value = int | tuple[tuple[int, ...], ...] | str
 
 
@@ -49,7 +51,9 @@ def _faults_of_origin(folder: Path, manifest: FirmwareManifest, compensator: Com
     ):
         if stated != value:
             yield f"the manifest's {key} is not that of compensator.json"
-    for name in manifest.core:
+    # The core in block form is the same for every valve: the file with its block names the compensator.
+    block = [name for name in manifest.files if name.endswith(f"/{BLOCK_SOURCE}")]
+    for name in block if manifest.calibration == "block" else manifest.core:
         written = BANNER.search(_text(folder / name))
         if written is None or written[1] != digest:
             yield f"{name} does not name this compensator.json in its first lines"

@@ -16,8 +16,13 @@ INCLUDE = re.compile(rf"{HASH}(?:include_next|include|import){BLANK}([^\n]*)", r
 INCLUDED_SCRIPT = re.compile(r"\bINCLUDE\s+(\S+)")
 NAME = re.compile(r"[A-Za-z_]\w*")
 FUNCTION = re.compile(r"\b(dz_\w+)\s*\(")
-#: A symbol that a linker file gives an address, over that of the C.
-ASSIGNED = re.compile(r"\b(\w+)\s*(?:[-+*/&|]|<<|>>)?=(?!=)")
+#: A symbol that a linker file gives an address, over that of the C; its name may stand in quotes.
+ASSIGNED = re.compile(r"\b(\w+)\"?\s*(?:[-+*/&|]|<<|>>)?=(?!=)")
+#: A file that a linker file has linked beside those of the command.
+LINKED = re.compile(r"\b(?:INPUT|GROUP|STARTUP|AS_NEEDED)\s*\(([^)]*)\)")
+#: How the members of the structs behind it are laid out.
+PACKED = re.compile(rf"(?:{HASH}pragma|_Pragma\s*\(\s*\"){BLANK}(?:\w+{BLANK})?pack\s*\(([^)]*)\)", re.MULTILINE)
+UNPACKED = ("", "pop")
 LINKER_FILES = {".ld", ".lds", ".lcf", ".icf", ".sct", ".cmd"}
 QUOTES = "\"'"
 C_FILES = {".c", ".s", ".asm"}
@@ -50,9 +55,15 @@ def _faults(path: Path, text: str, before: str, used: set[str], functions: set[s
     if ending in LINKER_FILES:
         for word in sorted({*ASSIGNED.findall(text)} & functions - {*ASSIGNED.findall(before)}):
             yield f"gives {word} another address"
+        for word in re.split(r"[\s,]+", " ".join(LINKED.findall(text))):
+            if word and (path.parent / word.strip(QUOTES)).is_file():
+                yield f"links {word.strip(QUOTES)}, which no check has looked at; have it built from a C file in board/"
         return
     if ending in C_FILES:
         return
+    packed = [found.strip() for found in PACKED.findall(text)]
+    if packed and packed[-1] not in UNPACKED:
+        yield f"leaves pack({packed[-1]}) in force, under which structs of the generated C lie otherwise; end with pop"
     macros = {*MACRO.findall(text)} - {*MACRO.findall(before)}
     for word in sorted(macros & used):
         yield f"makes {word}, which the generated C uses, a macro"

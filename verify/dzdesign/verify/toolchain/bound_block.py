@@ -2,24 +2,28 @@
 
 from pathlib import Path
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import RequirementError
+from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.verify.toolchain.machines import PROGRAMS
 
 #: The core's header of its block, and the block in the firmware's folder.
-BLOCK_HEADER, BLOCK_FILE = "dz_calibration.h", "calibration.bin"
+BLOCK_HEADER = "dz_calibration.h"
 BOUND_HEADER, BOUND_SOURCE = "bound.h", "dz_bound.c"
 WORDS_A_LINE = 12
 
 
 def block_of(folder: Path) -> bytes | None:
-    """Return the octets of a firmware's calibration block; None of a core with the numbers of its valve in it."""
+    """Return the octets of a firmware's calibration block; None of a core with the numbers of its valve in it.
+
+    A firmware in block form without one is a `RequirementError`: nothing says what its core computes.
+    """
     if not (folder / "core" / BLOCK_HEADER).exists():
         return None
     path = folder / BLOCK_FILE
     try:
         return path.read_bytes()
     except OSError as error:
-        raise InputError(
+        raise RequirementError(
             f"{path}: can't be read: {error.strerror}; this firmware takes its valve's numbers from a calibration "
             "block, make it again with `dzdesign codegen --calibration block`"
         ) from error

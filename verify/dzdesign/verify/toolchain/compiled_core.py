@@ -1,8 +1,10 @@
 """The generated core as a black box: compiled by itself for a machine, and every input tried there."""
 
 import copy
-from collections.abc import Sequence
+import ctypes
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
 from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of
+from dzdesign.verify.toolchain.host_compiler import load_library
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
 #: Source of each sign of command, and what its functions' names end with.
@@ -48,14 +51,14 @@ class CompiledCore:
     """One side of the core."""
 
     def __init__(self, folder: Path, sign: int = 1) -> None:
-        self._name, self._ending = SOURCES[sign]
+        self.name, self._ending = SOURCES[sign]
         #: Octets of the calibration block; None of a core with the numbers of its valve in it.
         self.block = block_of(folder)
         headers = ["dz_comp.h"]
         if self.block is not None:
-            self._name = BLOCK_SOURCE
+            self.name = BLOCK_SOURCE
             headers.append(BLOCK_HEADER)
-        self.sources = {name: _read(folder / "core" / name) for name in (self._name, *headers)}
+        self.sources = {name: _read(folder / "core" / name) for name in (self.name, *headers)}
 
     @property
     def sha256(self) -> str:
@@ -76,7 +79,7 @@ class CompiledCore:
 
     def compiled(self, machine: Machine = HOST) -> Path:
         """Return the core's object for a machine: compiled alone, so that nothing of it is inlined into the check."""
-        return machine.compile(self._name, self.sources, machine.core_flags, f"the core {self._name}")
+        return machine.compile(self.name, self.sources, machine.core_flags, f"the core {self.name}")
 
     def check(self, prepared: bytes, machine: Machine = HOST, *, sample: bool = False) -> Findings:
         """Try what was prepared on a machine; a core that does not compile, crashes or hangs: `RequirementError`."""
@@ -98,15 +101,25 @@ class CompiledCore:
         else:
             blocks = [str(stored(self.block))] if self.block is not None else []
             arguments = [str(stored(prepared)), *(["sample"] if sample else []), *blocks]
-        program = machine.link(objects, f"the core {self._name} ({machine.name})")
-        printed = machine.run(program, arguments, f"the core {self._name}")
-        return _findings(printed, sha256_of(core.read_bytes()), f"the core {self._name} on the {machine.name}")
+        program = machine.link(objects, f"the core {self.name} ({machine.name})")
+        printed = machine.run(program, arguments, f"the core {self.name}")
+        return _findings(printed, sha256_of(core.read_bytes()), f"the core {self.name} on the {machine.name}")
 
     def _adapter(self, machine: Machine, names: Sequence[str], held: bool) -> Path:
         """Return the object that binds the core's functions of a side to a block."""
         sources = {**self.sources, BOUND: _read(PROGRAMS / BOUND)}
         flags = (*machine.check_flags, *_defines(held, ("DZ_COMP", "DZ_STATUS", "DZ_BETA"), names))
         return machine.compile(BOUND, sources, flags, "the adapter of the block")
+
+
+def loaded_core(folder: Path, sign: int) -> tuple[Callable[..., int], Callable[..., int]]:
+    """Return dz_comp() and dz_status() of one side, loaded; of a core in block form bound to its block."""
+    core, (_, ending) = CompiledCore(folder, sign), SOURCES[sign]
+    texts = {name: text.decode(errors="surrogateescape") for name, text in core.sources.items()}
+    library = load_library(texts, f"the core {core.name}")
+    block = () if core.block is None else (ctypes.create_string_buffer(core.block, len(core.block)),)
+    comp, status = (partial(getattr(library, f"dz_{what}{ending}"), *block) for what in ("comp", "status"))
+    return comp, status
 
 
 def _defines(held: bool, macros: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
