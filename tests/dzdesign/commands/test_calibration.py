@@ -14,6 +14,7 @@ from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.block_images import image_of
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.calibration.places import place_of
+from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
@@ -279,6 +280,13 @@ def test_the_api_takes_the_result_of_the_stage_before(written, unproven):
     assert found.belongs is True and found.reading.serial == "V-7" and found.difference == ""
     made = api.calibration(compensator, serial="V-7")
     assert (made.format, made.address) == ("bin", None) and made.content == (written / "valve.bin").read_bytes()
+
+
+def test_the_firmware_holds_the_same_block(written, unproven):
+    content = (written / "compensator.json").read_bytes()
+    compensator = read_artefact(content, Compensator, "compensator.json")
+    firmware = generate(compensator, "f28335", content, "block")
+    assert firmware.contents["calibration.bin"] == api.calibration(written / "compensator.json").content
 
 
 def test_a_number_that_does_not_follow_from_the_valve_is_refused(written, tmp_path, capsys):
