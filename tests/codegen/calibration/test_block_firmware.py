@@ -22,7 +22,6 @@ from tests.codegen.core.test_misra import findings
 from tests.support.block_cores import block_folder
 from tests.support.core_variants import variant
 from tests.support.current_loops import PLAIN, SUPPLY
-from tests.support.f28335_device import COMPILER, HERE, periods
 from tests.support.golden_firmware import BLOCK_GOLDENS, differences, golden_block_files
 from tests.support.synthetic import needs_compiler
 
@@ -132,22 +131,3 @@ def test_no_octets_of_a_block_make_anything_undefined(tmp_path):
 def test_a_current_controller_has_its_block():
     assert {"dz_current.c", "dz_current.h"} <= core_of("current").keys()
     assert current_block(replace(PLAIN, supply=SUPPLY)).supply[0] == SUPPLY.nodes[0]
-
-
-@needs_compiler
-def test_an_invalid_block_leaves_the_output_released(tmp_path):
-    written(variant("default", "wide"), "f28335", tmp_path / "fw")
-    folder, core = tmp_path / "fw" / "f28335", tmp_path / "fw" / "core"
-    text = (folder / "dz_block.c").read_text()
-    assert ".length = 1330u" in text
-    sources = [folder / f"dz_{name}.c" for name in ("hardware", "isr", "telemetry", "frame", "block")]
-    sources += [*core.glob("*.c"), *(HERE / f"{name}.c" for name in ("device", "current", "driver"))]
-    flags = ["-DDEVICE_WITHOUT_CORE", "-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", f"-I{folder}", f"-I{core}"]
-    last = {}
-    for length in ("1330", "1331"):
-        (folder / "dz_block.c").write_text(text.replace(".length = 1330u", f".length = {length}u"))
-        command = [COMPILER, *flags, f"-I{HERE}", *map(str, sources), "-lm", "-o", str(folder / "driver")]
-        subprocess.run(command, check=True)
-        last[length] = periods(folder / "driver", "s" * 12)[-1]
-    assert (last["1330"]["released"], last["1330"]["fault"]) == (1, 0)
-    assert (last["1331"]["released"], last["1331"]["fault"], last["1331"]["duty"]) == (0, 0x40, 0)
