@@ -215,6 +215,7 @@ def place(tmp_path):
         made_from=(),
         target="host",
         law="paper",
+        calibration="fixed",
         core=("core/a.c",),
         board=(),
         origin=FirmwareOrigin(compensator_json=digest, valve_json=digest, ramp_tests=()),

@@ -36,7 +36,7 @@ def verified(tmp_path):
     listed = {name: sha256_of(text.encode()) for name, text in FILES.items()}
     manifest = FirmwareManifest(
         tool=THIS_TOOL, made_from=(SourceFile(source="compensator.json", sha256=NOT_HERE),),
-        target="f28335", law="paper", core=("core/dz_comp.c",), board=(PROJECT,),
+        target="f28335", law="paper", calibration="fixed", vectors=0, core=("core/dz_comp.c",), board=(PROJECT,),
         origin=FirmwareOrigin(compensator_json=NOT_HERE, valve_json=NOT_HERE, ramp_tests=()),
         constants=(), files=listed,
     )  # fmt: skip
