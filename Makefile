@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-c2000ware bench-identify bench-isr bench-verify
+.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-c2000ware bench-identify bench-isr bench-paper bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -56,6 +56,10 @@ bench-verify: $(STAMP)
 # 1000 valves: a quarter of an hour of two cores; `make bench-batch BENCH=--quick` tries 60.
 bench-batch: $(STAMP)
 	$(BIN)/python benchmarks/batch/run.py $(BENCH)
+
+# Every wrong statement about the paper, and its reproduction twice: minutes. CI tries a drawn part.
+bench-paper: $(STAMP)
+	$(BIN)/python benchmarks/paper/run.py $(BENCH)
 
 # Every reader against files that nobody meant; `make fuzz SECONDS=3600 SEED=2` goes on for an hour.
 SECONDS ?= 180

@@ -14,7 +14,7 @@ from scoreboard import Row, kept_rows, markdown, say
 
 FOLDER = Path(__file__).parent
 #: Benchmark to whether it can be had `--quick`.
-BENCHMARKS = {"identify": True, "isr": False, "verify": True, "batch": True}
+BENCHMARKS = {"identify": True, "isr": False, "verify": True, "batch": True, "paper": True}
 NO_ROWS = "ended without rows"
 
 

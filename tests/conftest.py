@@ -26,6 +26,36 @@ def page_of_a_file(monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def short_windows_beside_casadi():
+    """Compare the plant with CasADi's integrator over 0.3 s, not 2 s: a third of what `verify` costs a test.
+
+    They are whole in another process, which takes nothing of this patch: where a test runs the program, as the pages of
+    docs/ do, and of `batch --verify` with two or more `--jobs`. In this process, `batch --jobs 1` too, they are whole
+    where a test asks for `whole_windows`.
+    """
+    from dzdesign.verify.integrator import windows
+
+    whole_s = windows.WINDOWS_S
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(windows, "WINDOWS_S", 0.3)
+        yield whole_s
+
+
+@pytest.fixture
+def whole_windows(short_windows_beside_casadi, monkeypatch):
+    """Compare the plant with CasADi's integrator over all of what `verify` does."""
+    monkeypatch.setattr("dzdesign.verify.integrator.windows.WINDOWS_S", short_windows_beside_casadi)
+
+
+@pytest.fixture
+def each_core_once(monkeypatch):
+    """Run equal cores once in a session: for tests of what stands around that, see `run_each_core_once`."""
+    from tests.support.attacked_firmware import run_each_core_once
+
+    run_each_core_once(monkeypatch)
+
+
 @pytest.fixture
 def wording(request, tmp_path) -> Wording:
     """Compare whole messages with those kept: `wording("group: case", text)`, `with wording.refusal(Error):`."""

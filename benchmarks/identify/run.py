@@ -11,7 +11,8 @@ from pathlib import Path
 
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"):
     os.environ.setdefault(_threads, "1")  # before NumPy is imported: ratios of one core
-sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that all benchmarks share
+# For the recordings as loggers write them, and for the scoreboard that all benchmarks share.
+sys.path[:0] = [str(Path(__file__).parent / "recordings"), str(Path(__file__).parents[1])]
 
 from above_coverage import print_above_coverage  # noqa: E402
 from accuracy import print_accuracy  # noqa: E402

@@ -30,45 +30,54 @@ TIMED_FROM, TIMED_TO, REPEATS = 5, 45, 7
 
 def print_population(*, quick: bool, seed: int) -> list[Row]:
     """Print and return the rows of the populations."""
-    valves = {"example": example_valve()}
-    valves |= {name: valve_of(SHARED / name) for name in ("valve_a", "valve_e") if (SHARED / name).is_dir()}
-    rows = []
+    rows, known = [], valves()
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
-        for name, valve in valves.items():
+        for name, valve in known.items():
             say(f"population: {name}")
             rows += _of_valve(name, valve, Path(folder) / name, quick, seed)
-        rows += _wrong_budgets(valves["example"], Path(folder))
+        rows += _wrong_budgets(known["example"], Path(folder))
     print_rows(f"Machines drawn from the budget (seed {seed})", rows)
     return rows
 
 
-def _of_valve(name: str, valve: ValveModel, folder: Path, quick: bool, seed: int) -> list[Row]:
-    """Run scenarios and machines of one valve, coil and supply straight at the duty."""
-    compensator = designed(valve, folder, **DUTY)
-    scenes = scenes_of(folder, compensator, None)
+def valves() -> dict[str, ValveModel]:
+    """Return the example, and the shared measurements where they are here."""
+    shared = {name: valve_of(SHARED / name) for name in ("valve_a", "valve_e") if (SHARED / name).is_dir()}
+    return {"example": example_valve()} | shared
+
+
+def shut_rows(name: str, scenes: Sequence[Scene], machines: int, seed: int) -> list[Row]:
+    """Run scenarios and machines of one firmware, and return what of them flows at zero command."""
     results = [each for scene in scenes for each in run_scenarios(scene) if each.must_shut]
     flowing = sum(each.q_beyond_L_min > 1e-9 for each in results)
     coil = [each for each in results if each.name.startswith(("coil", "supply"))]
     opening = [each.figures["dead_zone_on_opening_percent"] for each in coil]
-    found = run_population(scenes, FEW if quick else MACHINES, seed)
+    corners = f"; dead zone on opening {min(opening):.1f} to {max(opening):.1f} % at the corners" if opening else ""
+    found = run_population(scenes, machines, seed)
     corner = run_population(scenes, 4, seed, drawn=())
-    rows = [
+    return [
         Row(what=f"{name}: required scenarios that flow at zero", value=flowing, limit=0,
-            note=f"of {len(results)}; dead zone on opening {min(opening):.1f} to {max(opening):.1f} % at the corners"),
+            note=f"of {len(results)}{corners}"),
         Row(what=f"{name}: machines that flow at zero", value=found.flowing, limit=0,
             note=f"of {found.machines}; below {found.upper_limit:.2e} with 95 %; {found.never_open} never opened"),
         Row(what=f"{name}: machines that flow with all at its worst", value=corner.flowing, limit=0,
             note=f"of {corner.machines}"),
     ]  # fmt: skip
+
+
+def _of_valve(name: str, valve: ValveModel, folder: Path, quick: bool, seed: int) -> list[Row]:
+    """Run scenarios and machines of one valve, coil and supply straight at the duty."""
+    scenes = scenes_of(folder, designed(valve, folder, **DUTY), None)
+    rows = shut_rows(name, scenes, FEW if quick else MACHINES, seed)
     if name == "example":
-        ours, theirs = _speed(scenes, found.pressures, seed), fold_map_speed(core_of(folder), quick, seed)
+        ours, theirs = _speed(scenes, seed), fold_map_speed(core_of(folder), quick, seed)
         ratio = ours / theirs
         rows.append(Row(what="example: machines over fold.map, goal over measured", value=FOLD_GOAL / ratio, limit=1.0,
                         note=f"{ratio:.4g} times faster: {ours:.0f} times real time, one core"))  # fmt: skip
     return rows
 
 
-def _speed(scenes: Sequence[Scene], pressures: int, seed: int) -> float:
+def _speed(scenes: Sequence[Scene], seed: int) -> float:
     """Return how many times real time machines run on one core, what does not grow with their number left out."""
     both, population_module.WORKERS = population_module.WORKERS, 1
     taken = []
@@ -76,7 +85,7 @@ def _speed(scenes: Sequence[Scene], pressures: int, seed: int) -> float:
         times = []
         for _ in range(REPEATS):
             begin = perf_counter()
-            run_population(scenes, machines, seed)
+            pressures = run_population(scenes, machines, seed).pressures
             times.append(perf_counter() - begin)
         taken.append(min(times))
     population_module.WORKERS = both

@@ -15,18 +15,23 @@ from above_tests import print_above  # noqa: E402
 from all_inputs import print_inputs  # noqa: E402
 from calibration_blocks import print_blocks  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
+from current_population import print_current_population  # noqa: E402
 from current_valve import print_current_valve  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
+from native_plant import print_native_plant  # noqa: E402
 from plant import print_plant  # noqa: E402
 from population import print_population  # noqa: E402
 from proof_of_c import print_proof  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 from stand_in_flow import print_stand_in  # noqa: E402
+from verify_time import print_verify_time  # noqa: E402
 
 PARTS = {
     "inputs": (print_inputs, 101),
     "plant": (print_plant, 303),
+    "native-plant": (print_native_plant, 1),
+    "verify-time": (print_verify_time, 0),
     "population": (print_population, 1),
     "stand-in": (print_stand_in, 0),
     "hysteresis": (print_hysteresis, 404),
@@ -34,6 +39,7 @@ PARTS = {
     "proof": (print_proof, 0),
     "current": (print_current_loop, 0),
     "current-valve": (print_current_valve, 0),
+    "current-population": (print_current_population, 1),
     "above": (print_above, 0),
     "blocks": (print_blocks, 24),
 }

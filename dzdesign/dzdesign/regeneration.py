@@ -3,6 +3,7 @@
 Stands here and not in verify, which shares no code with what it checks: this one check asks the generator itself.
 """
 
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,16 +18,19 @@ if TYPE_CHECKING:
     from dzdesign.verify.requirements import Check
 
 
-def regenerated(folder: Path) -> "Check":
+def regenerated(folder: Path, include: Sequence[Path] = ()) -> "Check":
     """Tell whether every file is what `codegen` makes of compensator.json, but for what is the user's.
 
-    Of a project file that is the folder of C2000Ware, of a header or a linker file all but what changes generated C.
+    Of a project file that is the folder of C2000Ware, of a header or a linker file all but what changes generated C. In
+    `include` lie headers that those of the user include.
 
     It is not checked where another version of dzdesign generated the firmware, or one with other targets: then nothing
-    tells an edited file from a generated one, so the firmware does not hold.
+    tells an edited file from a generated one, so the firmware does not hold. Nor is it where the user's headers can't
+    be compiled.
     """
     from dzdesign.codegen.project import generate
     from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
+    from dzdesign.verify.firmware.generated_meaning import compare_meaning
     from dzdesign.verify.requirements import REGENERATED
 
     manifest = read_firmware_manifest(folder)
@@ -45,7 +49,15 @@ def regenerated(folder: Path) -> "Check":
     if others:
         text = f"otherwise than generated now: {', '.join(others)}; make the firmware again with `dzdesign codegen`"
         return REGENERATED.check(holds=False, text=text)
+    meaning = compare_meaning(folder, manifest.target, firmware.files, frozenset(expected.board), include)
+    if meaning.not_compared:
+        return REGENERATED.check(holds=None, text=meaning.not_compared)
+    if meaning.faults:
+        text = f"{'; '.join(meaning.faults)}; headers of yours may not change generated C: correct them"
+        return REGENERATED.check(holds=False, text=text)
     text = f"generated again for {manifest.target}: {len(compared)} files and the manifest are the same, byte for byte"
+    if meaning.compared:
+        text += f"; with your headers {', '.join(meaning.compared)} compile to the same code"
     return REGENERATED.check(holds=True, text=text)
 
 

@@ -4,9 +4,8 @@ Thresholds, bounds and hashes that were edited together fit one another; the rec
 not in verify, which shares no code with what it checks: this one check asks `identify` itself.
 """
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError, and_more, one_line, quoted
 from dzdesign.core.options import Paths
+from dzdesign.core.value_differences import differences
 from dzdesign.stages.identify import IdentifyArguments, identify_again, stated_options
 from dzdesign.stages.recordings import expand
 
@@ -46,10 +46,13 @@ class GivenFiles:
         return cls(paths=paths)
 
 
-def identified_again(compensator: "Compensator", given: GivenFiles) -> "Check":
+def identified_again(
+    compensator: "Compensator", given: GivenFiles, identified: "ValveModel | None" = None
+) -> "Check":
     """Tell whether identifying again, from the recordings that a compensator's valve names, gives the same valve.
 
-    Which file is which its hash decides, whatever its name, its folder and the order.
+    Which file is which its hash decides, whatever its name, its folder and the order. What this very run has
+    `identified` from them is compared as it is.
     """
     from dzdesign.verify.requirements import AS_STATED
 
@@ -73,17 +76,18 @@ def identified_again(compensator: "Compensator", given: GivenFiles) -> "Check":
         return _check(holds=False, text="valve.json names two of its files alike; make it again")
     files = {each.source: given.paths[each.sha256] for each in valve.made_from}
     try:
-        found = identify_again(valve.options, valve.record, files)
+        found = identified or identify_again(valve.options, valve.record, files)
     except InputError as error:
         return _check(holds=False, text=f"from the same files nothing can be identified with its options: {error}")
-    differing = list(_differences(valve, found))
+    differing = list(differences(valve, found, rounding=ROUNDING))
     text = f"from {len(files)} files, with {_options_in_words(valve)}"
     if differing:
-        place, one, other = differing[0]
+        first = differing[0]
         more = f" (and {len(differing) - 1} more)" if len(differing) > 1 else ""
-        text = f"'{place}' of valve.json is {_words(one)}, but {_words(other)} follows {text}{more}"
+        one, other = _words(first.stated), _words(first.follows)
+        text = f"'{first.place}' of valve.json is {one}, but {other} follows {text}{more}"
         return _check(holds=False, text=f"{text}; make it again with `dzdesign identify`")
-    text = f"identified again {text}: every number the same"
+    text = f"identified {'again' if identified is None else 'in this run'} {text}: every number the same"
     if others := len(compensator.lot) - 1 if compensator.lot else 0:
         text += f"; of the lot's other {others} valves {AS_STATED}"
     return _check(holds=True, text=text)
@@ -105,34 +109,6 @@ def _about_foreign(path: Path, given: GivenFiles, stated: Mapping[str, str]) -> 
         f"valve.json was not made from '{path}' (SHA-256 {digest}), but from {len(stated)} other files; leave it out, "
         "or identify again with it"
     )
-
-
-def _differences(stated: object, follows: object, place: str = "") -> Iterator[tuple[str, object, object]]:
-    """Yield place, value and what follows, of all that differs by more than rounding."""
-    if is_dataclass(stated) and type(stated) is type(follows):
-        for field in fields(stated):
-            path = f"{place}.{field.name}" if place else field.name
-            yield from _differences(getattr(stated, field.name), getattr(follows, field.name), path)
-    elif isinstance(stated, Mapping) and isinstance(follows, Mapping):
-        for key in {**follows, **stated}:
-            yield from _differences(stated.get(key), follows.get(key), f"{place}.{key}")
-    elif _are_rows(stated, follows):
-        for index, (one, other) in enumerate(zip(stated, follows, strict=True)):  # type: ignore[call-overload]
-            yield from _differences(one, other, f"{place}[{index}]")
-    elif stated != follows and not _are_near(stated, follows):
-        yield place, stated, follows
-
-
-def _are_rows(stated: object, follows: object) -> bool:
-    rows = isinstance(stated, Sequence) and isinstance(follows, Sequence) and not isinstance(stated, str)
-    return rows and len(stated) == len(follows)  # type: ignore[arg-type]
-
-
-def _are_near(stated: object, follows: object) -> bool:
-    """Tell whether two numbers are one but for rounding; True and False are none."""
-    if not (isinstance(stated, float) and isinstance(follows, float)):
-        return False
-    return math.isclose(stated, follows, rel_tol=ROUNDING, abs_tol=ROUNDING)
 
 
 def _options_in_words(valve: "ValveModel") -> str:

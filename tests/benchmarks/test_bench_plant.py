@@ -10,7 +10,8 @@ from bench_plant import commanded, duration, hold, lagged, ramp, staircase, that
 
 FOLDER = Path(bench_plant.__file__).parent
 #: What makes recordings, and what it may take of the product: the container in which it hands them over.
-PLANTS = {f"{name}.py": set() for name in ("bench_plant", "bench_loggers", "corpus_plant", "four_port_plant")}
+PLANTS = {"bench_plant.py": set()}
+PLANTS |= {f"recordings/{name}.py": set() for name in ("bench_loggers", "corpus_plant", "four_port_plant")}
 CONTAINER = {"dzdesign.identify.reading.ramp_test"}
 PLANTS |= {"recorded_ramps.py": CONTAINER, "planned_bench.py": CONTAINER, "bench_model.py": CONTAINER}
 

@@ -8,6 +8,7 @@ import pytest
 from dzdesign.codegen.earlier_firmware import refuse_another_design
 from dzdesign.codegen.project import generate, write_firmware
 from dzdesign.command_line.cli import main
+from dzdesign.core import artefact_files
 from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
@@ -101,3 +102,14 @@ def test_a_firmware_whose_compensator_is_gone_is_not_written_over(example_compen
         write_firmware(firmware, tmp_path / "firmware")
     write_firmware(firmware, tmp_path / "firmware", over_another=True)
     assert (tmp_path / "firmware/compensator.json").is_file()
+
+
+def test_of_two_at_once_the_later_one_does_not_go_over_the_other(example_compensator, tmp_path, monkeypatch):
+    """Between the look into the folder and the writing another process writes its design there."""
+    folder, ours = tmp_path / "firmware", generate(example_compensator, "host")
+    other = replace(example_compensator, valve=replace(example_compensator.valve, record={"serial": "another"}))
+    theirs = write_firmware(generate(other, "host"), tmp_path / "theirs")
+    monkeypatch.setattr(artefact_files, "bring_back", lambda _: (tmp_path / "theirs").rename(folder))
+    with pytest.raises(InputError, match="holds the firmware of another design"):
+        write_firmware(ours, folder)
+    assert json.loads((folder / "manifest.json").read_text())["files"] == dict(theirs.manifest.files)

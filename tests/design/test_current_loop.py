@@ -9,6 +9,8 @@ from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.design.costs import costs_of, design_warnings
+from dzdesign.design.current import drive as current_drive
 from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
     CurrentSensor,
@@ -20,7 +22,7 @@ from dzdesign.design.current.choosing import (
 from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
 from dzdesign.design.current.drive import CurrentRequest, design_current_drive
 from dzdesign.design.current.margins import Gains, impulse_response, loop_transfer, margins, worst_margins
-from dzdesign.design.current.step_response import Coils, released_overshoot_A, run_loop, step_responses
+from dzdesign.design.current.step_response import Coils, StepResponse, released_overshoot_A, run_loop, step_responses
 from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
 from dzdesign.verify.exhaustive.zero_command import counted_dither
@@ -83,6 +85,23 @@ def test_no_corner_overshoots_as_it_is_released_and_none_is_held_down_for_nothin
         assert means.max() <= share + code_A
     assert released_overshoot_A(replace(loop, release=0), COIL, SAMPLING, line) > 50 * code_A
     assert released_overshoot_A(replace(loop, release=loop.release // 2), COIL, SAMPLING, line) > code_A
+
+
+def test_an_overshoot_that_no_beginning_prevents_is_stated_and_warned_of(example_compensator, wording, monkeypatch):
+    """Seeded: with inductances of 0.2 to 3 times the nominal one it was 80 codes, and nothing said so."""
+    given = {"step_responses": (), "dither_departure": (0, 0), "released_overshoot_A": 0.0331}
+    for name, found in {**given, "choose_loop": example_loop("supply unknown")}.items():
+        monkeypatch.setattr(current_drive, name, lambda *_, found=found, **__: found)
+    step = StepResponse(corner=COIL.nominal, rise_s=2e-3, least_s=1e-3, overshoot=0.05)
+    monkeypatch.setattr(current_drive, "worst_step", lambda _: (step, step))
+    request = CurrentRequest(circuit=COIL, sensor=SENSORS["supply unknown"], sampling=SAMPLING)
+    drive = design_current_drive(request, CONVERTER, 60000)
+    assert drive.release_overshoot_A == 0.0331
+    warned = replace(example_compensator, current_drive=drive)
+    (text,) = design_warnings(warned)
+    assert text in costs_of(warned)
+    assert not design_warnings(replace(warned, current_drive=replace(drive, release_overshoot_A=0.0)))
+    wording("current loop: an overshoot at release", text)
 
 
 def test_gains_beyond_the_gain_margin_oscillate_and_gains_within_do_not():

@@ -85,3 +85,21 @@ def test_the_workflow_stops_where_an_option_changed_an_artefact(repository):
     failed = [step for step in steps() if step.startswith(("dzdesign identify", "dzdesign design", "git diff"))
               if run(step, repository).returncode]  # fmt: skip
     assert failed == ["git diff --exit-code valve.json compensator.json"]
+
+
+@pytest.mark.skipif(not (shutil.which("bash") and shutil.which("git")), reason="a runner has bash and git")
+@pytest.mark.parametrize("missing", ["valve.json", "compensator.json"])
+def test_the_workflow_stops_where_nobody_committed_an_artefact(tmp_path, missing):
+    """Seeded: `git diff` says nothing of a file that is not under version control."""
+    for name in ("valve.json", "compensator.json"):
+        (tmp_path / name).write_text("{}\n")
+    git = "git -c user.name=test -c user.email=test@example.org -c init.defaultBranch=main"
+    start = f"{git} init -q && {git} add . && {git} rm -q --cached {missing} && {git} commit -qm start"
+    assert run(start, tmp_path).returncode == 0
+    failed = [step for step in steps() if step.startswith("git ") and run(step, tmp_path).returncode]
+    assert failed == ["git diff --exit-code valve.json compensator.json"]
+
+
+def test_the_workflow_identifies_again():
+    (verify,) = (step for step in steps() if step.startswith("dzdesign verify "))
+    assert "--ramps ramps/*.csv*" in verify

@@ -38,11 +38,12 @@ def verify(firmware_of, tmp_path, monkeypatch, capsys):
     """Copy a target's firmware, attack it, verify it; returns exit status and all that was printed."""
     take_the_rest_as_held(monkeypatch)
 
-    def run(target, attack=lambda folder: None):
+    def run(target, attack=lambda folder: None, *include):
         folder = tmp_path / target
         shutil.copytree(firmware_of / target, folder)
         attack(folder)
-        status = main(["verify", str(folder), "-o", str(tmp_path / "evidence")])
+        more = [word for option in include for word in (option, str(tmp_path / "sdk"))]
+        status = main(["verify", str(folder), "-o", str(tmp_path / "evidence"), *more])
         out, err = capsys.readouterr()
         return status, "\n".join(line for line in (out + err).splitlines() if not line.startswith("HOLDS"))
 
@@ -111,6 +112,12 @@ def law_of_ones_own(folder):
     edit(folder, PROJECT, "../core/dz_comp.c", "../board/my_law.c")
 
 
+def in_utf16(folder):
+    text = (folder / PROJECT).read_text(encoding="utf-8").replace("utf-8", "utf-16").replace("UTF-8", "UTF-16")
+    text = text.replace("<projectSpec>", '<!DOCTYPE projectSpec SYSTEM "../board/x.dtd">\n<projectSpec>')
+    (folder / PROJECT).write_bytes(text.encode("utf-16"))
+
+
 IN_THE_PROJECT = {
     "another source": (law_of_ones_own, "../board/my_law.c"),
     "one more source": (in_project(LINK, f'{LINK}<file action="link" path="../board/x.c"/>'), "../board/x.c"),
@@ -149,6 +156,10 @@ IN_THE_PROJECT = {
     "a document type": (
         in_project("<projectSpec>", '<!DOCTYPE projectSpec [<!ENTITY x "y">]>\n<projectSpec>'), "document type",
     ),
+    "a document type in UTF-16": (in_utf16, "document type"),
+    "an instruction": (in_project("<projectSpec>", '<?xml-stylesheet href="x.xsl"?><projectSpec>'), "xml-stylesheet"),
+    "a file behind C2000Ware's folder": (in_project(ROOT, 'path="C:/ti ../board/my.c y'), "C2000WARE_ROOT is"),
+    "the firmware in other case": (in_project(ROOT, 'path="../../F28335/board/ti'), "C2000Ware lies elsewhere"),
     "no XML": (in_project("</projectSpec>", ""), "not XML"),
     "no file": (lambda folder: (folder / PROJECT).unlink(), "is missing"),
     "text": (in_project("<projectSpec>", "<projectSpec>text"), "text in or behind"),
@@ -211,6 +222,8 @@ BESIDE = {
     "C of its own": ("f28335", "f28335/my.c"),
     "with a point behind": ("f28335", "core/dz_comp.h."),
     "in a folder like board": ("cortex-m4", "Board/my.c"),
+    "C as Arduino takes it": ("host", "core/more.ino"),
+    "C after its preprocessor": ("host", "host/more.i"),
 }
 
 
@@ -251,6 +264,10 @@ def included(name, text):
     return attack
 
 
+def in_linker(text):
+    return lambda folder: edit(folder, "cortex_m4/mps2_an386.ld", "ENTRY(", f"{text}\nENTRY(")
+
+
 IN_THE_USERS = {
     "a macro over the drive": (in_tick("#define dz_drive_tick(d) ((d)->compare_a = 60000u)"), "makes dz_drive_tick"),
     "a macro over a type": (in_tick("#define uint16_t unsigned char"), "makes uint16_t"),
@@ -286,6 +303,12 @@ IN_THE_USERS = {
         "includes ../board/my.txt",
     ),
     "in a text beside": (included("cortex_m4/my.txt", "#define dz_drive_tick my_tick\n"), "includes my.txt"),
+    "members packed": (in_tick("#pragma pack(1)"), "leaves pack(1)"),
+    "members packed otherwise": (in_tick('_Pragma("GCC pack(push, 2)")'), "leaves pack(push, 2)"),
+    "an address of a name in quotes": (in_linker('"dz_comp" = 0x1000;'), "gives dz_comp another address"),
+    "an object that is linked along": (
+        lambda folder: (add(folder, "board/x.o"), in_linker("INPUT( ../board/x.o )")(folder)), "links ../board/x.o",
+    ),
     "an address of the linker": (
         lambda folder: edit(folder, "cortex_m4/mps2_an386.ld", "ENTRY(", "dz_drive_tick = my_tick;\nENTRY("),
         "gives dz_drive_tick another address",
@@ -303,17 +326,20 @@ def test_a_file_of_the_users_that_changes_generated_c_is_named(verify, attack):
     assert status == 1 and named in said
 
 
+@pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="apt install gcc-arm-none-eabi")
 def test_what_a_user_fills_in_holds_and_is_named_as_not_checked(verify):
     def fill_in(folder):
         edit(folder, "cortex_m4/dz_board.c", "return dz_board_u_adc;", "return MY_ADC->result;")
         edit(folder, "cortex_m4/dz_tick.h", "#define DZ_TICK_RELOAD UINT32_C(9999)", "#define DZ_TICK_RELOAD 6399u")
         edit(folder, "cortex_m4/dz_tick.h", TICK, '#include "my_chip.h"\n' + TICK)
         edit(folder, "cortex_m4/mps2_an386.ld", "LENGTH = 4M", "LENGTH = 512K")
+        packed = "#pragma pack(push, 1)\nstruct adc { char result; };\n#pragma pack(pop)\n"
         more = "#define DDI 0\n#define SUM_SHIFT 1\n"  # of a comment; of the core's C, apart
-        add(folder, "board/my_chip.h", f'#include "core_cm4.h"\n#define MY_ADC ((struct adc *)0x40012000u)\n{more}')
+        add(folder, "board/my_chip.h", f'#include "core_cm4.h"\n{packed}#define MY_ADC ((adc *)0x40012000u)\n{more}')
+        add(folder.parent, "sdk/core_cm4.h", "typedef struct adc adc;\n")
         add(folder, "board/my_sink.c", '#include "dz_comp.h"\nunsigned f(void) { return dz_comp(0u, 0u, 0u); }\n')
 
-    status, said = verify("cortex-m4", fill_in)
+    status, said = verify("cortex-m4", fill_in, "--include")
     assert status == 0, said
     assert all(f"cortex_m4/{name}" in said for name in ("dz_board.c", "dz_tick.h", "mps2_an386.ld"))
     assert "board/my_chip.h" in said and "board/my_sink.c" in said

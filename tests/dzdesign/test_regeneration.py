@@ -174,6 +174,7 @@ def test_a_version_of_any_length_and_any_characters_fits_a_message(firmware_fold
 
 @pytest.mark.slow
 @pytest.mark.parametrize("origin", UNKNOWN_ORIGINS)
+@pytest.mark.usefixtures("each_core_once")
 def test_an_edit_does_not_hide_behind_an_unknown_origin(firmware_folder, tmp_path, monkeypatch, capsys, origin):
     monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
     always_60000(firmware_folder)
@@ -189,6 +190,7 @@ def test_an_edit_does_not_hide_behind_an_unknown_origin(firmware_folder, tmp_pat
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("each_core_once")
 def test_of_another_version_all_else_holds_and_the_function_says_so(firmware_folder, tmp_path, monkeypatch):
     monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
     always_60000(firmware_folder)
@@ -200,6 +202,7 @@ def test_of_another_version_all_else_holds_and_the_function_says_so(firmware_fol
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("each_core_once")
 def test_the_command_and_the_function_say_so(firmware_folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
     edit(firmware_folder, "f28335/dz_isr.c", "{", "{ /* another */")

@@ -221,6 +221,7 @@ class TestOptionsOfEveryKind:
 
 @needs_compiler
 @pytest.mark.slow
+@pytest.mark.usefixtures("each_core_once")
 def test_the_command_says_it_in_verdict_and_report(valve, ramps, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     api.generate(api.design(valve), target="host", output="firmware")

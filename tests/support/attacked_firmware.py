@@ -64,6 +64,28 @@ def take_the_rest_as_held(monkeypatch):
 
 
 @cache
+def _runs():
+    return {}
+
+
+def run_each_core_once(monkeypatch):
+    """Let `verify` run a core once of those that are equal, with equal compensators, plants and ramps.
+
+    For tests of what stands around that: the manifest, the files of the target, recordings, report and command.
+    """
+    run = verification._run_core
+
+    def once(folder, manifest, compensator, given, *watching):
+        core = tuple((path.name, path.read_bytes()) for path in sorted((folder / "core").iterdir()))
+        key = (core, tuple(manifest.core), to_json_bytes(compensator), repr(given))
+        if key not in _runs():
+            _runs()[key] = run(folder, manifest, compensator, given, *watching)
+        return _runs()[key]
+
+    monkeypatch.setattr(verification, "_run_core", once)
+
+
+@cache
 def _once(check):
     """Check equal compensators once: designing one again takes a second."""
     found = {}

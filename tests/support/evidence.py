@@ -1,19 +1,20 @@
 """Evidence as small as it may be, for tests of what reads it."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.loop_results import ClosedLoopResult
+from dzdesign.verify.loop_results import ClosedLoopResult, PressureResult
 from dzdesign.verify.requirements import ALWAYS
 
 LOOP = ClosedLoopResult(
     plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=(), against_integrator=()
 )
 EVIDENCE = Evidence(
-    tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), board_not_compiled="",
+    tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), differing_files={},
+    board_not_compiled="",
     checks=tuple(each.check(holds=True, text="yes") for each in ALWAYS), inputs=(), closed_loop=LOOP, scenarios=(),
     population=None, monte_carlo=None, current_loop=None, mutants=None,
 )  # fmt: skip
@@ -28,3 +29,10 @@ def read_evidence(path: Any) -> Evidence:
     """Return the evidence of a folder or file."""
     path = path / Evidence.FILE_NAME if path.is_dir() else path
     return read_artefact(path.read_bytes(), Evidence, str(path))
+
+
+def pressure_result(**changes: Any) -> PressureResult:
+    """Return what a ramp in closed loop shows that is as good as can be, with other fields."""
+    zero = {field.name: 0.0 for field in fields(PressureResult)}
+    of_it = {"side": "positive", "unseen_below_L_min": None, "allowed_at_zero_L_min": None}
+    return PressureResult(**{**zero, **of_it, **changes})

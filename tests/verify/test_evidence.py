@@ -2,17 +2,19 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.artefact_types import Tool, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify import requirements
+from dzdesign.verify.contradictions import contradictions
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.requirements import ALWAYS, OPTIONAL, Requirement
+from dzdesign.verify.requirements import ALWAYS, AS_STATED, FROM_INPUTS, OPTIONAL, RAMPS, Requirement
 from dzdesign.verify.untried import not_tried, untried_requirements
 from tests.support.evidence import EVIDENCE, read_evidence
 from tests.support.synthetic import needs_compiler
@@ -33,6 +35,23 @@ def test_every_check_of_a_firmware_is_of_a_declared_requirement(reported_demo):
     declared = {each.id: each.title for each in DECLARED}
     assert all(check.name == declared[check.id] for check in found.checks)  # of one sign of command
     assert {each.id for each in ALWAYS} <= {check.id for check in found.checks} and found.all_checks == found.checks
+
+
+def test_a_check_that_stands_twice_or_that_nobody_knows_adds_nothing_to_what_was_tried():
+    (first, *rest) = [each for each in EVIDENCE.checks if each.id not in {one.id for one in FROM_INPUTS}]
+    plain = replace(EVIDENCE, checks=(first, *rest))
+    assert contradictions(plain, None) == ()
+    for added in (first, replace(first, id="safe", name="certified")):
+        assert added in contradictions(plain.with_checks(added), None)
+    other = replace(plain, tool=Tool(name="dzdesign", version="0.0.9"))  # it may have had requirements of its own
+    assert contradictions(other.with_checks(replace(first, id="safe", name="certified")), None) == ()
+
+
+def test_of_a_lot_setting_the_recordings_of_one_valve_leave_the_others_as_stated():
+    compared = EVIDENCE.with_checks(RAMPS.check(holds=True, text="every number the same"))
+    assert EVIDENCE.reservation == AS_STATED and compared.reservation == ""
+    lot = replace(compared, inputs=(SimpleNamespace(lot=SimpleNamespace(valves=7)), SimpleNamespace(lot=None)))
+    assert lot.reservation == f"of the lot's other 6 valves {AS_STATED}"
 
 
 def test_what_holds_follows_from_the_checks():

@@ -125,6 +125,7 @@ def test_a_certificate_that_says_too_much_is_found(example_compensator, wording)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("each_core_once")
 def test_a_changed_file_fails_the_verification(firmware_folder):
     readme = firmware_folder / "f28335" / "README.md"
     readme.write_text(readme.read_text() + "\n")
@@ -208,6 +209,7 @@ def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder, wording):
     wording.of_test(shadowed.text)
 
 
+@pytest.mark.usefixtures("each_core_once")
 def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder, wording):
     manifest = json.loads((firmware_folder / "manifest.json").read_text())
     (firmware_folder / "manifest.json").write_text(to_json(manifest | {"files": {}, "core": []}))

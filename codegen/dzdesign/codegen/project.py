@@ -77,10 +77,14 @@ def write_firmware(firmware: Firmware, folder: Path, *, over_another: bool = Fal
     be written, or holds files that would be lost, is an `InputError`; so is one with the firmware of another design,
     unless it is to be written over.
     """
-    if not over_another:
-        refuse_another_design(Path(folder), firmware.compensator)
+
+    def check() -> None:
+        if not over_another:
+            refuse_another_design(Path(folder), firmware.compensator)
+
+    check()  # of two at once, the other one may have written since
     earlier = target_in(Path(folder))
-    kept = write_folder(folder, firmware.contents, firmware.manifest)
+    kept = write_folder(folder, firmware.contents, firmware.manifest, check)
     notes = [firmware.note] if firmware.note else []
     if earlier not in ("", firmware.manifest.target):
         gone = f"the firmware for {earlier} in '{folder}' was replaced by this one for {firmware.manifest.target}"

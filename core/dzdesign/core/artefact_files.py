@@ -4,7 +4,7 @@ import contextlib
 import logging
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -153,7 +153,10 @@ def _check_folder(folder: Path, schema: str | None) -> None:
 
 
 def write_folder(
-    folder: Path, files: Mapping[str, str | bytes], manifest: "Artefact | Mapping[str, Any]"
+    folder: Path,
+    files: Mapping[str, str | bytes],
+    manifest: "Artefact | Mapping[str, Any]",
+    check: Callable[[], None] = lambda: None,
 ) -> Mapping[str, bool]:
     """Write a folder whole or not at all; one that dzdesign made before is replaced, any other is left alone.
 
@@ -169,6 +172,8 @@ def write_folder(
         Relative POSIX path to content.
     manifest : Artefact or mapping
         Written as `MANIFEST_NAME`.
+    check : callable
+        Refuses what lies in the folder, while no other dzdesign can put anything else there.
 
     Returns
     -------
@@ -192,6 +197,7 @@ def write_folder(
         folder.parent.mkdir(parents=True, exist_ok=True)
         with alone_in(folder.parent):
             bring_back(folder)
+            check()
             _check_folder(folder, document.get("schema"))
             kept = _replace_folder(folder, contents, listing, board_of(document))
     logger.debug("wrote '%s', %d files", folder, len(contents))

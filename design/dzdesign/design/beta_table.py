@@ -128,9 +128,15 @@ def offset_ceiling(curve: OffsetCurve, u_max_V: Fraction, allowance: Allowance) 
         )
     low, high = allowance.window
     factor, kept = allowance.factor / u_max_V, allowance.kept
-    values = [certified_V(curve, dp_MPa) for dp_MPa in pressures_MPa(signals, low, code_max + high)]
+    values = _certified_at(curve, signals, low, code_max + high)
     limit = tuple(value * factor - kept for value in _least_of_windows(values, high - low + 1))
     return OffsetCeiling(limit=limit, certified=range(ceil(first), floor(last) + 1))
+
+
+@lru_cache(maxsize=8)
+def _certified_at(curve: OffsetCurve, signals: Signals, first: int, last: int) -> tuple[Fraction, ...]:
+    """Return what is certified at each of the codes, V; kept, for a valve is designed in several ways, and proved."""
+    return tuple(certified_V(curve, dp_MPa) for dp_MPa in pressures_MPa(signals, first, last))
 
 
 def certified_V(curve: OffsetCurve, dp_MPa: Fraction) -> Fraction:

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import in_units
-from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling
+from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling, pressures_MPa
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.offset.above_tests import AboveChoice
@@ -184,10 +184,11 @@ def _above(
     if curve.above is None:
         return tests_end, None
     holds_to, released_from, holds = tests_end, None, curve.above.certified
+    pressures = pressures_MPa(signals, 0, len(ceiling.limit) - 1)
     for code in range(ceiling.certified.stop, len(ceiling.limit)):
         index, share = divmod(code, STEP_CODES)
         offset = unit * Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
-        limit, here = ceiling.limit[code], max(signals.dp_MPa(code), tests_end)
+        limit, here = ceiling.limit[code], max(pressures[code], tests_end)
         holds = holds and (offset <= limit or offset * signals.compare_max < Fraction(1, 2))
         holds_to = here if holds else holds_to
         if offset > unit:
@@ -201,9 +202,9 @@ def _losses_V(
     curve: OffsetCurve, ceiling: OffsetCeiling, signals: Signals, table: tuple[int, ...], unit_V: Fraction
 ) -> list[float]:
     """Return by how much the table's offset lies under the certified curve at each certified code, V."""
-    losses = []
+    losses, pressures = [], pressures_MPa(signals, 0, len(ceiling.limit) - 1)
     for code in ceiling.certified or range(1):
         index, share = divmod(code, STEP_CODES)
         numerator = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
-        losses.append(float(curve.at(signals.dp_MPa(code)) - numerator * unit_V))
+        losses.append(float(curve.at(pressures[code]) - numerator * unit_V))
     return losses

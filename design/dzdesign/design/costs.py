@@ -34,15 +34,21 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
             f"from the first flow seen down to the onset: below {units.text(least, '.3g L/min')} not all of the "
             "recordings show a flow"
         )
-    return tuple(lines + _left_out(compensator) + _cost_of_options(compensator))
+    return (*lines, *_left_out(compensator), *_released(compensator), *_cost_of_options(compensator))
 
 
 def design_warnings(compensator: Compensator) -> tuple[str, ...]:
     """Return one line for each failure that the firmware can't see, and for a side of the valve that it does not drive.
 
-    They are among the costs; whoever generates a firmware without a look at these is told them again.
+    And for a current that overshoots as the drive is released. They are among the costs; whoever generates a firmware
+    without a look at these is told them again.
     """
-    return (*hidden_failures(compensator), *_left_out(compensator))
+    return (*hidden_failures(compensator), *_left_out(compensator), *_released(compensator))
+
+
+def _released(compensator: Compensator) -> tuple[str, ...]:
+    drive = compensator.current_drive
+    return drive.release_in_words(compensator.valve.recorded_units) if drive else ()
 
 
 def _left_out(compensator: Compensator) -> list[str]:

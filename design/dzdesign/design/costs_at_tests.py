@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from math import inf
 
 import numpy as np
 
@@ -34,6 +35,9 @@ class CostAtTest:
     #: Command at which the reading flow passes, and that of an ideal line to the largest flow.
     read: Mapping[str, float]
     ideal: float
+    #: Dead zone on opening of the declared machine that opens last: infinite where no command opens it, None where no
+    #: machine is declared or no rising branch was recorded.
+    last_opening: float | None
     #: Drive at full command, and the command from which it no longer rises, None where that is full command.
     full: float
     limited_from: float | None
@@ -100,6 +104,7 @@ def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> Cost
         reading_flow_L_min=compensator.reading_flow_L_min,
         read=read_dead_zone(compensator, test, sign),
         ideal=ideal_line(compensator.reading_flow_L_min, test.recorded.q_max_L_min),
+        last_opening=last_opening(compensator, test, sign),
         full=min(limit, corners.full),
         limited_from=corners.command_at(limit) if limit < corners.full else None,
     )
@@ -113,6 +118,16 @@ def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 
     """
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     return _commands_at(compensator, _code_of(compensator, test), sign, knees)
+
+
+def last_opening(compensator: Compensator, test: TestResult, sign: int) -> float | None:
+    """Return the dead zone on opening, a share of command, of the machine that opens last; as in `CostAtTest`."""
+    if compensator.machine is None or test.u_knee_rising_V is None:
+        return None
+    knee = float(compensator.machine.largest_factor) * test.u_knee_rising_V / float(compensator.u_max_V)
+    if knee > compensator.drive_functions.compare_limit / compensator.signals.compare_max:
+        return inf
+    return corners_of(compensator, _code_of(compensator, test), sign).command_at(knee)
 
 
 def between_tests(compensator: Compensator, sign: int) -> float:

@@ -1,11 +1,11 @@
 """That a compensator is what its valve and its options give: a file can be edited, and the firmware would follow it."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from itertools import takewhile
 
 from dzdesign.core.errors import InputError, RequirementError, quoted
+from dzdesign.core.value_differences import differences
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
@@ -50,10 +50,10 @@ def prove_derived(compensator: Compensator) -> None:
         redesigned = replace(redesigned, sides=compensator.sides, lot=compensator.lot, costs=compensator.costs)
     # The hash of valve.json counts its spacing, which is not kept.
     redesigned = replace(redesigned, tool=compensator.tool, made_from=compensator.made_from)
-    for place, one, other in _differences(compensator, redesigned):
-        stated, follows = _from_where_they_differ(one, other)
+    for found in differences(compensator, redesigned):
+        stated, follows = _from_where_they_differ(found.stated, found.follows)
         raise InputError(
-            f"'{place}' is {_words(stated)}, but {_words(follows)} follows from its valve and its options; "
+            f"'{found.place}' is {_words(stated)}, but {_words(follows)} follows from its valve and its options; "
             f"{Compensator.REMEDY}"
         )
 
@@ -82,24 +82,6 @@ def _prove_lot_setting(compensator: Compensator, redesigned: Compensator) -> Non
                 f"the lot has no valve with the hash and the {name} bounds of the valve in the file; make it again "
                 "with `dzdesign batch`"
             )
-
-
-def _differences(stated: object, follows: object, place: str = "") -> Iterator[tuple[str, object, object]]:
-    """Yield place, value and what should stand there, of each key that differs."""
-    if stated == follows:
-        return
-    if is_dataclass(stated) and type(stated) is type(follows):
-        for field in fields(stated):
-            path = f"{place}.{field.name}" if place else field.name
-            yield from _differences(getattr(stated, field.name), getattr(follows, field.name), path)
-    elif isinstance(stated, tuple) and isinstance(follows, tuple) and len(stated) == len(follows):
-        for index, (one, other) in enumerate(zip(stated, follows, strict=True)):
-            yield from _differences(one, other, f"{place}[{index}]")
-    elif isinstance(stated, Mapping) and isinstance(follows, Mapping):
-        for key in {**follows, **stated}:
-            yield from _differences(stated.get(key), follows.get(key), f"{place}.{key}")
-    else:
-        yield place, stated, follows
 
 
 def _from_where_they_differ(stated: object, follows: object) -> tuple[object, object]:

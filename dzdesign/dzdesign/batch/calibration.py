@@ -130,7 +130,8 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     if task.plant:
         plant = folder / task.plant[0]
         plant.write_bytes(task.plant[1])
-    verification = verify(VerifyArguments(out / FIRMWARE, plant=plant, output=out / "evidence"))
+    arguments = VerifyArguments(out / FIRMWARE, ramps=recordings, plant=plant, output=out / "evidence")
+    verification = verify(arguments, identified=valve)
     if verification.holds:
         return OK, ""
     check = next(check for check in verification.evidence.all_checks if not check.holds)

@@ -181,7 +181,7 @@ def unknown_words(words: list[str], name: str, command: Parser) -> InputError:
     if not wrong.startswith("-"):
         return InputError(f"'{wrong}' is one word too many; see `{command.prog} --help`")
     hint = nearest(wrong, command._option_string_actions)
-    owners = (other for other in COMMANDS if any(wrong == each.flag for each in arguments_of_command(other)))
-    if owner := next(owners, None):
-        hint = f" (it is an option of `dzdesign {owner}`)"
+    owners = [other for other in COMMANDS if any(wrong == each.flag for each in arguments_of_command(other))]
+    if owners:
+        hint = f" (it is an option of `dzdesign {'`, `'.join(owners)}`)"
     return InputError(f"`dzdesign {name}` has no option {wrong}{hint}; see `{command.prog} --help`")

@@ -45,9 +45,10 @@ def run(arguments: Arguments, json: bool) -> int:
         verdicts = verify_statements()
     expected = sum(verdict.as_expected for verdict in verdicts)
     say(f"derivation: {expected} of {len(verdicts)} statements have the verdict expected of them")
+    ramps = sorted((example / "ramps").glob("*.csv.gz"))
     valve = identify(
         IdentifyArguments(
-            sorted((example / "ramps").glob("*.csv.gz")), meter_lag=METER_LAG, meter_floor=METER_FLOOR, record=RECORD,
+            ramps, meter_lag=METER_LAG, meter_floor=METER_FLOOR, record=RECORD,
             output=folder / "valve.json",
         )
     )  # fmt: skip
@@ -55,8 +56,9 @@ def run(arguments: Arguments, json: bool) -> int:
     compensator = design(DesignArguments(valve, output=folder / "compensator.json"))
     generate(GenerateArguments(compensator, output=folder / "firmware"))
     verification = verify(
-        VerifyArguments(folder / "firmware", plant=example / "plant.toml", output=folder / "evidence"),
+        VerifyArguments(folder / "firmware", ramps=ramps, plant=example / "plant.toml", output=folder / "evidence"),
         plant_source="plant.toml of the example",
+        identified=valve,
     )
     if json:
         print_json(verification.evidence)

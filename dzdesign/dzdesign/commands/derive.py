@@ -34,7 +34,7 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Re-derive the paper's equations; 1 if one of those printed is not found as a correct account finds it."""
     from dzdesign.derivation.account.account import STATEMENTS, verify_statements
-    from dzdesign.derivation.account.passages.transcription import find_transcription_faults
+    from dzdesign.derivation.account.passages.transcription import find_transcription_faults, find_value_faults
     from dzdesign.derivation.presentation.report import check_format, closure, render
 
     check_format(arguments.format)
@@ -47,7 +47,7 @@ def run(arguments: Arguments, json: bool) -> int:
     chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
     with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
-        misprints = find_transcription_faults(paper=_text_of(arguments.paper))
+        misprints = find_transcription_faults(paper=_text_of(arguments.paper)) + find_value_faults(STATEMENTS)
     text = render(verdicts, "json" if json else arguments.format, chosen, misprints)
     if arguments.output:
         write_file(Path(arguments.output), text)

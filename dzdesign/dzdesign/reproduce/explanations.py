@@ -8,26 +8,34 @@ from dzdesign.derivation.account.published import (
     ABOUT_LARGEST_L_MIN,
     DP0_MPA,
     DP1_MPA,
-    DROP_ASSUMED,
     DUTY_COMMAND_V,
+    DUTY_WITH_PERCENT,
     FIRST,
-    METER_ACCURACY_L_MIN,
+    LARGEST_CODE,
+    LOAD_DP_MPA,
     METER_FLOOR_L_MIN,
-    SATURATED_FROM_V,
     SIMULATION,
+    TEMPERATURE_CHANGE_PER_MILLE,
     U_MAX_V,
     PublishedValve,
 )
+from dzdesign.derivation.account.readings import DROP_ASSUMED, METER_ACCURACY_L_MIN
 from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.assumptions import OILS
 from dzdesign.reproduce.displacement_readings import DISPLACEMENT, half_digits_off
+from dzdesign.reproduce.offset_reading import offset_percent
 from dzdesign.reproduce.recovered_valves import Reading, at_rest, half_digit, printed_at
-from dzdesign.reproduce.rows import Reason
+from dzdesign.reproduce.rows import OF_THE_LOOP, ONE_RECORD_PERCENT, PRINTED_NONE_L_MIN, Reason
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, Drive, ValveRuns
+from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE
 
 DROP = f"taken {DROP_ASSUMED}"
-#: By how much the closed loop may differ from the plant at rest, as a share.
-OF_THE_LOOP = 0.01
+#: By how much the end of the product's transition may lie off the opening threshold: four codes of the command, in per
+#: cent of full command.
+OF_TRANSITION_PERCENT = 400 / int(LARGEST_CODE)
 LAW_AT_FULL_COMMAND = "Eq. (18) gives full command at full command, so the valve has the flow that it has without it"
+#: Where a flow that grows up to full command comes within 0.1 % of its largest, V.
+AT_THE_END_V = (0.99 * U_MAX_V, float(U_MAX_V))
 #: What the displacement's dead zone is a share of.
 READINGS: Mapping[Reading, str] = {
     "overlap": "read as a share of the largest displacement, the travel that opens nothing: T6e of `dzdesign derive`",
@@ -78,55 +86,64 @@ def _displacement_by_hand(quantity: str, reading: Reading, dp_MPa: float) -> flo
 
 
 def residual(runs: ValveRuns, dp_MPa: float, by: Driver) -> Reason:
-    """Say what the printed dead zone with compensator tells of the paper's offset, which it does not print."""
+    """Say which offset the printed dead zone with compensator asks for, and what ours leaves instead."""
     recovered, valve = runs.valve, runs.valve.published
-    printed = float(valve.residual_percent)
-    if by == PRODUCT and runs.dead_zone_percent(Drive(PRODUCT), dp_MPa) > printed:
+    if by == PRODUCT:
         return _residual_of_product(runs, dp_MPa)
-    if not recovered.level_L_min:
-        text = "the paper does not say how far below the threshold its offset stays, nor at what flow it reads"
-        return Reason(text, (0.0, printed))
-    u_min0, u_min1 = (float(text) / 100 for text in (valve.dead_zone0_percent, valve.dead_zone1_percent))
-    beta, seen = (1.0, u_min0) if dp_MPa == DP0_MPA else (u_min1 / u_min0, u_min1)
-    gain = 1 - beta * u_min0  # of Eq. (18) with k x_max = u_max - u_min0
+    printed = printed_at(valve, dp_MPa).dead_zone_percent
+    offset_V = float(printed) / 100 * U_MAX_V
+    asked = U_MAX_V / 100 * offset_percent(float(printed), float(valve.residual_percent))
     rest = at_rest(recovered.plant, dp_MPa)
-    hidden = float(rest.flow_per_volt) * (U_MAX_V * (seen - gain * printed / 100) - float(rest.opens_V))
-    what = (
-        f"its offset lets {hidden:.2f} L/min pass at zero command, below what its meter shows"
-        if hidden > 0
-        else "its offset stays below the threshold"
-    )
+    passes = float(rest.flow_per_volt) * (asked - float(rest.opens_V))
+    leaves = 100 * FLOW_SHARE if not recovered.level_L_min else 0.0
     text = (
-        f"the paper prints no offset, and one at the dead zone that it reads leaves none; read where the meter starts, "
-        f"{float(METER_FLOOR_L_MIN):g} L/min, {valve.residual_percent} % mean that {what}"
+        f"the offset is taken to be the dead zone that is printed, {offset_V:.2f} V at {dp_MPa:g} MPa, which leaves "
+        f"none; {valve.residual_percent} % ask for {asked:.2f} V"
+        + (f", which pass {passes:.2f} L/min at zero command" if passes > 0 else ", below where the valve opens")
+        + f": see \"dead zone with, offset of {valve.residual_percent} %\""
     )
-    return Reason(text, (0.0, printed))
+    # One digit of the printed dead zone, in the command before the compensator.
+    rounding = (half_digit(printed) + ONE_RECORD_PERCENT) / (1 - offset_V / U_MAX_V)
+    return Reason(text, (0.0, leaves + rounding))
 
 
 def _residual_of_product(runs: ValveRuns, dp_MPa: float) -> Reason:
-    """Say what the product's dead zone is made of where it is larger than what is printed."""
-    valve, band = runs.valve.published, runs.product_zero_band_percent
-    line = 100 * runs.valve.level_L_min / float(printed_at(valve, dp_MPa).flow)
-    opens0, opens1 = (float(at_rest(runs.valve.plant, each).opens_V) for each in (DP0_MPA, DP1_MPA))
-    fall = 100 * (opens0 - opens1) / (U_MAX_V - opens0)
+    """Say where the product's flow begins; with a meter, where a straight line from zero reaches what it shows."""
+    band, transition = runs.product_zero_band_percent, runs.product_transition_percent
+    if not runs.valve.level_L_min:
+        text = (
+            f"the product's zero band is {band:.2f} % and its transition to the opening threshold {transition:.2f} %: "
+            f"flow begins in it, and nothing passes at zero command"
+        )
+        return Reason(text, (band, band + transition + 100 * FLOW_SHARE))
+    level, largest = runs.valve.level_L_min, float(printed_at(runs.valve.published, dp_MPa).flow)
+    line = 100 * level / largest
+    more = level - float(runs.valve.published.residual_percent) / 100 * largest
     text = (
-        f"no flow is hidden at zero command: where the meter starts, a straight line from zero reads {line:.2f} %, "
-        f"the product's zero band adds {band:.2f} %, and its offset, which two tests allow at {DP0_MPA} MPa to be no "
-        f"higher than at {DP1_MPA}, up to {fall:.1f} %"
+        f"nothing passes at zero command: a straight line from there to {largest:g} L/min reads {line:.2f} % where the "
+        f"meter starts, the product to {OF_TRANSITION_PERCENT:.2f} % the same; on it the paper's valve has "
+        f"{abs(more):.2f} L/min {'more' if more > 0 else 'less'} there"
     )
-    return Reason(text, (0.0, line + band + fall))
+    return Reason(text, (line - OF_TRANSITION_PERCENT, line + OF_TRANSITION_PERCENT))
 
 
 def flow_with(runs: ValveRuns, dp_MPa: float) -> Reason:
-    """Say why the law can't make the largest flow larger."""
-    printed = printed_at(runs.valve.published, dp_MPa)
+    """Say why the law can't make the largest flow larger, and which pressure drop would."""
+    valve, printed = runs.valve.published, printed_at(runs.valve.published, dp_MPa)
     change, room = float(printed.flow_with) - float(printed.flow), float(METER_ACCURACY_L_MIN)
+    exponent = math.log(float(valve.flow1) / float(valve.flow0)) / math.log(DP1_MPA / DP0_MPA)
+    needed = dp_MPa * (float(printed.flow_with) / float(printed.flow)) ** (1 / exponent)
     text = (
         f"{LAW_AT_FULL_COMMAND}; the paper prints {change:.1f} L/min more, beyond its meter's accuracy of {room:g} "
-        "L/min: its recordings differ in more than the compensator"
+        f"L/min: as flows grow between its two pressure drops (T7a), {needed:.1f} MPa in place of {dp_MPa:g} would "
+        "pass that much"
     )
-    reach = room + half_digit(printed.flow)
-    return Reason(text, (float(printed.flow) - reach, float(printed.flow) + reach))
+    return Reason(text, _as_without(printed.flow))
+
+
+def _as_without(printed: str) -> tuple[float, float]:
+    """Return what the flow at full command must be, whoever gives it: the printed one without compensator."""
+    return float(printed) - half_digit(printed), float(printed) + half_digit(printed)
 
 
 def flow_with_stop(runs: ValveRuns) -> Reason:
@@ -149,12 +166,13 @@ def flow_with_stop(runs: ValveRuns) -> Reason:
 
 def about_largest() -> Reason:
     """Say that the paper has three numbers for one flow."""
-    reach = float(METER_ACCURACY_L_MIN) + half_digit(FIRST.flow1)
+    apart, room = float(ABOUT_LARGEST_L_MIN) - float(FIRST.flow1), float(METER_ACCURACY_L_MIN)
     text = (
         f"the paper prints {FIRST.flow1} L/min without and {FIRST.flow1_with} with compensator for the same valve and "
-        f"pressure drop, and about {ABOUT_LARGEST_L_MIN}; the fit follows the first"
+        f"pressure drop, and about {ABOUT_LARGEST_L_MIN}, {apart:.1f} apart where its meter is off by {room:g}; the "
+        "fit follows the first"
     )
-    return Reason(text, (float(FIRST.flow1) - reach, float(FIRST.flow1) + reach))
+    return Reason(text, _as_without(FIRST.flow1))
 
 
 def zero_without_beta(runs: ValveRuns, by: Driver) -> Reason:
@@ -170,9 +188,9 @@ def zero_without_beta(runs: ValveRuns, by: Driver) -> Reason:
     opens0, opens1 = (float(at_rest(runs.valve.plant, each).opens_V) for each in (DP0_MPA, DP1_MPA))
     text = (
         f"the product's offset is none of the paper's: two tests allow it no higher than {opens1:.2f} V, where the "
-        f"valve opens at {DP1_MPA} MPa, though at {DP0_MPA} MPa at {opens0:.2f} V; without beta less passes too"
+        f"valve opens at {DP1_MPA} MPa, though at {DP0_MPA} MPa at {opens0:.2f} V; so none passes without beta either"
     )
-    return Reason(text, (0.0, float(valve.zero_flow_without_beta)))
+    return Reason(text, (0.0, PRINTED_NONE_L_MIN))
 
 
 def _rounding_of_zero_flow(valve: PublishedValve) -> tuple[float, float]:
@@ -201,22 +219,27 @@ def no_stop_beside() -> Reason:
         f"MPa, the paper prints {printed:.2f} times; the fit follows the flows, with a flow force that keeps the spool "
         "off its stop there"
     )
-    return Reason(text, (float(SATURATED_FROM_V[1]), float(U_MAX_V)))
+    return Reason(text, AT_THE_END_V)
 
 
 def no_saturation_of_product() -> Reason:
     """Say why the product's curve isn't flat below full command."""
     text = "the product takes k x_max up to the stop, so that full command just meets it"
-    return Reason(text, (float(SATURATED_FROM_V[1]), float(U_MAX_V)))
+    return Reason(text, AT_THE_END_V)
 
 
-def temperature(published: str) -> Reason:
-    """Say what of the plant depends on the oil's temperature."""
+def temperature(runs: ValveRuns) -> Reason:
+    """Say what of the plant depends on the oil's temperature, and how much that moves what the meter shows."""
+    per_volt = float(at_rest(runs.valve.plant, LOAD_DP_MPA).flow_per_volt)
+    densities = [oil.density for oil in OILS]
+    roots = math.sqrt(max(densities)) - math.sqrt(min(densities))
+    moves = 1e3 * float(METER_FLOOR_L_MIN) / per_volt * roots / U_MAX_V
     text = (
         "in Eqs. (19)-(24) no threshold depends on the temperature, as Assumption 1 says: only the density moves the "
-        "command at which the meter starts; the paper gives neither the temperatures nor the oil"
+        f"command at which the meter starts, by {moves:.2f} of 1000 over the assumed oils; "
+        f"{TEMPERATURE_CHANGE_PER_MILLE} of 1000 would be {float(TEMPERATURE_CHANGE_PER_MILLE) * U_MAX_V:g} mV"
     )
-    return Reason(text, (0.0, float(published)))
+    return Reason(text, (0.0, moves + 10 * ONE_RECORD_PERCENT))
 
 
 def duty(runs: ValveRuns, by: Driver) -> Reason:
@@ -225,10 +248,12 @@ def duty(runs: ValveRuns, by: Driver) -> Reason:
     seen, half = float(valve.dead_zone0_percent), half_digit(valve.dead_zone0_percent)
     opens1 = 100 / U_MAX_V * float(at_rest(runs.valve.plant, DP1_MPA).opens_V)
     low, high = (100 * share + (1 - share) * offset for offset in (opens1, seen + half))  # Eq. (14) by hand
+    asked = (float(DUTY_WITH_PERCENT) / 100 - share) / (1 - share) * U_MAX_V
     if by == PRODUCT:
         text = (
-            "the product's offset lies below the command of the first flow seen, which is the paper's: between the "
-            "commands at which the valve opens"
+            f"the product's offset is where the valve opens, at {opens1 * U_MAX_V / 100:.2f} V or above, the paper's "
+            f"{seen * U_MAX_V / 100:g} V where its meter shows the first flow: by Eq. (14) {low:.1f} to {high:.1f} %; "
+            f"{DUTY_WITH_PERCENT} % ask for {asked:.2f} V"
         )
         return Reason(text, (low, high))
     text = f"{DUTY_OF_ONE}; of an offset of {seen:g} % Eq. (14) makes {high - (1 - share) * half:.1f} %"

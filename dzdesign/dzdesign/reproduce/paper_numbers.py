@@ -6,15 +6,16 @@ from functools import partial
 from dzdesign.derivation.account.published import (
     ABOUT_LARGEST_L_MIN,
     DP0_MPA,
-    METER_ACCURACY_L_MIN,
     SATURATED_FROM_V,
     SECOND,
     U_MAX_V,
 )
+from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
 from dzdesign.report.reproduction import Driver, PaperNumber
 from dzdesign.reproduce import explanations
 from dzdesign.reproduce.displacement_readings import DISPLACEMENT, DISPLACEMENT_DEAD_ZONE
 from dzdesign.reproduce.first_valve_numbers import duty_cycles, of_section_4_3, of_the_pulse
+from dzdesign.reproduce.offset_reading import of_the_offset
 from dzdesign.reproduce.recovered_valves import (
     OF_READING,
     at_rest,
@@ -62,6 +63,7 @@ def numbers_of_valve(subject: Subject) -> Iterator[PaperNumber]:
         yield _flow_with(subject, dp_MPa)
     if subject.runs.valve.published.zero_flow_without_beta:
         yield from _zero_command(subject)
+    yield from of_the_offset(subject)
 
 
 def _read_at(subject: Subject) -> str:
@@ -174,7 +176,7 @@ def _no_saturation(subject: Subject) -> PaperNumber:
     return row(
         subject, PRESSURES_MPA[0], "largest flow with: reached at", "V", "no saturation", "in words",
         lambda runs, by: runs.flat_from_V(Drive(by), PRESSURES_MPA[0]), subject.compensators,
-        why=explanations.NO_SATURATION,
+        allowed=explanations.AT_THE_END_V, why=explanations.NO_SATURATION,
     )  # fmt: skip
 
 

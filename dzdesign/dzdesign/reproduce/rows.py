@@ -1,19 +1,24 @@
 """A row of the paper's numbers: a printed one beside ours, the range that its digits give, and why ours misses it."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from dzdesign.derivation.account.published import METER_ACCURACY_L_MIN, U_MAX_V
+from dzdesign.derivation.account.published import U_MAX_V
+from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
 from dzdesign.report.reproduction import Driver, Kind, Outcome, PaperNumber
 from dzdesign.reproduce.load_and_oil import LoadAndOil
-from dzdesign.reproduce.recovered_valves import half_digit
+from dzdesign.reproduce.recovered_valves import RecoveredValve, at_rest, half_digit
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, PRODUCT, Drive, ValveRuns
 from dzdesign.verify.closed_loop.loop import RECORD_S
 
 #: Decimals in reproduction.json: more than the paper prints, fewer than a compiler's last bits reach.
 DIGITS = 4
 Range = tuple[float, float]
+#: By how much the closed loop may differ from the plant at rest, as a share.
+OF_THE_LOOP = 0.01
+#: Full command in the unit of a command.
+PER_FULL: Mapping[str, float] = {"%": 100.0, "V": float(U_MAX_V), "1/1000": 1000.0, "1": 1.0}
 #: A command is read between two records of a ramp, as in the paper (section 4.1), per cent of full command.
 ONE_RECORD_PERCENT = RECORD_S
 #: A flow that prints as none, L/min.
@@ -93,7 +98,11 @@ def row(
             value = read(runs, by)
             value = None if value is None else round(value, DIGITS)
             hysteresis_V = runs.valve.plant.hysteresis_V
-            text, reach = _reason(value, limits, (reasons or {}).get(by), hysteresis_V > 0)
+            reason = (reasons or {}).get(by)
+            if hysteresis_V:  # beside what it does, the number is that without it, whatever is said of that
+                plain = next(one for one in outcomes if one.by == by)
+                reason = _of_hysteresis(runs.valve, dp_MPa, unit, plain)
+            text, reach = _reason(value, limits, reason)
             outcomes.append(
                 Outcome(
                     by=by, hysteresis_V=hysteresis_V, value=value, allowed=limits, reason=text, explained=reach,
@@ -106,16 +115,25 @@ def row(
     )  # fmt: skip
 
 
-def _reason(
-    value: float | None, allowed: Range | None, reason: Reason | None, hysteresis: bool
-) -> tuple[str, Range | None]:
-    """Return why a value misses, and how far that reaches; of a hysteresis that is assumed nothing is required."""
-    if value is None or allowed is None or allowed[0] <= value <= allowed[1]:
+def _reason(value: float | None, allowed: Range | None, reason: Reason | None) -> tuple[str, Range | None]:
+    """Return why a value misses, and how far that reaches; nothing if it agrees."""
+    if value is None or allowed is None or reason is None or allowed[0] <= value <= allowed[1]:
         return "", None
-    reach = None if reason is None else (round(reason.reach[0], DIGITS), round(reason.reach[1], DIGITS))
-    if reason and reach and (not hysteresis or reach[0] <= value <= reach[1]):
-        return reason.text, reach
-    return (HYSTERESIS, None) if hysteresis else ("", None)
+    return reason.text, (round(reason.reach[0], DIGITS), round(reason.reach[1], DIGITS))
+
+
+def _of_hysteresis(valve: RecoveredValve, dp_MPa: float | None, unit: str, plain: Outcome) -> Reason | None:
+    """Return what an assumed hysteresis may do: hold a flow, or a command, that so many volts are."""
+    if plain.value is None or dp_MPa is None:
+        return None
+    volts = valve.plant.hysteresis_V * (1 + OF_THE_LOOP)
+    rest = at_rest(replace(valve.plant, hysteresis_V=0.0), dp_MPa)
+    opened_V = U_MAX_V - float(rest.opens_V)
+    # Before the compensator a command is worth less, by its gain.
+    moves = volts * float(rest.flow_per_volt) if unit == "L/min" else PER_FULL[unit] * volts / opened_V
+    outside = plain.allowed is not None and plain.agrees is False
+    text = plain.reason if outside and plain.reason else HYSTERESIS
+    return Reason(text, (min(plain.value, max(0.0, plain.value - moves)), plain.value + moves))
 
 
 def around(published: str, room: float = 0.0) -> Range:

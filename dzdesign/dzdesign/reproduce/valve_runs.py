@@ -46,6 +46,15 @@ class ValveRuns:
     product_duty_percent: float | None = None
     #: Commands about zero that the product takes for zero, per cent of full.
     product_zero_band_percent: float = 0.0
+    #: Commands behind these in which the product goes from the closing offset to the opening threshold.
+    product_transition_percent: float = 0.0
+
+    @property
+    def direct_duty_percent(self) -> float:
+        """Duty cycle of the loop's PWM at the command of Fig. 12, with nobody between, per cent."""
+        run = self.ramps[Drive(DIRECT), PRESSURES_MPA[0]]
+        at = int(np.argmax(run.command >= DUTY_COMMAND_V / U_MAX_V))
+        return 100 * float(run.compare[at] / run.compare.max())
 
     def dead_zone_percent(self, drive: Drive, dp_MPa: float, level_L_min: float | None = None) -> float:
         """Return the command, per cent of full, at which rising flow passes a level: of the paper unless given."""
@@ -114,15 +123,16 @@ def run_valve(valve: RecoveredValve, loop: ClosedLoop, compensator: Compensator 
             ramps[Drive(PAPER, with_beta), dp_MPa] = replace(driven, command=command)
             if compensator:
                 ramps[Drive(PRODUCT, with_beta), dp_MPa] = _run_product(loop, command, dp_MPa, with_beta)
-    duty, band = None, 0.0
+    duty, band, transition = None, 0.0, 0.0
     if compensator:
         held = np.concatenate([resting(loop), np.full(2, DUTY_COMMAND_V / U_MAX_V)])
         at_duty = _run_product(loop, held, PRESSURES_MPA[0], with_beta=True)
         duty = 100 * float(at_duty.compare[-1]) / compensator.signals.compare_max
-        band = 100 * compensator.zero_band_codes / compensator.signals.command.span(1)
+        span = compensator.signals.command.span(1)
+        band, transition = (100 * codes / span for codes in (compensator.zero_band_codes, compensator.transition_codes))
     return ValveRuns(
         valve=valve, ramps=ramps, steps=_steps(valve, loop, compensator is not None), product_duty_percent=duty,
-        product_zero_band_percent=band,
+        product_zero_band_percent=band, product_transition_percent=transition,
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
+    from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.evidence import MutationScore
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
@@ -56,8 +57,12 @@ class VerifyArguments:
     """Also prove by Frama-C that nothing overflows a 16-bit int."""
 
 
-def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification":
+def verify(
+    arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
+) -> "Verification":
     """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
+
+    What this very run has `identified` from the given ramps is not identified again.
 
     Raises
     ------
@@ -83,6 +88,7 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
         plant_source = plant_source or Path(arguments.plant).name  # how the evidence calls the plant
     tolerances = read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None
     backs_MPa = _back_pressures_MPa(texts_of(arguments.back_pressure))
+    include = [Path(place) for place in paths_of(arguments.include)]
     recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
     with _firmware_folder(arguments.firmware) as folder:
         ware = arguments.c2000ware
@@ -90,13 +96,13 @@ def verify(arguments: VerifyArguments, plant_source: str = "") -> "Verification"
         with stage_progress() as stage:
             verification = verify_folder(
                 folder, plant, plant_source, digest, tolerances=tolerances, backs_MPa=backs_MPa,
-                include=[Path(place) for place in paths_of(arguments.include)], say=stage, watch=stage.each,
+                include=include, say=stage, watch=stage.each,
             )  # fmt: skip
         if recordings:
-            with stage_progress("identifying again"):
-                added.append(identified_again(read_compensator(folder), recordings))
+            with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
+                added.append(identified_again(read_compensator(folder), recordings, identified))
         more, mutants = _further_checks(arguments, folder, verification)
-        verification = verification.with_checks(regenerated(folder), *added, *more)
+        verification = verification.with_checks(regenerated(folder, include), *added, *more)
         if mutants:
             verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
         if arguments.output is not None:

@@ -48,9 +48,9 @@ def _table(title: str, budget: "Budget", units: "RecordedUnits") -> Table:
     from dzdesign.report.sections.budget import shown_places
 
     millivolts, places = units.label("mV"), shown_places(len(budget.dp_MPa))
-    at = [f"{units.text(budget.dp_MPa[place], '.3g MPa')} ({millivolts})" for place in places]
-    headers = ("component", "origin", "half-width", f"largest sensitivity ({millivolts} per unit)", *at, "price")
-    table = Table(title, *headers, words=(0, 1))
+    at = [units.text(budget.dp_MPa[place], ".3g MPa") for place in places]
+    headers = ("component", "origin", "half-width", "largest sensitivity (per unit)", *at, "price")
+    table = Table(f"{title}, {millivolts}", *headers, words=(0, 1))
     for line in budget.lines:
         table.add_row(
             line.component,

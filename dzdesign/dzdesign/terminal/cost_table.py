@@ -26,10 +26,13 @@ def print_costs_at_tests(compensator: "Compensator", console: "Console | None" =
         read_at = units.text(compensator.reading_flow_L_min, ".2f L/min")
         title = f"Dead zone that remains, of command: at the onset (knee) and read at {read_at}"
         title += "" if compensator.negative is None else f", {side} side"
-        put_rows(console, title, costs, _columns(units, transition=compensator.transition_codes > 0))
+        columns = _columns(units, transition=compensator.transition_codes > 0, machine=compensator.machine is not None)
+        put_rows(console, title, costs, columns)
 
 
-def _columns(units: "RecordedUnits", *, transition: bool) -> "dict[str, Callable[[CostAtTest], str]]":
+def _columns(
+    units: "RecordedUnits", *, transition: bool, machine: bool
+) -> "dict[str, Callable[[CostAtTest], str]]":
     def share(value: float | None) -> str:
         return "-" if value is None else f"{value:.2%}"
 
@@ -44,10 +47,15 @@ def _columns(units: "RecordedUnits", *, transition: bool) -> "dict[str, Callable
         f"offset ({units.label('V')})": lambda each: units.number(each.offset_V, ".3f V"),
         "onset: opening": lambda each: onset(each, "opening"),
         "onset: closing": lambda each: onset(each, "closing"),
+        "opening at the machine's other end": lambda each: (
+            "never" if each.last_opening is not None and each.last_opening > 1 else share(each.last_opening)
+        ),
         "read: opening": lambda each: share(each.read.get("opening")),
         "read: closing": lambda each: share(each.read.get("closing")),
         "ideal line": lambda each: share(each.ideal),
     }
+    if not machine:
+        del columns["opening at the machine's other end"]
     if transition:
         columns[f"flow on closing at transition's end ({units.label('L/min')})"] = lambda each: (
             "-" if each.at_end_L_min is None else units.number(each.at_end_L_min, ".2f L/min")

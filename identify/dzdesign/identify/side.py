@@ -18,6 +18,7 @@ from dzdesign.identify.fitting.identifying import identify_curve
 from dzdesign.identify.fitting.low_flow import unseen_of_curve, with_low_flow
 from dzdesign.identify.fitting.opening import opening_curve
 from dzdesign.identify.fitting.threshold import Threshold
+from dzdesign.identify.fitting.unknown_threshold import unknown_threshold
 from dzdesign.identify.fitting.zero_flow import allowed_at_zero
 from dzdesign.identify.knees.between_ramps import FEW_DEGREES, BetweenRamps
 from dzdesign.identify.knees.curve_thinning import recorded_curve
@@ -88,7 +89,12 @@ def _certify(
     )
     between, threshold = group.between(guarding.column), next(iter(guarding.thresholds.values())).ordered
     _refuse_unlike_repeats(between, threshold)
-    return certify_thresholds(guarding.thresholds, tested)
+    try:
+        return certify_thresholds(guarding.thresholds, tested)
+    except InputError as error:
+        if why := unknown_threshold(group, guarding):
+            raise InputError(why) from error
+        raise
 
 
 def _reference(described: tuple[DescribedTest, ...], dp0: float | None) -> int:
@@ -150,7 +156,7 @@ def _side_model(
             confidence=options.confidence,
             guard=guard,
             level_L_min=level,
-            unseen_below_L_min=unseen_of_curve(low_flow, guard, curves[guard], level)[0],
+            unseen_below_L_min=unseen_of_curve(low_flow, guard, curves[guard], level).below_L_min,
             zero_flow_L_min=None if options.zero_flow is None else options.zero_flow / L_MIN,
             repeatability=_repeatability(group.between(guarding.column)),
         ),

@@ -14,7 +14,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.redesign_check import prove_derived
-from dzdesign.report.artefact_folder import VERIFICATION_NAME, is_of, listed_files
+from dzdesign.report.artefact_folder import VERIFICATION_NAME, is_document, is_of, listed_files
 from dzdesign.report.chain import KINDS, Chain, Place
 
 
@@ -130,20 +130,45 @@ class _Search:
             self._name_other(role, stated, which)
 
     def _firmware_files(self, firmware: FirmwareManifest, place: str) -> None:
-        """Name the files of the firmware that are not those generated; a board file is its user's to change."""
+        """Name the files of the firmware that are not those generated, or not those verified.
+
+        A board file is its user's to change, but evidence is of the one that was there when it was made.
+        """
+        evidence = self.found.get("evidence")
+        verified = evidence.differing_files if evidence else {}
+        if evidence and evidence.target != firmware.target:
+            self.faults.append(f"the evidence is for {evidence.target}, the firmware it names for {firmware.target}")
         for leaf, stated in firmware.files.items():
             digest = self.hashes.get(place + leaf)
-            if digest == stated:
-                continue
-            if leaf in firmware.board:
-                self.missing.append(f"{place}{leaf}: yours, and no longer as generated: nothing here is about it")
-            elif digest is None:
+            if leaf not in firmware.board and digest is None:
                 self.faults.append(f"{place}{leaf} is gone; the firmware's manifest lists it")
-            else:
+            elif leaf not in firmware.board and digest != stated:
                 self.faults.append(
                     f"{place}{leaf} was changed since it was generated: its SHA-256 is {digest}, the manifest says "
                     f"{stated}. What is reported here is of the firmware as generated"
                 )
+            elif evidence and digest != verified.get(leaf, stated):
+                self._unlike_verified(place + leaf, verified.get(leaf, stated))
+            elif digest != stated and not evidence:
+                self.missing.append(f"{place}{leaf}: yours, and no longer as generated: nothing here is about it")
+        if evidence is None:
+            return
+        names = {name.removeprefix(place) for name in self.files if name.startswith(place)}
+        added = {name for name in names if not is_document(name)} - firmware.files.keys()
+        for leaf in sorted(added | verified.keys() - firmware.files.keys()):
+            if self.hashes.get(place + leaf) != verified.get(leaf):
+                self._unlike_verified(place + leaf, verified.get(leaf))
+
+    def _unlike_verified(self, name: str, verified: str | None) -> None:
+        """Name a file of the firmware that another one, or none, was when the evidence was made."""
+        digest = self.hashes.get(name)
+        if verified is None:
+            found = f"{name} was added since `dzdesign verify`"
+        elif digest is None:
+            found = f"{name} is gone since `dzdesign verify`"
+        else:
+            found = f"{name} was changed since `dzdesign verify` (SHA-256 {digest}, verified was {verified})"
+        self.faults.append(f"this folder is not what was verified: {found}; run `dzdesign verify` on it again")
 
     def _valve(self, compensator: Compensator) -> None:
         """Take the valve's file; where it is not here, the valve that the compensator holds."""

@@ -4,11 +4,14 @@ import contextlib
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, parse_document, sha256_of
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.report.lot.valve_folder import ValveManifest
 from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.firmware.build_inputs import BUILD_FILES
+from dzdesign.verify.firmware.unchanged_files import added_files
 
 VERIFICATION_NAME = Evidence.FILE_NAME
 #: No larger file is read, and no more of them in a folder: an artefact is far smaller.
@@ -86,7 +89,7 @@ def _is_one_stage(folder: Path) -> bool:
 
 
 def _files_in(place: Path, root: Path) -> dict[str, bytes]:
-    """Return JSON of this tool, the evidence's CSV and what a manifest lists, by name below `root`."""
+    """Return JSON of this tool, the evidence's CSV, what a manifest lists and a build reads, by name below `root`."""
     evidence = (place / VERIFICATION_NAME).is_file()
     suffixes = (".json", ".csv") if evidence else (".json",)
     paths = [path for path in sorted(place.iterdir()) if path.suffix in suffixes]
@@ -96,13 +99,29 @@ def _files_in(place: Path, root: Path) -> dict[str, bytes]:
             content = path.read_bytes()
             if path.suffix == ".csv" or b'"dzdesign.' in content[:HEAD]:
                 files[path.relative_to(root).as_posix()] = content
-    listed = listed_files(files.get((place / MANIFEST_NAME).relative_to(root).as_posix()))
-    for name in list(listed)[:MOST]:
+    manifest = files.get((place / MANIFEST_NAME).relative_to(root).as_posix())
+    added = _added_in(place, manifest)  # all of them: evidence states the hash of each
+    for name in [*list(listed_files(manifest))[:MOST], *added]:
         path = place / name
         inside = path.resolve().is_relative_to(place)  # a name in a manifest is somebody's text
-        if inside and path.is_file() and path.stat().st_size <= LARGEST:
+        if inside and path.is_file() and (name in added or path.stat().st_size <= LARGEST):
             files[path.relative_to(root).as_posix()] = path.read_bytes()
     return files
+
+
+def _added_in(place: Path, manifest: bytes | None) -> list[str]:
+    """Return the files of a firmware that a build may read and its manifest does not list."""
+    if manifest is None or not is_of(manifest, schema_of(FirmwareManifest)):
+        return []
+    try:
+        return added_files(place, read_artefact(manifest, FirmwareManifest, MANIFEST_NAME))
+    except InputError:
+        return []
+
+
+def is_document(leaf: str) -> bool:
+    """Tell whether a file that no manifest lists was read as an artefact or a table, and not as what a build reads."""
+    return "/" not in leaf and leaf.endswith((".json", ".csv")) and leaf.lower() not in BUILD_FILES
 
 
 def is_of(content: bytes, schema: str) -> bool:

@@ -77,15 +77,21 @@ class PaperNumber:
     ] = field(init=False)
     holds: Annotated[
         bool | None,
-        Meta(description="Whether each agrees, or misses for a reason that reaches so far; null: as in `agrees`."),
+        Meta(
+            description="Whether each agrees, or misses for a reason that reaches so far; false too where what is "
+            "given or said in words is contradicted; null: as in `agrees`."
+        ),
     ] = field(init=False)
 
     def __post_init__(self) -> None:
-        compared = [one for one in self.outcomes if one.agrees is not None and not one.hysteresis_V]
-        if self.kind in ("given", "in words"):
-            compared = []
-        agrees = all(one.agrees for one in compared) if compared else None
-        object.__setattr__(self, "agrees", agrees)
+        compared = [one for one in self.outcomes if one.agrees is not None]
+        if self.kind in ("given", "in words"):  # these can't agree, but may contradict
+            compared = [one for one in compared if not one.agrees and not one.hysteresis_V]
+            object.__setattr__(self, "agrees", None)
+            object.__setattr__(self, "holds", False if compared else None)
+            return
+        plain = [one for one in compared if not one.hysteresis_V]
+        object.__setattr__(self, "agrees", all(one.agrees for one in plain) if plain else None)
         object.__setattr__(self, "holds", all(one.accounted for one in compared) if compared else None)
 
 

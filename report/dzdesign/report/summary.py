@@ -53,9 +53,10 @@ def _verdict(chain: Chain) -> Headline:
         text = "THE EVIDENCE CONTRADICTS ITSELF: what it says to hold does not follow from its figures"
         return Headline(kind="bad", text=text, reasons=reasons)
     judged = _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
-    if judged.kind == "good" and evidence.reservation:
-        return replace(judged, text=f"{judged.text}; {evidence.reservation}")
-    return judged
+    if judged.kind != "good":
+        return judged
+    absent = "" if chain.firmware else "the firmware that was verified is not here"
+    return replace(judged, text="; ".join(filter(None, [judged.text, evidence.reservation, absent])))
 
 
 def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headline:

@@ -7,22 +7,24 @@ import sympy
 
 from dzdesign.derivation import symbols as s
 from dzdesign.derivation.account import proof
-from dzdesign.derivation.account.account import STATEMENTS, verify_statements
-from dzdesign.derivation.account.proof import judge, overrule, prove
+from dzdesign.derivation.account.proof import judge, overrule
+from dzdesign.derivation.account.referee.drawn import drawn_plants, drawn_valves
 from dzdesign.derivation.account.referee.referee import hear
 from dzdesign.derivation.account.scope import (
     AT_ZERO_COMMAND,
+    FIXED_OPENING,
     FREE_BETA,
     LAW_AT_REFERENCE,
     LAW_OFF_REFERENCE,
     PLANT,
     TARGET_OFF_REFERENCE,
     scope,
+    under_law,
 )
-from dzdesign.derivation.account.statement import Ground, Kind, Outcome
+from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome
+from tests.support.account_claims import BY_NUMBER
 
 ONE, ZERO = sympy.S.One, sympy.S.Zero
-BY_NUMBER = {statement.number: statement for statement in STATEMENTS}
 
 
 def theorem(symbol, member, *grounds, **more):
@@ -153,29 +155,63 @@ FALSE = {
         theorem(s.beta, ONE, "(5)", "constant threshold", eliminate=(s.u_min1,)),
         "its ground constant threshold does not hold in its scope",
     ),
+    # Scopes that admitted nothing but zero, full command, or dP1, of all the situations that there were.
+    "the paper's law meets the target at small commands": (
+        replace(BY_NUMBER["T1d"], number="false", scope=scope(
+            under_law("paper"), FIXED_OPENING, sympy.Eq(s.dP, s.dP1), s.dP0 < s.dP1, s.u_i < s.u_min / 50)),
+        "does not hold in its scope",
+    ),
+    "full drive from nine tenths on": (
+        theorem(s.u_O, s.u_min0 + s.k * s.x_max, at("(14)", (s.u_i, s.u_max)),
+                scope=LAW_AT_REFERENCE & scope(9 * s.u_max < 10 * s.u_i)),
+        "does not hold in its scope",
+    ),
+    "beta of dP1 at every pressure drop up to twice that": (
+        replace(BY_NUMBER["(18)"], number="false", kind=Kind.THEOREM,
+                scope=scope(under_law("paper"), s.dP0 < s.dP, s.dP < 2 * s.dP1, s.dP0 < s.dP1)),
+        "does not hold in its scope",
+    ),
+    "the same, where zero only was tried": (
+        replace(BY_NUMBER["T1d"], number="false", scope=scope(
+            under_law("paper"), FIXED_OPENING, sympy.Eq(s.dP, s.dP1), s.dP0 < s.dP1, 10**9 * s.u_i < s.u_min)),
+        "leaves only special values of u_i",
+    ),
+    # The dead zone that is left was that of the paper's law, whoever drove.
+    "the law `target` leaves what the paper's leaves": (
+        theorem(s.u_dz, s.u_max * (s.u_min - s.u_min0) / (s.k * s.x_max),
+                at("(14)", (s.u_O, s.u_min), (s.u_i, s.u_dz)), scope=scope(under_law("target"), s.dP <= s.dP0)),
+        "does not hold in its scope",
+    ),
+    "beta is 2, if one threshold is twice the other": (
+        theorem(s.beta, 2 * ONE, "(5)", expected=Outcome.FOLLOWS_IF,
+                condition=Condition(any_of=((sympy.Eq(s.u_min1, 2 * s.u_min0),),),
+                                    discrepancy=s.u_min1 / s.u_min0 - 2)),
+        "no valve in its scope meets its condition",
+    ),
+    "by grounds that no number can try": (
+        theorem(s.K_1, s.K_0 * s.Q_max1 / s.Q_max0,
+                at("(2)", (s.K_e, s.K_1), (s.Q_max, s.Q_max1), (s.u_max, s.t)),
+                at("(2)", (s.K_e, s.K_0), (s.Q_max, s.Q_max0), (s.u_max, s.t)), eliminate=(s.t,)),
+        "no situation of its scope has numbers for its ground",
+    ),
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def account():
-    return {verdict.number: verdict for verdict in verify_statements()}
-
-
 @pytest.mark.parametrize("name", FALSE)
-def test_a_false_theorem_does_not_follow(name, account, monkeypatch):
+def test_a_false_theorem_does_not_follow(name, verdicts, monkeypatch):
     claim, named = FALSE[name]
     statements = {**BY_NUMBER, "false": claim}
-    judged = judge(claim, statements, account)
+    judged = judge(claim, statements, verdicts)
     verdict = overrule(judged, hear(judged, statements)) if judged.as_expected else judged
     assert not verdict.holds
     assert not verdict.as_expected
     assert named in verdict.words
     # By algebra alone it follows: that is what makes it a trap.
     monkeypatch.setattr(proof, "find_renaming_fault", lambda *_: "")
-    assert judge(claim, statements, account).as_expected
+    assert judge(claim, statements, verdicts).as_expected
 
 
-def test_the_three_false_theorems_fall_one_after_another():
+def test_the_three_false_theorems_fall_one_after_another(verdicts):
     """K_1 = K_0, then dP1 = dP0, then beta = 1 always, each from the one before."""
     gains = replace(FALSE["K_1 is K_0"][0], number="K")
     drops = replace(
@@ -184,11 +220,31 @@ def test_the_three_false_theorems_fall_one_after_another():
         eliminate=(s.K_1, s.K_0, s.gamma_0, s.gamma_1),
     )
     always = theorem(s.beta, ONE, "beta(dP)", "D", eliminate=(s.dP1,))
-    *_, first, second, third = prove([*STATEMENTS, gains, drops, always], hear)
-    assert [one.holds or one.as_expected for one in (first, second, third)] == [False] * 3
-    assert "(2) is taken at dP1, but not its Q_max" in first.words
+    book, judged = dict(BY_NUMBER), dict(verdicts)
+    for one in (gains, drops, always):
+        verdict = judge(one, book, judged)
+        verdict = overrule(verdict, hear(verdict, book)) if verdict.as_expected else verdict
+        book[one.number], judged[one.number] = one, verdict
+        assert not verdict.holds and not verdict.as_expected
+    assert "(2) is taken at dP1, but not its Q_max" in judged["K"].words
     # The numbers speak for themselves: not only because the one before fell.
-    for one in (second, third):
+    for one in (judged["D"], judged["false"]):
         believed = replace(one, outcome=Outcome.FOLLOWS, objection="")
-        book = {**BY_NUMBER, "K": gains, "D": drops, "false": always}
         assert "does not hold in its scope" in hear(believed, book)
+
+
+def test_a_scope_has_no_alternatives():
+    """Of two, one could leave general values and the other those that matter."""
+    with pytest.raises(ValueError, match="single comparisons"):
+        scope(sympy.Or(sympy.Eq(s.dP, s.dP1), 10**9 * s.u_i < s.u_min))
+
+
+def test_the_referee_draws_numbers_that_no_statement_was_fitted_to():
+    """No two constants of the drawn valves and plants are equal, and no command or drop of a valve is another's."""
+    numbers = [
+        value
+        for drawn in (*drawn_valves(), *(plant for plant, _ in drawn_plants()))
+        for name in drawn.__slots__
+        if isinstance(value := getattr(drawn, name), float) and value not in (0.0, 1.0)
+    ]
+    assert len(numbers) > 150 and len(set(numbers)) == len(numbers)

@@ -1,9 +1,11 @@
 """Every number of the paper is the one that stands in its passage; a wrong one fails without the paper."""
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import sympy
 
 from dzdesign.commands import derive
 from dzdesign.derivation.account import published
@@ -14,9 +16,10 @@ from dzdesign.derivation.account.passages.transcription import (
     Passage,
     digest_of,
     find_transcription_faults,
+    find_value_faults,
     passages_of,
 )
-from dzdesign.derivation.account.published import transcribed
+from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION, transcribed
 from tests.support.synthetic import SHARED
 
 #: The paper's text, for who has it.
@@ -41,9 +44,53 @@ def test_a_wrong_transcription_fails(name):
 
 
 def test_a_number_more_or_less_is_seen():
-    fewer = {name: number for name, number in transcribed().items() if name != "dP1"}
-    assert find_transcription_faults(fewer)[0].startswith("dP1: the passage has a digest")
+    fewer = {name: number for name, number in transcribed().items() if name != "DP1_MPA"}
+    assert find_transcription_faults(fewer)[0].startswith("DP1_MPA: the passage has a digest")
     assert find_transcription_faults({**transcribed(), "new": "7"})[0].startswith("new: 7 is transcribed")
+
+
+@pytest.mark.parametrize("value", ["7.5", 7, sympy.Rational("7.5"), ("1", "2"), "7.5 MPa", replace(FIRST, name="x")])
+def test_a_new_constant_needs_a_passage(value, monkeypatch):
+    """Seeded once: five constants were added, and no list knew of them."""
+    monkeypatch.setattr(published, "NEW_MPA", value, raising=False)
+    faults = find_transcription_faults()
+    assert faults and all("but its passage has no digest" in fault for fault in faults)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("METER_FLOOR_L_MIN", sympy.Rational("0.604")),  # once read to two digits
+        ("LOAD_COMMANDS_V", ("1.5", "3.6")),
+        ("DP0_MPA", 2),
+        ("VALVES", (replace(SIMULATION, stroke_falls_mm="-0.1"), FIRST, SECOND)),  # once read without its sign
+        ("VALVES", (replace(SIMULATION, flow0="15.0"), FIRST, SECOND)),
+    ],
+)
+def test_a_constant_that_was_changed_is_seen(name, value, monkeypatch):
+    monkeypatch.setattr(published, name, value)
+    if name == "VALVES":
+        monkeypatch.setattr(published, "SIMULATION", value[0])
+    (fault,) = find_transcription_faults()
+    assert "is not the number that stands in its passage" in fault
+
+
+def test_what_is_printed_as_a_change_is_taken_from_the_reference():
+    """Section 2.2: the displacement decreased, its dead zone increased."""
+    assert (SIMULATION.stroke1_mm, SIMULATION.displacement_dead_zone1_percent) == ("1.7", "55")
+    assert (FIRST.stroke1_mm, FIRST.displacement_dead_zone1_percent) == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [({"published": "1.12"}, "the paper has no such number"), ({"remark": ""}, "no remark says why")],
+)
+def test_a_number_beside_a_statement_is_printed_and_explained(changes, named):
+    assert find_value_faults(STATEMENTS) == []
+    first = next(statement for statement in STATEMENTS if statement.number == "T3b")
+    values = tuple(replace(one, **changes) if one.label == "first valve" else one for one in first.values)
+    (fault,) = find_value_faults([replace(first, values=values)])
+    assert fault.startswith("T3b, first valve: ") and named in fault
 
 
 def test_numbers_are_looked_up_in_a_text():

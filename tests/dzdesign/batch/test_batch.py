@@ -33,6 +33,7 @@ from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.lot.valve_folder import read_manifest
 from dzdesign.stages.identify import IdentifyChoices
+from dzdesign.verify.requirements import RAMPS
 from tests.support.crashing_work import die_over_bad
 from tests.support.synthetic import needs_compiler
 
@@ -375,6 +376,8 @@ def test_a_firmware_that_does_not_hold_is_no_calibrated_valve(lot, tmp_path, cap
     assert row["status"] == "does not hold" and row["reason"]
     evidence = json.loads((tmp_path / "out/valves/V0000/evidence/verification.json").read_text())
     assert evidence["holds"] is False
+    (again,) = [check for check in evidence["checks"] if check["id"] == RAMPS.id]
+    assert again["holds"] is True and "in this run" in again["text"]
 
 
 def test_patterns_that_overlap_are_named_with_what_to_do(lot, tmp_path, capsys):

@@ -5,6 +5,7 @@ import json
 import re
 from dataclasses import replace
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.derivation.account.published import RAMP_S, VALVES
+from dzdesign.derivation.account.published import RAMP_S, SIMULATION, VALVES
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.plots.frame import plot_style, saved
@@ -34,13 +35,22 @@ from tests.support.synthetic import needs_compiler
 
 pytestmark = [pytest.mark.slow, needs_compiler]
 NUMBERS = ("02", "03", "06", "07", "08", "12", "13", *(str(number) for number in range(16, 24)), "18_with_a_stop")
+NUMBERS_AS_DRAWN = (*NUMBERS[:-6], "18_with_a_stop", *NUMBERS[-6:-1])
+#: Of the figures, the first, drawn a second time.
+REDRAWN = 4
 FIGURES = {f"figure_{number}.svg" for number in NUMBERS}
 
 
 @pytest.fixture(scope="module")
 def reproduced(tmp_path_factory):
-    """The command as a user runs it: its folder, and the chains that it ran."""
+    """The command as a user runs it: its folder, the chains that it ran, and the figures that it drew."""
     folder, chains, run_chain = tmp_path_factory.mktemp("reproduce") / "out", [], chain.run_chain
+    drawn, save = [], paper_figures.saved
+
+    def kept(figure, form):
+        drawn.append(figure)
+        # To write all of them as SVG takes as long as two valves; `make bench-paper` does, twice.
+        return save(figure, form) if len(drawn) <= REDRAWN else b"<svg/>"
 
     def recorded(valve, say):
         chains.append(run_chain(valve, say=say))
@@ -48,8 +58,9 @@ def reproduced(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduction, "run_chain", recorded)
+        patch.setattr(paper_figures, "saved", kept)
         assert main(["reproduce", "-o", str(folder)]) == 0
-    return folder, chains
+    return folder, chains, dict(zip(NUMBERS_AS_DRAWN, drawn, strict=True))
 
 
 def subjects(chains):
@@ -77,7 +88,7 @@ def missed(number):
 
 
 def test_every_valve_and_figure_is_there_with_its_origin(reproduced):
-    folder, _ = reproduced
+    folder, *_ = reproduced
     document = document_of(reproduced)
     assert document["holds"] is True
     assert {path.name for path in folder.glob("*.svg")} == FIGURES
@@ -118,7 +129,7 @@ def test_only_what_is_predicted_agrees_and_every_miss_has_its_reason(reproduced)
             assert number["outcomes"][0]["agrees"], where
         assert number["agrees"] is not True or not missed(number)
     kinds = [number["kind"] for number in numbers]
-    assert [kinds.count(kind) for kind in ("fitted", "predicted", "given", "in words")] == [16, 29, 2, 6]
+    assert [kinds.count(kind) for kind in ("fitted", "predicted", "given", "in words")] == [19, 34, 2, 6]
 
 
 #: What the paper and the bench say of their errors: the meter, 0.5 % of 150 L/min; 100 records a second of 100 s.
@@ -131,7 +142,7 @@ def test_no_range_is_wider_than_the_printed_digits_and_a_stated_error(reproduced
     for number in document_of(reproduced)["numbers"]:
         simulated = number["valve"] == "simulation"
         for one in number["outcomes"]:
-            if one["allowed"] is None:
+            if one["allowed"] is None or number["kind"] in ("given", "in words"):
                 continue
             low, high = one["allowed"]
             error = 0.0 if simulated and number["unit"] == "L/min" else ERROR[number["unit"]]
@@ -148,7 +159,7 @@ def test_no_range_is_wider_than_the_printed_digits_and_a_stated_error(reproduced
     assert compared > 80
 
 
-def test_hysteresis_is_shown_with_and_without_and_requires_nothing(reproduced):
+def test_hysteresis_is_shown_with_and_without(reproduced):
     valves, _ = subjects(reproduced[1])
     for subject in valves:
         gain = float(recovered_valves.at_rest(subject.runs.valve.plant, 1).flow_per_volt)
@@ -161,7 +172,8 @@ def test_hysteresis_is_shown_with_and_without_and_requires_nothing(reproduced):
         assert assumed.q_mean_L_min[half_open] > plain.q_mean_L_min[half_open] + 0.5 * gain * HYSTERESIS_V
     for number in document_of(reproduced)["numbers"]:
         both = {bool(one["hysteresis_V"]) for one in number["outcomes"]}
-        beside = number["valve"] != "first valve with a stop" and "(" not in number["quantity"].replace("(at", "")
+        at_rest = "(" in number["quantity"].replace("(at", "") or "offset of" in number["quantity"]
+        beside = number["valve"] != "first valve with a stop" and not at_rest
         assert both == ({False, True} if beside else {False})
 
 
@@ -196,6 +208,14 @@ def tampered(chains, place, by, scale, *, at_MPa=5.0):
         (1, PRODUCT, 0.2, 1.0, "dead zone with (at 0.6 L/min)"),
         (2, PRODUCT, 0.3, 5.0, "dead zone with (at 0.6 L/min)"),
         (6, PRODUCT, 0.8, 5.0, "largest flow with"),
+        # Those were explained as well, by reasons that reached from zero to what is printed, or to the meter's error.
+        (1, PAPER, 0.98, 5.0, "largest flow with"),
+        (1, DIRECT, 0.98, 5.0, "largest flow, about"),
+        (1, PRODUCT, 0.9, 1.0, "dead zone with (at 0.6 L/min)"),
+        (2, PAPER, 0.5, 1.0, "dead zone with (at 0.6 L/min)"),
+        # With the assumed hysteresis nothing was required.
+        (4, PRODUCT, 0.8, 5.0, "largest flow with"),
+        (3, PAPER, 2.0, 5.0, "largest flow with"),
     ],
 )
 def test_a_reason_explains_no_more_than_it_says(
@@ -210,6 +230,31 @@ def test_a_reason_explains_no_more_than_it_says(
         if number["holds"] is False
     }
     assert (quantity, at_MPa) in unexplained
+
+
+def test_what_is_given_or_said_in_words_may_be_contradicted():
+    """Seeded: a flow that falls where the paper says that it rises, and another frequency."""
+    for kind, published, value, allowed in (
+        ("in words", "increasing", -0.7, (0.001, 100.0)),
+        ("given", "2.5", 3.0, (2.45, 2.55)),
+    ):
+        ours = Outcome(by="valve", value=value, difference=None, allowed=allowed)
+        number = PaperNumber(
+            valve="first valve", quantity="", unit="", dp_MPa=3.0, published=published, kind=kind, outcomes=(ours,),
+            tolerance="", why="",
+        )  # fmt: skip
+        assert number.agrees is None and number.holds is False
+        assert replace(number, outcomes=(replace(ours, value=allowed[1]),)).holds is None
+
+
+def test_a_reason_of_the_digits_reaches_what_is_printed_or_says_that_it_does_not(reproduced):
+    for number in document_of(reproduced)["numbers"]:
+        for one in missed(number):
+            if re.search(r"digits allow|they allow", one["reason"]):
+                half = recovered_valves.half_digit(number["published"])
+                low, high = (float(number["published"]) + side * half for side in (-1, 1))
+                within = one["explained"][0] <= high and low <= one["explained"][1]
+                assert within == one["reason"].startswith("within the rounding"), one["reason"]
 
 
 def test_what_was_fitted_never_counts_as_agreement():
@@ -289,14 +334,15 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, capsys):
 
 
 def test_figures_name_their_axes_with_units_and_are_the_same_bytes_again(reproduced):
-    folder, chains = reproduced
+    folder, chains, drawn = reproduced
     with plot_style():
-        for number, figure in paper_figures.figures(*subjects(chains)):
+        for number, figure in drawn.items():
             for axes in figure.axes:
                 assert re.search(r"\((V|ms|MPa)\)$", axes.get_xlabel()) or number == "13", number
             assert re.search(r"\((L/min|mm|V)\)$", figure.axes[0].get_ylabel()), number
             legend = figure.legends[0].get_window_extent()
             assert legend.x0 >= 0 and legend.x1 <= figure.bbox.x1, f"Fig. {number}: the legend is cut off"
+        for number, figure in islice(paper_figures.figures(*subjects(chains)), REDRAWN):
             assert saved(figure, "svg") == (folder / f"figure_{number}.svg").read_bytes()
 
 
@@ -313,6 +359,8 @@ def test_the_pulse_is_drawn_with_its_printed_amplitude_and_duty_cycle(reproduced
 def test_published_numbers_stand_in_one_place():
     """Whatever is printed as published is what `published.py` holds, and nothing else does."""
     printed = {value for valve in VALVES for name in valve.__slots__ if (value := getattr(valve, name))}
+    # What is printed as a change of 0.1 mm is used as what it makes; a tenth may be anything.
+    printed = printed - {SIMULATION.stroke_falls_mm} | {SIMULATION.stroke1_mm}
     sources = set(Path(paper_numbers.__file__).parent.glob("*.py"))
     sources = {source for source in sources if "figure" not in source.name}  # widths of lines
     assert len(sources) > 4

@@ -1,6 +1,7 @@
 """Flows measured by hand below the meter's floor: of valves whose small flows are known, behind a meter with one."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.low_flow_table import LowFlowTable
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.low_flow import LowFlow
+from dzdesign.verify.firmware.stated_basis import about_basis
 
 L_MIN, MPA = 1e-3 / 60, 1e6
 PRESSURES = (1.0, 3.0, 5.0)
@@ -48,8 +50,9 @@ class Valve:
 
     def reading(self, u_V, dp_MPa, branch="falling", error=0.005):
         flow = float(self.flow(np.array(u_V), dp_MPa, rising=branch == "rising"))
+        row = f"{1e3 * u_V:.0f}{1e3 * dp_MPa:.0f}"
         return LowFlow(
-            source=f"low.csv, {u_V:.3f} V", branch=branch, u_V=u_V, dp_MPa=dp_MPa, q_L_min=flow, q_error_L_min=error
+            source=f"low.csv, row {row}", branch=branch, u_V=u_V, dp_MPa=dp_MPa, q_L_min=flow, q_error_L_min=error
         )
 
 
@@ -60,13 +63,16 @@ RAMPS = {valve: [valve.ramp(dp) for dp in PRESSURES] for valve in (SHARP, NOTCHE
 def identified(valve, rows=(), **options):
     tables = [LowFlowTable(source="low.csv", sha256="a" * 64, rows=tuple(rows))] if rows else []
     chosen = IdentifyOptions(meter_floor=FLOOR * L_MIN, meter_lag=0.0, meter_lag_tolerance=0.0, **options)
-    return identify_sides(RAMPS[valve], chosen, None, tables).model
+    model = identify_sides(RAMPS[valve], chosen, None, tables).model
+    assert not list(about_basis(model.positive))  # as verify computes the level
+    return model
 
 
 def side_of(*args, **options):
     return identified(*args, **options).positive
 
 
+@cache
 def thresholds(valve, **options):
     return side_of(valve, **options).curve.u_threshold_V
 
@@ -77,16 +83,22 @@ def at_thresholds(valve, beyond=0.0, branch="falling", **options):
     return [valve.reading(u + beyond, dp, branch) for dp, u in pairs]
 
 
+def confirming(valve, beyond=0.5):
+    """Return a reading in the meter's range, which the ramps confirm."""
+    return valve.reading(thresholds(valve)[1] + beyond, 3.0)
+
+
 def codes(model):
     return [warning.code for warning in model.warnings]
 
 
 class TestAReadingThatAgrees:
     def test_lowers_the_level_below_which_nothing_is_seen(self):
-        before, after = side_of(SHARP), identified(SHARP, at_thresholds(SHARP, 0.002))
+        rows = at_thresholds(SHARP, 0.002)
+        before, after = side_of(SHARP), identified(SHARP, [*rows, confirming(SHARP)])
         assert before.certificate.unseen_below_L_min == before.certificate.level_L_min >= FLOOR
         basis = after.positive.certificate
-        worst = max(row.at_most_L_min for row in after.positive.low_flow)
+        worst = max(row.at_most_L_min for row in rows)
         assert basis.unseen_below_L_min == pytest.approx(worst, abs=1e-6) and worst < 0.05
         assert basis.level_L_min == before.certificate.level_L_min
         assert after.positive.curve.u_lower_V == before.curve.u_lower_V
@@ -101,35 +113,107 @@ class TestAReadingThatAgrees:
         """The next closing may be lower than the one that was measured: the bound counts on that, the reading not."""
         bounds = side_of(SHARP).curve.u_lower_V
         rows = [SHARP.reading(u, dp) for dp, u in zip(PRESSURES, bounds, strict=True)]
-        model = identified(SHARP, rows)
+        model = identified(SHARP, [*rows, confirming(SHARP)])
         assert model.positive.certificate.unseen_below_L_min >= FLOOR
         assert "low-flow" in codes(model) and "onset-hidden" in codes(model)
 
     def test_says_nothing_of_closing_where_it_was_taken_on_opening(self):
-        model = identified(SHARP, at_thresholds(SHARP, 0.002, "rising"))
+        model = identified(SHARP, [*at_thresholds(SHARP, 0.002, "rising"), confirming(SHARP)])
         assert model.positive.certificate.unseen_below_L_min >= FLOOR and "low-flow" in codes(model)
 
     def test_says_nothing_of_a_test_at_another_pressure_drop(self):
-        model = identified(SHARP, at_thresholds(SHARP, 0.002)[1:])
+        model = identified(SHARP, [*at_thresholds(SHARP, 0.002)[1:], confirming(SHARP)])
+        assert model.positive.certificate.unseen_below_L_min >= FLOOR and "low-flow" in codes(model)
+
+    def test_in_the_range_of_the_meter_tells_nothing_of_the_bound(self):
+        """Seeded: the reading that confirms the table stood for the one that the test lacked, and nothing said so."""
+        rows = [row for row in at_thresholds(SHARP, 0.002) if row.dp_MPa != 3.0]
+        model = identified(SHARP, [*rows, confirming(SHARP)])
         assert model.positive.certificate.unseen_below_L_min >= FLOOR and "low-flow" in codes(model)
 
     def test_at_a_lower_pressure_drop_counts_for_more_flow_at_the_test(self):
         rows = at_thresholds(SHARP, 0.002)
         near = [LowFlow(**{**_fields(row), "dp_MPa": 0.96 * row.dp_MPa, "q_L_min": 0.02}) for row in rows]
-        assert side_of(SHARP, near).certificate.unseen_below_L_min == pytest.approx(0.025 / 0.96, abs=1e-6)
+        near = [LowFlow(**{**_fields(row), "u_V": row.u_V + 0.02}) for row in near]
+        found = side_of(SHARP, [*near, confirming(SHARP)])
+        assert found.certificate.unseen_below_L_min == pytest.approx(0.025 / 0.96, abs=1e-6)
+
+    def test_at_a_lower_pressure_drop_counts_from_the_threshold_there(self):
+        """Seeded: 12 mV lower at 5 MPa than at 4.75 MPa, a threshold took that reading for one above it."""
+        rows = [LowFlow(**{**_fields(row), "dp_MPa": 0.96 * row.dp_MPa}) for row in at_thresholds(SHARP, 0.002)]
+        model = identified(SHARP, [*rows, confirming(SHARP)])
+        assert model.positive.certificate.unseen_below_L_min >= FLOOR and "low-flow" in codes(model)
 
     def test_takes_the_least_of_several_and_the_worst_of_the_tests(self):
         rows = [row for beyond in (0.002, 0.02) for row in at_thresholds(SHARP, beyond)]
         first = max(row.at_most_L_min for row in rows[:3])
-        assert side_of(SHARP, rows).certificate.unseen_below_L_min == pytest.approx(first, abs=1e-6)
+        found = side_of(SHARP, [*rows, confirming(SHARP)])
+        assert found.certificate.unseen_below_L_min == pytest.approx(first, abs=1e-6)
 
     def test_whose_error_is_larger_than_the_level_lowers_nothing(self):
         rows = [SHARP.reading(row.u_V, row.dp_MPa, error=2.0) for row in at_thresholds(SHARP, 0.002)]
-        assert side_of(SHARP, rows).certificate.unseen_below_L_min >= FLOOR
+        assert side_of(SHARP, [*rows, confirming(SHARP)]).certificate.unseen_below_L_min >= FLOOR
 
     def test_comes_in_any_order(self):
-        rows = at_thresholds(SHARP, 0.002)
+        rows = [*at_thresholds(SHARP, 0.002), confirming(SHARP)]
         assert side_of(SHARP, rows).certificate == side_of(SHARP, rows[::-1]).certificate
+
+
+class TestATableThatNothingConfirms:
+    """Below the meter's floor the ramps contradict nothing: of another valve no flow at all is right anywhere there."""
+
+    @staticmethod
+    def rows(flow=0.0, *more):
+        at = at_thresholds(SHARP, 0.002)
+        return [*(LowFlow(**{**_fields(row), "q_L_min": flow}) for row in at), *more]
+
+    def assert_unseen(self, rows):
+        model = identified(SHARP, rows)
+        assert model.positive.certificate.unseen_below_L_min >= FLOOR
+        assert {"low-flow", "onset-hidden"} <= set(codes(model))
+        return model
+
+    def test_leaves_the_level_as_the_meter_has_it(self, wording):
+        model = self.assert_unseen(self.rows())
+        found = next(each for each in model.warnings if each.code == "low-flow")
+        wording("low flow: a table that nothing confirms", found.text)
+
+    def test_is_not_confirmed_by_a_reading_below_the_level(self):
+        self.assert_unseen(self.rows(0.0, SHARP.reading(thresholds(SHARP)[1] + 0.05, 3.0)))
+
+    def test_is_not_confirmed_by_a_reading_whose_error_hides_the_flow(self):
+        self.assert_unseen(self.rows(0.0, SHARP.reading(thresholds(SHARP)[1] + 0.5, 3.0, error=2.5)))
+
+    def test_is_not_confirmed_by_one_on_opening(self):
+        self.assert_unseen(self.rows(0.0, SHARP.reading(thresholds(SHARP)[1] + 0.6, 3.0, "rising")))
+
+    def test_is_not_confirmed_by_another_table(self):
+        other = LowFlow(**{**_fields(confirming(SHARP)), "source": "other.csv, row 2"})
+        self.assert_unseen(self.rows(0.0, other))
+
+    def test_of_a_valve_that_opens_a_quarter_of_a_volt_later_is_refused_where_it_could_be_seen(self, wording):
+        with wording.refusal(InputError):
+            identified(SHARP, self.rows(0.0, Valve(knee_V=5.65).reading(thresholds(SHARP)[1] + 0.5, 3.0)))
+
+
+class TestReadingsThatContradictOneAnother:
+    """The one that shows more, at a lower command, counts: seeded, the least of all was taken."""
+
+    def unseen(self, *more):
+        at_threshold = [*at_thresholds(SHARP, 0.002), confirming(SHARP)]
+        return side_of(SHARP, [*at_threshold, *more]).certificate.unseen_below_L_min
+
+    @pytest.mark.parametrize(("where", "dp"), [(-0.02, 3.0), (-0.02, 2.0), (0.001, 3.0)])
+    @pytest.mark.parametrize("branch", ["falling", "rising"])
+    def test_at_a_test_and_between_two(self, where, dp, branch):
+        u = float(np.interp(dp, PRESSURES, thresholds(SHARP))) + where
+        row = LowFlow(**{**_fields(SHARP.reading(u, dp, branch)), "q_L_min": 0.3})
+        assert row.at_least_L_min > 0.05  # of what flows at the thresholds
+        assert self.unseen(row) == pytest.approx(row.at_most_L_min, abs=1e-6)
+
+    def test_one_that_shows_no_more_than_its_error_contradicts_none(self):
+        row = SHARP.reading(thresholds(SHARP)[1] - 0.02, 3.0, error=0.5)
+        assert self.unseen(row) == self.unseen()
 
 
 def _fields(row):
@@ -155,7 +239,7 @@ class TestAReadingBelowTheThreshold:
 
     def test_lowers_all_thresholds_to_a_command_at_which_there_is_none(self):
         before = side_of(NOTCHED, noise_level=self.NONE)
-        model = identified(NOTCHED, self.rows(), noise_level=self.NONE)
+        model = identified(NOTCHED, [*self.rows(), confirming(NOTCHED)], noise_level=self.NONE)
         after = model.positive
         flows = [
             float(NOTCHED.flow(np.array(u), dp, rising=False))
@@ -167,6 +251,13 @@ class TestAReadingBelowTheThreshold:
         assert after.certificate.unseen_below_L_min < 0.03
         warning = next(each for each in model.warnings if each.code == "low-flow")
         assert "closing" in warning.text and warning.source.startswith("low.csv")
+
+    def test_counts_the_depth_from_the_threshold_at_the_pressure_drop_of_the_one_that_shows_none(self):
+        """Seeded: a command below that of 5 MPa was taken for as far below that of 4.75 MPa, which is higher."""
+        at_5, at_4_75 = (float(np.interp(dp, PRESSURES, thresholds(NOTCHED))) for dp in (5.0, 4.75))
+        rows = [NOTCHED.reading(at_5 - 0.1, 5.0), NOTCHED.reading(at_5 - 0.65, 4.75)]
+        depth = at_5 - side_of(NOTCHED, rows, noise_level=self.NONE).curve.u_threshold_V[2]
+        assert depth == pytest.approx(0.65 + at_4_75 - at_5, abs=1e-5) and at_4_75 > at_5 + 0.01
 
     def test_lowers_them_all_by_one_reading_too(self):
         rows = [row for row in self.rows() if row.dp_MPa == 3.0]
@@ -215,6 +306,11 @@ class TestAReadingThatNoRampAgreesWith:
         with wording.refusal(InputError):
             identified(SHARP, [SHARP.reading(5.0, 7.0)])
 
+    def test_beside_the_only_tested_pressure_drop_is_refused(self, wording, monkeypatch):
+        monkeypatch.setitem(RAMPS, SHARP, RAMPS[SHARP][:1])
+        with wording.refusal(InputError):
+            identified(SHARP, [SHARP.reading(5.0, 7.0)])
+
     def test_of_a_side_without_a_ramp_is_refused(self, wording):
         row = SHARP.reading(5.0, 3.0)
         with wording.refusal(InputError):
@@ -225,9 +321,10 @@ def test_the_negative_side_has_its_own_readings():
     from dataclasses import replace
 
     tests = [replace(test, u=-test.u, q=-test.q) for test in RAMPS[SHARP]]
-    rows = tuple(LowFlow(**{**_fields(row), "u_V": -row.u_V}) for row in at_thresholds(SHARP, 0.002))
+    given = [*at_thresholds(SHARP, 0.002), confirming(SHARP)]
+    rows = tuple(LowFlow(**{**_fields(row), "u_V": -row.u_V}) for row in given)
     table = LowFlowTable(source="low.csv", sha256="a" * 64, rows=rows)
     options = IdentifyOptions(meter_floor=FLOOR * L_MIN, meter_lag=0.0, meter_lag_tolerance=0.0)
     both = identify_sides([*RAMPS[SHARP], *tests], options, None, [table]).model.sides
     assert both["negative"].certificate.unseen_below_L_min < 0.05 < both["positive"].certificate.unseen_below_L_min
-    assert [row.u_V > 0 for row in both["negative"].low_flow] == [True] * 3 and not both["positive"].low_flow
+    assert [row.u_V > 0 for row in both["negative"].low_flow] == [True] * 4 and not both["positive"].low_flow

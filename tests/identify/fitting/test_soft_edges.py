@@ -8,6 +8,7 @@ import pytest
 import soft_edges as bench
 from bench_plant import commanded, lagged, ramp
 
+from dzdesign.core.errors import InputError
 from dzdesign.identify.fitting import guarding, soft_edges
 from dzdesign.identify.fitting.edge_averages import EdgeAverages
 from dzdesign.identify.fitting.edge_fits import fit_edges
@@ -38,6 +39,15 @@ def test_no_more_than_the_level_flows_and_the_meter_can_show_it(name):
     for opened, below_floor, *_ in examined(name, COUNTS[name]):
         assert not opened
         assert not below_floor
+
+
+@pytest.mark.slow
+def test_one_whose_first_flows_tell_too_little_is_refused_for_that(wording):
+    """Seeded: of valve 45 of its case the message blamed the meter's zero."""
+    rng, (draw, guard) = np.random.default_rng([1313, 5, 45]), bench.CASES["notches and a floor"]
+    valve = draw(rng)
+    with wording.refusal(InputError):
+        bench.examine(valve, guard, rng)
 
 
 def test_without_the_shape_of_the_edge_the_notch_opens(monkeypatch):

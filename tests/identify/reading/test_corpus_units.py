@@ -1,4 +1,4 @@
-"""Ports, units and staircases as loggers write them: benchmarks/identify/corpus_units.py, and that its faults show."""
+"""Ports, units and staircases as loggers write them: `corpus_units.py` of the benchmarks, and that its faults show."""
 
 from dataclasses import replace
 

@@ -40,16 +40,26 @@ def test_it_may_be_written_in_many_ways(tmp_path, header, cells):
     assert row.q_L_min == pytest.approx(0.012) and row.q_error_L_min == pytest.approx(0.003)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_spreadsheet_writes_marks_of_its_encoding_and_ends_of_lines(tmp_path, encoding):
+    path = tmp_path / "low.csv"
+    path.write_bytes("u [V];dP [MPa];Q [mm³/s];Q_error [mm³/s];branch\r\n5,10;3,0;200;50;closing\r\n".encode(encoding))
+    (row,) = read_low_flow(path, 10.0).rows
+    assert (row.u_V, row.q_L_min, row.q_error_L_min) == (5.1, pytest.approx(0.012), pytest.approx(0.003))
+
+
 def test_it_may_be_compressed(tmp_path):
     path = tmp_path / "low.csv.gz"
     path.write_bytes(gzip.compress(f"{HEADER}\n{ROW}\n".encode()))
     assert len(read_low_flow(path, 10.0).rows) == 1
 
 
-def test_negative_commands_are_of_the_negative_side_whatever_the_sign_of_their_flow(tmp_path):
-    read = table(tmp_path, HEADER, ROW, "-5.10,3.0,-12,3,closing", "-5.20,3.0,14,3,closing")
-    assert [row.u_V for row in readings_of_side([read], -1)] == [5.1, 5.2]
-    assert [row.q_L_min for row in readings_of_side([read], -1)] == pytest.approx([0.012, 0.014])
+@pytest.mark.parametrize("sign", ["-", ""], ids=["as the command", "as an amount"])
+def test_negative_commands_are_of_the_negative_side_whichever_sign_their_flows_have(tmp_path, sign):
+    rows = f"-5.10,3.0,{sign}12,3,closing", f"-5.20,3.0,{sign}14,3,closing", "-4.90,3.0,1,3,closing"
+    read = table(tmp_path, HEADER, ROW, *rows)
+    assert [row.u_V for row in readings_of_side([read], -1)] == [5.1, 5.2, 4.9]
+    assert [row.q_L_min for row in readings_of_side([read], -1)] == pytest.approx([0.012, 0.014, 0.001])
     assert [row.u_V for row in readings_of_side([read], 1)] == [5.1]
 
 
@@ -79,6 +89,8 @@ def test_a_little_less_than_none_within_its_error_is_none(tmp_path):
         "more than full command": [HEADER, "51,3,12,3,closing"],
         "flow against the command": [HEADER, "5.1,3,-12,3,closing"],
         "a row twice": [HEADER, ROW, ROW],
+        "a mark of thousands": [HEADER.replace(",", ";"), "5.10;3.0;1,200;300;closing"],
+        "negative commands with flows of both signs": [HEADER, "-5.1,3,-12,3,closing", "-5.2,3,14,3,closing"],
     }.items(),
     ids=lambda case: case[0],
 )

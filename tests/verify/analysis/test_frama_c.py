@@ -58,6 +58,7 @@ def test_a_fault_is_seen(file, right, wrong, function, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("each_core_once")
 def test_without_frama_c_the_requirement_is_not_checked(firmware_folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(proof, "PROGRAM", "no-such-program")
     found = proof_check(firmware_folder)

@@ -152,6 +152,7 @@ def test_a_part_of_all_mutants_is_killed_or_equivalent(name, request):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("each_core_once")
 def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(mutation, "all_mutants", lambda bench: [edited(bench, *JUDGED[k][:3]) for k in (0, 3)])
     assert main(["verify", str(firmware_folder), "--mutate", "-o", str(tmp_path / "evidence")]) == 0

@@ -61,8 +61,8 @@ def failing(checks) -> set[str]:
     return {check.id for check in checks if check.holds is False}
 
 
-def test_a_firmware_with_current_control_holds(either, tmp_path):
-    """All that `verify` requires, with every input, in one run; 27 corners and each kind of fault stand in evidence."""
+def test_a_firmware_with_current_control_holds(either, tmp_path, whole_windows):
+    """All that `verify` requires, every input and whole windows; 27 corners and each kind of fault are in evidence."""
     evidence = verify(firmware_of(either, tmp_path / "firmware")).evidence
     assert failing(evidence.checks) == set()
     assert {each.id for each in OF_CURRENT} <= {check.id for check in evidence.checks}

@@ -318,6 +318,7 @@ def input_check_of(folder):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("each_core_once")
 def test_the_command_line_reports_a_machine_that_is_not_here_and_does_not_hold(
     firmware_folder, tmp_path, capsys, monkeypatch
 ):

@@ -86,6 +86,7 @@ def test_another_targets_firmware_is_bad_input(firmware_folder, ware, wording):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("old", "status"), [(None, 0), ("ETPS", 1)])
+@pytest.mark.usefixtures("each_core_once")
 def test_the_command_reports_it_with_the_other_evidence(
     firmware_folder, ware, tmp_path, monkeypatch, capsys, old, status
 ):

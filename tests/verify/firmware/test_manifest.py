@@ -113,6 +113,7 @@ def test_c_of_another_compensator_is_named(firmware_folder):
 
 @pytest.mark.slow
 @needs_compiler
+@pytest.mark.usefixtures("each_core_once")
 def test_verify_says_so(firmware_folder):
     manifest = manifest_of(firmware_folder)
     change(manifest, ("constants", place_of(manifest, "SUM_SHIFT"), "value"), 31)

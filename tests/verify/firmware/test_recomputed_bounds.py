@@ -5,6 +5,7 @@ import math
 from copy import deepcopy
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from scipy.special import stdtrit
 
@@ -14,6 +15,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.verify.firmware import recomputed_bounds
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow, student
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -132,6 +134,40 @@ def test_a_confidence_that_is_only_stated_is_caught(valves):
     path = ("sides", "positive", "certificate", "confidence")
     for premise in PREMISES:
         assert is_caught(edited(valves[premise], path, lambda _: 0.999))
+
+
+ORIGIN = {
+    "a tenth of the pressure": (("recorded_units", "pressure", "factor"), 0.1, "recorded_units.pressure.factor is 0.1"),
+    "bar that are MPa": (("recorded_units", "pressure", "unit"), "bar", "factor is 1, but 10"),
+    "no unit of pressure": (("recorded_units", "pressure", "unit"), "\u041cPa", "no unit of pressure"),
+    "another flow": (("recorded_units", "flow", "factor"), 60.0, "recorded_units.flow.factor is 60"),
+    "another command": (("recorded_units", "command", "factor"), 2.0, "recorded_units.command.factor is 2"),
+    "a zero elsewhere": (("recorded_units", "command", "at_zero"), 4.0, "recorded_units.command.at_zero is 4"),
+    "no recordings": (("made_from",), [], "which is no file of made_from"),
+    "another confidence asked for": (("options", "texts", "confidence"), "0.9999", "confidence is 0.9999, but 0.99"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("edit", ORIGIN)
+def test_what_is_said_of_the_recordings_fits_the_valve(valves, edit):
+    """Units with another factor show every number as another one: '0.05 to 0.5 MPa' of what was tested to 5 MPa."""
+    path, value, named = ORIGIN[edit]
+    document = deepcopy(valves["monotone"])
+    document["options"] = {"texts": {"confidence": "0.990"}, "tables": {}, "lists": {}}
+    assert check_of(as_read(document)).holds
+    check = check_of(as_read(edited(document, path, lambda _: value)))
+    assert check.holds is False and named in check.text
+
+
+def test_a_bound_that_is_no_number_does_not_hold(valves, monkeypatch):
+    valve = as_read(valves["monotone"])
+
+    def of(curve, *_):
+        band = np.array(curve.above.band_V if curve.above else ())
+        return SimpleNamespace(lower=np.full(len(curve.u_lower_V), np.nan), band=band, most=1.0, most_above=1.0)
+
+    monkeypatch.setattr(recomputed_bounds.RecomputedBounds, "of", of)
+    assert check_of(valve).holds is False
 
 
 def test_a_budget_traded_for_a_bound_is_taken_as_stated(valves):

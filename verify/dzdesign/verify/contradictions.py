@@ -1,5 +1,7 @@
 """Whether the checks of evidence follow from its figures: who edits one of both contradicts the other."""
 
+from collections import Counter
+
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.compensator import Compensator
@@ -11,12 +13,22 @@ from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.all_inputs import input_checks
 from dzdesign.verify.exhaustive.lot_check import lot_checked
 from dzdesign.verify.integrator.comparison import native_plant_check
-from dzdesign.verify.requirements import FROM_INPUTS, FROM_LOOP, LOT, OF_CURRENT, POPULATION, ZERO_COMMAND, Check
+from dzdesign.verify.requirements import (
+    FROM_INPUTS,
+    FROM_LOOP,
+    KNOWN_IDS,
+    LOT,
+    OF_CURRENT,
+    POPULATION,
+    ZERO_COMMAND,
+    Check,
+)
 
 
 def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple[Check, ...]:
     """Return the checks that are said to hold and do not follow from the figures, here counted and compared again.
 
+    One that stands there twice, or that this version does not know, is none either: it would add to what was tried.
     Without a compensator the figures of the inputs alone are looked at.
     """
     inputs, loop = evidence.inputs, evidence.closed_loop
@@ -46,4 +58,8 @@ def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple
         return (check.id, check.name, check.holds, check.text if worded_alike else "")
 
     ids, derived = {kind.id for kind in kinds}, {key(check) for check in follow}
-    return tuple(each for each in evidence.checks if each.holds and each.id in ids and key(each) not in derived)
+    found = [each for each in evidence.checks if each.holds and each.id in ids and key(each) not in derived]
+    if evidence.tool == THIS_TOOL:
+        tried = Counter((each.id, each.name) for each in evidence.checks)
+        found += [each for each in evidence.checks if each.id not in KNOWN_IDS or tried[each.id, each.name] > 1]
+    return tuple(found)

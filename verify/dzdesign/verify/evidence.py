@@ -162,6 +162,10 @@ class Evidence(Artefact):
         Names, about("Board files that were filled in since they were generated: not checked.")
     ]
     user_files: Annotated[Names, about("Source and project files of the user's in the folder board/: not checked.")]
+    differing_files: Annotated[
+        Mapping[str, Sha256],
+        about("SHA-256, as verified, of every file of the firmware that its manifest has otherwise, or has not."),
+    ]
     board_not_compiled: Annotated[
         str, about("Why the changed board files were not compiled; empty if they were, or none was changed.")
     ]
@@ -207,9 +211,14 @@ class Evidence(Artefact):
 
     @property
     def reservation(self) -> str:
-        """What a good verdict is not about: thresholds that no ramp test was compared with; empty where all were."""
-        compared = any(check.id == RAMPS.id and check.holds for check in self.checks)
-        return "" if compared else AS_STATED
+        """What a good verdict is not about: thresholds that no ramp test was compared with; empty where all were.
+
+        Of a lot setting the recordings are those of one of its valves.
+        """
+        if not any(check.id == RAMPS.id and check.holds for check in self.checks):
+            return AS_STATED
+        others = max((each.lot.valves for each in self.inputs if each.lot), default=1) - 1
+        return f"of the lot's other {others} valves {AS_STATED}" if others else ""
 
     def with_checks(self, *checks: Check) -> "Evidence":
         """Return the evidence with further requirements."""

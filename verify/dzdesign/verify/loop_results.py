@@ -91,14 +91,20 @@ def flow_in_words(flow_L_min: float, unseen_below_L_min: float | None, units: Re
     return units.number(flow_L_min, ".2f L/min")
 
 
-WindowKind = Literal["ramp", "step", "load step"]
+WindowKind = Literal["ramp", "step", "load step", "disturbances"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlantComparison:
     """The closed loop's plant beside CasADi's integrator, over one window of time."""
 
-    kind: Annotated[WindowKind, about("What the command, or the pressure drop, does in it.")]
+    kind: Annotated[
+        WindowKind,
+        about(
+            "What the command, or the pressure drop, does in it; disturbances: other pressures, drive, oil and "
+            "readings, and a sensor that fails."
+        ),
+    ]
     side: Side
     dp_MPa: PressureDrop
     then_MPa: Annotated[
@@ -115,7 +121,13 @@ class PlantComparison:
         float, quantity("1", "Largest difference of the flows there, over the largest one of the window.", ge=0, le=1e6)
     ]
     q_largest_L_min: Annotated[Flow, about("That largest flow, by the integrator.")]
-    unlike_compare_values: Annotated[Count, about("PWM periods in which the two loops' compare values differ.")]
+    unlike_compare_values: Annotated[
+        Count,
+        about(
+            "PWM periods in which the two loops' compare values differ, those of a direct command under the drive's "
+            "dither too, and samples of a pressure's code."
+        ),
+    ]
     codes_at_border: Annotated[
         Count, about("Pressures so close to the border of two codes that the plant's code was taken.")
     ]

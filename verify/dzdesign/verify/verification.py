@@ -29,7 +29,7 @@ from dzdesign.verify.firmware.compilation import board_compiles, changed_board_f
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
-from dzdesign.verify.firmware.unchanged_files import files_unchanged, user_files
+from dzdesign.verify.firmware.unchanged_files import differing_files, files_unchanged, user_files
 from dzdesign.verify.integrator.comparison import compare_with_integrator
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EXACT_LAW, Check
@@ -95,16 +95,9 @@ def verify(
     manifest, compensator = _read(folder, plant, tolerances, include)
     host_compiler()
     say("compiling the core with every warning an error")
-    # A compiler's time, not ours.
-    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
-    core, loop, current = _try_core(folder, manifest, compensator, say), FirmwareLoop(), CurrentChecks()
-    compared: tuple[PlantComparison, ...] = ()
-    of_plant: tuple[Check, ...] = ()
-    if core.inputs:
-        current, scenes = current_checks(folder, compensator, say), building.result()
-        loop = close_the_loop(scenes, compensator, plant, sequence or RampSequence(), tolerances, say, watch)
-        compared, native_plant = compare_with_integrator(folder, scenes, say)
-        of_plant = (native_plant,)
+    given = (plant, sequence or RampSequence(), tolerances, backs_MPa)
+    run = _run_core(folder, manifest, compensator, given, say, watch)
+    core, current, loop = run.core, run.current, run.loop
     board, law = board_compiles(folder, manifest, include), law_follows(compensator)
     checks = (
         files_unchanged(folder, manifest),
@@ -112,7 +105,7 @@ def verify(
         *core.checks,
         *current.checks,
         *loop.checks,
-        *of_plant,
+        *run.of_plant,
         certificate_follows(compensator),
         bounds_follow(compensator),
         law,
@@ -125,10 +118,11 @@ def verify(
         target=manifest.target,
         changed_board_files=tuple(changed_board_files(folder, manifest)),
         user_files=tuple(user_files(folder, manifest)),
+        differing_files=differing_files(folder, manifest),
         board_not_compiled=board.not_compiled,
         checks=checks,
         inputs=core.inputs,
-        closed_loop=loop.result(plant, plant_source, plant_sha256, compared),
+        closed_loop=loop.result(plant, plant_source, plant_sha256, run.compared),
         scenarios=loop.scenarios,
         population=loop.population,
         monte_carlo=loop.monte_carlo,
@@ -165,6 +159,38 @@ class _Core:
     checks: tuple[Check, ...]
     inputs: tuple[InputCheck, ...] = ()
     maps: tuple[InputMap, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """What the compiled core did: by itself, with its current controller, in the closed loop and beside CasADi."""
+
+    core: _Core
+    current: CurrentChecks
+    loop: FirmwareLoop
+    compared: tuple[PlantComparison, ...] = ()
+    of_plant: tuple[Check, ...] = ()
+
+
+def _run_core(
+    folder: Path,
+    manifest: FirmwareManifest,
+    compensator: Compensator,
+    given: tuple[Plant | None, RampSequence, Tolerances | None, Sequence[float] | None],
+    say: Callable[[str], None],
+    watch: Watch,
+) -> _Run:
+    """Try the core, then the closed loop around it: of a firmware folder only what lies in core/ counts here."""
+    plant, sequence, tolerances, backs_MPa = given
+    # A compiler's time, not ours.
+    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
+    core = _try_core(folder, manifest, compensator, say)
+    if not core.inputs:
+        return _Run(core=core, current=CurrentChecks(), loop=FirmwareLoop())
+    current, scenes = current_checks(folder, compensator, say), building.result()
+    loop = close_the_loop(scenes, compensator, plant, sequence, tolerances, say, watch)
+    compared, native_plant = compare_with_integrator(folder, scenes, say)
+    return _Run(core=core, current=current, loop=loop, compared=compared, of_plant=(native_plant,))
 
 
 def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator, say: Callable[[str], None]) -> _Core:

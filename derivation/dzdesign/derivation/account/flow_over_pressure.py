@@ -5,13 +5,13 @@ import sympy
 from dzdesign.derivation.account.published import (
     DP0_MPA,
     DP1_MPA,
-    DROP_ASSUMED,
     FIRST,
     SECOND,
     SIMULATION,
     U_MAX_V,
     VALVES,
 )
+from dzdesign.derivation.account.readings import DROP_ASSUMED
 from dzdesign.derivation.account.scope import FIXED_OPENING, scope
 from dzdesign.derivation.account.statement import Condition, Kind, Outcome, Value
 from dzdesign.derivation.symbols import *

@@ -3,7 +3,8 @@
 import sympy
 
 from dzdesign.derivation.account.equations import ORIFICE
-from dzdesign.derivation.account.published import DROP_ASSUMED, FIRST, SECOND, PublishedValve
+from dzdesign.derivation.account.published import FIRST, SECOND, PublishedValve
+from dzdesign.derivation.account.readings import DROP_ASSUMED
 from dzdesign.derivation.account.scope import BARE, CONSTANT_THRESHOLD, FREE_OPENING, scope
 from dzdesign.derivation.account.statement import Ground, Kind, Value
 from dzdesign.derivation.symbols import *

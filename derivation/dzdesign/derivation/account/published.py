@@ -1,27 +1,33 @@
-"""The numbers that the paper prints, once: exact, as printed, with where they stand."""
+"""The numbers that the paper prints, once: exact, as printed, with where they stand.
 
+Nothing else stands here: `transcribed` finds every number of a constant of this module by itself, and one whose passage
+has no digest (`passages/`) makes `dzdesign derive` fail.
+"""
+
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
+from decimal import Decimal
+from typing import Any
 
 import sympy
 
 from dzdesign.derivation.account.statement import Replacements
-from dzdesign.derivation.symbols import *
+from dzdesign.derivation.symbols import Q_floor, Q_max0, Q_max1, beta, dP0, dP1, k, u_max, u_min0, u_min1, x_max
 
 U_MAX_V = 10
 DP0_MPA, DP1_MPA = 1, 5  # section 2.1: the reference, and off it
 RAMP_S = 100  # sections 2.2 and 4.1: from zero to full command
 METER_FLOOR_L_MIN = sympy.Rational("0.6")  # section 4.1, as are the next four
 METER_RANGE_L_MIN = "150"
+#: Of its range.
 METER_ACCURACY_PERCENT = "0.5"
-#: Accuracy of the flow meter, of its range.
-METER_ACCURACY_L_MIN = sympy.Rational(METER_RANGE_L_MIN) * sympy.Rational(METER_ACCURACY_PERCENT) / 100
 RECORDS_HZ = 100
 #: "About", of the first valve at 5 MPa.
 ABOUT_LARGEST_L_MIN = "27"
 #: Section 3: duty cycles at a command of 2 V without (Fig. 12) and with the compensator (Fig. 13), per cent.
 DUTY_COMMAND_V = 2
 DUTY_WITHOUT_PERCENT, DUTY_WITH_PERCENT = "20", "55"
-#: Eqs. (29)-(31): largest code of the converter, full scale at its pin, counts per volt there.
+#: Eqs. (29)-(30): largest code of the converter, full scale at its pin, counts per volt there.
 LARGEST_CODE, PIN_V, COUNTS_PER_PIN_VOLT = "4095", "3", "1365"
 #: Section 3: frequency and amplitude of the PWM that both figures show.
 PWM_KHZ, PWM_AMPLITUDE_V = "2.5", "3.16"
@@ -55,12 +61,23 @@ class PublishedValve:
     #: Flow at zero command and dP1 with the compensator that ignores beta, L/min; empty where none is printed. With
     #: beta it is none.
     zero_flow_without_beta: str = ""
-    #: Largest displacement of the spool at dP0 and dP1, mm; empty where none is printed.
+    #: Largest displacement of the spool at dP0, mm, and by how much less it is at dP1; empty where none is printed.
     stroke0_mm: str = ""
-    stroke1_mm: str = ""
-    #: Command from which on the spool moves, per cent of u_max; empty where none is printed.
+    stroke_falls_mm: str = ""
+    #: The displacement's dead zone at dP0, per cent, and by how much more it is at dP1; empty where none is printed.
     displacement_dead_zone0_percent: str = ""
-    displacement_dead_zone1_percent: str = ""
+    displacement_dead_zone_rises_percent: str = ""
+
+    @property
+    def stroke1_mm(self) -> str:
+        """The largest displacement at dP1, mm; empty where none is printed."""
+        return str(Decimal(self.stroke0_mm) - Decimal(self.stroke_falls_mm)) if self.stroke0_mm else ""
+
+    @property
+    def displacement_dead_zone1_percent(self) -> str:
+        """The displacement's dead zone at dP1, per cent; empty where none is printed."""
+        at_dP0, rises = self.displacement_dead_zone0_percent, self.displacement_dead_zone_rises_percent
+        return str(Decimal(at_dP0) + Decimal(rises)) if at_dP0 else ""
 
     def at(self) -> Replacements:
         """Return its numbers: commands in V, pressures in MPa, flows in L/min.
@@ -84,8 +101,6 @@ class PublishedValve:
         )
 
 
-#: Where a number of the second valve depends on it.
-DROP_ASSUMED = "at 5 MPa, which the paper does not say of this valve"
 SIMULATION = PublishedValve(
     name="simulation",
     where="section 2.2",
@@ -98,9 +113,9 @@ SIMULATION = PublishedValve(
     residual_percent="2",
     zero_flow_without_beta="0.95",
     stroke0_mm="1.8",
-    stroke1_mm="1.7",
+    stroke_falls_mm="0.1",
     displacement_dead_zone0_percent="54",
-    displacement_dead_zone1_percent="55",
+    displacement_dead_zone_rises_percent="1",
 )
 FIRST = PublishedValve(
     name="first valve",
@@ -128,40 +143,34 @@ SECOND = PublishedValve(
 VALVES = (SIMULATION, FIRST, SECOND)
 
 
+#: What is printed once more, by where.
+ALSO_PRINTED = {"COUNTS_PER_PIN_VOLT, Eq. (31)": COUNTS_PER_PIN_VOLT}
+
+
 def transcribed() -> dict[str, str]:
-    """Return every number of this module as the paper prints it, by what it is and where it stands."""
-    numbers = {
-        "full command": str(U_MAX_V),
-        "dP0": str(DP0_MPA),
-        "dP1": str(DP1_MPA),
-        "duration of the ramp": str(RAMP_S),
-        "meter's floor": str(METER_FLOOR_L_MIN.evalf(2)).rstrip("0"),
-        "meter's range": METER_RANGE_L_MIN,
-        "meter's accuracy": METER_ACCURACY_PERCENT,
-        "rate of the records": str(RECORDS_HZ),
-        "largest flow, about": ABOUT_LARGEST_L_MIN,
-        "command of the duty cycles": str(DUTY_COMMAND_V),
-        "duty cycle without": DUTY_WITHOUT_PERCENT,
-        "duty cycle with": DUTY_WITH_PERCENT,
-        "largest code": LARGEST_CODE,
-        "volts at the pin": PIN_V,
-        "counts per volt, (30)": COUNTS_PER_PIN_VOLT,
-        "counts per volt, (31)": COUNTS_PER_PIN_VOLT,
-        "flat from": SATURATED_FROM_V[0],
-        "flat from, at most": SATURATED_FROM_V[1],
-        "change with temperature": TEMPERATURE_CHANGE_PER_MILLE,
-    }
-    for valve in VALVES:
-        for field in fields(valve):
-            value = getattr(valve, field.name)
-            if value and field.name not in ("name", "where"):
-                numbers[f"{valve.name}, {field.name}"] = value
-    # The paper prints these two as changes from dP0.
-    for change, first, second in (
-        ("stroke", "stroke0_mm", "stroke1_mm"),
-        ("displacement dead zone", "displacement_dead_zone0_percent", "displacement_dead_zone1_percent"),
-    ):
-        before, after = (sympy.Rational(numbers[f"simulation, {name}"]) for name in (first, second))
-        numbers[f"simulation, change of {change}"] = str(float(abs(after - before))).removesuffix(".0")
-        del numbers[f"simulation, {second}"]
-    return numbers
+    """Return every number of every constant of this module, as printed: by its name, and that of its field or place."""
+    constants = ((name, value) for name, value in globals().items() if name.isupper())
+    return {name: text for constant, value in constants for name, text in _numbers_of(constant, value)}
+
+
+def _numbers_of(name: str, value: Any) -> Iterator[tuple[str, str]]:
+    """Yield the numbers in a value, each with its name; words have none."""
+    if isinstance(value, PublishedValve):
+        for field in fields(value)[2:]:  # what it is called and where it stands are no numbers
+            yield from _numbers_of(f"{value.name}, {field.name}", getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        for place, each in value.items():
+            yield from _numbers_of(place, each)
+    elif isinstance(value, tuple):
+        for index, each in enumerate(value):
+            yield from _numbers_of(f"{name}, {index + 1}", each)
+    elif not isinstance(value, str):
+        yield name, _as_printed(value)
+    elif any(letter.isdigit() for letter in value):
+        yield name, value
+
+
+def _as_printed(value: int | sympy.Rational) -> str:
+    """Return a number's decimals, all of them."""
+    exact = sympy.Rational(value)
+    return f"{Decimal(exact.p) / Decimal(exact.q):f}"

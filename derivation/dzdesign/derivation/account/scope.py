@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import sympy
+from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
 
 from dzdesign.derivation.symbols import dP, dP0, dP1, k, u_i, u_max, u_min, u_min0, u_min1, u_O, x_max
@@ -28,7 +29,7 @@ CODES_OF_COMMAND = Setting("codes", "codes in the counts of the command")
 
 
 def under_law(name: str) -> Setting:
-    """Return the setting in which a law drives the valve."""
+    """Return the setting in which a law drives the valve, with commands from zero to full: a law is for one side."""
     return Setting("drive", f"the law `{name}`")
 
 
@@ -75,7 +76,7 @@ class Scope:
 EVERYWHERE = Scope()
 
 
-def scope(*limits: Setting | Boolean) -> Scope:
+def scope(*limits: Setting | Relational) -> Scope:
     """Return a scope from settings and comparisons in any order.
 
     Examples
@@ -84,6 +85,9 @@ def scope(*limits: Setting | Boolean) -> Scope:
     >>> str(scope(BARE, sympy.Eq(dP, dP0)))
     'the valve without compensator; Eq(dP, dP0)'
     """
+    # Of comparisons joined by "or" one could be true at general values, the other of those that matter.
+    if any(not isinstance(limit, Setting | Relational) for limit in limits):
+        raise ValueError(f"a scope is made of settings and single comparisons, got {limits}")
     settings = tuple(limit for limit in limits if isinstance(limit, Setting))
     return Scope(settings, sympy.And(*(limit for limit in limits if not isinstance(limit, Setting))))
 

@@ -31,7 +31,7 @@ ZERO_COMMAND = (
         "flow at zero command",
         Q,
         sympy.Piecewise((0, u_min1 > _OFFSET), (gamma_1 * (_OFFSET - u_min1) / k, u_min1 <= _OFFSET)),
-        scope=scope(FREE_BETA, beta * u_min0 <= u_max) & AT_ZERO_COMMAND,
+        scope=scope(FREE_BETA, sympy.Eq(dP, dP1), beta * u_min0 <= u_max) & AT_ZERO_COMMAND,
         grounds=(
             Ground(
                 "(1)",
@@ -52,7 +52,7 @@ ZERO_COMMAND = (
         gamma_1 * (u_min0 - u_min1) / k,
         Q_max1 * (u_min0 - u_min1) / (u_max - u_min1),
         provided=(sympy.Ne(u_max, u_min1),),
-        scope=scope(FREE_BETA, FREE_OPENING, sympy.Eq(beta, 1), u_min1 < u_min0) & AT_ZERO_COMMAND,
+        scope=scope(FREE_BETA, FREE_OPENING, sympy.Eq(dP, dP1), sympy.Eq(beta, 1), u_min1 < u_min0) & AT_ZERO_COMMAND,
         grounds=(Ground("T3a", ((beta, sympy.S.One),)), "largest flow"),
         eliminate=(gamma_1,),
         cases=(Case(((u_min1, u_min0 - excess),), "threshold lower than at the reference"),),
@@ -121,7 +121,7 @@ SHAPE = (
         "the selector (7) is continuous at dP0",
         jump,
         sympy.S.Zero,
-        scope=scope(FREE_BETA, dP0 < dP1),
+        scope=scope(FREE_BETA, sympy.Eq(dP, dP1), dP0 < dP1),
         grounds=(
             "jump",
             Ground("L2", ((u_O, u_above), (dP1, dP0 + above))),

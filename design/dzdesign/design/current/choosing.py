@@ -171,10 +171,11 @@ def _with_release(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSamp
     """Return the loop whose output begins low enough that no current overshoots as the drive is released.
 
     What the integral takes up on the way would carry the current past the offset, where the valve opens. It comes up
-    from below instead, within some time constants of the integral.
+    from below instead, within some time constants of the integral. Where even the lowest beginning is too high it is
+    taken, and `CurrentDrive.release_overshoot_A` says what is left.
     """
     unit = max((1 << (loop.full_counts.bit_length() - 1)) // 64, 1)
-    allowed_A = RELEASED_CODES / (line.V_per_A * line.codes_per_V)
+    allowed_A = allowed_at_release_A(line)
     low, high = -1, len(RELEASES) - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -184,6 +185,11 @@ def _with_release(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSamp
         else:
             low = middle
     return replace(loop, release=RELEASES[high] * unit)
+
+
+def allowed_at_release_A(line: SensorLine) -> float:
+    """Return the overshoot of a release that is none: what the sensor does not show."""
+    return RELEASED_CODES / (line.V_per_A * line.codes_per_V)
 
 
 def worst_step(steps: Sequence[StepResponse]) -> tuple[StepResponse, StepResponse]:

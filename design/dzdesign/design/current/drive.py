@@ -13,6 +13,7 @@ from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
     SHORT_SHARE,
     CurrentSensor,
+    allowed_at_release_A,
     choose_loop,
     gains_of,
     sensor_line,
@@ -22,7 +23,7 @@ from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
 from dzdesign.design.current.dither_response import dither_departure
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.current.margins import worst_margins
-from dzdesign.design.current.step_response import STEP_S, step_responses
+from dzdesign.design.current.step_response import STEP_S, released_overshoot_A, step_responses
 from dzdesign.design.target_inputs import Converter
 
 
@@ -40,6 +41,15 @@ class CurrentDrive:
     least_rise_s: Annotated[float, quantity("s", "The same at that corner with the switch on all the time.")]
     fall_s: Annotated[float, quantity("s", "90 to 10 % at the slowest corner: the freewheeling diode decides.")]
     overshoot: Annotated[float, quantity("1", "Largest overshoot of the step up, of its height.")]
+    release_overshoot_A: Annotated[
+        float,
+        quantity(
+            "A",
+            "By how much the current passes the set point that it is released to, at the worst corner; 0: by no more "
+            "than half a code of its sensor.",
+            ge=0,
+        ),
+    ]
     dither_above_counts: Annotated[
         int,
         Meta(
@@ -83,6 +93,18 @@ class CurrentDrive:
             *self._weak_in_words(units),
         )
 
+    def release_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
+        """Warn of a current that passes the set point that it is released to; of none say nothing."""
+        if not self.release_overshoot_A:
+            return ()
+        share = self.release_overshoot_A / self.circuit.rated_A
+        return (
+            f"as the drive is released the current passes its set point by up to "
+            f"{units.text(self.release_overshoot_A, '.2g A')} ({share:.1%} of the rated one), however low the output "
+            "begins: the valve may open by it at zero command; declare narrower ranges of inductance, resistance or "
+            "supply, or measure the supply",
+        )
+
     def _weak_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
         """Say what flows at most where no supply drives the rated current; those corners have no step."""
         circuit = self.circuit
@@ -124,6 +146,7 @@ def design_current_drive(
             f"{slowest.corner.supply_V:.3g} V the current does not reach 90 % of the rated one in {1e3 * STEP_S:g} ms; "
             "declare narrower ranges of coil and supply, or a lower --rated-current"
         )
+    released_A = released_overshoot_A(loop, circuit, sampling, line)
     above, below = dither_departure(loop, circuit, sampling, line, counts=dither[0], ticks=dither[1])
     high, low = 0.9 * circuit.rated_A, 0.1 * circuit.rated_A
     return CurrentDrive(
@@ -137,6 +160,7 @@ def design_current_drive(
         least_rise_s=round(slowest.least_s, 9),
         fall_s=round(max(circuit.fastest_fall_s(corner, high, low) for corner in circuit.corners()), 9),
         overshoot=round(largest.overshoot, 6),
+        release_overshoot_A=round(released_A, 9) if released_A > allowed_at_release_A(line) else 0.0,
         dither_above_counts=above,
         dither_below_counts=below,
     )

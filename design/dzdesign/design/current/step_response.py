@@ -54,32 +54,28 @@ class Coils:
 
     def __init__(self, circuit: CoilCircuit, corners: Sequence[Corner], sampling: CurrentSampling) -> None:
         columns = np.array(corners).T
-        self._resistance, self._inductance, self.supply = columns
-        self._freewheel, self._period = circuit.freewheel_V, sampling.period_s
-        self._instants = (np.arange(sampling.samples) + 0.5) / sampling.samples
+        resistance, inductance, self.supply = columns
+        #: Of the current, 1/s, and where it settles with the switch on and with the diode conducting, A.
+        self._rate, self._full, self._freewheels = (
+            resistance / inductance, self.supply / resistance, -circuit.freewheel_V / resistance
+        )  # fmt: skip
+        self._period = sampling.period_s
+        self._instants = (np.arange(sampling.samples)[:, np.newaxis] + 0.5) / sampling.samples * sampling.period_s
         self.current = np.zeros(len(corners))
 
     def period(self, duty: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Go on by a period of the PWM; return the current at each instant, (N, corners), and its mean."""
-        charge, at, codes = np.zeros_like(self.current), np.zeros_like(self.current), []
-        for end in (*self._instants, 1.0):
-            on_until = np.clip(duty, at, end)
-            charge += self._move(self.supply, (on_until - at) * self._period)
-            charge += self._move(np.full_like(self.supply, -self._freewheel), (end - on_until) * self._period)
-            at = np.full_like(at, end)
-            codes.append(self.current.copy())
-        return np.array(codes[:-1]), charge / self._period
-
-    def _move(self, volts: np.ndarray, seconds: np.ndarray) -> np.ndarray:
-        rate, settled = self._resistance / self._inductance, volts / self._resistance
-        end = settled + (self.current - settled) * np.exp(-rate * seconds)
-        blocks = end < 0
-        ratio = np.where(blocks, (self.current - settled) / np.where(blocks, -settled, 1.0), 1.0)
-        conducting = np.where(blocks, np.log(ratio) / rate, seconds)  # until the diode blocks
-        end = np.maximum(end, 0.0)
-        charge: np.ndarray = settled * conducting + (self.current - end) / rate
-        self.current = end
-        return charge
+        begin, rate, on_s = self.current, self._rate, np.clip(duty, 0, 1) * self._period
+        opens = self._full + (begin - self._full) * np.exp(-rate * on_s)
+        blocks_s = np.log1p(opens / -self._freewheels) / rate
+        since_s = np.vstack([self._instants - on_s, self._period - on_s])
+        falling = self._freewheels + (opens - self._freewheels) * np.exp(-rate * np.maximum(since_s, 0))
+        falling = np.where(since_s < blocks_s, np.maximum(falling, 0.0), 0.0)
+        rising = self._full + (begin - self._full) * np.exp(-rate * np.minimum(self._instants, on_s))
+        end = self.current = np.where(since_s[-1] > 0, falling[-1], opens)
+        conducts_s = np.minimum(since_s[-1], blocks_s)
+        charge = self._full * on_s + (begin - opens) / rate + self._freewheels * conducts_s + (opens - end) / rate
+        return np.where(since_s[:-1] <= 0, rising, falling[:-1]), charge / self._period
 
 
 def run_loop(

@@ -1,11 +1,11 @@
 """What a declared machine costs, and what was not declared, in a person's words."""
 
 from fractions import Fraction
-from math import inf
 
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.costs_at_tests import last_opening
 from dzdesign.design.law_corners import corners_of
 from dzdesign.design.machine.bench_current import premise_of_bench_current
 from dzdesign.design.machine.colder_coil import colder_coil_in_words
@@ -39,14 +39,9 @@ def _other_end(compensator: Compensator, sign: int) -> list[str]:
     """Say how long the dead zone is on the machine that opens last, which the transition does not reach."""
     if compensator.machine is None:
         return []
-    factor, found = float(compensator.machine.largest_factor), []
-    limit = compensator.drive_functions.compare_limit / compensator.signals.compare_max
-    for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
-        if test.u_knee_rising_V is not None:
-            dp_code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
-            knee = factor * test.u_knee_rising_V / float(compensator.u_max_V)
-            corners = corners_of(compensator, dp_code, sign)
-            found.append(corners.command_at(knee) if knee <= limit else inf)
+    factor = float(compensator.machine.largest_factor)
+    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    found = [share for test in tests if (share := last_opening(compensator, test, sign)) is not None]
     if not found:
         return []
     words = f"at the other end of the machine the threshold is {factor:.3f} times the bench's: "

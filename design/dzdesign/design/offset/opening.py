@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve
+from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, pressures_MPa
 from dzdesign.design.certificate import hold_below
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import Signals
@@ -49,7 +49,7 @@ def opening_ceiling(
     Above the tests it comes down by as much as the certified offset: a transition, and the hysteresis that a play takes
     out of it, stay as they are at the last test. Where the offset is let go, only that height is left of it.
     """
-    pressures = [signals.dp_MPa(code) for code in range(signals.largest_difference(sign) + 1)]
+    pressures = pressures_MPa(signals, 0, signals.largest_difference(sign))
     limit = [opening.at(dp_MPa) for dp_MPa in pressures]
     for code in range(tested.stop, len(limit)) if certified.above is not None else ():
         let_go = released_from is not None and code >= released_from

@@ -7,6 +7,9 @@ from dzdesign.identify.fitting.low_flow import Lowered, unseen_of_curve
 from dzdesign.identify.valve.guard_curve import Guard
 from dzdesign.identify.valve.side_model import SideModel
 
+#: Times the level, the flow of the reading that a message asks for.
+ASKED = 2.0
+
 
 def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterator[Finding]:
     """Yield the warnings about the readings of one side: thresholds that were lowered, and tests without a reading."""
@@ -19,11 +22,20 @@ def about_low_flow(side: SideModel, lowered: Mapping[Guard, Lowered]) -> Iterato
     if not side.low_flow:
         return
     guard, level = side.certificate.guard, side.certificate.level_L_min
-    _, missing = unseen_of_curve(side.low_flow, guard, side.curve, level)
-    if missing:
-        first = missing[0]
+    unseen = unseen_of_curve(side.low_flow, guard, side.curve, level)
+    for table in unseen.unconfirmed:
+        middle = len(side.tests) // 2
+        recorded = side.tests[middle].recorded
+        shown = recorded.closing if guard == "closing" else recorded.opening
+        yield warn(
+            "low-flow", table, "unconfirmed",
+            branch=guard, level_L_min=level, flow_L_min=ASKED * level, dp_MPa=side.curve.dp_MPa[middle],
+            u_V=shown.command_at(ASKED * level) or shown.u_V[-1],
+        )  # fmt: skip
+    if unseen.missing and not unseen.unconfirmed:
+        first = unseen.missing[0]
         yield warn(
             "low-flow", None, "short",
-            count=len(missing), tests=len(side.tests), branch=guard, dp_MPa=side.curve.dp_MPa[first],
+            count=len(unseen.missing), tests=len(side.tests), branch=guard, dp_MPa=side.curve.dp_MPa[first],
             u_V=side.curve.u_threshold_V[first], level_L_min=level,
         )  # fmt: skip

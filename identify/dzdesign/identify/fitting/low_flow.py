@@ -3,7 +3,9 @@
 Flow grows with the command. So where a reading shows flow at a command below a threshold, the edge opens below that
 command: the threshold is lowered to the highest command below it that a reading shows none at, and so are those of all
 tests, for one edge has made them. And where a reading shows at most so much at the threshold or above it, no more flows
-at any bound, which lies below the threshold by all that the next closing may differ.
+at any bound, which lies below the threshold by all that the next closing may differ; unless another reading shows more
+at a lower command. That counts only of a table that the ramps confirm: below the meter's floor they contradict nothing,
+neither a wrong unit nor a table of another valve.
 """
 
 from collections.abc import Sequence
@@ -30,6 +32,19 @@ COLUMN_OF = {"rising": 0, "falling": 1}
 ROUNDING_V = 1e-6
 #: Of a ramp's flow, what it may differ from a reading at rest by beside the threshold's own error: its meter's span.
 OF_FLOW = 0.1
+#: Of a reading's flow, its largest error where the ramps are to confirm it.
+CONFIRMS = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unseen:
+    """The flow at a guard's bounds below which nothing is known, L/min; where no reading tells, and why."""
+
+    below_L_min: float
+    #: The tests that no reading tells of.
+    missing: tuple[int, ...] = ()
+    #: Tables of which no reading lies where the ramps could confirm it.
+    unconfirmed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,10 +105,11 @@ def _tested(group: DescribedTests, rows: Sequence[LowFlow]) -> np.ndarray:
     dp = np.array([(item.dp or 0.0) / MPA for item in group.tests])
     for row in rows:
         if not dp[0] * (1 - SAME_PRESSURE) <= row.dp_MPa <= dp[-1] * (1 + SAME_PRESSURE):
+            expected = "{high:.3g MPa}" if dp[0] == dp[-1] else "{low:.3g #MPa} to {high:.3g MPa}"
             raise InputError(
                 worded(
-                    "{source}: its pressure drop is {at:.3g MPa}, expected {low:.3g #MPa} to {high:.3g MPa} as in the "
-                    "ramp tests; measure it there, or record a ramp at its pressure drop",
+                    "{source}: its pressure drop is {at:.3g MPa}, expected " + expected + " as in the ramp tests; "
+                    "measure it there, or record a ramp at its pressure drop",
                     source=row.source, at=row.dp_MPa, low=dp[0], high=dp[-1],
                 )
             )  # fmt: skip
@@ -108,13 +124,16 @@ def _refuse_another_valve(row: LowFlow, dp: np.ndarray, guarding: Guarding, grou
             continue
         apart = max(_apart(each, test) for each in guarding.thresholds.values())
         low, high = (_seen(shape, row.u_V + shift, group.leak[test]) for shift in (-apart, apart))
-        level = group.noise_level / L_MIN
-        if row.at_most_L_min < (1 - OF_FLOW) * low - level or row.at_least_L_min > (1 + OF_FLOW) * high + level:
+        # Below the level a ramp tells no more than that; above it, it tells the flow.
+        level = (group.noise_level + group.leak[test]) / L_MIN
+        least = (1 - OF_FLOW) * low if low > level else 0.0
+        most = max((1 + OF_FLOW) * high, level)
+        if row.at_most_L_min < least or row.at_least_L_min > most:
             raise InputError(
                 worded(
-                    "{source} has {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, but the ramps show {low:.3g #L/min} "
+                    "{source} has {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, but the ramps allow {low:.3g #L/min} "
                     "to {high:.3g L/min} there: check its units, its branch, and whether it is of this valve",
-                    source=row.source, flow=row.q_L_min, u=row.u_V, at=row.dp_MPa, low=low, high=high,
+                    source=row.source, flow=row.q_L_min, u=row.u_V, at=row.dp_MPa, low=least, high=most,
                 )
             )  # fmt: skip
 
@@ -144,19 +163,23 @@ def _lowered(
     InputError
         If no reading below it shows that there is none.
     """
-    values = [np.interp(row.dp_MPa, dp, each.value) for each in (guarded.free, guarded.ordered)]
-    threshold, least = float(max(values)), float(np.interp(row.dp_MPa, dp, none))
+
+    def threshold_at(dp_MPa: float) -> float:
+        return max(_continued(dp_MPa, dp, each.value) for each in (guarded.free, guarded.ordered))
+
+    threshold, least = threshold_at(row.dp_MPa), float(np.interp(row.dp_MPa, dp, none))
     if not row.shows_flow_on(branch) or row.u_V > threshold or row.at_least_L_min <= least:
         return None
-    shut = [
-        other.u_V
+    # Each counts from the threshold at its own pressure drop: at a higher one the edge may open earlier.
+    depths = [
+        threshold_at(other.dp_MPa) - other.u_V
         for other in rows
         if other.shows_none_on(branch) and other.is_at(row.dp_MPa) and other.u_V < row.u_V
         and other.at_most_at(row.dp_MPa) <= least
     ]  # fmt: skip
-    if not shut:
+    if not depths:
         raise InputError(_open_below(row, branch, threshold, least))
-    return Lowered(depth=threshold - max(shut), by=row)
+    return Lowered(depth=min(depths), by=row)
 
 
 def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) -> Worded:
@@ -176,24 +199,69 @@ def _shifted(guarded: GuardedThreshold, depth: float) -> GuardedThreshold:
     return replace(guarded, free=lower(guarded.free), ordered=lower(guarded.ordered)) if depth else guarded
 
 
-def unseen_of_curve(
-    rows: Sequence[LowFlow], guard: Guard, curve: CertifiedCurve, level_L_min: float
-) -> tuple[float, tuple[int, ...]]:
-    """Return the flow at a guard's bounds below which nothing is known, L/min, and the tests that no reading tells of.
+def unseen_of_curve(rows: Sequence[LowFlow], guard: Guard, curve: CertifiedCurve, level_L_min: float) -> Unseen:
+    """Return the flow at a guard's bounds below which nothing is known.
 
-    It is the meter's level unless a reading at every test, at its threshold or above, shows that no more flows there.
+    It is the meter's level unless a reading at every test, at its threshold or above, shows that no more flows there,
+    of a table that the ramps confirm in their own range; and no other reading shows more at a lower command.
     """
+    branch = BRANCH_OF.get(guard)
+    if branch is None or not rows:
+        return Unseen(below_L_min=level_L_min, missing=tuple(range(len(curve.dp_MPa))) if rows else ())
+    confirmed = {row.table for row in rows if _confirms(row, branch, curve, level_L_min)}
+    nodes, thresholds = np.array(curve.dp_MPa), np.array(curve.u_threshold_V)
     found, missing = [], []
     for test, (dp, threshold) in enumerate(zip(curve.dp_MPa, curve.u_threshold_V, strict=False)):
         told = [
-            row.at_most_at(dp)
+            flow
             for row in rows
-            if guard in BRANCH_OF and row.shows_none_on(BRANCH_OF[guard]) and row.is_at(dp)
-            and row.u_V >= threshold - ROUNDING_V
-        ]
+            if (flow := _at_most(row, rows, branch, dp)) < level_L_min  # the meter tells as much
+            and row.table in confirmed and row.shows_none_on(branch) and row.is_at(dp)
+            and row.u_V >= max(threshold, _continued(row.dp_MPa, nodes, thresholds)) - ROUNDING_V
+        ]  # fmt: skip
         if told:
             found.append(min(told))
         else:
             missing.append(test)
-    least = level_L_min if missing or not found else min(level_L_min, max(found))
-    return least, tuple(missing)
+    least = level_L_min if missing or not found else max(found)
+    more = [
+        row.at_most_L_min
+        for row in rows
+        if row.shows_flow_on(branch) and row.at_least_L_min > least
+        and row.u_V <= _continued(row.dp_MPa, nodes, thresholds)
+    ]  # fmt: skip
+    return Unseen(
+        below_L_min=min(level_L_min, max([least, *more])),
+        missing=tuple(missing),
+        unconfirmed=tuple(sorted({row.table for row in rows} - confirmed)),
+    )
+
+
+def _confirms(row: LowFlow, branch: Branch, curve: CertifiedCurve, level_L_min: float) -> bool:
+    """Tell whether the ramps show the flow of a reading, which they did not contradict."""
+    return (
+        row.branch == branch
+        and any(row.is_at(dp) for dp in curve.dp_MPa)
+        and row.at_least_L_min > level_L_min
+        and row.q_error_L_min <= CONFIRMS * row.q_L_min
+    )
+
+
+def _at_most(row: LowFlow, rows: Sequence[LowFlow], branch: Branch, dp_MPa: float) -> float:
+    """Return the most that flows at a reading's command at a test, L/min: where another shows more earlier, as much."""
+    most = row.at_most_at(dp_MPa)
+    more = [
+        other.at_most_at(dp_MPa)
+        for other in rows
+        if other.shows_flow_on(branch) and other.is_at(dp_MPa) and other.u_V <= row.u_V and other.at_least_L_min > most
+    ]
+    return max([most, *more])
+
+
+def _continued(dp_MPa: float, nodes: np.ndarray, values: np.ndarray) -> float:
+    """Return the straight line between nodes, continued beyond the ends."""
+    if nodes.size < 2:
+        return float(values[0])
+    upper = int(np.clip(np.searchsorted(nodes, dp_MPa), 1, nodes.size - 1))
+    share = (dp_MPa - nodes[upper - 1]) / (nodes[upper] - nodes[upper - 1])
+    return float(values[upper - 1] + share * (values[upper] - values[upper - 1]))

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 PARTS, POINTS = 8, 4
 #: valve.json has seven decimals: rounding both offset and bound may bring them nearer by this, V.
 ROUNDING_V = 1.5e-7
+#: Of a stored number.
+HALF_DIGIT = 0.5e-7
 #: By how much a curve may run the wrong way for the solver's tolerance, over u_max.
 WRONG_WAY = 2 * ACTIVE
 
@@ -77,13 +79,19 @@ def fit_offset_under(
     else:
         found = _solve(nodes, np.interp(nodes, dp_MPa, identified), ceiling, lowest, trend, u_max)
     slack = ceiling - np.interp(points, nodes, found)
-    found = found - max(largest_excess(bound, nodes, found), 0.0) - ROUNDING_V
+    found = found - max(largest_excess(bound, nodes, found), 0.0) - _rounding_V(dp_MPa)
     return OffsetUnderBound(
         dp_MPa=nodes,
         offset=found,
         u_min0=float(np.interp(dp_MPa[reference], nodes, found)),
         active=tuple(_in_words(points, slack < ACTIVE * u_max)),
     )
+
+
+def _rounding_V(dp_MPa: np.ndarray) -> float:
+    """Return what the offset keeps from the bound, V: M too is stored to a last digit, of which a wide sag has many."""
+    widest_MPa = float(np.diff(dp_MPa).max(initial=0.0))
+    return ROUNDING_V + HALF_DIGIT * max(widest_MPa**2 / 8 - 1, 0.0)
 
 
 def _in_words(points: np.ndarray, active: np.ndarray) -> Iterator[str]:

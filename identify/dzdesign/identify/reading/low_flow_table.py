@@ -71,12 +71,15 @@ def read_low_flow(path: Path, u_max: float, name: str = "") -> LowFlowTable:
     if not 1 < len(kept) <= MOST_ROWS + 1:
         raise InputError(f"'{path}' has {len(kept) - 1} rows, expected 1 to {MOST_ROWS} of flows measured one by one")
     source = name or path.name.encode(errors="replace").decode()
-    rows = []
+    typed = []
     for number, line in kept[1:]:
         cells = [cell.strip(' \t"') for cell in line.split(separator)]
         if len(cells) != len(kept[0][1].split(separator)):
             raise InputError(f"'{path}' row {number} has {len(cells)} cells, expected as many as its header")
-        rows.append(_Row(path, number, cells, columns, u_max).reading(source))
+        typed.append(_Row(path, number, cells, columns, u_max))
+    _refuse_two_marks(typed)
+    rows = [row.reading(source) for row in typed]
+    _refuse_two_signs(typed)
     _refuse_repeated(path, rows)
     return LowFlowTable(source=source, sha256=digest, rows=tuple(rows))
 
@@ -126,30 +129,35 @@ class _Row:
 
     def reading(self, source: str) -> LowFlow:
         """Return the reading, or refuse what no valve gives."""
-        u, dp, q, error = (self._number(name) for name in ("u", "dP", "Q", "error"))
+        u, dp, q, error = (self.number_of(name) for name in ("u", "dP", "Q", "error"))
         branch = self.cells[self.columns["branch"][0]].lower()
         if branch not in BRANCHES:
-            raise self._wrong("branch", f"expected {' or '.join(('opening', 'closing'))}: the way to that command")
+            raise self.wrong("branch", f"expected {' or '.join(('opening', 'closing'))}: the way to that command")
         if abs(u) > ABOVE_FULL * self.u_max:
-            raise self._wrong("u", f"expected at most full command, {self.u_max:g} V; give --u-max, or correct it")
+            raise self.wrong("u", f"expected at most full command, {self.u_max:g} V; give --u-max, or correct it")
         if not SMALLEST_DP <= dp <= LARGEST_DP:
-            raise self._wrong(
+            raise self.wrong(
                 "dP",
                 f"expected {SMALLEST_DP / MPA:g} to {LARGEST_DP / MPA:g} MPa: without a pressure drop nothing flows "
                 "through any edge",
             )
         if not error > 0:
-            raise self._wrong("error", "expected more than zero: what volume, time and leaks may be wrong by")
+            raise self.wrong("error", "expected more than zero: what volume, time and leaks may be wrong by")
         if u < 0:
             q = abs(q)  # counted from zero down, as a cylinder that moves the other way
         if q < -error:
-            raise self._wrong("Q", "expected a flow the way of the command: a cylinder that is driven back tells none")
+            raise self.wrong("Q", "expected a flow the way of the command: a cylinder that is driven back tells none")
         return LowFlow(
             source=f"{source}, row {self.number}", branch=BRANCHES[branch], u_V=u, dp_MPa=dp / MPA,
             q_L_min=max(q, 0.0) / L_MIN, q_error_L_min=error / L_MIN,
         )  # fmt: skip
 
-    def _number(self, name: str) -> float:
+    def marks(self, name: str) -> set[str]:
+        """Return the decimal marks in a cell."""
+        return {".", ","} & set(self.cells[self.columns[name][0]])
+
+    def number_of(self, name: str) -> float:
+        """Return a cell's number in SI units and V, or refuse what is none."""
         place, column = self.columns[name]
         quantity = "Q" if name == "error" else name
         text = self.cells[place].replace("\u2212", "-")
@@ -158,17 +166,39 @@ class _Row:
         try:
             value = float(text)
         except ValueError as error:
-            raise self._wrong(name, "expected a number") from error
+            raise self.wrong(name, "expected a number") from error
         scaling = scaling_of(self.path, quantity, column, self.u_max)
         scaled = value * scaling.gain + scaling.offset
         if not math.isfinite(scaled) or abs(scaled) > LARGEST_DP:
-            raise self._wrong(name, "expected a number that a valve gives")
+            raise self.wrong(name, "expected a number that a valve gives")
         return scaled
 
-    def _wrong(self, name: str, expected: str) -> InputError:
+    def wrong(self, name: str, expected: str) -> InputError:
+        """Return the refusal of a cell."""
         place, column = self.columns[name]
         cell = self.cells[place][:QUOTED]
         return InputError(f"'{self.path}' row {self.number}, column '{column.label}': {quoted(cell)}, {expected}")
+
+
+def _refuse_two_marks(rows: Sequence[_Row]) -> None:
+    """Refuse a point in one number and a comma in another: of 1,200 nobody can tell a thousand and more from one."""
+    known: set[str] = set()
+    for row in rows:
+        for name in ("u", "dP", "Q", "error"):
+            known |= row.marks(name)
+            if len(known) > 1:
+                raise row.wrong(name, "expected one decimal mark in the whole table, and no mark of thousands")
+
+
+def _refuse_two_signs(rows: Sequence[_Row]) -> None:
+    """Refuse flows of both signs, beyond their errors, at negative commands: some would go against the command."""
+    signs: set[bool] = set()
+    for row in rows:
+        flow = row.number_of("Q")
+        if row.number_of("u") < 0 and abs(flow) > row.number_of("error"):
+            signs.add(flow > 0)
+        if len(signs) > 1:
+            raise row.wrong("Q", "expected flows of one sign at all negative commands: one of them tells of no edge")
 
 
 def _refuse_repeated(path: Path, rows: Sequence[LowFlow]) -> None:

@@ -31,6 +31,11 @@ class LowFlow:
     q_error_L_min: Annotated[SmallFlow, Meta(description="Its largest error.")]
 
     @property
+    def table(self) -> str:
+        """The table that it stands in."""
+        return self.source.rpartition(", row ")[0] or self.source
+
+    @property
     def at_least_L_min(self) -> float:
         """The least that flows."""
         return self.q_L_min - self.q_error_L_min

@@ -282,7 +282,7 @@ class ClosedLoop:
         series = (
             np.array(choices, dtype=np.int32), command, supply, back, bias, np.ascontiguousarray(codes, dtype=np.int32),
             channels.zeros, channels.fulls, channels.spans, errors.table,
-            plant.flat, plant.coarse, plant.fine, self._curve,
+            plant.up_to(float(supply.max())), plant.coarse, plant.fine, self._curve,
         )  # fmt: skip
         *given, recording = (
             None if each is None else each.ctypes.data_as(ctypes.c_void_p) for each in (*series, record)

@@ -7,6 +7,7 @@ from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.verify.closed_loop.dead_zone import BIN
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.recorded_agreement import check_recorded
@@ -57,19 +58,30 @@ def plant_opens(ramps: Sequence[PressureResult], units: RecordedUnits) -> Check:
 
 
 def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Check:
-    """Tell whether the plant opens where the ramp tests say that the valve does."""
+    """Tell whether the plant opens, and closes, where the ramp tests say that the valve does."""
+
+    def test_of(ramp: PressureResult) -> TestResult:
+        return min(valve.sides[ramp.side].tests, key=lambda test: abs((test.dp_MPa or 0.0) - ramp.dp_MPa))
 
     def opens_V(ramp: PressureResult) -> tuple[float, float]:
-        test = min(valve.sides[ramp.side].tests, key=lambda test: abs((test.dp_MPa or 0.0) - ramp.dp_MPa))
-        known = test.u_guard_V if test.u_knee_rising_V is None else test.u_knee_rising_V
-        return ramp.dead_zone_opening * valve.u_max_V, known
+        known = test_of(ramp).u_knee_rising_V
+        return ramp.dead_zone_opening * valve.u_max_V, test_of(ramp).u_guard_V if known is None else known
+
+    def late_V(ramp: PressureResult) -> float:
+        known = test_of(ramp).u_knee_falling_V
+        return ramp.dead_zone_closing * valve.u_max_V - (test_of(ramp).u_guard_V if known is None else known)
 
     worst = max(ramps, key=lambda ramp: abs(float.__sub__(*opens_V(ramp))))
+    early = max(ramps, key=late_V)  # shut where the valve still passes flow
     plant_V, valve_V = opens_V(worst)
-    holds = abs(plant_V - valve_V) <= SAME_THRESHOLD * valve.u_max_V
+    opens, closes = (miss <= SAME_THRESHOLD * valve.u_max_V for miss in (abs(plant_V - valve_V), late_V(early)))
+    holds = opens and closes
     units = valve.recorded_units
     plant_at, valve_at = (units.of_side(worst.side).text(opens, ".2f V") for opens in (plant_V, valve_V))
     text = f"at {plant_at}, the ramp tests at {valve_at} (at {_at(worst, units)}, the worst); "
+    if not closes:
+        above = units.of_side(early.side).text(late_V(early), ".2f dV")
+        text += f"it closes {above} above them (at {_at(early, units)}); "
     text += _miss(max(ramps, key=lambda ramp: ramp.flow_miss), units)
     if not holds:
         text += "; the closed loop is of another valve: correct preload, spring or force in --plant"

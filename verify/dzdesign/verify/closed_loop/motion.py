@@ -5,12 +5,13 @@ linear part is solved exactly, by matrix exponentials that are tabulated over th
 through its values at the start, the middle and the end of the period, which makes an exponential Runge-Kutta step. The
 pulse makes a ripple that such a parabola does not follow; so the middle value is taken where the step is exact of an
 acceleration that is straight in the position (`balanced` of period_maps.py), and not at the position in the middle.
-Where a stop or the edge is passed within the period, plant_period.h takes it apart and follows `plant_path`.
+Where a stop is met or the edge passed within the period, plant_period.h takes it apart and follows `plant_path` from
+one to the other.
 """
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from dzdesign.verify.closed_loop.period_maps import BALANCE_TERMS, FINE, MAP, balanced, period_map, response_tables
-from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, derivatives, opening_of, orifice
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, derivatives, opening_of, orifice, past_edge
 
 if TYPE_CHECKING:
     import casadi
@@ -46,7 +47,8 @@ class Equations(NamedTuple):
     linear: "casadi.Function"
     #: plant -> what of `nonlinear` depends on the parameters only.
     extracted: "casadi.Function"
-    #: (x, supply, plant, extracted) -> acceleration beyond the linear part, m/s²; dP, MPa; Q, L/min.
+    #: (x, supply, plant, extracted) -> acceleration beyond the linear part, m/s²; dP, MPa; Q, L/min; acceleration
+    #: of an open edge, continued where it is shut.
     nonlinear: "casadi.Function"
 
 
@@ -60,15 +62,17 @@ def equations() -> Equations:
     # Not a `Plant`, whose parameters are checked to be numbers, but with the same names.
     plant = cast(Plant, SimpleNamespace(**dict(zip(names, ca.vertsplit(symbols), strict=True))))
     state, inputs, rates = derivatives(plant)
+    *same, open_rates = derivatives(plant, past_edge)
     nothing = [ca.SX.zeros(3), ca.SX.zeros(3)]
     jacobians = [ca.jacobian(rates, state), ca.jacobian(rates, inputs)]
     by_state, by_input = ca.substitute(jacobians, [state, inputs], nothing)
     x, supply = ca.SX.sym("x"), ca.SX.sym("supply")
     # Without the spring, which is in the linear part; of a mass of 1 kg it is the force, which saves a division.
     beside = [ca.vertcat(0, x, 0), ca.vertcat(0, 0, supply), ca.SX(0), ca.SX(1)]
-    force = ca.substitute([rates[2]], [state, inputs, plant.K_et_N_m, plant.m_e_kg], beside)[0]
-    acceleration = force * (1 / plant.m_e_kg)
-    acting = ca.vertcat(acceleration, *orifice(plant, opening_of(plant, x), supply))
+    parts = [(rates, state, inputs), (open_rates, *same)]
+    forces = [ca.substitute([r[2]], [s, u, plant.K_et_N_m, plant.m_e_kg], beside)[0] for r, s, u in parts]
+    shut, open_ = (force * (1 / plant.m_e_kg) for force in forces)
+    acting = ca.vertcat(shut, *orifice(plant, opening_of(plant, x), supply), open_)
     remaining, found, extracted = ca.extract_parametric(acting, symbols)
     return Equations(
         ca.Function("linear", [symbols], [by_state, by_input]),
@@ -89,7 +93,18 @@ class Numbers:
     #: (FINE, 12): the same in 0, 1, ... half counts, after the first eight entries of `MAP` for that time, which are
     #: what it does to a state that is there already.
     fine: np.ndarray
+    #: The spool's stiffness over its mass, 1/s², of its spring and of its flow force per MPa; the rate of all that
+    #: moves faster than these, rad/s.
+    stiffness: tuple[float, float]
+    beside_rad_s: float
 
+    def up_to(self, dp_MPa: float) -> np.ndarray:
+        """Return `flat` with no more steps in a period than pressure drops up to this one need."""
+        spring, per_MPa = self.stiffness
+        fastest = max(self.beside_rad_s, math.sqrt(spring + per_MPa * dp_MPa))
+        flat = self.flat.copy()
+        flat[NAMED.index("STEPS")] = max(math.ceil(fastest * PWM_PERIOD_S / STEP_RAD), 1)
+        return flat
 
     def driven(self, ratio: float) -> "Numbers":
         """Return those of the same plant whose PWM has so many times the voltage when it is on."""
@@ -98,7 +113,7 @@ class Numbers:
             flat[NAMED.index(name)] *= ratio**power
         flat[NAMED.index("BALANCE_0") :][:BALANCE_TERMS] *= ratio
         fine[:, 8:] *= ratio
-        return Numbers(flat, self.coarse * ratio, fine)
+        return replace(self, flat=flat, coarse=self.coarse * ratio, fine=fine)
 
 
 def numbers_of(plant: Plant, compare_max: int) -> Numbers:
@@ -123,7 +138,9 @@ def numbers_of(plant: Plant, compare_max: int) -> Numbers:
     if not linear:
         entries, series = balanced(rates, drive, entries)
     flat = np.concatenate([named, series, entries, parameters, extracted])
-    return Numbers(flat, *response_tables(rates, drive, 2 * compare_max))
+    stiffness = plant.K_et_N_m / plant.m_e_kg, plant.flow_force_N_mm_MPa * 1e3 / plant.m_e_kg
+    beside_rad_s = max(plant.B_e_N_s_m / plant.m_e_kg, float(np.abs(np.linalg.eigvals(by_state)).max()))
+    return Numbers(flat, *response_tables(rates, drive, 2 * compare_max), stiffness, beside_rad_s)
 
 
 @cache
@@ -137,7 +154,7 @@ def motion_header() -> str:
     ``plant_step_linear(i, x, v, response[5], acts, push, p) -> (i, x, v, charge, middle)``
         does where `acts` is constant.
     ``plant_path(state[3], voltage, h, push, supply_MPa, p) -> (i, x, v, charge)[ORDER + 1]``
-        gives the path over any short time h as powers of the share of it that has passed.
+        gives the path past the edge over any short time h as powers of the share of it that has passed.
     ``plant_path_linear(state[3], voltage, h, acts, push, p) -> (i, x, v, charge)[ORDER + 1]``
         does where `acts` is constant.
     ``plant_acting(x, supply_MPa, p) -> (acts in m/s², dp_MPa, Q_L_min)``
@@ -163,14 +180,17 @@ def motion_header() -> str:
     def acceleration(position: Any) -> Any:
         return acting(position)[0] + push
 
+    def acceleration_past_edge(position: Any) -> Any:
+        return acting(position)[3] + push
+
     whole, fixed = [i, x, v, response, acts, push], acts + push
     generator = ca.CodeGenerator("plant_motion.c")
     for name, inputs, outputs in (
         ("plant_step", [*whole, supply, p], _step(through, (i, x, v), response, fixed, acceleration)),
         ("plant_step_linear", [*whole, p], _step(through, (i, x, v), response, fixed, lambda _: fixed)[:5]),
-        ("plant_path", [state, voltage, h, push, supply, p], _path(named, state, voltage, h, acceleration)),
+        ("plant_path", [state, voltage, h, push, supply, p], _path(named, state, voltage, h, acceleration_past_edge)),
         ("plant_path_linear", [state, voltage, h, acts, push, p], _straight_path(named, state, voltage, h, fixed)),
-        ("plant_acting", [x, supply, p], acting(x)),
+        ("plant_acting", [x, supply, p], acting(x)[:3]),
     ):
         generator.add(ca.Function(name, inputs, outputs))
     names = ", ".join(f"PLANT_{name.upper()}" for name in (*NAMED, *MAP))

@@ -138,11 +138,26 @@ def read_parameters(path: Path, what: str, others: Sequence[str] = ()) -> dict[s
     return values
 
 
-def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
+def opening_of(plant: Plant, position: Any) -> Any:
+    """Return how far the edge is open, m."""
+    import casadi as ca
+
+    past = past_edge(plant, position)
+    return ca.if_else(past > 0, past, 0)  # fmax would be a call of the C library
+
+
+def past_edge(plant: Plant, position: Any) -> Any:
+    """Return how far the spool is past the edge, m; below zero where that is shut."""
+    return position - plant.overlap_mm * 1e-3
+
+
+def derivatives(
+    plant: Plant, opening_at: Callable[[Plant, Any], Any] = opening_of
+) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
     """Return state, inputs and their derivatives of Eqs. (19)-(24), lowered from SymPy to CasADi, free of the stops.
 
     The state is (i in A, x_e in m, v in m/s); the inputs are (amplifier voltage in V, force offset of the play in N,
-    supply pressure drop in MPa).
+    supply pressure drop in MPa). With `past_edge` as its opening the equations of the open edge go smoothly on beyond.
     """
     import casadi as ca
 
@@ -152,7 +167,7 @@ def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
     state, inputs = ca.SX.sym("state", 3), ca.SX.sym("inputs", 3)
     current, position, speed = (state[index] for index in range(3))
     voltage, play_force, supply = (inputs[index] for index in range(3))
-    opening = opening_of(plant, position)
+    opening = opening_at(plant, position)
     dp_MPa, _ = orifice(plant, opening, supply)
     load = (
         plant.preload_N
@@ -167,14 +182,6 @@ def derivatives(plant: Plant) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
     names = (*equations.STATE, *equations.INPUTS, *equations.PARAMETERS)
     lowered = lower(list(equations.state_derivatives()), names)
     return state, inputs, ca.vertcat(*lowered(current, position, speed, voltage, load, *parameters))
-
-
-def opening_of(plant: Plant, position: Any) -> Any:
-    """Return how far the edge is open, m."""
-    import casadi as ca
-
-    past = position - plant.overlap_mm * 1e-3
-    return ca.if_else(past > 0, past, 0)  # fmax would be a call of the C library
 
 
 def orifice(plant: Plant, opening_m: Any, supply_MPa: Any) -> tuple[Any, Any]:

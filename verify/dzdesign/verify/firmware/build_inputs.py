@@ -8,11 +8,13 @@ SOURCES = {
     ".c", ".h", ".cc", ".cpp", ".cxx", ".c++", ".hh", ".hpp", ".hxx", ".h++", ".inc", ".inl", ".ipp", ".tcc", ".s",
     ".sx", ".sa", ".asm", ".cla", ".y", ".l", ".w", ".ch", ".web", ".lib", ".a", ".ld", ".lds", ".lcf", ".cmd", ".opt",
     ".icf", ".sct", ".def", ".mk", ".mak", ".cmake", ".ninja", ".bazel", ".props", ".targets", ".rsp", ".bat",
+    ".i", ".ii", ".ino", ".pde", ".tpp", ".ll", ".gas",
     ".projectspec", ".ccxml", ".gel", ".syscfg", ".ioc", ".uvprojx", ".ewp", ".cproj", ".vcxproj",
 }  # fmt: skip
 BUILD_FILES = {
     "makefile", "gnumakefile", "cmakelists.txt", "cmakepresets.json", "cmakeuserpresets.json", "meson.build",
-    "sconstruct", "platformio.ini", "xmake.lua", "premake5.lua", ".project", ".cproject", ".ccsproject",
+    "sconstruct", "platformio.ini", "xmake.lua", "premake5.lua", "module.modulemap",
+    ".project", ".cproject", ".ccsproject",
 }  # fmt: skip
 #: Endings of precompiled headers, files or folders: a compiler takes one in place of the header beside it.
 PRECOMPILED = (".gch", ".pch", ".pcm")

@@ -7,6 +7,7 @@ from pathlib import Path
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
+from dzdesign.core.input_files import reason_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 
@@ -26,6 +27,26 @@ def read_firmware_manifest(folder: Path) -> FirmwareManifest:
     return manifest
 
 
+def _check_readable(folder: Path) -> None:
+    def refuse(error: OSError) -> None:
+        if isinstance(error, FileNotFoundError):
+            return  # said by what reads a file of it
+        raise InputError(f"'{error.filename}' can't be read: {reason_of(error)}; change who may read it") from error
+
+    for place, _, names in os.walk(folder, onerror=refuse):
+        for name in names:
+            path = os.path.join(place, name)
+            if any("\ud800" <= letter <= "\udfff" for letter in name):
+                raise InputError(f"'{quotable(path)}' has a name that is no text in UTF-8; rename it, or take it away")
+            if os.path.exists(path) and not os.access(path, os.R_OK):
+                raise InputError(f"'{path}' can't be read: no permission; change who may read it")
+
+
+def quotable(path: str) -> str:
+    """Return a name with a mark for each byte that is no text."""
+    return path.encode(errors="replace").decode()
+
+
 def read_compensator(folder: Path) -> Compensator:
     """Return the compensator of a firmware folder."""
     path = folder / "compensator.json"
@@ -39,7 +60,11 @@ def _compensator(content: bytes, source: str) -> Compensator:
 
 
 def check_firmware_inside(folder: Path) -> None:
-    """Refuse a firmware folder whose C is not in it, or with a link: a build follows it, and no check looks behind."""
+    """Refuse a firmware folder whose C is not in it, or with a link: a build follows it, and no check looks behind.
+
+    Refused is too what can't be read, here and now, and a name that no text can hold: nothing could be said of it.
+    """
+    _check_readable(folder)
     found = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.[ch]"))]
     check_inside(folder, ["compensator.json", *found], f"'{folder}'")
     home = os.path.realpath(folder)

@@ -3,10 +3,11 @@
 import os
 import re
 from collections.abc import Iterator
-from pathlib import Path, PureWindowsPath
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from xml.etree import ElementTree
 
 from dzdesign.core.errors import quoted
+from dzdesign.verify.firmware.build_inputs import SOURCES
 
 ENDING = ".projectspec"
 #: The path variable that is the user's.
@@ -31,19 +32,35 @@ def project_faults(path: Path, generated: str, firmware: Path) -> Iterator[str]:
     if not path.is_file():
         yield "it is missing"
         return
-    content = path.read_bytes()
-    if b"<!DOCTYPE" in content:
-        yield "it declares a document type, which no project has"
-        return
+    builder = _PlainBuilder()
     try:
-        found = ElementTree.fromstring(content)
+        found = ElementTree.fromstring(path.read_bytes(), ElementTree.XMLParser(target=builder))
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         yield f"it is not XML ({error})"
+        return
+    if builder.more:
+        yield f"it has {builder.more[0]}, which no project has"
         return
     yield from _differences(found, ElementTree.fromstring(generated))
     for entry in found.iter("pathVariable"):
         if entry.get("name") == WARE_VARIABLE:
             yield from _faults_of_folder(entry.get("path", ""), path.parent, firmware)
+
+
+class _PlainBuilder(ElementTree.TreeBuilder):
+    """Notes what tells whoever reads the file to read more or otherwise, in whichever encoding it stands there."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.more: list[str] = []
+
+    def doctype(self, *_: object) -> None:
+        """Note a document type: it may give attributes their values."""
+        self.more.append("a document type")
+
+    def pi(self, target: str, *_: object) -> None:  # type: ignore[override]
+        """Note an instruction."""
+        self.more.append(f"an instruction {quoted(target)}")
 
 
 def _differences(found: Element, generated: Element) -> Iterator[str]:
@@ -70,14 +87,20 @@ def _differences(found: Element, generated: Element) -> Iterator[str]:
 
 def _faults_of_folder(value: str, place: Path, firmware: Path) -> Iterator[str]:
     """Yield why the user's value is no folder of C2000Ware: it adds an option, or leads into the firmware."""
-    if not value.strip() or NO_PATH.search(value):
+    if not value.strip() or NO_PATH.search(value) or any(map(_is_file_of_its_own, value.split()[1:])):
         yield f"{WARE_VARIABLE} is {quoted(value)}, expected the name of a folder and nothing else"
         return
     if PureWindowsPath(value).drive and os.name != "nt":  # another machine's
         return
-    home, led_to = os.path.realpath(firmware), os.path.realpath(place / value.replace("\\", "/"))
+    led = os.path.realpath(place / value.replace("\\", "/"))
+    home, led_to = os.path.realpath(firmware).casefold(), led.casefold()  # it is built on Windows
     if led_to == home or led_to.startswith(os.path.join(home, "")):
         yield f"{WARE_VARIABLE} is {quoted(value)}, a folder of this firmware; C2000Ware lies elsewhere"
+
+
+def _is_file_of_its_own(word: str) -> bool:
+    """Tell whether what follows a blank is a file that a compiler would take along: paths in options have no quotes."""
+    return word.startswith((".", "/")) or PurePosixPath(word.replace("\\", "/")).suffix.lower() in SOURCES
 
 
 def _difference(found: str, generated: str) -> str:

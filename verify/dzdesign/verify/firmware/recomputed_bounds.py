@@ -17,6 +17,7 @@ from dzdesign.identify.valve.bound_errors import BoundErrors
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.firmware.stated_basis import ROUNDING_V, ROUNDINGS, about_basis, about_errors
+from dzdesign.verify.firmware.stated_origin import about_files, about_options, about_units
 from dzdesign.verify.requirements import BOUNDS, Check
 
 #: Degrees of freedom of the noise's standard errors, and the least share of it in a variance that counts in others'.
@@ -35,7 +36,7 @@ POINTS, FURTHEST, FURTHEST_MPA = 101, 1.05 * 1.1**28, 1e3
 def bounds_follow(compensator: Compensator) -> Check:
     """Tell whether every lower bound of the firmware's valve follows from what stands beside it."""
     valve, units = compensator.valve, compensator.valve.recorded_units
-    faults: list[str] = []
+    faults = [*about_units(valve), *about_files(valve), *about_options(valve)]
     count, largest = 0, 0.0
     for name, side in valve.sides.items():
         place = f"sides.{name}.certified"
@@ -50,7 +51,7 @@ def bounds_follow(compensator: Compensator) -> Check:
                 apart = np.abs(np.array(stated) - found)
                 count += apart.size
                 largest = max(largest, float(apart.max(initial=0.0)))
-                if np.any(apart > ROUNDINGS * ROUNDING_V * (1 + quantile)):
+                if not np.all(apart <= ROUNDINGS * ROUNDING_V * (1 + quantile)):  # one that is no number is no bound
                     row = int(apart.argmax())
                     faults.append(f"{place}.{guard}.{key}[{row}]: {_unlike(units, stated[row], float(found[row]))}")
     if faults:

@@ -41,21 +41,47 @@ def about_basis(side: SideModel) -> Iterator[str]:
 def _unseen(side: SideModel) -> float:
     """Return the flow at the guarded bounds that nothing shows, L/min: the meter's, unless readings tell at each test.
 
-    A reading tells of a test within 5 % of its pressure drop, at its threshold or above; of closing one after closing.
-    At a higher pressure drop than it was taken at, so much more may flow.
+    A reading tells of a test within 5 % of its pressure drop, at its threshold and at that of its own pressure drop or
+    above; of closing one after closing. At a higher pressure drop than it was taken at, so much more may flow. Its
+    table needs one in the meter's range, and a reading that shows more at a lower command counts in its place.
     """
     level, most = side.certificate.level_L_min, 0.0
-    of_guard = {"closing": {"falling"}, "opening": {"rising", "falling"}}.get(side.certificate.guard, set())
-    for dp, threshold in zip(side.curve.dp_MPa, side.curve.u_threshold_V, strict=False):
-        flows = [
-            (row.q_L_min + row.q_error_L_min) * max(dp / row.dp_MPa, 1.0)
-            for row in side.low_flow
-            if row.branch in of_guard and abs(row.dp_MPa / dp - 1) <= NEAR_DP and row.u_V > threshold - NEAR_V
-        ]
+    of_guard = {"closing": ("falling",), "opening": ("rising", "falling")}.get(side.certificate.guard, ())
+    shows = {"closing": ("falling", "rising"), "opening": ("rising",)}.get(side.certificate.guard, ())
+    dps, thresholds = np.array(side.curve.dp_MPa), np.array(side.curve.u_threshold_V)
+    confirmed = {
+        row.source.rsplit(", row ", 1)[0]
+        for row in side.low_flow
+        if row.branch in of_guard[:1] and row.q_L_min - row.q_error_L_min > level
+        and 4 * row.q_error_L_min <= row.q_L_min and np.any(np.abs(row.dp_MPa - dps) <= NEAR_DP * dps)
+    }  # fmt: skip
+
+    def threshold_at(dp: float) -> float:
+        row = min(max(int(np.sum(dps < dp)), 1), dps.size - 1) if dps.size > 1 else 0
+        slope = (thresholds[row] - thresholds[row - 1]) / (dps[row] - dps[row - 1]) if row else 0.0
+        return float(thresholds[row] + slope * (dp - dps[row]))
+
+    for dp, threshold in zip(dps, thresholds, strict=False):
+        near = [row for row in side.low_flow if abs(row.dp_MPa / dp - 1) <= NEAR_DP]
+        flows = []
+        for row in near:
+            if row.branch not in of_guard or row.source.rsplit(", row ", 1)[0] not in confirmed:
+                continue
+            if row.u_V <= max(threshold, threshold_at(row.dp_MPa)) - NEAR_V:
+                continue
+            flow = (row.q_L_min + row.q_error_L_min) * max(dp / row.dp_MPa, 1.0)
+            earlier = [each for each in near if each.branch in shows and each.u_V <= row.u_V]
+            for each in earlier:
+                if each.q_L_min - each.q_error_L_min > (row.q_L_min + row.q_error_L_min) * max(dp / row.dp_MPa, 1.0):
+                    flow = max(flow, (each.q_L_min + each.q_error_L_min) * max(dp / each.dp_MPa, 1.0))
+            flows.append(flow)
         if not flows:
             return level
         most = max(most, min(flows))
-    return min(level, most) if most else level
+    least = most or level
+    below = [row for row in side.low_flow if row.branch in shows and row.u_V <= threshold_at(row.dp_MPa)]
+    flowing = [row.q_L_min + row.q_error_L_min for row in below if row.q_L_min - row.q_error_L_min > least]
+    return min(level, max([least, *flowing]))
 
 
 def about_errors(curve: CertifiedCurve) -> Iterator[str]:

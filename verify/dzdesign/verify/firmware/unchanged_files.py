@@ -70,6 +70,12 @@ def changed_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
     ]
 
 
+def differing_files(folder: Path, manifest: FirmwareManifest) -> dict[str, str]:
+    """Return the SHA-256 of each file that was changed or added since it was generated: as it was verified."""
+    names = sorted({*changed_files(folder, manifest), *added_files(folder, manifest)})
+    return {name: sha256_of((folder / name).read_bytes()) for name in names if (folder / name).is_file()}
+
+
 def added_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
     """Return the files that were not generated and that a build may read, but for what CMake writes where it builds."""
     built, generated = _cmake_trees(folder, manifest), _names(manifest)

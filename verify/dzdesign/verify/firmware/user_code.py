@@ -1,7 +1,8 @@
 """The user's headers and linker files: they may not change what the generated C means, which includes them."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
 from dzdesign.verify.firmware.build_inputs import SOURCES
@@ -16,8 +17,24 @@ INCLUDE = re.compile(rf"{HASH}(?:include_next|include|import){BLANK}([^\n]*)", r
 INCLUDED_SCRIPT = re.compile(r"\bINCLUDE\s+(\S+)")
 NAME = re.compile(r"[A-Za-z_]\w*")
 FUNCTION = re.compile(r"\b(dz_\w+)\s*\(")
-#: A symbol that a linker file gives an address, over that of the C.
-ASSIGNED = re.compile(r"\b(\w+)\s*(?:[-+*/&|]|<<|>>)?=(?!=)")
+#: A symbol that a linker file gives an address, over that of the C; its name may stand in quotes.
+ASSIGNED = re.compile(r"\b(\w+)\"?\s*(?:[-+*/&|]|<<|>>)?=(?!=)")
+#: A file that a linker file has linked beside those of the command.
+LINKED = re.compile(r"\b(?:INPUT|GROUP|STARTUP|AS_NEEDED)\s*\(([^)]*)\)")
+#: Where a linker file lets a program begin, what it leaves out, and what it gives no place in memory or does not load.
+ENTERED = re.compile(r"\bENTRY\s*\(\s*\"?([^\s\")]+)\"?\s*\)")
+LEFT_OUT = re.compile(r"(/DISCARD/\s*|\(\s*(?:NOLOAD|DSECT|COPY|INFO|OVERLAY)\s*\)\s*):[^{]*\{([^}]*)\}")
+#: There a pattern of files with its patterns of sections, once exceptions and sorting are taken out.
+EXCEPT = re.compile(r"EXCLUDE_FILE\s*\([^)]*\)")
+SORTED = re.compile(r"\b(?:SORT\w*|KEEP)\s*\(((?:[^()]|\([^()]*\))*)\)")
+OF_FILES = re.compile(r"([^\s()]*)\s*\(([^()]*)\)")
+#: A function of C or a label of assembly; the one that a reset leads to.
+DEFINED, RESET = re.compile(r"\b(\w+)\s*\([^;{}()]*\)\s*\{|^\s*(\w+):", re.MULTILINE), "dz_reset"
+#: Sections that a compiler may put generated code and constants in, one for each name.
+WITH_CODE = (".text", ".rodata", ".data", ".vectors")
+#: How the members of the structs behind it are laid out.
+PACKED = re.compile(rf"(?:{HASH}pragma|_Pragma\s*\(\s*\"){BLANK}(?:\w+{BLANK})?pack\s*\(([^)]*)\)", re.MULTILINE)
+UNPACKED = ("", "pop")
 LINKER_FILES = {".ld", ".lds", ".lcf", ".icf", ".sct", ".cmd"}
 QUOTES = "\"'"
 C_FILES = {".c", ".s", ".asm"}
@@ -34,6 +51,9 @@ def interference(folder: Path, names: list[str], generated: Mapping[str, str], b
     reached = {name for name in code if name not in board and not (name.startswith("core/") and name.endswith(".c"))}
     used = {word for name in reached for word in NAME.findall(code[name])}
     functions = {word for text in code.values() for word in FUNCTION.findall(text)}
+    words = {word for text in code.values() for word in NAME.findall(text)}
+    sections = {*WITH_CODE, *(f"{kind}.{word}" for kind in WITH_CODE for word in words)}
+    entries = {word for name in names for word in _entries(folder / name, generated.get(name))}
     for name in names:
         path = folder / name
         if not path.is_file():
@@ -41,6 +61,8 @@ def interference(folder: Path, names: list[str], generated: Mapping[str, str], b
         text = _without_comments(path.read_text(encoding="utf-8", errors="replace"))
         before = _without_comments(generated.get(name, ""))
         yield from (f"{name} {fault}" for fault in _faults(path, text, before, used, functions))
+        if path.suffix.lower() in LINKER_FILES:
+            yield from (f"{name} {fault}" for fault in _unplaced(text, sections, entries))
         yield from (f"{name} includes {found}" for found in _odd_includes(path, text, folder))
 
 
@@ -50,14 +72,45 @@ def _faults(path: Path, text: str, before: str, used: set[str], functions: set[s
     if ending in LINKER_FILES:
         for word in sorted({*ASSIGNED.findall(text)} & functions - {*ASSIGNED.findall(before)}):
             yield f"gives {word} another address"
+        for word in re.split(r"[\s,]+", " ".join(LINKED.findall(text))):
+            if word and (path.parent / word.strip(QUOTES)).is_file():
+                yield f"links {word.strip(QUOTES)}, which no check has looked at; have it built from a C file in board/"
         return
     if ending in C_FILES:
         return
+    packed = [found.strip() for found in PACKED.findall(text)]
+    if packed and packed[-1] not in UNPACKED:
+        yield f"leaves pack({packed[-1]}) in force, under which structs of the generated C lie otherwise; end with pop"
     macros = {*MACRO.findall(text)} - {*MACRO.findall(before)}
     for word in sorted(macros & used):
         yield f"makes {word}, which the generated C uses, a macro"
     for word in sorted({*NAME.findall(text)} & functions - {*NAME.findall(before)} - macros):
         yield f"has {word}, a function of the generated C; call it from a C file"
+
+
+def _unplaced(text: str, sections: Iterable[str], entries: set[str]) -> Iterator[str]:
+    """Yield what a linker file leaves out of the program or does not load of generated C, and an odd entry of it."""
+    for kind, body in LEFT_OUT.findall(text):
+        plain = SORTED.sub(r"\1", SORTED.sub(r"\1", EXCEPT.sub(" ", body)))
+        patterns = [word for files, words in OF_FILES.findall(plain) if ".a" not in files for word in words.split()]
+        found = next((word.strip(QUOTES) for word in patterns if _matches(word.strip(QUOTES), sections)), "")
+        if found:
+            yield f"{'discards' if 'DISCARD' in kind else 'does not load'} {found}, in which generated code may lie"
+    for word in ENTERED.findall(text):
+        if word not in entries:
+            yield f"enters at {word}, which no start-up file in the firmware defines; put yours into board/"
+
+
+def _matches(pattern: str, sections: Iterable[str]) -> bool:
+    return any(fnmatchcase(section, pattern) for section in sections)
+
+
+def _entries(path: Path, before: str | None) -> Iterator[str]:
+    """Yield the functions of a C or assembly file of the user's; of one as generated only that of a reset."""
+    if path.suffix.lower() in C_FILES and path.is_file():
+        text = path.read_text(encoding="utf-8", errors="replace")
+        defined = DEFINED.findall(_without_comments(text))
+        yield from (name for pair in defined for name in pair if name and (text != before or name == RESET))
 
 
 def _odd_includes(path: Path, text: str, folder: Path) -> Iterator[str]:

@@ -1,64 +1,32 @@
-"""The native plant beside CasADi's integrator, over a window of each kind of scenario: ramp, step and load step."""
+"""The native plant beside CasADi's integrator, over a window of each kind of scenario.
+
+Ramp, step and load step; and all that scenarios, machines and sensors that fail may give the loop beside them.
+"""
 
 import ctypes
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, LoopRun
+from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, PERIODS_PER_RECORD, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.integrator.compiled_calls import compiled_core
-from dzdesign.verify.integrator.reference_loop import Course, ReferenceLoop, ReferenceRun
-from dzdesign.verify.loop_results import PlantComparison, WindowKind
+from dzdesign.verify.integrator.direct_drive import unlike_direct_values
+from dzdesign.verify.integrator.reference_loop import ReferenceLoop, ReferenceRun
+from dzdesign.verify.integrator.windows import Window, course_of, windows_of
+from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import NATIVE_PLANT, Check
 
-#: Of all windows together, s.
-WINDOWS_S = 2.0
 #: Largest differences: of the position over the stroke, and of the flow over the largest one of the window.
 MOST_APART = 1e-5
 #: What is stored of a difference that is no number.
 NO_NUMBER = 1e6
-#: The command over the share of a window that has passed.
-COMMANDS: dict[WindowKind, tuple[tuple[float, ...], tuple[float, ...]]] = {
-    "ramp": ((0.0, 0.05, 0.5, 0.9, 1.0), (0.0, 0.0, 0.3, 0.0, 0.0)),
-    "step": ((0.0, 0.05, 0.05, 0.45, 0.45, 0.65, 0.65, 1.0), (0.0, 0.0, 1.0, 1.0, 0.5, 0.5, 0.0, 0.0)),
-    "load step": ((0.0, 0.05, 0.5, 0.9, 1.0), (0.0, 0.0, 0.6, 0.0, 0.0)),
-}
-#: And where in it the pressure drop jumps.
-JUMPS_AT = 0.4
-#: Zero command before a window, beyond what an interlock waits for, s.
-REST_S = 0.01
 #: Time constants after which no more than 1e-13 is left of what was before.
 SETTLED = 30
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Window:
-    """What happens in a window, and where."""
-
-    kind: WindowKind
-    scene: Scene
-    then_MPa: float
-    seconds: float
-
-
-def windows_of(scenes: Sequence[Scene]) -> list[Window]:
-    """Return the windows of every side: the ramp at its lowest pressure drop, the step at its highest, and between."""
-    chosen: list[tuple[WindowKind, Scene, float]] = []
-    for side in dict.fromkeys(scene.side for scene in scenes):
-        own = sorted((scene for scene in scenes if scene.side == side), key=lambda scene: scene.dp_MPa)
-        chosen += [("ramp", own[0], own[0].dp_MPa), ("step", own[-1], own[-1].dp_MPa)]
-        if own[0].tested_MPa:
-            chosen.append(("load step", own[0], own[0].tested_MPa[1]))
-    return [
-        Window(kind=kind, scene=scene, then_MPa=then_MPa, seconds=WINDOWS_S / len(chosen))
-        for kind, scene, then_MPa in chosen
-    ]
 
 
 def compare_with_integrator(
@@ -86,48 +54,44 @@ def _compared(firmware: Path, windows: Sequence[Window]) -> Iterator[PlantCompar
 
 
 def compare(window: Window, library: ctypes.CDLL) -> PlantComparison:
-    """Run one window in both loops, from rest, and return what is between them."""
-    scene, loop = window.scene, window.scene.loop
-    command, supply = _course(window)
-    native = loop.run(command, supply, "compensated", back_MPa=scene.back_MPa, periods_per_record=1)
-    begin, first, end = _span(window, native)
-    end = min(end, command.size)
-    course = Course(
-        command=command[:end], supply_MPa=supply[:end], back_MPa=scene.back_MPa,
-        native_codes=np.stack([native.code_a, native.code_b], axis=1)[:end].astype(int),
+    """Run one window in both loops, from rest, and return what is between them.
+
+    The native loop runs twice: with a record for each period, and as the ramps of the closed loop have it; and in the
+    step with a direct command once more, where that has a wave about it.
+    """
+    scene, loop, records = window.scene, window.loop, course_of(window)
+    course = records.by_period()
+    native, coarse = (
+        loop.run(
+            each.command, each.supply_MPa, "compensated", back_MPa=each.back_MPa, added_V=each.added_V,
+            shown=each.shown, errors=window.errors, periods_per_record=periods,
+        )
+        for each, periods in ((course, 1), (records, PERIODS_PER_RECORD))
     )  # fmt: skip
+    begin, first, end = (each // PERIODS_PER_RECORD * PERIODS_PER_RECORD for each in _span(window, native))
+    end = min(end, course.command.size)
     reference = ReferenceLoop(
-        scene.plant, library, scene.compensator.signals, scene.sign, loop.coil,
-        without_dither=loop.wave()[2],
-    ).run(course, begin)  # fmt: skip
-    return _result(window, native, reference, begin, slice(first, end))
-
-
-def _course(window: Window) -> tuple[np.ndarray, np.ndarray]:
-    """Return command and pressure drop at no flow, a value for each period; slower ramps of the drive stretch it."""
-    loop = window.scene.loop
-    count = round((window.seconds + 2 * loop.slowest_ramp_s) / PWM_PERIOD_S)
-    passed = np.arange(count) / count
-    times, levels = COMMANDS[window.kind]
-    before = np.zeros(round((loop.waits_s + REST_S) / PWM_PERIOD_S))
-    command = np.concatenate([before, np.interp(passed, times, levels)])
-    supply = np.full(command.size, window.scene.dp_MPa)
-    supply[before.size + round(JUMPS_AT * count) :] = window.then_MPa
-    return command, supply
+        window.plant, library, scene.compensator.signals, scene.sign, loop.coil,
+        without_dither=loop.wave()[2], drive=window.drive,
+    ).run(course, window.errors, np.stack([native.code_a, native.code_b], axis=1).astype(int), begin, end)  # fmt: skip
+    unlike = unlike_direct_values(window, library, course, native) if window.kind == "step" else 0
+    return _result(window, native, coarse, reference, begin, slice(first, end), unlike)
 
 
 def _span(window: Window, native: LoopRun) -> tuple[int, int, int]:
     """Return the periods in which the reference begins, from which on it is compared, and with which it ends.
 
-    It begins while the spool rests. Behind a slow ramp of the drive, which opens the valve long after that, it begins
-    later, from rest all the same, and is compared once coil and spool have forgotten where they were; by then a rising
-    command has brought the play to its end. A coil's controller remembers, so there it begins with the run.
+    It begins before the first pulse: the play remembers a current that does not move the spool yet. Behind a slow ramp
+    of the drive, which opens the valve long after that, it begins later, from rest all the same, and is compared once
+    coil and spool have forgotten where they were; by then a rising command has brought the play to its end. A coil's
+    controller remembers, so there it begins with the run.
     """
-    count, plant = round(window.seconds / PWM_PERIOD_S), window.scene.plant.parameters
+    count, plant = round(window.seconds / PWM_PERIOD_S), window.plant.parameters
     moved = np.flatnonzero(native.position_mm > 0)
     flows = np.flatnonzero(native.q_L_min > native.q_L_min[0] + NO_FLOW_L_MIN)
-    leaves, opens = (int(found[0]) if found.size else 0 for found in (moved, flows))
-    begin = max(leaves - math.ceil(SETTLED / plant.coil_rad_s / PWM_PERIOD_S), 0)
+    pulses = np.flatnonzero(native.compare > 0)
+    leaves, opens, driven = (int(found[0]) if found.size else 0 for found in (moved, flows, pulses))
+    begin = min(leaves, driven)
     late = opens - count // 2
     if window.scene.loop.controls_current:
         return 0, 0, max(late, begin) + count
@@ -145,12 +109,22 @@ def _forgets(plant: Plant) -> int:
 
 
 def _result(
-    window: Window, native: LoopRun, reference: ReferenceRun, begin: int, part: slice
-) -> PlantComparison:  # fmt: skip
-    stroke_mm, since = window.scene.plant.parameters.stroke_mm, slice(part.start - begin, None)
-    largest = float(reference.q_L_min[since].max())
+    window: Window, native: LoopRun, coarse: LoopRun, reference: ReferenceRun, begin: int, part: slice, direct: int
+) -> PlantComparison:
+    stroke_mm, since = window.plant.parameters.stroke_mm, slice(part.start - begin, None)
+    flows = reference.q_L_min[since]
+    largest = float(flows.max())
     position = float(np.abs(native.position_mm[part] - reference.position_mm[since]).max()) / stroke_mm
-    flow = float(np.abs(native.q_L_min[part] - reference.q_L_min[since]).max())
+    records = slice(part.start // PERIODS_PER_RECORD, part.stop // PERIODS_PER_RECORD)
+    of_record = flows.reshape(-1, PERIODS_PER_RECORD)
+    apart = (
+        native.q_L_min[part] - flows,
+        coarse.q_L_min[records] - of_record[:, -1],
+        coarse.q_mean_L_min[records] - of_record.mean(axis=1),
+        coarse.q_largest_L_min[records] - of_record.max(axis=1),
+    )
+    flow = max(float(np.abs(each).max()) for each in apart)
+    unlike = direct + int(np.count_nonzero(native.compare[part] != reference.compare[since]))
     return PlantComparison(
         kind=window.kind,
         side=window.scene.side,
@@ -160,7 +134,7 @@ def _result(
         position_difference=_number(position),
         flow_difference=_number(flow / largest if largest > 0 else flow),
         q_largest_L_min=largest,
-        unlike_compare_values=int(np.count_nonzero(native.compare[part] != reference.compare[since])),
+        unlike_compare_values=unlike + reference.unlike_codes,
         codes_at_border=reference.codes_at_border,
         impacts=reference.impacts,
     )
@@ -184,7 +158,7 @@ def native_plant_check(
         f"allowed: {MOST_APART:.0e}; {sum(each.impacts for each in found)} stops met, as events in both"
     )
     if unlike:
-        text += f"; {unlike} compare values differ"
+        text += f"; {unlike} compare values or codes differ"
     if by_current:
         text += "; the coil with its controller is in both"
     if is_stand_in:
@@ -200,4 +174,6 @@ def _where(found: PlantComparison, units: RecordedUnits) -> str:
     if found.kind == "load step":
         first, then = (units.text(each, ".3g MPa") for each in (found.dp_MPa, found.then_MPa))
         return f"load step from {first} to {then}"
+    if found.kind == "disturbances":
+        return "with disturbances"
     return f"{found.kind} at {units.text(found.dp_MPa, '.3g MPa')}"

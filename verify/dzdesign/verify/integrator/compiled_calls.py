@@ -30,6 +30,8 @@ class CompiledDrive:
         self._shown = (ctypes.c_int32 * 4)()
         #: PWM periods from one sample to the next.
         self.periods_per_sample = int(library.core_periods_per_sample())
+        #: What the law gave at the last tick.
+        self.law = 0
         library.core_init(self._memory)
 
     def sample(self, codes: tuple[int, int, int]) -> None:
@@ -40,6 +42,7 @@ class CompiledDrive:
         """Let a PWM period pass; return the compare value of the solenoid, or of the law without the dither."""
         self._library.core_tick(self._memory, self._shown)
         a, b, law, side = self._shown
+        self.law = law
         if without_dither:
             return law if side == self._sign else 0
         return a if self._sign > 0 else b

@@ -3,28 +3,20 @@
 Written from the paper once more, as it checks motion.py and the C beside it: nothing of them is used here. Beyond the
 paper: preload, the force by which the pressure drop helps to open, and the flow force in the load f_eL; overlap; stops
 that swallow the spool's speed; and the play, a force that is constant over a period of the PWM (see `reference_loop`).
-
-CVODES takes Adams' formulas at a relative tolerance of 1e-12. Against the same at 1e-14 a position is then off by
-5e-12 mm; collocation of order 3 to 6 in one element a phase, no faster, by 1e-7 mm, as its step does not end where the
-metering edge opens.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.integrator.cvodes import Cvodes
 
 if TYPE_CHECKING:
     import casadi
 
-#: Of CVODES, for states in A, A ms, mm and m/s.
-CVODES: dict[str, Any] = {
-    "linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional",
-    "reltol": 1e-12, "abstol": 1e-14, "max_num_steps": 1_000_000,
-}  # fmt: skip
 #: Rests and flights in one phase; more would be chatter at a stop.
 MOST_EVENTS = 20
 #: Of a phase, ms: nothing shorter is integrated.
@@ -47,10 +39,6 @@ class SpoolState:
     speed: float = 0.0
     #: At stops, so far.
     impacts: int = 0
-
-    def array(self) -> np.ndarray:
-        """Return it as CVODES has it."""
-        return np.array([self.current, self.charge, self.position, self.speed])
 
     def take(self, found: np.ndarray) -> None:
         """Become what CVODES found."""
@@ -91,7 +79,7 @@ class CvodesSpool:
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
-        self._solve = _integrator(plant)
+        self._cvodes = _integrator(plant)
         #: Force per volt of command at rest, from Eqs. (19)-(22), N/V: by it a play in V is one in N.
         loop_ohm = plant.R_c_ohm + plant.r_p_ohm + plant.K_a * plant.K_fi_V_A
         self.N_per_V = plant.K_i_N_A * plant.K_a / loop_ohm
@@ -134,23 +122,36 @@ class CvodesSpool:
         given = [
             milliseconds, acting.volts, acting.push_N, acting.supply_MPa, float(free), float(not acting.current_held),
         ]  # fmt: skip
-        found: np.ndarray = np.array(self._solve(x0=state.array(), p=given)["xf"]).ravel()
-        return found
+        return self._cvodes.end((state.current, state.charge, state.position, state.speed), given)
 
     def _rest(self, state: SpoolState, acting: Acting, left: float) -> float:
         """Stay at a stop until the current lets go, or to the end; return for how long."""
 
-        def pull_after(milliseconds: float) -> float:
-            later = SpoolState(position=state.position)
-            later.current = float(self._integrated(state, acting, milliseconds, free=False)[0])
-            return self._pull(later, acting)
+        def after(milliseconds: float) -> np.ndarray:
+            return self._integrated(state, acting, milliseconds, free=False)
 
-        away = 1.0 if state.position <= 0.0 else -1.0
-        taken = left
-        if away * pull_after(left) > 0.0:
-            taken = _root(pull_after, 0.0, left)
-        state.take(self._integrated(state, acting, taken, free=False))
+        def pull(later: np.ndarray) -> float:
+            return self._pull(SpoolState(position=state.position, current=float(later[0])), acting)
+
+        away, taken, end = 1.0 if state.position <= 0.0 else -1.0, left, after(left)
+        if away * pull(end) > 0.0:
+            taken = _root(lambda ms: pull(after(ms)), 0.0, left)
+            end = after(taken)
+        state.take(end)
         return taken
+
+    def _reach_mm(self, state: SpoolState, acting: Acting, end: np.ndarray, left: float) -> float:
+        """Return how far at most a spool between the stops gets in a phase: every force one way, and no damping.
+
+        In a phase the current goes one way, so that it is largest at an end of it.
+        """
+        plant = self._plant
+        load_N = abs(plant.preload_N) + acting.supply_MPa * (
+            abs(plant.pressure_force_N_MPa) + abs(plant.flow_force_N_mm_MPa) * (plant.stroke_mm - plant.overlap_mm)
+        )  # Eq. (23), at its largest
+        force_N = plant.K_i_N_A * max(abs(state.current), abs(float(end[0]))) + abs(acting.push_N)
+        force_N += plant.K_et_N_m * 1e-3 * plant.stroke_mm + load_N
+        return abs(state.speed) * left + force_N / plant.m_e_kg * 1e-3 * left**2 / 2
 
     def _fly(self, state: SpoolState, acting: Acting, left: float) -> float:
         """Move free of the stops until one is met, or to the end; return for how long."""
@@ -162,6 +163,10 @@ class CvodesSpool:
             return max(-position, position - self._plant.stroke_mm)
 
         end = after(left)
+        reach = self._reach_mm(state, acting, end, left)
+        if outside(state.position) < -reach:
+            state.take(end)
+            return left
         inside, out = 0.0, left
         if state.speed * end[3] < 0.0:
             turn = _root(lambda ms: float(after(ms)[3]), 0.0, left)
@@ -198,7 +203,7 @@ def _root(value: Callable[[float], float], low: float, high: float) -> float:
     return float(brentq(value, low, high, xtol=1e-13, rtol=1e-14))
 
 
-def _integrator(plant: Plant) -> "casadi.Function":
+def _integrator(plant: Plant) -> Cvodes:
     """Return CVODES over a phase of any length: the time is counted in shares of it."""
     import casadi as ca
 
@@ -212,5 +217,4 @@ def _integrator(plant: Plant) -> "casadi.Function":
     f_e = plant.K_i_N_A * current  # Eq. (22)
     by_speed = (f_e - plant.B_e_N_s_m * speed - plant.K_et_N_m * 1e-3 * position - load + push) / plant.m_e_kg  # (23)
     rates = ca.vertcat(own_current * 1e-3 * by_current, current, free * speed, free * 1e-3 * by_speed)
-    problem = {"x": state, "p": given, "ode": milliseconds * rates}
-    return ca.integrator("phase", "cvodes", problem, 0, 1, CVODES)
+    return Cvodes(state, given, milliseconds * rates)

@@ -32,6 +32,11 @@ TIMEOUT_S = 120
 #: and to build no traps into what is undefined (it does so where it is not told to optimize).
 LIKE_OTHERS = ("-g0", "-mcpu=baseline", "-fno-sanitize=undefined")
 
+#: C that every compiler must refuse with `STRICT`; one that takes it was told to keep its warnings to itself.
+NARROWS = "short dz_narrows(int value);\nshort dz_narrows(int value) { return value; }\n"
+#: Variables by which gcc and clang take other headers or options than those of the command.
+REDIRECTING = ("CPATH", "C_INCLUDE_PATH", "CCC_OVERRIDE_OPTIONS")
+
 logger = logging.getLogger(__name__)
 
 
@@ -87,6 +92,7 @@ def environment() -> dict[str, str]:
     """Return the environment of a compiler: Zig keeps its C library in the user's cache, and what it builds with ours.
 
     Without a home it would refuse to work; with ours for all it would build the C library at every start, for seconds.
+    What would have the same command compile other C is left out.
     """
     kept = platformdirs.user_cache_path("dzdesign", appauthor=False) / "zig"
     try:
@@ -98,7 +104,7 @@ def environment() -> dict[str, str]:
         "ZIG_GLOBAL_CACHE_DIR": str(kept if may_write else build_folder() / "zig"),
         "ZIG_LOCAL_CACHE_DIR": str(build_folder() / "zig"),
     }
-    return {**ours, **os.environ}
+    return {**ours, **{name: value for name, value in os.environ.items() if name not in REDIRECTING}}
 
 
 def host_compiler() -> str:
@@ -141,11 +147,27 @@ def build(command: Sequence[str], what: str, folder: Path | None = None) -> None
         raise RequirementError(f"{what} does not compile: {first_error(done.stderr)}")
 
 
+def keeps_warnings(compiler: str) -> bool:
+    """Tell whether a compiler takes without a word what it must refuse: then its word on other C means nothing."""
+    source = build_folder() / "narrows.c"
+    source.write_text(NARROWS, encoding="utf-8")
+    try:
+        check_strictly(source, compiler)
+    except RequirementError:
+        return False
+    return True
+
+
+def name_of(compiler: str) -> str:
+    """Return a compiler as a person calls it: without its folder, but with the words that $CC adds."""
+    return Path(compiler).name if shutil.which(compiler) else compiler
+
+
 def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> None:
     """Compile one file with every warning an error, and with further options."""
     target = build_folder() / "strict.o"
     command = [*words_of(compiler), *STRICT, "-O2", *options, "-c", str(source), "-o", str(target)]
-    build(command, f"{source.name} ({Path(compiler).name})")
+    build(command, f"{source.name} ({name_of(compiler)})")
 
 
 _guard = Lock()
@@ -171,6 +193,11 @@ def built(name: str, command: Sequence[str], sources: Mapping[str, bytes], what:
             for each, text in sources.items():
                 (folder / each).write_bytes(text)
             build([*command, "-o", f"new-{name}"], what, folder)
+            if not (folder / f"new-{name}").is_file():
+                raise RequirementError(
+                    f"{what} was not compiled: `{shlex.join(command[:2])} ...` ended well and wrote nothing; set $CC "
+                    "to a C compiler, without options by which it does not compile or link"
+                )
             (folder / f"new-{name}").replace(folder / name)
     return folder / name
 

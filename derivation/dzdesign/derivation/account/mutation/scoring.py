@@ -7,9 +7,11 @@ itself. A change that leaves the meaning as it is (``<`` for ``<=`` where both g
 compared with the original first.
 """
 
+import math
+import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from msgspec import Meta
 
@@ -26,7 +28,6 @@ from dzdesign.derivation.account.renaming import check_grounds
 from dzdesign.derivation.account.statement import Statement
 from dzdesign.derivation.symbols import Name
 
-_Mutant = TypeVar("_Mutant")
 #: Of what is changed.
 WAYS = ("formulas", "scopes", "grounds", "kinds", "published numbers")
 
@@ -81,15 +82,29 @@ class _Account:
         return bool(hear(judge(mutant, statements, self.verdicts), statements))
 
 
-def score_mutations(verdicts: Sequence[Verdict]) -> AccountMutants:
-    """Mutate every statement of a proved account, and every number transcribed, and see which mutants are caught."""
+class _Tried(NamedTuple):
+    """Mutants of one statement or number in one way, each with its text (None: it changes nothing), and their judge."""
+
+    number: str
+    changed: str
+    mutants: Iterable[tuple[Any, str]]
+    is_caught: Callable[[Any], bool]
+
+
+def score_mutations(verdicts: Sequence[Verdict], share: float = 1.0, seed: int = 0) -> AccountMutants:
+    """Mutate every statement of a proved account, and every number transcribed, and see which mutants are caught.
+
+    Of the mutants a `share` is tried, drawn with a `seed` in two stages, statements and mutants of these: all of them,
+    unless a smaller one is given.
+    """
     account = _Account(
         statements={verdict.number: verdict.statement for verdict in verdicts},
         verdicts={verdict.number: verdict for verdict in verdicts},
     )
-    ways: tuple[Callable[[Statement, _Account], StatementMutants], ...] = (_formulas, _scopes, _grounds, _kinds)
-    scores = [way(statement, account) for way in ways for statement in account.statements.values()]
-    scores += [_of_number(name) for name in transcribed()]
+    ways: tuple[Callable[[Statement, _Account], _Tried], ...] = (_formulas, _scopes, _grounds, _kinds)
+    tried = [way(statement, account) for way in ways for statement in account.statements.values()]
+    tried += [_of_number(name) for name in transcribed()]
+    scores = [_score(one, share, seed) for one in tried]
     return AccountMutants(
         tool=THIS_TOOL,
         made_from=(),
@@ -99,7 +114,7 @@ def score_mutations(verdicts: Sequence[Verdict]) -> AccountMutants:
     )
 
 
-def _formulas(statement: Statement, account: _Account) -> StatementMutants:
+def _formulas(statement: Statement, account: _Account) -> _Tried:
     users = [
         user
         for user in account.statements.values()
@@ -113,53 +128,56 @@ def _formulas(statement: Statement, account: _Account) -> StatementMutants:
         found = (account.shows(mutant if user is statement else user, mutant) for user in judged)
         return any(found) or account.is_refuted(mutant)
 
-    return _score(statement.number, "formulas", formula_mutants(statement, neighbours), is_caught)
+    return _Tried(statement.number, "formulas", formula_mutants(statement, neighbours), is_caught)
 
 
-def _scopes(statement: Statement, account: _Account) -> StatementMutants:
-    return _score(statement.number, "scopes", scope_mutants(statement), lambda one: _is_caught(one, account))
+def _scopes(statement: Statement, account: _Account) -> _Tried:
+    return _Tried(statement.number, "scopes", scope_mutants(statement), lambda one: _is_caught(one, account))
 
 
-def _grounds(statement: Statement, account: _Account) -> StatementMutants:
+def _grounds(statement: Statement, account: _Account) -> _Tried:
     mutants = ground_mutants(statement, account.statements)
-    return _score(statement.number, "grounds", mutants, lambda one: _is_caught(one, account))
+    return _Tried(statement.number, "grounds", mutants, lambda one: _is_caught(one, account))
 
 
-def _kinds(statement: Statement, account: _Account) -> StatementMutants:
+def _kinds(statement: Statement, account: _Account) -> _Tried:
     known = {name for one in _before(statement, account.statements).values() for name in names_in(one)}
-    return _score(statement.number, "kinds", kind_mutants(statement), lambda one: bool(find_kind_fault(one, known)))
+    return _Tried(statement.number, "kinds", kind_mutants(statement), lambda one: bool(find_kind_fault(one, known)))
 
 
 def _is_caught(mutant: Statement, account: _Account) -> bool:
     return account.shows(mutant, mutant) or account.is_refuted(mutant)
 
 
-def _of_number(name: str) -> StatementMutants:
+def _of_number(name: str) -> _Tried:
     """Change the last digit of a number, shift its point, and put another one in its place."""
     printed = transcribed()
     number = printed[name]
     digits = {f"{number[:-1]}{(int(number[-1]) + step) % 10}" for step in (1, 9)}
     wrong = (digits | {f"{number}0", *printed.values()}) - {number}
     mutants = [(one, f"{one} for {number}") for one in sorted(wrong)]
-    return _score(
+    return _Tried(
         name, "published numbers", mutants, lambda one: bool(find_transcription_faults({**printed, name: one}))
     )
 
 
-def _score(
-    number: str, changed: str, mutants: Iterable[tuple[_Mutant | None, str]], is_caught: Callable[[_Mutant], bool]
-) -> StatementMutants:
+def _score(these: _Tried, share: float, seed: int) -> StatementMutants:
+    draw = random.Random(f"{seed} {these.changed} {these.number}")
+    part = math.sqrt(share)
+    is_drawn = draw.random() < part
     tried, equivalent, survivors = 0, [], []
-    for mutant, text in mutants:
+    for mutant, text in these.mutants if is_drawn else ():  # to make them is half the work
+        if draw.random() >= part:
+            continue
         if mutant is None:
             equivalent.append(text)
             continue
         tried += 1
-        if not is_caught(mutant):
+        if not these.is_caught(mutant):
             survivors.append(text)
     return StatementMutants(
-        number=number,
-        changed=changed,
+        number=these.number,
+        changed=these.changed,
         mutants=tried,
         caught=tried - len(survivors),
         survivors=tuple(survivors),

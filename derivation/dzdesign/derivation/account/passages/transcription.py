@@ -12,8 +12,11 @@ import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+import sympy
+
 from dzdesign.derivation.account.passages.digests import PASSAGES
 from dzdesign.derivation.account.published import transcribed
+from dzdesign.derivation.account.statement import Statement
 
 _WORDS = 6  # before the number, and as many after it
 _TOKEN = re.compile(r"\d+(?:\.\d+)?|[^\W\d_]+")
@@ -60,6 +63,19 @@ def find_transcription_faults(
         elif paper is not None and passage not in passages_of(paper, number):
             faults.append(f"{name}: the text given has no {number} in the passage recorded")
     return sorted(faults)
+
+
+def find_value_faults(statements: Sequence[Statement]) -> list[str]:
+    """Say which printed numbers beside statements are not the paper's, or differ from ours without a remark."""
+    printed, faults = {*transcribed().values()}, []
+    for statement, value in ((one, each) for one in statements for each in one.values if each.published):
+        where = f"{statement.number}, {value.label}: {value.published}"
+        if value.published not in printed:
+            faults.append(f"{where} is called printed, and the paper has no such number")
+        elif not value.agrees(statement) and not value.remark:
+            ours = sympy.N(value.exact(statement), 4)
+            faults.append(f"{where} is printed, the statement gives {ours}, and no remark says why")
+    return faults
 
 
 def _digest(text: str) -> str:

@@ -12,7 +12,9 @@ import sympy
 from dzdesign.derivation.account.proof import Verdict, relation_of
 from dzdesign.derivation.account.referee.evaluation import NoNumberError, agree, evaluate, holds
 from dzdesign.derivation.account.referee.situations import Situation, situations
-from dzdesign.derivation.account.statement import Statement
+from dzdesign.derivation.account.scope import Scope
+from dzdesign.derivation.account.statement import Ground, Statement
+from dzdesign.derivation.symbols import Name, dP, u_i
 
 
 def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
@@ -21,9 +23,10 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
     places = [one for one in situations() if _admits(statement, one) and _conditions_hold(verdict, statements, one)]
     if not places:
         return f"no valve is ever in its scope ({statement.scope or 'everywhere'})"
-    tried, is_refuted = False, False
+    free, silent = _left_free(statement.scope), set(statement.grounds)
+    tried, is_refuted, is_met, is_general = False, False, False, False
     for place in places:
-        objection = _ground_objection(statement, statements, place)
+        objection = _ground_objection(statement, statements, place, silent)
         if objection:
             return objection
         try:
@@ -31,15 +34,29 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
             meets = _meets(statement, place)
         except NoNumberError:
             continue
-        tried = True
+        tried, is_met = True, is_met or meets
+        is_general = is_general or free <= place.general
         if wrong and verdict.holds and meets:
             return f"{wrong}: {place.words}"
         is_refuted = is_refuted or bool(wrong)
     if not tried:
         return f"no situation of its scope ({statement.scope or 'everywhere'}) has numbers for its symbols"
+    if silent:
+        return f"no situation of its scope has numbers for its ground {', '.join(sorted(map(str, silent)))}"
+    if verdict.holds and not is_met:
+        return "no valve in its scope meets its condition"
+    if not is_general:
+        names = " and ".join(sorted(map(str, free)))
+        return f"its scope ({statement.scope or 'everywhere'}) leaves only special values of {names}, and says none"
     if not is_refuted and (statement.condition is not None or not verdict.holds):
         return "it is true of every valve, also where it should not follow"
     return ""
+
+
+def _left_free(scope: Scope) -> set[Name]:
+    """Return which of command and pressure drop a scope leaves free: no equation of it says a value."""
+    said = {name for one in scope.comparisons if isinstance(one, sympy.Eq) for name in one.free_symbols}
+    return {u_i, dP} - said
 
 
 def _admits(statement: Statement, place: Situation) -> bool:
@@ -68,13 +85,17 @@ def _meets(statement: Statement, place: Situation) -> bool:
     return any(all(holds(equation, place) for equation in alternative) for alternative in condition.any_of)
 
 
-def _ground_objection(statement: Statement, statements: Mapping[str, Statement], place: Situation) -> str:
+def _ground_objection(
+    statement: Statement, statements: Mapping[str, Statement], place: Situation, silent: set[Ground]
+) -> str:
+    """Say which ground is not true in a place; those that have numbers there leave `silent`."""
     for ground in statement.grounds:
         relation = relation_of(statements[ground.number], ground)
         try:
             left, right = evaluate(relation.left, place), evaluate(relation.right, place)
         except NoNumberError:
             continue
+        silent.discard(ground)
         if not agree(left, right):
             return f"its ground {ground} does not hold in its scope ({left:.6g}, {right:.6g}): {place.words}"
     return ""

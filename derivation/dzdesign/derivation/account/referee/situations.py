@@ -5,12 +5,13 @@ number there.
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import sympy
 
 from dzdesign.derivation import symbols as s
+from dzdesign.derivation.account.referee.drawn import drawn_commands, drawn_drops, drawn_plants, drawn_valves
 from dzdesign.derivation.account.referee.plain_plant import PLANTS, PlainPlant
 from dzdesign.derivation.account.referee.valve import VALVES, PlainValve
 from dzdesign.derivation.account.scope import (
@@ -27,8 +28,8 @@ from dzdesign.derivation.account.scope import (
 from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
 
-_N_ADC, _V_ADC, _N_FULL, _SCALE = 4096.0, 3.0, 1024.0, 1.5
 _STEP = 1e-5  # of a difference quotient
+_S = 1.5  # at which transforms are taken of the plants that are not drawn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,6 +38,8 @@ class Situation:
 
     words: str
     settings: frozenset[Setting]
+    #: Of command and pressure drop, which are no special ones: zero, full, at a threshold, dP0, dP1.
+    general: frozenset[s.Name]
     numbers: Mapping[s.Name, float]
     #: Of functions, such as f(dP) and X_e(s).
     functions: Mapping[sympy.core.function.UndefinedFunction, Callable[[float], float]]
@@ -45,35 +48,53 @@ class Situation:
 @cache
 def situations() -> tuple[Situation, ...]:
     """Return all of them."""
-    found = [one for valve in VALVES for one in _of_valve(valve)]
-    return (*found, *(_of_plant(valve, plant, dP) for valve in VALVES for plant in PLANTS for dP in _drops(valve)))
+    found = [one for valve in (*VALVES, *drawn_valves()) for one in _of_valve(valve)]
+    plants = [(plant, _S) for plant in PLANTS]
+    found += [_of_plant(valve, plant, at, dP) for valve in VALVES for plant, at in plants for dP in _drops(valve)]
+    pairs = zip(drawn_valves(), (*drawn_plants(), *drawn_plants()), strict=False)
+    return (*found, *(_of_plant(valve, *plant, dP) for valve, plant in pairs for dP in _drops(valve)))
 
 
 def _drops(valve: PlainValve) -> tuple[float, ...]:
-    """The two pressure drops, one below both and one above."""
+    """The two pressure drops, one below both and one above; of a drawn valve drawn ones beside the two."""
+    if valve in drawn_valves():
+        return valve.dP0, valve.dP1, *drawn_drops(valve)
     return valve.dP0, valve.dP1, 0.5 * min(valve.dP0, valve.dP1), 2 * max(valve.dP0, valve.dP1)
 
 
-def _of_valve(valve: PlainValve) -> Iterator[Situation]:
+def _commands(valve: PlainValve, dP: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The commands of a bare valve, of both signs, and those behind a compensator."""
     top = valve.u_max
+    if valve in drawn_valves():
+        general = tuple(drawn_commands(valve, dP))
+        return (0.0, top, -top, *general, *(-one for one in general[1:])), (0.0, top, *general)
     seen0 = valve.command_for(valve.Q_floor, valve.dP0)
+    return (0.0, 1.5, seen0, 6.25, top, -1.5, -6.25, -top), (0.0, 0.5, 2.0, top)
+
+
+def _of_valve(valve: PlainValve) -> Iterator[Situation]:
+    beta = valve.threshold(valve.dP1) / valve.threshold(valve.dP0)
     for dP in _drops(valve):
-        beta = valve.threshold(valve.dP1) / valve.threshold(valve.dP0)
-        for u_i in (0.0, 1.5, seen0, 6.25, top, -1.5, -6.25, -top):
-            yield _situation(valve, dP, u_i, BARE, beta, u_i)
-        for u_i in (0.0, 0.5, 2.0, top):
-            offset = valve.threshold(dP)
-            yield _situation(valve, dP, u_i, under_law("paper"), beta, _paper_drive(valve, dP, u_i))
-            follows = valve.k * valve.x_max / valve.u_max * u_i + offset
-            yield _situation(valve, dP, u_i, under_law("target"), beta, follows)
-            for name in sorted({*LAW_NAMES} - {"paper", "target"}):
-                ratio, kappa = offset / valve.u_min0, valve.k * valve.x_max / valve.u_max
-                drive = law(name).evaluate_gain(ratio, kappa) * u_i + law(name).evaluate_offset(ratio, valve.u_min0)
-                yield _situation(valve, dP, u_i, under_law(name), beta, drive)
+        bare, compensated = _commands(valve, dP)
+        for u_i in bare:
+            yield _situation(valve, dP, u_i, BARE, beta, lambda u: u)
+        for u_i in compensated:
+            for name in LAW_NAMES:
+                yield _situation(valve, dP, u_i, under_law(name), beta, partial(_drive, valve, name, dP))
             if dP == valve.dP1:
                 for free in (0.5, 1.0, 1.25):
-                    drive = u_i + free * (_reference_drive(valve, u_i) - u_i)
-                    yield _situation(valve, dP, u_i, FREE_BETA, free, drive)
+                    yield _situation(valve, dP, u_i, FREE_BETA, free, partial(_scaled_drive, valve, free))
+
+
+def _drive(valve: PlainValve, name: str, dP: float, u_i: float) -> float:
+    """What a law gives; of the two that the account is about without its formula."""
+    if name == "paper":
+        return _paper_drive(valve, dP, u_i)
+    kappa, offset = valve.k * valve.x_max / valve.u_max, valve.threshold(dP)
+    if name == "target":
+        return kappa * u_i + offset
+    ratio = offset / valve.u_min0
+    return float(law(name).evaluate_gain(ratio, kappa) * u_i + law(name).evaluate_offset(ratio, valve.u_min0))
 
 
 @cache
@@ -83,27 +104,48 @@ def _reference_drive(valve: PlainValve, u_i: float) -> float:
     return valve.command_for(wanted, valve.dP0)
 
 
-def _paper_drive(valve: PlainValve, dP: float, u_i: float) -> float:
-    """The paper's choice: the compensation signal of dP0, times the ratio of thresholds above dP0."""
-    share = valve.threshold(dP) / valve.u_min0 if dP > valve.dP0 else 1.0
+def _scaled_drive(valve: PlainValve, share: float, u_i: float) -> float:
+    """The compensation signal of dP0, a share of it."""
     return u_i + share * (_reference_drive(valve, u_i) - u_i)
 
 
-def _situation(valve: PlainValve, dP: float, u_i: float, drive: Setting, beta: float, u_O: float) -> Situation:
+def _paper_drive(valve: PlainValve, dP: float, u_i: float) -> float:
+    """The paper's choice: the compensation signal of dP0, times the ratio of thresholds above dP0."""
+    return _scaled_drive(valve, valve.threshold(dP) / valve.u_min0 if dP > valve.dP0 else 1.0, u_i)
+
+
+def _situation(
+    valve: PlainValve, dP: float, u_i: float, drive: Setting, beta: float, drives: Callable[[float], float]
+) -> Situation:
     spool = FIXED_OPENING if valve.has_stop else FREE_OPENING
-    codes = CODES_AT_PIN if u_i == 2.0 else CODES_OF_COMMAND
+    # One of the drawn commands in two, and one of the others.
+    at_pin = u_i == 2.0 or (valve in drawn_valves() and not valve.fall)
+    codes, u_O = CODES_AT_PIN if at_pin else CODES_OF_COMMAND, drives(u_i)
     numbers = {
         **_constants(valve),
         **_at_drop(valve, dP),
         **_of_flow(valve, dP, u_i, u_O),
         **_of_drive(valve, u_i, u_O, beta, drive, codes),
+        s.u_dz: _left(valve.threshold(dP), drives),
     }
     return Situation(
         words=f"valve with {valve.name}, {drive.words}, dP = {dP:g}, u_i = {u_i:g}, beta = {beta:g}",
         settings=frozenset((drive, spool, codes)),
+        general=_general(valve, dP, u_i),
         numbers=numbers,
         functions={s.f: valve.threshold},
     )
+
+
+def _general(valve: PlainValve, dP: float, u_i: float) -> frozenset[s.Name]:
+    is_general = {s.dP: dP not in (valve.dP0, valve.dP1), s.u_i: abs(u_i) not in (0.0, valve.u_max)}
+    return frozenset(name for name, here in is_general.items() if here and valve in drawn_valves())
+
+
+def _left(threshold: float, drives: Callable[[float], float]) -> float:
+    """Command at which a drive reaches the threshold: a straight line, from two of its points."""
+    low, high = drives(0.25), drives(1.25)
+    return 0.25 + (threshold - low) / (high - low)
 
 
 @cache
@@ -115,7 +157,7 @@ def _constants(valve: PlainValve) -> dict[s.Name, float]:
     return {
         **numbers,
         **{s.u_max: valve.u_max, s.k: valve.k, s.x_max: valve.x_max, s.Q_floor: valve.Q_floor},
-        **{s.C_d: valve.C_d, s.W: valve.W, s.rho: valve.rho, s.scale: _SCALE},
+        **{s.C_d: valve.C_d, s.W: valve.W, s.rho: valve.rho, s.scale: valve.scale},
         s.kappa: valve.k * valve.x_max / valve.u_max,
         s.gamma_0: per_opening * math.sqrt(valve.dP0),
         s.gamma_1: per_opening * math.sqrt(valve.dP1),
@@ -124,7 +166,7 @@ def _constants(valve: PlainValve) -> dict[s.Name, float]:
         s.q_x: valve.k * valve.x_max,
         # Distances that only decide between cases.
         **{s.headroom: 0.5, s.guard: 0.25, s.excess: 0.25, s.above: 0.5, s.below: 0.5, s.rest: 0.5},
-        **{s.n_adc: _N_ADC, s.V_adc: _V_ADC, s.n_V: _N_ADC / _V_ADC, s.n_full: _N_FULL},
+        **{s.n_adc: valve.n_adc, s.V_adc: valve.V_adc, s.n_V: valve.n_adc / valve.V_adc, s.n_full: valve.n_full},
     }
 
 
@@ -148,10 +190,7 @@ def _at_drop(valve: PlainValve, dP: float) -> dict[s.Name, float]:
     threshold = valve.threshold(dP)
     u_1, u_2 = threshold + 0.25, threshold + 1.0
     samples = {s.u_1: u_1, s.u_2: u_2, s.Q_1: valve.flow(u_1, dP), s.Q_2: valve.flow(u_2, dP)}
-    # A straight line in the command, from two of its points.
-    low, high = (_paper_drive(valve, dP, u) for u in (0.25, 1.25))
-    left = 0.25 + (threshold - low) / (high - low)
-    return {generic[names]: value for names, value in _of_drop(valve, dP).items()} | samples | {s.u_dz: left}
+    return {generic[names]: value for names, value in _of_drop(valve, dP).items()} | samples
 
 
 def _of_flow(valve: PlainValve, dP: float, u_i: float, u_O: float) -> dict[s.Name, float]:
@@ -162,8 +201,8 @@ def _of_flow(valve: PlainValve, dP: float, u_i: float, u_O: float) -> dict[s.Nam
         value = getattr(valve, name)
         return (flow(**{name: value + _STEP}) - flow(**{name: value - _STEP})) / (2 * _STEP)
 
-    x, overlap = valve.opening(u_O, dP), 0.375
-    scaled = flow(C_d=_SCALE * valve.C_d, k=_SCALE * valve.k, x_max=valve.x_max / _SCALE)
+    x, overlap = valve.opening(u_O, dP), valve.x_ov
+    scaled = flow(C_d=valve.scale * valve.C_d, k=valve.scale * valve.k, x_max=valve.x_max / valve.scale)
     beyond = abs(u_O) - valve.threshold(dP)
     wanted = {
         name: valve.flow(valve.u_max, at) / valve.u_max * u_i
@@ -180,15 +219,16 @@ def _of_flow(valve: PlainValve, dP: float, u_i: float, u_O: float) -> dict[s.Nam
 def _of_drive(
     valve: PlainValve, u_i: float, u_O: float, beta: float, drive: Setting, codes: Setting
 ) -> dict[s.Name, float]:
-    pin = _V_ADC * u_i / valve.u_max
+    pin = valve.V_adc * u_i / valve.u_max
     numbers = {
         **{
             s.beta: beta,
             s.drive_left: valve.u_max - u_O,
             s.duty: u_O / valve.u_max,
-            s.n_pwm: _N_FULL * u_O / valve.u_max,
+            s.n_pwm: valve.n_full * u_O / valve.u_max,
         },
-        **{s.V_pin: pin, s.n_i: _N_ADC * pin / _V_ADC, s.K_c: valve.u_max / _N_ADC * (1.0 if u_i != 0.5 else 1.25)},
+        **{s.V_pin: pin, s.n_i: valve.n_adc * pin / valve.V_adc},
+        s.K_c: valve.u_max / valve.n_adc * (1.25 if u_i == 0.5 else valve.K_c_share),
     }
     if u_i < 0:
         return numbers
@@ -196,16 +236,16 @@ def _of_drive(
     numbers |= {s.u_0: signal, s.u_above: u_i + beta * signal, s.u_below: u_i + signal, s.jump: (beta - 1) * signal}
     step = 0.25
     slope = (_reference_drive(valve, step) - _reference_drive(valve, 0.0)) / step
-    per_volt = _N_ADC / (_V_ADC if codes == CODES_AT_PIN else valve.u_max)
+    per_volt = valve.n_adc / (valve.V_adc if codes == CODES_AT_PIN else valve.u_max)
     numbers |= {s.slope: 1 + beta * (slope - 1), s.n_0: per_volt * signal}
     if drive == BARE:
         return numbers
     return numbers | {s.u_no: u_O - u_i, s.n_no: per_volt * beta * signal}
 
 
-def _of_plant(valve: PlainValve, plant: PlainPlant, dP: float) -> Situation:
+def _of_plant(valve: PlainValve, plant: PlainPlant, at_s: float, dP: float) -> Situation:
     """The simulation model at one moment, and its transforms at one s."""
-    i, x_e, v, s_value = 0.75, 0.625, -0.25, 1.5
+    i, x_e, v = 0.75 * at_s / _S, 0.625, -0.25 * at_s
     di_dt, dx_e_dt, dv_dt = plant.rates(i, x_e, v, plant.u_step, plant.load_step)
     feedback = plant.K_fi * i
     names = "K_a K_fi K_i R_c r_p L_c m_e B_e K_et i_init x_init v_init a"
@@ -230,7 +270,7 @@ def _of_plant(valve: PlainValve, plant: PlainPlant, dP: float) -> Situation:
         **{getattr(s, name): getattr(plant, name) for name in names.split()},
         **{s.i: i, s.x_e: x_e, s.v: v, s.di_dt: di_dt, s.dx_e_dt: dx_e_dt, s.dv_dt: dv_dt},
         **{s.u_i: plant.u_step, s.u_if: feedback, s.u_e: plant.K_a * (plant.u_step - feedback)},
-        **{s.f_e: plant.K_i * i, s.f_eL: plant.load_step, s.s: s_value, s.x_ov: 0.0, s.x: x_e, s.Q: per_opening * x_e},
+        **{s.f_e: plant.K_i * i, s.f_eL: plant.load_step, s.s: at_s, s.x_ov: 0.0, s.x: x_e, s.Q: per_opening * x_e},
         # Long after a step the flow per command.
         s.G_0: per_opening * still.transforms(1e-9)[1] * 1e-9 / plant.u_step,
     }
@@ -250,4 +290,10 @@ def _of_plant(valve: PlainValve, plant: PlainPlant, dP: float) -> Situation:
     words = (
         f"valve with {valve.name}, {PLANT.words}, dP = {dP:g}, {'' if plant.load_step else 'un'}loaded, a = {plant.a:g}"
     )
-    return Situation(words=words, settings=frozenset((PLANT, spool)), numbers=numbers, functions=functions)
+    return Situation(
+        words=words,
+        settings=frozenset((PLANT, spool)),
+        general=_general(valve, dP, plant.u_step),
+        numbers=numbers,
+        functions=functions,
+    )

@@ -30,6 +30,15 @@ class PlainValve:
     rho: float = 3.0
     #: The meter shows nothing below this flow.
     Q_floor: float = 0.0625
+    #: Travel of the spool that opens nothing.
+    x_ov: float = 0.375
+    #: Of converter and PWM behind it: codes and volts at full scale; conversion coefficient over what (32) asks for.
+    n_adc: float = 4096.0
+    V_adc: float = 3.0
+    n_full: float = 1024.0
+    K_c_share: float = 1.0
+    #: Of the other valve that flow alone can't tell from this one.
+    scale: float = 1.5
 
     def threshold(self, dP: float) -> float:
         return self.u_min0 - self.fall * math.log2(dP / self.dP0)

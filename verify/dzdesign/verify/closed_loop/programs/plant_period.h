@@ -4,23 +4,11 @@
 
 #include "plant_curve.h"
 
-/* Where the edge is passed, each phase is moved in so many pieces. */
+/* Past the edge, each phase that is not taken whole is moved in so many pieces. */
 #define PIECES 8
-/* There the acceleration has a kink: this share of what its interpolation may else leave unexplained. */
-#define AT_EDGE 0.01
-
-/* Whether a spool at a stop stays there through the period: by the current's largest value, or its least. */
-static inline int held(const struct plant *plant, double after)
-{
-    const double *p = plant->p;
-
-    if (plant->x > 0.0) {
-        return (pulled(plant, plant->i) > 0.0) && (pulled(plant, after) > 0.0);
-    }
-    /* Switched off, a current keeps the share of itself that one from rest, switched on, has still to go. */
-    return (pulled(plant, plant->i) < 0.0) &&
-           (p[PLANT_PULL] * after + pulled(plant, 0.0) * (1.0 - plant->off * p[PLANT_PER_SETTLED]) < 0.0);
-}
+/* The step is exact of an acceleration straight in the position: what is not, as at the edge, which is a kink, may be
+ * this share of what the interpolation may leave unexplained. */
+#define CURVED 0.001
 
 /* What the current's ripple may move a spool within a period beyond what its speeds at both ends tell, m: a bound. */
 static inline double ripple_m(const struct plant *plant)
@@ -32,13 +20,22 @@ static inline double ripple_m(const struct plant *plant)
     return 0.5 * p[PLANT_PULL] * ripple_A * p[PLANT_PERIOD_S] * p[PLANT_PERIOD_S];
 }
 
+/* Whether no straight line over the position, from the period's start through its end, meets the middle value. */
+static inline int is_curved(const struct plant *plant, double x, double middle, double end_acts, double excess)
+{
+    const double moved = x - plant->x;
+    const double line = (end_acts - plant->acts) * (middle - 0.5 * (plant->x + x));
+
+    return fabs(excess * moved - line) > CURVED * plant->p[PLANT_JUMP] * fabs(moved);
+}
+
 /* A period that may be taken whole, in one piece: 0. Otherwise nothing moves, and it needs so many pieces a phase. */
 static inline int32_t whole_period(struct plant *plant, int linear, double *charge, double *at_middle)
 {
     const double *p = plant->p;
     double i, x, v, middle, end, near;
+    double end_acts = 0.0;
     double excess = 0.0;
-    int at_edge;
 
     if (linear) {
         const casadi_real *arg[7] = {&plant->i, &plant->x, &plant->v, plant->response, &plant->acts, &plant->push, p};
@@ -51,16 +48,15 @@ static inline int32_t whole_period(struct plant *plant, int linear, double *char
         casadi_real *res[7] = {&i, &x, &v, charge, &middle, &end, &excess};
 
         (void)plant_step(arg, res, 0, 0, 0);
+        end_acts = end - plant->push;
     }
     /* Further than this from a stop it can't have been there and back. */
     near = (fabs(plant->v) + fabs(v)) * p[PLANT_PERIOD_S] + ripple_m(plant);
-    at_edge = !linear && (p[PLANT_OVERLAP_M] >= fmin(plant->x, x) - near) &&
-              (p[PLANT_OVERLAP_M] <= fmax(plant->x, x) + near);
-    if ((plant->x <= near) || (x <= near) || (middle <= near) || (plant->x >= p[PLANT_STROKE_M] - near) ||
-        (x >= p[PLANT_STROKE_M] - near) || (middle >= p[PLANT_STROKE_M] - near)) {
-        return at_edge ? PIECES : 1;
+    if ((fmin(fmin(plant->x, x), middle) <= near) ||
+        (fmax(fmax(plant->x, x), middle) >= p[PLANT_STROKE_M] - near)) {
+        return (!linear && (fmax(plant->x, x) >= p[PLANT_OVERLAP_M] - near)) ? PIECES : 1;
     }
-    if (fabs(excess) > (at_edge ? AT_EDGE : 1.0) * p[PLANT_JUMP]) {
+    if (!linear && ((fabs(excess) > p[PLANT_JUMP]) || is_curved(plant, x, middle, end_acts, excess))) {
         return PIECES;
     }
     plant->i = i;
@@ -69,7 +65,7 @@ static inline int32_t whole_period(struct plant *plant, int linear, double *char
     *at_middle = middle;
     if (!linear) {
         act(plant);
-        plant->acts = end - plant->push; /* which the next period need not wait for */
+        plant->acts = end_acts; /* which the next period need not wait for */
     }
     return 0;
 }
@@ -87,6 +83,17 @@ static inline struct response response_after(const struct plant *plant, int32_t 
     };
 
     return response;
+}
+
+/* Whether a spool at a stop stays there through the period: by the current's largest value, or its least. */
+static inline int held(const struct plant *plant, double after)
+{
+    if (plant->x > 0.0) {
+        return (pulled(plant, plant->i) > 0.0) && (pulled(plant, after) > 0.0);
+    }
+    /* Where it is switched off: not told by what is left of it in the end, of a fast coil the last bits of a number. */
+    return (pulled(plant, plant->i) < 0.0) &&
+           (pulled(plant, plant->i + plant->on * (1.0 - plant->p[PLANT_PER_SETTLED] * plant->i)) < 0.0);
 }
 
 /* What full voltage adds in a share of a period, at its end, to where the middle value stands (motion.py). */
@@ -108,7 +115,7 @@ static inline void respond(struct plant *plant, int32_t compare)
     const struct response off = response_after(plant, 2 * (plant->counts - compare));
 
     plant->compare = compare;
-    plant->off = off.i;
+    plant->on = response_after(plant, 2 * compare).i;
     plant->response[0] = plant->all.i - off.i;
     plant->response[1] = plant->all.x - off.x;
     plant->response[2] = plant->all.v - off.v;
@@ -176,8 +183,8 @@ static inline void plant_period(struct plant *plant, int32_t compare, int linear
             charge = p[PLANT_Q_I] * plant->i + plant->response[3];
             plant->i = after;
         } else {
-            /* An edge that a spool from rest may come to within the period. */
-            const int edge_at_stop = !linear && (p[PLANT_OVERLAP_M] <= p[PLANT_REACH_M]);
+            /* An edge that a spool from rest may come to within the period, or one that is open. */
+            const int edge_at_stop = !linear && ((plant->x > 0.0) || (p[PLANT_OVERLAP_M] <= p[PLANT_REACH_M]));
 
             charge = period_in_pieces(plant, compare, (edge_at_stop ? PIECES : 1) * (int32_t)p[PLANT_STEPS]);
         }

@@ -8,11 +8,11 @@
 #define CASADI_SYMBOL_EXPORT static inline
 #include "plant_motion.h"
 
-/* A stop is met where the spool is as close to it as this share of the stroke; more events in one phase are chatter. */
+/* Stop or edge is met where the spool is as close to it as this share of the stroke; more events are chatter. */
 #define CLOSE 1e-14
 #define STEPS 60
 #define TURN_STEPS 27
-#define EVENTS 4
+#define EVENTS 8
 
 /* What full voltage makes of a plant at rest. */
 struct response
@@ -44,7 +44,7 @@ struct plant
     struct response all; /* to full voltage through the period */
     double half_x;       /* its position in the middle */
     int32_t compare;     /* of the last period, and for it: */
-    double off;          /* the current that full voltage makes in the time for which it is off */
+    double on;           /* the current that full voltage makes, from none, in the time for which it is on */
     double response[5];  /* what the voltage adds: current, position, speed, charge, position in the middle */
     const double *curve; /* the recorded characteristic, see plant_curve.h; none: the edge is that of Eq. (24) */
     const double *below; /* its tests on both sides of the pressure drop, */
@@ -105,24 +105,25 @@ static inline double at(const double *terms, double share)
     return value;
 }
 
-static struct path free_path(const struct plant *plant, double voltage, double h)
+/* Whether the edge is shut, or about to be: then nothing that acts depends on the position. */
+static inline int is_shut(const struct plant *plant)
+{
+    const double *p = plant->p;
+    const int closes = (plant->v < 0.0) || ((plant->v <= 0.0) && (pulled(plant, plant->i) < 0.0));
+
+    return (p[PLANT_LINEAR] > 0.5) || (plant->x < p[PLANT_OVERLAP_M] + (closes ? CLOSE * p[PLANT_STROKE_M] : 0.0));
+}
+
+static struct path free_path(const struct plant *plant, double voltage, double h, int shut)
 {
     struct path path;
     const double before[3] = {plant->i, plant->x, plant->v};
-    const double *p = plant->p;
-    const double closed = (p[PLANT_LINEAR] > 0.5) ? 2.0 * p[PLANT_STROKE_M] : 0.5 * p[PLANT_OVERLAP_M];
-    const casadi_real *arg[6] = {before, &voltage, &h, &plant->acts, &plant->push, plant->p};
+    const double *force = shut ? &plant->acts : &plant->push;
+    const double *more = shut ? &plant->push : &plant->supply_MPa;
+    const casadi_real *arg[6] = {before, &voltage, &h, force, more, plant->p};
     casadi_real *res[4] = {path.i, path.x, path.v, path.charge};
 
-    /* As long as the edge is closed, nothing that acts depends on the position. */
-    if (plant->x < closed) {
-        (void)plant_path_linear(arg, res, 0, 0, 0);
-    }
-    if ((plant->x >= closed) || (at(path.x, 1.0) >= closed)) {
-        arg[3] = &plant->push;
-        arg[4] = &plant->supply_MPa;
-        (void)plant_path(arg, res, 0, 0, 0);
-    }
+    (void)(shut ? plant_path_linear : plant_path)(arg, res, 0, 0, 0);
     return path;
 }
 
@@ -151,25 +152,36 @@ static double share_to_turn(const struct path *path, double speed)
     return after;
 }
 
-/* The share at which a path that is outside at `outside` comes to the stop: Newton's steps, halves where they lead
- * astray. */
-static double share_to_stop(const struct plant *plant, const struct path *path, double stop, double h, double outside)
+/* How far a position is past the edge, from its shut side or its open one, m; of a linear plant the edge is none. */
+static inline double past_edge(const struct plant *plant, double position, int shut)
+{
+    const double past = position - plant->p[PLANT_OVERLAP_M];
+
+    return (plant->p[PLANT_LINEAR] > 0.5) ? -1.0 : (shut ? past : -past);
+}
+
+static inline double past_any(const struct plant *plant, double position, int shut)
+{
+    return fmax(past_stop(plant, position), past_edge(plant, position, shut));
+}
+
+/* The share at which a path that is past a position at `outside` comes to it, from below (1) or above (-1): Newton's
+ * steps, halves where they lead astray. */
+static double share_to(const struct plant *plant, const struct path *path, double to, double from, double h,
+                       double outside)
 {
     double inside = 0.0;
     double share = outside;
 
     for (int step = 0; step < STEPS; step++) {
-        const double x = at(path->x, share);
+        const double past = at(path->x, share) - to;
 
-        if (fabs(x - stop) <= CLOSE * plant->p[PLANT_STROKE_M]) {
+        if (fabs(past) <= CLOSE * plant->p[PLANT_STROKE_M]) {
             break;
         }
-        if (past_stop(plant, x) > 0.0) {
-            outside = share;
-        } else {
-            inside = share;
-        }
-        share -= (x - stop) / (h * at(path->v, share));
+        inside = (from * past > 0.0) ? inside : share;
+        outside = (from * past > 0.0) ? share : outside;
+        share -= past / (h * at(path->v, share));
         if (!((share > inside) && (share < outside))) {
             share = 0.5 * (inside + outside);
         }
@@ -177,35 +189,40 @@ static double share_to_stop(const struct plant *plant, const struct path *path, 
     return share;
 }
 
-/* Whether a path that turns could have come to the stop on its side, had it kept the faster speed of its two ends. */
-static int may_touch(const struct plant *plant, const struct path *path, double end, double h)
+/* Whether a path turns, and could have come to a stop or the edge had it kept the faster speed of its two ends. */
+static int may_touch(const struct plant *plant, const struct path *path, double end, double h, int shut)
 {
     const double reach = fmax(fabs(plant->v), fabs(at(path->v, 1.0))) * h;
+    const double furthest = (plant->v < 0.0) ? fmin(plant->x, end) - reach : fmax(plant->x, end) + reach;
 
-    return (plant->v < 0.0) ? (fmin(plant->x, end) < reach)
-                            : (fmax(plant->x, end) > plant->p[PLANT_STROKE_M] - reach);
+    return (plant->v * at(path->v, 1.0) < 0.0) && (past_any(plant, furthest, shut) > 0.0);
 }
 
-/* Moves for h, or until a stop ends the motion, and returns for how long. */
+/* Moves for h, or until a stop ends the motion or the edge is passed, and returns for how long. */
 static double move_to_stop(struct plant *plant, double voltage, double h, double *charge)
 {
-    const struct path path = free_path(plant, voltage, h);
+    const int shut = is_shut(plant);
+    const struct path path = free_path(plant, voltage, h, shut);
     double end = at(path.x, 1.0);
     double share = 1.0;
 
     /* It may have been there and back: then the turn lies outside. */
-    if ((past_stop(plant, end) <= 0.0) && (plant->v * at(path.v, 1.0) < 0.0) && may_touch(plant, &path, end, h)) {
+    if ((past_any(plant, end, shut) <= 0.0) && may_touch(plant, &path, end, h, shut)) {
         const double turn = share_to_turn(&path, plant->v);
 
-        if (past_stop(plant, at(path.x, turn)) > 0.0) {
+        if (past_any(plant, at(path.x, turn), shut) > 0.0) {
             share = turn;
             end = at(path.x, turn);
         }
     }
-    if (past_stop(plant, end) > 0.0) {
+    if (past_edge(plant, end, shut) > 0.0) {
+        share = share_to(plant, &path, plant->p[PLANT_OVERLAP_M], shut ? 1.0 : -1.0, h, share);
+        plant->x = plant->p[PLANT_OVERLAP_M];
+        plant->v = at(path.v, share);
+    } else if (past_stop(plant, end) > 0.0) {
         const double stop = (end < 0.0) ? 0.0 : plant->p[PLANT_STROKE_M];
 
-        share = share_to_stop(plant, &path, stop, h, share);
+        share = share_to(plant, &path, stop, (end < 0.0) ? -1.0 : 1.0, h, share);
         plant->x = stop;
         plant->v = 0.0;
     } else {

@@ -2,7 +2,7 @@
 
 Each case is a valve's recordings as text, the command line that reads them, and the truth beside them: where each side
 opens and closes at the pressure drop of its metering edge. No code shared with the product, which is asked through its
-command line. ``corpus_units.py FOLDER`` writes all files.
+command line. With both folders above on PYTHONPATH ``corpus_units.py FOLDER`` writes all files.
 """
 
 import contextlib

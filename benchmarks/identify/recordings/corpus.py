@@ -2,8 +2,8 @@
 
 Each case is one or more recordings from `corpus_plant`, as text, and the truth beside them: the commands at which each
 side opens and closes at each pressure drop. A case is misread where a side, a pressure drop or a branch is missing, or
-where a knee lies off the truth by more than 15 mV and 3 standard errors. ``corpus.py FOLDER`` writes all files, with
-truth.json beside them.
+where a knee lies off the truth by more than 15 mV and 3 standard errors. With both folders above on PYTHONPATH
+``corpus.py FOLDER`` writes all files, and truth.json beside them.
 """
 
 import json

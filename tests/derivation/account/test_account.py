@@ -1,0 +1,96 @@
+"""The account of the paper: every equation has its verdict, and every statement what it rests on."""
+
+from dataclasses import replace
+
+import pytest
+
+from dzdesign.derivation.account import identity
+from dzdesign.derivation.account.account import SECTIONS, STATEMENTS
+from dzdesign.derivation.account.equations import PAPER_NUMBERS
+from dzdesign.derivation.account.proof import judge
+from dzdesign.derivation.account.statement import Kind, Outcome
+from tests.support.account_claims import BY_NUMBER
+
+DERIVED = [statement for statement in STATEMENTS if not statement.kind.is_given]
+
+
+GIVEN, FOLLOWS, IF, NOT = Outcome.GIVEN, Outcome.FOLLOWS, Outcome.FOLLOWS_IF, Outcome.DOES_NOT_FOLLOW
+#: Read off the paper by hand, not off the account.
+PAPER = {
+    **dict.fromkeys((1, 4, 5, 6, 7, 11, 19, 20, 21, 22, 23, 24), GIVEN),
+    **dict.fromkeys((2, 3, 8, 9, 10, 12, 13, 14, 15, 16, 17, 18, 26), FOLLOWS),
+    **dict.fromkeys((25, 27, 28, 32), IF),
+    **dict.fromkeys((29, 30, 31), NOT),
+}
+
+
+def number_of(statement):
+    return statement.number
+
+
+@pytest.mark.slow
+def test_all_32_equations_have_their_verdict(verdicts):
+    assert [int(number.strip("()")) for number in PAPER_NUMBERS] == sorted(PAPER) == list(range(1, 33))
+    assert {number: verdicts[f"({number})"].outcome for number in PAPER} == PAPER
+
+
+def test_every_statement_is_as_expected(verdicts):
+    assert [verdict.number for verdict in verdicts.values() if not verdict.as_expected] == []
+
+
+def test_every_condition_is_proved_necessary(verdicts):
+    conditional = [verdict for verdict in verdicts.values() if verdict.statement.condition is not None]
+    assert len(conditional) >= 13
+    assert all(verdict.necessary for verdict in conditional)
+
+
+def test_what_does_not_follow_is_corrected_by_what_does(verdicts):
+    for verdict in verdicts.values():
+        if verdict.outcome is NOT and verdict.statement.kind is Kind.PAPER:
+            assert verdicts[verdict.statement.corrected_by].holds
+            assert verdict.discrepancy is not None
+
+
+def test_every_reference_between_statements_exists():
+    for statement in STATEMENTS:
+        assert {*statement.see} <= set(BY_NUMBER), statement.number
+        assert statement.corrected_by in {"", *BY_NUMBER}, statement.number
+        assert statement.section in SECTIONS
+
+
+def test_the_conditions_are_handed_on(verdicts):
+    assert verdicts["T6b"].inherited == ("(28)", "(27)", "(25)")
+    assert verdicts["T6b"].words == "follows on the condition of (28), (27), (25)"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("statement", DERIVED, ids=number_of)
+def test_a_derivation_can_be_read_to_its_end(statement, verdicts):
+    verdict = verdicts[statement.number]
+    for proof in verdict.proofs:
+        assert proof.steps
+        assert identity.agree(proof.steps[-1].result.xreplace(dict(proof.solution)), proof.derived)
+        named = {ground.number for step in proof.steps for ground in step.used}
+        assert named <= {ground.number for ground in statement.grounds}
+
+
+@pytest.mark.parametrize("statement", [e for e in DERIVED if len(e.grounds) > 1], ids=number_of)
+def test_every_named_premise_is_needed(statement, verdicts):
+    for index in range(len(statement.grounds)):
+        fewer = statement.grounds[:index] + statement.grounds[index + 1 :]
+        verdict = judge(replace(statement, grounds=fewer), BY_NUMBER, verdicts)
+        assert not verdict.as_expected, f"{statement.grounds[index]} is not needed"
+
+
+def test_a_limit_is_handed_on(verdicts):
+    assert {"(3)", "(13)"} == set(verdicts["(18)"].limited_by)
+    # What the user's scope says itself is not said again.
+    assert "(10)" not in verdicts["(13)"].limited_by
+    assert verdicts["T8e"].limited_by == ("straight part", "T8d")
+
+
+def test_a_difference_from_the_paper_is_explained():
+    for statement in STATEMENTS:
+        for value in statement.values:
+            assert value.exact(statement).is_number
+            assert not value.published or value.agrees(statement) or value.remark, f"{statement.number}: {value.label}"

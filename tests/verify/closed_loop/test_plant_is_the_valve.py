@@ -1,0 +1,34 @@
+"""A plant of the user's own opens and closes where the valve does, or the closed loop says nothing of that valve."""
+
+import pytest
+
+from dzdesign.verify.closed_loop.loop_checks import plant_is_the_valve
+from dzdesign.verify.loop_results import PressureResult
+from tests.support.evidence import pressure_result
+
+
+def at_the_thresholds(valve, **off_V: float) -> PressureResult:
+    """What a ramp of a plant shows that opens and closes where the first test does, but for so many volts."""
+    test = valve.positive.tests[0]
+    shares = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
+    found = {f"dead_zone_{name}": (at + off_V.get(name, 0.0)) / valve.u_max_V for name, at in shares.items()}
+    return pressure_result(dp_MPa=test.dp_MPa, **found)
+
+
+@pytest.mark.parametrize(
+    ("off_V", "holds"),
+    [
+        ({}, True),
+        ({"opening": 0.29, "closing": 0.29}, True),
+        ({"opening": 0.31}, False),
+        ({"opening": -0.31}, False),
+        ({"closing": 0.31}, False),
+        ({"closing": -0.9}, True),
+    ],
+    ids=str,
+)
+def test_where_it_opens_and_closes_is_compared(example_valve, off_V, holds):
+    """One that closes at a larger command would show no flow where the valve still passes some; else it is no fault."""
+    check = plant_is_the_valve([at_the_thresholds(example_valve, **off_V)], example_valve)
+    assert check.holds is holds
+    assert ("closes 0.31 V above" in check.text) == ("closing" in off_V and not holds)

@@ -1,0 +1,55 @@
+"""A compiler that $CC names may be no compiler, or one told to keep quiet: neither gives a green light."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.verify.firmware.compilation import compiles_strictly
+from dzdesign.verify.toolchain.host_compiler import environment, find_compilers, keeps_warnings
+from dzdesign.verify.toolchain.machines import HOST
+from tests.support.synthetic import needs_compiler
+
+pytestmark = needs_compiler
+SOURCES = {"one.c": b"int one(void) { return 1; }\n"}
+
+
+@pytest.fixture
+def of_words(monkeypatch):
+    """Have $CC name the machine's first compiler, with further words."""
+    first = find_compilers()[0]
+
+    def set_them(words):
+        monkeypatch.setenv("CC", words.format(cc=first))
+
+    return set_them
+
+
+def test_the_compilers_of_this_machine_do_not_keep_quiet():
+    assert not any(map(keeps_warnings, find_compilers()))
+
+
+@pytest.mark.parametrize("words", ["{cc} -w", "true", "echo"])
+def test_what_a_quiet_compiler_takes_is_not_checked(tmp_path, of_words, words):
+    (tmp_path / "one.c").write_bytes(b"int one(void);\nint one(void) { return 1; }\n")
+    firmware = SimpleNamespace(core=("one.c",))
+    assert compiles_strictly(tmp_path, firmware).holds
+    of_words(words)
+    check = compiles_strictly(tmp_path, firmware)
+    assert check.holds is None and "-w out of $CC" in check.text
+
+
+@pytest.mark.parametrize("words", ["true", "echo x", "{cc} -fsyntax-only"])
+def test_a_compiler_that_writes_nothing_is_named(of_words, words):
+    of_words(words)
+    with pytest.raises(RequirementError, match=r"was not compiled: .* wrote nothing; set \$CC"):
+        HOST.compile("one.c", SOURCES, HOST.core_flags, "the core")
+
+
+@pytest.mark.parametrize("variable", ["CPATH", "C_INCLUDE_PATH"])
+def test_headers_that_the_environment_puts_before_the_compilers_have_no_say(tmp_path, monkeypatch, variable):
+    (tmp_path / "stdint.h").write_text("#error another header\n")
+    monkeypatch.setenv(variable, str(tmp_path))
+    source = {"two.c": f"#include <stdint.h>\nuint16_t {variable}(void);\n".encode()}
+    assert HOST.compile("two.c", source, HOST.core_flags, "C").is_file()
+    assert variable not in environment() and "PATH" in environment()
