@@ -41,7 +41,8 @@ class Corpus:
             octets[place] ^= 4
             header = BITS["FORMAT"] * (place in (0, 5))
             self.octets.append(bytes(octets))
-            self.expected.append((BITS["CRC"] | header, 0 if place in (0, 5, -1) else 0xFFFF & ~BITS["CRC"]))
+            apart = 0 if place in (0, 5, -1) else 0xFFFF & ~BITS["CRC"]
+            self.expected.append((BITS["CRC"] | (0 if apart else self.expected[0][0] | header), apart))
         self._sources = texts(block_core_files(built))
         self._all = ctypes.create_string_buffer(b"".join(self.octets), sum(map(len, self.octets)))
 
