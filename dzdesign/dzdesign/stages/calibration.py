@@ -6,6 +6,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from dzdesign.block_checks import other_numbers
 from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, sha256_of, write_file
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import AnyPath, Option, Text
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
 #: Formats that hold a block.
 READABLE = ("hex", "bin", "txt")
-#: Entries of a block that do not follow from a compensator.
-OF_NO_COMPENSATOR = ("serial", "record", "crc32")
 COMPENSATOR_NAME = "compensator.json"
 
 
@@ -266,12 +265,6 @@ def _difference(
     block: "CalibrationBlock", reading: "CalibrationReading", compensator: "Compensator", digest: str
 ) -> str:
     """Say why a block is not that of a compensator: another file, or numbers that do not follow from it."""
-    from dzdesign.codegen.calibration.block import block_of
-
     if reading.compensator_sha256 != digest:
         return f"its compensator.json has the SHA-256 {digest}, the block names {reading.compensator_sha256}"
-    numbers = [name for name in block.__dataclass_fields__ if name not in OF_NO_COMPENSATOR]
-    follows = block_of(compensator, digest)
-    if differ := [name for name in numbers if getattr(block, name) != getattr(follows, name)]:
-        return f"it names this compensator, but numbers differ from those that follow from it: {', '.join(differ)}"
-    return ""
+    return other_numbers(block, compensator, digest)
