@@ -7,6 +7,7 @@ from dzdesign.core.option_readers import whole_number
 from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.design import TARGETS
+from dzdesign.stages.generate import FORMS
 from dzdesign.stages.identify import IdentifyChoices
 
 
@@ -32,5 +33,8 @@ class BatchArguments(DesignChoices, IdentifyChoices):
     """Also verify each valve's firmware, as the command does."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
     """File with the plant of the closed loop, for the verification."""
+    calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
+    """fixed (default): a firmware a valve. block: one firmware for the lot, and for each valve a calibration block that
+    is tried with it on every input."""
     target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
     """Microcontroller; `codegen --list-targets` lists them."""

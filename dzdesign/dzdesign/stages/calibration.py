@@ -108,7 +108,10 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
     target = _target_of(compensator, arguments.target)
     place = _place(target, arguments.address, OCTETS)
     _refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
-    serial, record = (_entry(compensator, name, getattr(arguments, name)) for name in ("serial", "record"))
+    serial, record = (
+        entry_of_record(compensator, name) if (given := getattr(arguments, name)) is None else given
+        for name in ("serial", "record")
+    )
     octets = pack(block_of(compensator, digest, serial=serial, record=record))
     made = CalibrationImage(
         content=image_of(octets, form, place),
@@ -252,10 +255,8 @@ def _place(target: str, address: str | None, octets: int) -> "Place":
         raise InputError(f"--address is {quoted(address)}, expected a whole number such as 0x330000") from error
 
 
-def _entry(compensator: "Compensator", name: str, given: str | None) -> str:
-    """Return a text of the block: as given, or that entry of the test record; one setting for a lot is of no valve."""
-    if given is not None:
-        return given
+def entry_of_record(compensator: "Compensator", name: str) -> str:
+    """Return a text of the block: that entry of the test record; one setting for a lot is of no valve."""
     if compensator.lot:
         return ""
     return next((text for key, text in compensator.valve.record.items() if key.casefold() == name), "")
