@@ -78,7 +78,8 @@ def print_lot(*, quick: bool, seed: int) -> list[Row]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the benchmark and print what missed its limit."""
-    return run_parts(__doc__.splitlines()[0], {"lot": (print_lot, 7), "blocks": (print_blocks, 7)}, "60 valves, 6 with blocks", arguments)
+    parts = {"lot": (print_lot, 7), "blocks": (print_blocks, 7)}
+    return run_parts(__doc__.splitlines()[0], parts, "60 valves, 6 with blocks", arguments)
 
 
 if __name__ == "__main__":

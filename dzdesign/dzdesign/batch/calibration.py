@@ -126,15 +126,16 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     compensator = design(
         DesignArguments(valve, target=task.target, **vars(task.design), output=out / "compensator.json")
     )
-    place, found = out / FIRMWARE, (OK, "")
+    place = out / FIRMWARE
     if task.calibration == "block":
-        place, found = folder / FIRMWARE, write_block(compensator, task.target, out)  # the lot's stands beside all valves
-    if found[0] != OK or (task.calibration == "block" and not task.verify):
-        return found
-    firmware = generate(compensator, task.target, calibration=task.calibration)  # proved by the design, some lines above
+        status, reason = write_block(compensator, task.target, out)
+        if status != OK or not task.verify:
+            return status, reason
+        place = folder / FIRMWARE  # the lot's firmware stands beside all valves
+    firmware = generate(compensator, task.target, calibration=task.calibration)  # proved by the design above
     write_folder(place, firmware.contents, firmware.manifest)
     if not task.verify:
-        return found
+        return OK, ""
     plant = None
     if task.plant:
         plant = folder / task.plant[0]

@@ -95,9 +95,9 @@ def verify(
     backs_MPa = _back_pressures_MPa(texts_of(arguments.back_pressure))
     include = [Path(place) for place in paths_of(arguments.include)]
     recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
-    files = expand(arguments.blocks) if paths_of(arguments.blocks) else []
+    block_files = expand(arguments.blocks) if paths_of(arguments.blocks) else []
     with _firmware_folder(arguments.firmware) as folder:
-        blocks = given_blocks(folder, files)
+        blocks = given_blocks(folder, block_files)
         ware = arguments.c2000ware
         added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
         with stage_progress() as stage:

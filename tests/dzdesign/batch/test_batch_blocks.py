@@ -64,7 +64,8 @@ def test_one_firmware_and_a_block_a_valve(made):
     projects = [path.parent for path in output.rglob("manifest.json") if (path.parent / "core").is_dir()]
     assert projects == [output / "lot" / "firmware"]
     core = block_core(built_for(compensator_of(valve(output, "V0000"))))
-    assert all((projects[0] / name).read_text(encoding="utf-8") == text for name, text in core.items()) and len(core) == 6
+    assert len(core) == 6
+    assert all((projects[0] / name).read_text(encoding="utf-8") == text for name, text in core.items())
     for name in ("V0000", "V0001"):
         folder, octets = valve(output, name), octets_in_file(valve(output, name) / "calibration.bin")
         block = unpack(octets)
@@ -91,7 +92,8 @@ def test_a_valve_that_needs_another_firmware_fails_alone_with_the_reason(made):
     reason = rows["V0002"]["reason"]
     assert "another firmware" in reason and "target cortex-m4 instead of host" in reason
     assert not list(valve(output, "V0002").glob("calibration.*"))
-    assert rows["V0001"]["calibration_bin_sha256"] == sha256_of((valve(output, "V0001") / "calibration.bin").read_bytes())
+    octets = (valve(output, "V0001") / "calibration.bin").read_bytes()
+    assert rows["V0001"]["calibration_bin_sha256"] == sha256_of(octets)
 
 
 def test_what_is_done_is_taken_up(made, capsys):

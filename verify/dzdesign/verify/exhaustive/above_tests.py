@@ -47,7 +47,9 @@ def check_above(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> Abo
     side = compensator.side(exact.sign)
     let_go = floor(side.u_min0_over_u_max * exact.compare_max / compensator.beta_denominator + Fraction(1, 2))
     released = certificate.released_from_MPa
-    not_released = 0 if released is None else int(np.sum(above & (codes >= ceil(released / step_MPa)) & (at_zero > let_go)))
+    not_released = 0
+    if released is not None:
+        not_released = int(np.sum(above & (codes >= ceil(released / step_MPa)) & (at_zero > let_go)))
     return AboveCheck(
         choice=compensator.above,
         certified_to_MPa=float(certificate.holds_to_MPa) if certificate.holds_to_MPa > last else None,

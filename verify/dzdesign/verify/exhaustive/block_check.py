@@ -1,4 +1,4 @@
-"""One firmware in block form with the calibration blocks of many valves: each on every input, the core compiled once."""
+"""One firmware in block form with the calibration blocks of many valves: each on every input, compiled once."""
 
 import ctypes
 from collections.abc import Callable
@@ -44,7 +44,8 @@ class BlockCheck(Artefact):
     holds: Annotated[bool, about("Whether it is accepted and nothing was found on any input.")] = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "holds", not self.refused and bool(self.inputs) and all(each.holds for each in self.inputs))
+        tried = not self.refused and bool(self.inputs)
+        object.__setattr__(self, "holds", tried and all(each.holds for each in self.inputs))
 
     def requirement(self, name: str, compensator: Compensator) -> Check:
         """Return it as one requirement; `name` says whose block it is."""
@@ -61,8 +62,8 @@ class BlockCheck(Artefact):
             least = min(each.smallest_margin_V for each in self.inputs)
             hashes = ", ".join(each.outputs_hash for each in self.inputs)
             margin = compensator.valve.recorded_units.text(1e3 * least, ".3f mV")
-            text = f"{count} inputs checked, 0 wrong; smallest margin at zero command {margin}; hash of all compare values"
-            text += f" {hashes}"
+            text = f"{count} inputs checked, 0 wrong; smallest margin at zero command {margin}; "
+            text += f"hash of all compare values {hashes}"
         return CALIBRATION_BLOCK.check(holds=self.holds, text=text, name=f"{CALIBRATION_BLOCK.title}: {name}")
 
 
@@ -71,8 +72,8 @@ class BlockFirmware:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        names = (ACCEPTANCE, BLOCK_HEADER)
-        self._acceptance = {name: read_bytes(folder / "core" / name, "core of a firmware in block form") for name in names}
+        core = {name: folder / "core" / name for name in (ACCEPTANCE, BLOCK_HEADER)}
+        self._acceptance = {name: read_bytes(path, "core of a firmware in block form") for name, path in core.items()}
 
     def check(self, block: bytes, compensator: Compensator, source: SourceFile) -> BlockCheck:
         """Try a block on every input against the exact law of its compensator, whose file is `source`.
