@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the scoreboard that al
 
 from above_tests import print_above  # noqa: E402
 from all_inputs import print_inputs  # noqa: E402
+from calibration_blocks import print_blocks  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
 from current_population import print_current_population  # noqa: E402
 from current_valve import print_current_valve  # noqa: E402
@@ -40,6 +41,7 @@ PARTS = {
     "current-valve": (print_current_valve, 0),
     "current-population": (print_current_population, 1),
     "above": (print_above, 0),
+    "blocks": (print_blocks, 24),
 }
 
 

@@ -36,7 +36,7 @@ class CalibrationArguments:
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write: .hex is Intel HEX, .bin the octets alone, .txt TI-TXT, .a2l the layout for XCP tools."""
     format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
-    """hex, bin, txt or a2l, for a file of another ending (default: by the file's ending)."""
+    """Format of a file of another ending: hex, bin, txt or a2l (default: by the file's ending)."""
     target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
     """Microcontroller whose addresses the file states (default: that of the design)."""
     address: Annotated[Text, Option("N", example="0x330000")] = None
@@ -58,7 +58,7 @@ class ReadCalibrationArguments:
     """compensator.json, or a firmware folder that holds one, to compare the block with."""
     _: KW_ONLY
     format: Annotated[Text, Option("NAME", choices=READABLE)] = None
-    """hex, bin or txt, of a file of another ending (default: by the file's ending)."""
+    """Format of a file of another ending: hex, bin or txt (default: by the file's ending)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,9 +5,10 @@ import pytest
 from dzdesign.codegen.calibration.block_files import octets_in_file
 from dzdesign.codegen.calibration.block_images import FORMATS, image_of
 from dzdesign.codegen.calibration.places import SECTORS, Place, place_of
-from dzdesign.codegen.project import TARGET_NAMES
+from dzdesign.codegen.project import targets
 from dzdesign.core.errors import InputError
 from tests.support.block_reader import hex_memory, ti_txt_memory
+from tests.support.paths import ROOT
 
 OCTETS = bytes(range(256)) * 10 + b"last"
 PLACES = {
@@ -91,4 +92,7 @@ def test_an_address_has_room_behind_it_in_every_format(place, address, right):
 
 
 def test_the_sectors_are_of_targets():
-    assert set(SECTORS) < set(TARGET_NAMES) and place_of("host") == Place()
+    regions = {target.name: target.sector.region for target in targets() if target.sector}
+    assert set(SECTORS) == set(regions) and place_of("host") == Place()
+    page = (ROOT / "docs" / "reference" / "calibration.md").read_text(encoding="utf-8")
+    assert all(f"`{region}`" in page for region in regions.values())

@@ -14,6 +14,7 @@ from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.block_images import image_of
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.calibration.places import place_of
+from dzdesign.codegen.project import generate
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
@@ -21,6 +22,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.recorded_units import CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.lot.valves import LotValve
 from tests.support.block_reader import hex_memory, members_of, ti_txt_memory
 from tests.support.core_variants import variant
 from tests.support.paths import ROOT
@@ -237,6 +239,11 @@ def test_serial_and_record_come_from_the_test_record_unless_given(unproven):
     assert (by_record["serial"], by_record["record"]) == ("4711 №".encode(), b"lot 12")
     assert (given["serial"], given["record"]) == (b"8", b"shelf 3")
     assert (none["serial"], none["record"]) == (b"", b"")
+    # One setting for a lot is designed from one valve, whose number is not that of the others.
+    sides = {1: compensator.valve.sides["positive"]}
+    lot = tuple(LotValve.of(name, "0" * 64, sides, {1: "closing"}) for name in ("V-1", "V-2"))
+    of_lot = members_of(pack(api.calibration(replace(compensator, lot=lot)).block))
+    assert (of_lot["serial"], of_lot["record"]) == (b"", b"")
     with pytest.raises(api.InputError, match="at most 24; shorten it"):
         api.calibration(compensator, serial="x" * 25)
 
@@ -273,6 +280,13 @@ def test_the_api_takes_the_result_of_the_stage_before(written, unproven):
     assert found.belongs is True and found.reading.serial == "V-7" and found.difference == ""
     made = api.calibration(compensator, serial="V-7")
     assert (made.format, made.address) == ("bin", None) and made.content == (written / "valve.bin").read_bytes()
+
+
+def test_the_firmware_holds_the_same_block(written, unproven):
+    content = (written / "compensator.json").read_bytes()
+    compensator = read_artefact(content, Compensator, "compensator.json")
+    firmware = generate(compensator, "f28335", content, "block")
+    assert firmware.contents["calibration.bin"] == api.calibration(written / "compensator.json").content
 
 
 def test_a_number_that_does_not_follow_from_the_valve_is_refused(written, tmp_path, capsys):

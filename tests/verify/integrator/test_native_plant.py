@@ -116,6 +116,16 @@ def test_plants_at_the_ends_of_what_is_allowed(name, made, core):
 
 
 @needs_compiler
+def test_a_spool_that_turns_twice_in_a_phase_meets_the_stop_between(made, core, monkeypatch):
+    """Its speeds at both ends are of one sign. Seeded: the reference passed the stop, and was off by 2e-3."""
+    changes = {"m_e_kg": 0.005, "B_e_N_s_m": 0.0, "L_c_H": 0.012, "flow_force_N_mm_MPa": 0.0, "stroke_mm": 3.734}
+    window = short(list(other_scenes(made, **changes)), "step", 0.1)
+    assert holds(comparison.compare(window, core))
+    monkeypatch.setattr(CvodesSpool, "_fastest", lambda *_: 0.0)
+    assert holds(comparison.compare(window, core)) is False
+
+
+@needs_compiler
 @pytest.mark.parametrize("kind", ["step", "load step", "disturbances"])
 def test_the_stand_in_is_within_rounding(kind, firmware_folder, example_compensator):
     """Seeded: until the period's end the core was shown a new supply as if nothing flowed."""

@@ -44,7 +44,6 @@
 #define DZ_FAULT_TRIP_INPUT 0x0002u /* TZ1 (GPIO12) went low while the output was in use */
 #define DZ_FAULT_WATCHDOG 0x0004u   /* the last reset came from the watchdog: power-cycle to clear */
 #define DZ_FAULT_CLOCK 0x0008u      /* crystal missing, or PLL not set for 150 MHz */
-#define DZ_FAULT_CALIBRATION 0x0040u /* dz_calibration_check() refuses the block: dz_state.calibration says why */
 
 /* Trip zone set up and tripped: EPWM1A is low, and EPWM2A, whatever the other registers say. Call it first. */
 void dz_output_hold_low(void);

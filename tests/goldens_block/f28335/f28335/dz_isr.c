@@ -2,9 +2,11 @@
 /* Compensator SHA-256: d69cc06162a2b40c580781852a91f7ceead129506442354cd8c905179b4ae8d5 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
+#include <stddef.h>
+
 #include "DSP28x_Project.h"
 
-#include "dz_block.h"
+#include "dz_active.h"
 #include "dz_comp.h"
 #include "dz_drive.h"
 #include "dz_hardware.h"
@@ -17,6 +19,7 @@ static struct dz_drive drive;
 
 static uint16_t take_sample(void);
 static void show_drive(void);
+static void rest(void);
 static void write_compare_a(uint16_t compare);
 static void write_compare_b(uint16_t compare);
 static void force_output_low(void);
@@ -27,6 +30,7 @@ static void release_output(void);
 #pragma CODE_SECTION(dz_isr, ".TI.ramfunc");
 #pragma CODE_SECTION(take_sample, ".TI.ramfunc");
 #pragma CODE_SECTION(show_drive, ".TI.ramfunc");
+#pragma CODE_SECTION(rest, ".TI.ramfunc");
 #pragma CODE_SECTION(write_compare_a, ".TI.ramfunc");
 #pragma CODE_SECTION(write_compare_b, ".TI.ramfunc");
 #pragma CODE_SECTION(force_output_low, ".TI.ramfunc");
@@ -38,13 +42,24 @@ void dz_isr_init(uint16_t faults)
     dz_state.ticks = 0u;
     dz_state.ticks_without_sample = 0u;
     dz_state.released = 0u;
-    dz_state.calibration = dz_calibration_check(&dz_block);
-    dz_state.fault = (dz_state.calibration == 0u) ? faults : (uint16_t)(faults | DZ_FAULT_CALIBRATION);
+    dz_state.fault = faults;
     dz_state.u_adc = 0u;
     dz_state.p_a_adc = 0u;
     dz_state.p_b_adc = 0u;
-    dz_drive_init(&dz_block, &drive);
+    dz_state.held = 1u;
+    rest();
     show_drive();
+}
+
+/* Nothing driven. It reads no block: there may be none, or the memory that it lies in may be busy. */
+static void rest(void)
+{
+    drive.compare_a = 0u;
+    drive.compare_b = 0u;
+    drive.status = (dz_active == NULL) ? DZ_STATUS_CALIBRATION : 0u;
+    drive.law = 0u;
+    drive.side = 0;
+    drive.ramped = 0;
 }
 
 static void show_drive(void)
@@ -53,6 +68,7 @@ static void show_drive(void)
     dz_state.compare_b = drive.compare_b;
     dz_state.side = drive.side;
     dz_state.status = drive.status;
+    dz_state.ramped = (uint16_t)((uint32_t)((drive.ramped < 0) ? -drive.ramped : drive.ramped) >> 16);
 }
 
 /* 1 if a finished sequence with three 12-bit codes was there, 0 otherwise. */
@@ -103,7 +119,7 @@ static void write_compare_b(uint16_t compare)
 static void force_output_low(void)
 {
     dz_state.released = 0u;
-    dz_drive_init(&dz_block, &drive);
+    rest();
     show_drive();
     write_compare_a(0u);
     write_compare_b(0u);
@@ -116,7 +132,7 @@ static void force_output_low(void)
 /* Only from here on the drive runs: its ramps start from rest, and it waits for zero command. */
 static void release_output(void)
 {
-    dz_drive_init(&dz_block, &drive);
+    dz_drive_init(dz_active, &drive);
     /* A halt of the debugger stops the counter at the end of its period, where the pin has gone low (README). */
     EPwm1Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;
     EPwm2Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;
@@ -150,12 +166,18 @@ interrupt void dz_isr(void)
         dz_state.fault |= DZ_FAULT_NO_SAMPLE;
     }
 
-    if (dz_state.fault != 0u)
+    if ((dz_state.fault != 0u) || (dz_hold_wanted != 0u) || (dz_active == NULL))
     {
         force_output_low();
+        dz_state.held = 1u;
     }
     else
     {
+        if (dz_state.held != 0u)
+        {
+            /* The block may be another one than before. */
+            dz_state.held = 0u;
+        }
         /* Until the trip input is high the start waits: that is not a fault. */
         if ((dz_state.released == 0u) && (fresh != 0u) && (GpioDataRegs.GPADAT.bit.GPIO12 != 0u))
         {
@@ -165,10 +187,10 @@ interrupt void dz_isr(void)
         {
             if (fresh != 0u)
             {
-                dz_drive_sample(&dz_block, &drive, dz_state.u_adc, dz_state.p_a_adc, dz_state.p_b_adc);
+                dz_drive_sample(dz_active, &drive, dz_state.u_adc, dz_state.p_a_adc, dz_state.p_b_adc);
             }
             /* Each tick, for the dither's sake; between two samples the law's value holds. */
-            dz_drive_tick(&dz_block, &drive);
+            dz_drive_tick(dz_active, &drive);
             show_drive();
             write_compare_a(drive.compare_a);
             write_compare_b(drive.compare_b);

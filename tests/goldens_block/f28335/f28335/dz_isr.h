@@ -15,7 +15,8 @@ struct dz_state
     uint16_t ticks_without_sample; /* since the last usable sample */
     uint16_t released;             /* 1 from the first sample on, 0 after a fault */
     uint16_t fault;                /* DZ_FAULT_..., 0: none */
-    uint16_t calibration;          /* DZ_CALIBRATION_..., what is wrong with the calibration block; 0: nothing */
+    uint16_t held;                 /* 1: the output is held low and no block is read */
+    uint16_t ramped;               /* how far from zero the command is after the ramps, codes; 0 without ramps */
     uint16_t u_adc;                /* ADCINA0, command, 0..4095 */
     uint16_t p_a_adc;              /* ADCINA1, pressure A */
     uint16_t p_b_adc;              /* ADCINA2, pressure B */

@@ -2,21 +2,27 @@
 /* Compensator SHA-256: d69cc06162a2b40c580781852a91f7ceead129506442354cd8c905179b4ae8d5 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
+#include <stddef.h>
+
 #include "DSP28x_Project.h"
 
-#include "dz_block.h"
+#include "dz_active.h"
 #include "dz_comp.h"
 #include "dz_isr.h"
+#include "dz_load_steps.h"
 #include "dz_telemetry.h"
 
 #define SCI_EIGHT_BITS 0x0007u /* SCICCR: 8 bits, no parity, one stop bit, idle-line mode */
-#define SCI_TRANSMITS 0x0002u  /* SCICTL1: TXENA, held in software reset; the receiver stays off */
-#define SCI_RUNS 0x0022u       /* SCICTL1: TXENA, out of software reset */
+#define SCI_TRANSMITS 0x0003u  /* SCICTL1: RXENA and TXENA, held in software reset */
+#define SCI_RUNS 0x0023u       /* SCICTL1: RXENA and TXENA, out of software reset */
+#define RECEIVES 0x2000u       /* SCIFFRX: receive FIFO works, no interrupt */
+#define OCTET 0x00FFu          /* SCIRXBUF: what came; the bits above it tell of errors, which the CRC finds */
 #define FIFO_CLEARED 0xC000u   /* SCIFFTX: FIFOs on, transmit FIFO held empty, no interrupt */
 #define FIFO_RUNS 0xE000u      /* SCIFFTX: FIFOs on, transmit FIFO works, no interrupt */
 #define READINGS_OF_STATE 2u
 
 struct dz_telemetry dz_telemetry;
+struct dz_load dz_load;
 
 void dz_telemetry_init(void)
 {
@@ -25,6 +31,8 @@ void dz_telemetry_init(void)
     dz_telemetry.at = DZ_FRAME_OCTETS;
     dz_telemetry.sent = 0u;
     dz_telemetry.dropped = 0u;
+    dz_telemetry.reply_at = 0u;
+    dz_telemetry.line_errors = 0u;
 
     EALLOW;
     SysCtrlRegs.LOSPCP.all = DZ_SCI_LOSPCP;
@@ -40,12 +48,13 @@ void dz_telemetry_init(void)
     SciaRegs.SCIFFCT.all = 0u; /* octets follow one another without a gap, no autobaud */
     SciaRegs.SCICTL1.all = SCI_RUNS;
     SciaRegs.SCIFFTX.all = FIFO_RUNS;
+    SciaRegs.SCIFFRX.all = RECEIVES;
 
     EALLOW;
     GpioCtrlRegs.GPAPUD.bit.GPIO28 = 0u; /* pull-up: an open line rests high */
     GpioCtrlRegs.GPAPUD.bit.GPIO29 = 0u;
     GpioCtrlRegs.GPAQSEL2.bit.GPIO28 = 3u; /* asynchronous */
-    GpioCtrlRegs.GPAMUX2.bit.GPIO28 = 1u;  /* SCIRXDA, not read */
+    GpioCtrlRegs.GPAMUX2.bit.GPIO28 = 1u;  /* SCIRXDA */
     GpioCtrlRegs.GPAMUX2.bit.GPIO29 = 1u;  /* SCITXDA, resting high by now */
     EDIS;
 }
@@ -81,8 +90,16 @@ static uint16_t status_of(const struct dz_state *state)
 {
     uint16_t status = state->fault;
 
-    status |= (uint16_t)(((state->side < 0) ? dz_status_negative(&dz_block, state->u_adc, state->p_a_adc, state->p_b_adc)
-                                            : dz_status(&dz_block, state->u_adc, state->p_a_adc, state->p_b_adc)) << 8);
+    if (dz_load.block == NULL)
+    {
+        status |= DZ_STATUS_NO_CALIBRATION;
+    }
+    else
+    {
+        status |= (uint16_t)(((state->side < 0)
+                                  ? dz_status_negative(dz_load.block, state->u_adc, state->p_a_adc, state->p_b_adc)
+                                  : dz_status(dz_load.block, state->u_adc, state->p_a_adc, state->p_b_adc)) << 8);
+    }
     status |= (uint16_t)(state->status << 8);
     if (state->released != 0u)
     {
@@ -104,12 +121,16 @@ static void start_frame(void)
     else
     {
         frame.ticks = dz_telemetry.ticks + (uint16_t)(state.ticks - (uint16_t)(dz_telemetry.ticks & 0xFFFFu));
-        frame.origin = DZ_FIRMWARE_ORIGIN;
+        frame.origin = (uint16_t)(dz_load_origin(dz_load.block) >> 16);
         frame.u_adc = state.u_adc;
         frame.p_a_adc = state.p_a_adc;
         frame.p_b_adc = state.p_b_adc;
-        frame.beta = (state.side < 0) ? dz_beta_negative(&dz_block, state.p_a_adc, state.p_b_adc)
-                                      : dz_beta(&dz_block, state.p_a_adc, state.p_b_adc);
+        frame.beta = 0u;
+        if (dz_load.block != NULL)
+        {
+            frame.beta = (state.side < 0) ? dz_beta_negative(dz_load.block, state.p_a_adc, state.p_b_adc)
+                                          : dz_beta(dz_load.block, state.p_a_adc, state.p_b_adc);
+        }
         frame.compare_a = state.compare_a;
         frame.compare_b = state.compare_b;
         frame.status = status_of(&state);
@@ -119,10 +140,48 @@ static void start_frame(void)
     }
 }
 
+/* A reply goes out whole, between two frames. */
+static void feed_reply(void)
+{
+    while ((dz_telemetry.reply_at < dz_load.reply_octets) && (SciaRegs.SCIFFTX.bit.TXFFST < DZ_SCI_FIFO_OCTETS))
+    {
+        SciaRegs.SCITXBUF = dz_load.reply[dz_telemetry.reply_at];
+        dz_telemetry.reply_at++;
+    }
+    if (dz_telemetry.reply_at >= dz_load.reply_octets)
+    {
+        dz_telemetry.reply_at = 0u;
+        dz_load.reply_octets = 0u;
+    }
+}
+
+/* All that came since the last pass, 16 octets at most. After a break or a wrong stop bit the receiver stands still
+ * until it is set up again; the transmitter is set up with it, so it must be at rest. */
+static void receive(uint16_t ticks)
+{
+    uint16_t octets;
+
+    for (octets = 0u; (octets < DZ_SCI_FIFO_OCTETS) && (SciaRegs.SCIFFRX.bit.RXFFST != 0u); octets++)
+    {
+        dz_load_receive(&dz_load.receiver, (uint16_t)(SciaRegs.SCIRXBUF.all & OCTET), ticks);
+    }
+    if ((SciaRegs.SCIRXST.bit.RXERROR != 0u) && (SciaRegs.SCIFFTX.bit.TXFFST == 0u) &&
+        (SciaRegs.SCICTL2.bit.TXEMPTY != 0u))
+    {
+        SciaRegs.SCICTL1.all = SCI_TRANSMITS;
+        SciaRegs.SCICTL1.all = SCI_RUNS;
+        dz_telemetry.line_errors++;
+    }
+}
+
 /* At most a whole frame, and at most until the FIFO is full. */
 static void feed_transmitter(void)
 {
-    while ((dz_telemetry.at < DZ_FRAME_OCTETS) && (SciaRegs.SCIFFTX.bit.TXFFST < DZ_SCI_FIFO_OCTETS))
+    if (((dz_telemetry.at == 0u) || (dz_telemetry.at >= DZ_FRAME_OCTETS)) && (dz_load.reply_octets != 0u))
+    {
+        feed_reply();
+    }
+    while ((dz_telemetry.reply_at == 0u) && (dz_telemetry.at < DZ_FRAME_OCTETS) && (SciaRegs.SCIFFTX.bit.TXFFST < DZ_SCI_FIFO_OCTETS))
     {
         SciaRegs.SCITXBUF = dz_telemetry.octets[dz_telemetry.at];
         dz_telemetry.at++;
@@ -134,6 +193,8 @@ void dz_telemetry_poll(void)
     const uint16_t ticks = dz_state.ticks;
 
     dz_telemetry.ticks += (uint16_t)(ticks - (uint16_t)(dz_telemetry.ticks & 0xFFFFu));
+    receive(ticks);
+    dz_load_poll(&dz_load, ticks);
     feed_transmitter();
     if ((uint16_t)(ticks - dz_telemetry.due) >= DZ_FRAME_TICKS)
     {

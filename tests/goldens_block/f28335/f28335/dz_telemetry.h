@@ -2,13 +2,15 @@
 /* Compensator SHA-256: d69cc06162a2b40c580781852a91f7ceead129506442354cd8c905179b4ae8d5 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* Telemetry over SCI-A: 100 frames a second, sent by the main loop and by nothing else. Nothing is received. */
+/* Telemetry over SCI-A: 100 frames a second, sent by the main loop and by nothing else.
+ * Requests about the calibration block come in between, and are answered (dz_load.h). */
 #ifndef DZ_TELEMETRY_H
 #define DZ_TELEMETRY_H
 
 #include <stdint.h>
 
 #include "dz_frame.h"
+#include "dz_load.h"
 
 /* LSPCLK = 150 MHz / (2 * 1) = 75 MHz, limit 75 MHz. The line has
  * LSPCLK / (8 * (80 + 1)) = 115741 bit/s: +0.47 % from 115200. */
@@ -22,8 +24,8 @@
 /* Bit of a frame's status word beside the DZ_FAULT_...: the output is in use. */
 #define DZ_STATUS_RELEASED 0x0080u
 
-/* First 16 bits of the SHA-256 of compensator.json: the monitor knows by it whose scalings to use. */
-#define DZ_FIRMWARE_ORIGIN 0xD69Cu
+/* Likewise: there is no valid calibration block, and the output stays off until one is loaded. */
+#define DZ_STATUS_NO_CALIBRATION 0x0040u
 
 /* Written by the main loop only. */
 struct dz_telemetry
@@ -34,15 +36,21 @@ struct dz_telemetry
     uint16_t at;                      /* its first octet that the transmitter has not got yet */
     uint16_t sent;                    /* frames, modulo 65536 */
     uint16_t dropped;                 /* frames that were due and not sent, modulo 65536 */
+    uint16_t reply_at;                /* of dz_load.reply, its first octet that the transmitter has not got yet */
+    uint16_t line_errors;             /* times that the receiver was set up again, modulo 65536 */
 };
 
 extern struct dz_telemetry dz_telemetry;
 
+/* The load under way and the block in use; the main loop's. */
+extern struct dz_load dz_load;
+
 /* SCI-A and its pins GPIO28 and GPIO29. Call it after InitSysCtrl(), which gives SCI-A its clock. */
 void dz_telemetry_init(void);
 
-/* One pass: hands over what the transmitter has room for, and packs the next frame if it is due. Never waits. Call it
- * from the main loop, at least once in 65535 PWM periods. */
+/* One pass: takes what came, goes on with a load, hands over what the transmitter has room for, and packs the next frame
+ * if it is due. Never waits, but for what dz_store.c does. Call it from the main loop: the receiver holds
+ * 1.38 ms of octets. */
 void dz_telemetry_poll(void);
 
 #endif

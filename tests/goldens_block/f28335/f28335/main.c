@@ -4,6 +4,8 @@
 
 #include "DSP28x_Project.h"
 
+#include "dz_active.h"
+#include "dz_block.h"
 #include "dz_hardware.h"
 #include "dz_isr.h"
 #include "dz_telemetry.h"
@@ -40,6 +42,10 @@ int main(void)
     InitPieVectTable();
     InitAdc(); /* calibration, power-up, 5 ms */
 
+    dz_store_init();
+    dz_load_init(&dz_load, &dz_block);
+    dz_load_use(dz_load.block);
+    (void)dz_load_hold(0u);
     dz_hardware_init();
     dz_telemetry_init();
     dz_interrupt_init();

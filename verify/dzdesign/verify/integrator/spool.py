@@ -168,8 +168,9 @@ class CvodesSpool:
             state.take(end)
             return left
         inside, out = 0.0, left
-        if state.speed * end[3] < 0.0:
-            turn = _root(lambda ms: float(after(ms)[3]), 0.0, left)
+        fastest = self._fastest(state, acting, after, left)
+        if state.speed * end[3] < 0.0 or (fastest and state.speed * float(after(fastest)[3]) < 0.0):
+            turn = _root(lambda ms: float(after(ms)[3]), 0.0, fastest or left)
             inside, out = (0.0, turn) if outside(float(after(turn)[2])) > 0.0 else (turn, left)
         elif state.speed == 0.0 and outside(float(end[2])) > 0.0:
             inside = self._turn_from_rest(after, left)
@@ -186,6 +187,23 @@ class CvodesSpool:
         state.position, state.speed = stop, 0.0
         state.impacts += 1
         return max(met, SHORTEST_MS)
+
+    def _fastest(self, state: SpoolState, acting: Acting, after: Callable[[float], np.ndarray], left: float) -> float:
+        """Return when a spool that is braked first and driven on at last is fastest the other way; 0 of any other.
+
+        It may turn before that and again behind it, so that its speeds at both ends of the phase are of one sign.
+        """
+
+        def force(ms: float) -> float:
+            current, _, position, speed = map(float, after(ms) if ms > 0.0 else start)
+            there = SpoolState(position=position, current=current)
+            return self._pull(there, acting) - self._plant.B_e_N_s_m * speed
+
+        start = np.array([state.current, state.charge, state.position, state.speed])
+        end_speed = float(after(left)[3])
+        if state.speed * end_speed <= 0.0 or state.speed * force(0.0) >= 0.0 or end_speed * force(left) <= 0.0:
+            return 0.0
+        return _root(force, 0.0, left)
 
     @staticmethod
     def _turn_from_rest(after: Callable[[float], np.ndarray], left: float) -> float:
