@@ -15,7 +15,7 @@ SCHEMAS = {
     "compensator": ("dzdesign.design.compensator:Compensator", "compensator.json", "design"),
     "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
     "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
-    "calibration-check": (
+    "calibration": (
         "dzdesign.verify.exhaustive.block_check:BlockCheck", "calibration_check.json", "batch --calibration block"
     ),
     "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
