@@ -34,7 +34,7 @@ class BatchArguments(DesignChoices, IdentifyChoices):
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
     """File with the plant of the closed loop, for the verification."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
-    """fixed (default): a firmware a valve. block: one firmware for the lot, and for each valve a calibration block that
-    is tried with it on every input."""
+    """Where the numbers of a valve stand: fixed in a firmware of its own (default), or in a calibration block for one
+    firmware of the lot; each block is tried on every input."""
     target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
     """Microcontroller; `codegen --list-targets` lists them."""

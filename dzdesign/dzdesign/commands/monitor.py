@@ -44,7 +44,7 @@ class Arguments:
     firmware: Annotated[AnyPath, Option("DIR")] = "firmware"
     """Folder made by `dzdesign codegen`, with the scalings."""
     compensator: Annotated[AnyPath | None, Option("FILE")] = None
-    """compensator.json of the calibration block that was loaded since (default: the firmware's own)."""
+    """File compensator.json of the calibration block that was loaded since (default: the firmware's own)."""
     baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=POSITIVE))] = None
     """Bits per second (default: what the firmware sends)."""
     seconds: Annotated[Text, Option("S", read=number("a positive number such as 60", between=POSITIVE))] = None
