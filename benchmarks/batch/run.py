@@ -1,4 +1,4 @@
-"""Benchmark of `dzdesign batch`: a lot of 1000 valves, 10 of them broken; ``run.py [--quick]``.
+"""Benchmark of `dzdesign batch`: a lot of 1000 valves, 10 of them broken; ``run.py [--quick] [--only blocks]``.
 
 Exit status 1 if a limit is missed.
 """
@@ -16,6 +16,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "POLARS_MAX_THREADS"
     os.environ.setdefault(_threads, "1")
 sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parents[1] / "identify")]
 
+from many_blocks import print_blocks  # noqa: E402
 from many_valves import write_lot  # noqa: E402
 from scoreboard import Row, print_rows, run_parts, say  # noqa: E402
 
@@ -77,7 +78,8 @@ def print_lot(*, quick: bool, seed: int) -> list[Row]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the benchmark and print what missed its limit."""
-    return run_parts(__doc__.splitlines()[0], {"lot": (print_lot, 7)}, "60 valves", arguments)
+    parts = {"lot": (print_lot, 7), "blocks": (print_blocks, 7)}
+    return run_parts(__doc__.splitlines()[0], parts, "60 valves, 6 with blocks", arguments)
 
 
 if __name__ == "__main__":

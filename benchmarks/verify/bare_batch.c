@@ -3,7 +3,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#ifdef DZ_BLOCK_FORM
+#include "dz_comp.h"
+
+#include "bound.h"
+#else
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+#endif
 
 int main(int count, char **arguments)
 {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.codegen.banner import Banner, banner_of, board_lines
 from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
 from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.in_project import block_templates, block_values
 from dzdesign.codegen.calibration.layout import CalibrationBlock
@@ -172,6 +172,15 @@ def generate(
         | ({BLOCK_FILE: sha256_of(octets)} if octets else {}),
     )
     return Firmware(files=files, manifest=manifest, compensator=compensator, note=note, block=octets)
+
+
+def block_core(built: BuiltFor) -> dict[str, str]:
+    """Return the core of the firmware in block form, path to text: the same for every valve that it is compiled for."""
+    lines = Banner(digest="").of_any_valve  # which names no compensator
+    return {
+        path: _render(PACKAGE, file.template, lines(file.template), file.values)
+        for path, file in _in_core(block_core_files(built)).items()
+    }
 
 
 def _in_core(files: Mapping[str, CoreFile]) -> dict[str, CoreFile]:

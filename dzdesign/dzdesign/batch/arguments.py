@@ -7,6 +7,7 @@ from dzdesign.core.option_readers import whole_number
 from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.design import TARGETS
+from dzdesign.stages.generate import FORMS
 from dzdesign.stages.identify import IdentifyChoices
 
 
@@ -32,5 +33,8 @@ class BatchArguments(DesignChoices, IdentifyChoices):
     """Also verify each valve's firmware, as the command does."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
     """File with the plant of the closed loop, for the verification."""
+    calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
+    """Where the numbers of a valve stand: fixed in a firmware of its own (default), or in a calibration block for one
+    firmware of the lot; each block is tried on every input."""
     target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
     """Microcontroller; `codegen --list-targets` lists them."""

@@ -12,6 +12,7 @@ from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import DzdesignError, one_line
 from dzdesign.design.design_choices import DesignChoices
+from dzdesign.design.firmware_manifest import Calibration
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
 from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
 from dzdesign.stages.identify import IdentifyChoices
@@ -34,6 +35,7 @@ class Task:
     identify: IdentifyChoices
     design: DesignChoices
     target: str
+    calibration: Calibration = "fixed"
     verify: bool = False
     plant: tuple[str, bytes] | None = None
     refused: str = ""
@@ -48,6 +50,7 @@ class Task:
             "identify": asdict(self.identify),
             "design": asdict(self.design),
             "target": self.target,
+            "calibration": self.calibration,
             "verify": self.verify,
             "plant": self.plant and (self.plant[0], sha256_of(self.plant[1])),
             "refused": self.refused,
@@ -110,6 +113,7 @@ def calibrate(task: Task) -> Outcome:
 
 def _run(task: Task, folder: Path) -> tuple[Status, str]:
     """Run the stages into ``folder/out`` and return status and reason."""
+    from dzdesign.batch.blocks import write_block
     from dzdesign.codegen.project import generate
     from dzdesign.stages.design import DesignArguments, design
     from dzdesign.stages.identify import IdentifyArguments, identify
@@ -122,15 +126,21 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     compensator = design(
         DesignArguments(valve, target=task.target, **vars(task.design), output=out / "compensator.json")
     )
-    firmware = generate(compensator, task.target)  # proved by the design, a line above
-    write_folder(out / FIRMWARE, firmware.files, firmware.manifest)
+    place = out / FIRMWARE
+    if task.calibration == "block":
+        status, reason = write_block(compensator, task.target, out)
+        if status != OK or not task.verify:
+            return status, reason
+        place = folder / FIRMWARE  # the lot's firmware stands beside all valves
+    firmware = generate(compensator, task.target, calibration=task.calibration)  # proved by the design above
+    write_folder(place, firmware.contents, firmware.manifest)
     if not task.verify:
         return OK, ""
     plant = None
     if task.plant:
         plant = folder / task.plant[0]
         plant.write_bytes(task.plant[1])
-    arguments = VerifyArguments(out / FIRMWARE, ramps=recordings, plant=plant, output=out / "evidence")
+    arguments = VerifyArguments(place, ramps=recordings, plant=plant, output=out / "evidence")
     verification = verify(arguments, identified=valve)
     if verification.holds:
         return OK, ""

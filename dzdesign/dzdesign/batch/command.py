@@ -10,6 +10,7 @@ from pathlib import Path
 from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
+from dzdesign.batch.lot_firmware import needing_another, write_lot_firmware
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import (
@@ -26,11 +27,13 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in
 from dzdesign.core.options import arguments_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
+from dzdesign.design.firmware_manifest import form_named
 from dzdesign.report.lot.budget import lot_budget
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.summary import LotSummary
 from dzdesign.report.lot.table import table_files
 from dzdesign.report.lot.table_rows import table_rows
+from dzdesign.report.lot.valve_folder import ValveFolder
 from dzdesign.report.valve_report import REPORT_NAME
 from dzdesign.stages.design import design_options
 from dzdesign.stages.identify import IdentifyChoices, identify_options, record_of
@@ -51,6 +54,7 @@ def calibrate_lot(args: BatchArguments) -> LotSummary:
         raise InputError("--jobs is for this machine; with --dask its workers decide, so leave it out")
     jobs = read_options(args, ["jobs"])["jobs"] or os.cpu_count() or 1
     _check_options(args)
+    form_named(args.calibration)
     if source.is_dir() and output.resolve().is_relative_to(source.resolve()):
         raise InputError(f"'{output}' lies in '{source}', whose subfolders are the valves; choose another with -o")
     valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
@@ -104,12 +108,16 @@ def _finished(
     """Write table, lot setting and batch.json, from the valves' folders alone; return the last."""
     output = results.folder
     found = [results.read(valve.name, unwritten) for valve in with_bar(valves, "making the table")]
+    in_blocks = form_named(args.calibration) == "block"
+    if in_blocks:
+        found = _with_one_firmware(results, found)
     designed = {each.name: each.compensator for each in found if each.compensator is not None}
     setting, why_not = lot_setting_of(designed)
     rows = table_rows(
         found, setting.compensator if setting else None, {valve.name: _record(valve, args) for valve in valves}
     )
     table = table_files(rows)
+    firmware = write_lot_firmware(output, designed, setting.compensator if setting else None) if in_blocks else None
     summary = summary_of(
         rows,
         files=table,
@@ -123,6 +131,7 @@ def _finished(
         },
         anomalies=anomalies_of(found, output, valves),
         budget=lot_budget(designed),
+        firmware=firmware,
         units=units_of_lot(designed),
     )
     if setting is None:
@@ -130,6 +139,14 @@ def _finished(
     write_files(output, {**table, **(setting_files(setting) if setting else {})}, "-o")
     results.write_summary(summary)
     return summary
+
+
+def _with_one_firmware(results: Results, found: list[ValveFolder]) -> list[ValveFolder]:
+    """Turn the valves whose block needs another firmware into failed ones, which the next run tries again."""
+    reasons = needing_another(found)
+    for name, reason in reasons.items():
+        results.refuse(name, reason)
+    return [results.read(each.name, {}) if each.name in reasons else each for each in found]
 
 
 def _write_report(output: Path) -> None:
@@ -188,6 +205,7 @@ def _task(valve: Valve, args: BatchArguments, plant: tuple[str, bytes] | None) -
         identify=IdentifyChoices(**{each.name: options[each.name] for each in fields(IdentifyChoices)}),
         design=DesignChoices(**{each.name: options[each.name] for each in fields(DesignChoices)}),
         target=options["target"],
+        calibration=form_named(args.calibration),
         verify=args.verify,
         plant=plant,
         refused=refused,

@@ -7,7 +7,7 @@ from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.lot.budget import lot_budget_lines
 from dzdesign.report.lot.setting_text import checked_line, cost_lines, span, untested_lines
-from dzdesign.report.lot.summary import LotSummary
+from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware, LotSummary
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
 
 #: Valves of one warning that are named, and of those that hold the lot setting down.
@@ -26,6 +26,8 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
     put_table(console, table)
     for line in (*lot_budget_lines(summary.budget), *_setting_lines(summary)):
         put_line(console, line)
+    if summary.firmware:
+        put_line(console, _firmware_line(summary.firmware, folder))
     warned = sorted(summary.warnings.items(), key=lambda item: len(item[1]))
     if warned:
         few = {code: f" ({', '.join(names)})" if len(names) <= NAMED else "" for code, names in warned}  # where to look
@@ -38,6 +40,14 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
         console,
         f"{count} of {summary.valves} valves calibrated, {len(summary.failed)} not. Table: {folder}/valves.csv, "
         f"valves.parquet; {f'to be read: {report}' if report else 'no report.html'}",
+    )
+
+
+def _firmware_line(firmware: LotFirmware, folder: Path) -> str:
+    held = firmware.block_of if firmware.block_of == LOT_SETTING else f"valve {firmware.block_of}"
+    return (
+        f"one firmware for {firmware.target}: {folder / firmware.folder}, with the block of {held} until a valve's own "
+        f"is loaded; these are {folder}/valves/NAME/{' and '.join(firmware.blocks)}, each tried on every input"
     )
 
 

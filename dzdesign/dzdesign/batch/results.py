@@ -7,10 +7,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from dzdesign.batch.blocks import BLOCK_IMAGE
 from dzdesign.batch.calibration import Outcome
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.report.lot.folder import is_lot
 from dzdesign.report.lot.summary import FAILED, SUMMARY_NAME, LotSummary, UnfinishedLot
 from dzdesign.report.lot.valve_folder import (
@@ -65,6 +67,13 @@ class Results:
         firmware = files.get(f"{FIRMWARE}/{MANIFEST_NAME}")  # its board files are the user's to fill in
         board = tuple(f"{FIRMWARE}/{name}" for name in json.loads(firmware)["board"]) if firmware else ()
         write_folder(self.of(outcome.name), files, replace(outcome.manifest, board=board))
+
+    def refuse(self, name: str, reason: str) -> None:
+        """Turn a calibrated valve into a failed one, without its block; the next run tries it again."""
+        folder = self.of(name)
+        manifest = replace(read_manifest(folder), status=FAILED, reason=reason, inputs_sha256=None)
+        kept = [file for file in manifest.files if file not in (BLOCK_FILE, BLOCK_IMAGE)]
+        self.write(Outcome(manifest=manifest, files={file: (folder / file).read_bytes() for file in kept}))
 
     def read(self, name: str, unwritten: Mapping[str, str]) -> ValveFolder:
         """Read a valve's folder; one that could not be written has failed, whatever an earlier run left there."""

@@ -14,6 +14,7 @@ from dzdesign.report.lot.budget import LotBudget
 from dzdesign.report.lot.spread import quantiles, spreads_of
 from dzdesign.report.lot.summary import (
     FailedValve,
+    LotFirmware,
     LotSettingSummary,
     LotSummary,
     SettingOfOthers,
@@ -55,6 +56,7 @@ def summary_of(
     made_from: Mapping[str, bytes],
     anomalies: Sequence[str] = (),
     budget: LotBudget | None = None,
+    firmware: LotFirmware | None = None,
     units: RecordedUnits = AS_COMPUTED,
 ) -> LotSummary:
     """Return what batch.json says of a finished lot.
@@ -84,6 +86,7 @@ def summary_of(
         lot_setting=setting,
         why_no_lot_setting=why_no_setting,
         budget=budget,
+        firmware=firmware,
         recorded_units=units,
     )
 

@@ -10,6 +10,7 @@ from dzdesign.terminal.page import print_json
 Arguments = BatchArguments
 EXAMPLES = (
     'dzdesign batch lot -o calibrated --jobs 4 --meter-lag "0.1 s"',
+    'dzdesign batch lot -o calibrated --meter-lag "0.1 s" --calibration block',
     "dzdesign batch lot.csv -o calibrated --verify --dask tcp://10.0.0.5:8786",
 )
 

@@ -15,6 +15,9 @@ SCHEMAS = {
     "compensator": ("dzdesign.design.compensator:Compensator", "compensator.json", "design"),
     "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
     "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
+    "calibration": (
+        "dzdesign.verify.exhaustive.block_check:BlockCheck", "calibration_check.json", "batch --calibration block"
+    ),
     "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
     "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
     "reproduction": ("dzdesign.report.reproduction:Reproduction", "reproduction.json", "reproduce"),

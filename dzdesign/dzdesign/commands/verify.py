@@ -10,6 +10,7 @@ Arguments = VerifyArguments
 EXAMPLES = (
     "dzdesign verify firmware",
     "dzdesign verify firmware --plant plant.toml --tolerances tolerances.toml",
+    'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
     "dzdesign verify firmware --machine-code --mutate --proof",
 )
 

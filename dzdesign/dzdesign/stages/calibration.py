@@ -6,6 +6,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from dzdesign.block_checks import other_numbers
 from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, sha256_of, write_file
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import AnyPath, Option, Text
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
 #: Formats that hold a block.
 READABLE = ("hex", "bin", "txt")
-#: Entries of a block that do not follow from a compensator.
-OF_NO_COMPENSATOR = ("serial", "record", "crc32")
 COMPENSATOR_NAME = "compensator.json"
 
 
@@ -109,7 +108,10 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
     target = _target_of(compensator, arguments.target)
     place = _place(target, arguments.address, OCTETS)
     _refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
-    serial, record = (_entry(compensator, name, getattr(arguments, name)) for name in ("serial", "record"))
+    serial, record = (
+        entry_of_record(compensator, name) if (given := getattr(arguments, name)) is None else given
+        for name in ("serial", "record")
+    )
     octets = pack(block_of(compensator, digest, serial=serial, record=record))
     made = CalibrationImage(
         content=image_of(octets, form, place),
@@ -253,10 +255,8 @@ def _place(target: str, address: str | None, octets: int) -> "Place":
         raise InputError(f"--address is {quoted(address)}, expected a whole number such as 0x330000") from error
 
 
-def _entry(compensator: "Compensator", name: str, given: str | None) -> str:
-    """Return a text of the block: as given, or that entry of the test record; one setting for a lot is of no valve."""
-    if given is not None:
-        return given
+def entry_of_record(compensator: "Compensator", name: str) -> str:
+    """Return a text of the block: that entry of the test record; one setting for a lot is of no valve."""
     if compensator.lot:
         return ""
     return next((text for key, text in compensator.valve.record.items() if key.casefold() == name), "")
@@ -266,12 +266,6 @@ def _difference(
     block: "CalibrationBlock", reading: "CalibrationReading", compensator: "Compensator", digest: str
 ) -> str:
     """Say why a block is not that of a compensator: another file, or numbers that do not follow from it."""
-    from dzdesign.codegen.calibration.block import block_of
-
     if reading.compensator_sha256 != digest:
         return f"its compensator.json has the SHA-256 {digest}, the block names {reading.compensator_sha256}"
-    numbers = [name for name in block.__dataclass_fields__ if name not in OF_NO_COMPENSATOR]
-    follows = block_of(compensator, digest)
-    if differ := [name for name in numbers if getattr(block, name) != getattr(follows, name)]:
-        return f"it names this compensator, but numbers differ from those that follow from it: {', '.join(differ)}"
-    return ""
+    return other_numbers(block, compensator, digest)

@@ -11,6 +11,7 @@ from dzdesign.core.artefact_files import check_folder_may_be_written, read_bytes
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Texts, paths_of, texts_of
 from dzdesign.core.units import parse_quantity
+from dzdesign.stages.recordings import expand
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
@@ -36,6 +37,9 @@ class VerifyArguments:
     ramps: Annotated[Paths, Option("RAMP", several=True)] = ()
     """Recordings that valve.json was made from, or patterns such as "ramps/*.csv", in any order: identify again, and
     compare with the valve that the firmware carries (default: its thresholds are taken as stated)."""
+    blocks: Annotated[Paths, Option("FILE", several=True)] = ()
+    """Calibration blocks of other valves, or patterns such as "lot/valves/*/calibration.bin": try each with this
+    firmware, of block form, on every input. Its compensator.json lies beside it."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
     """File with the plant of the closed loop, like examples/paper_valve/plant.toml (default: made of the identified
     thresholds)."""
@@ -69,6 +73,7 @@ def verify(
     InputError
         If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
     """
+    from dzdesign.block_checks import blocks_checked, given_blocks
     from dzdesign.regeneration import regenerated
     from dzdesign.reidentification import GivenFiles, identified_again
     from dzdesign.report.valve_report import with_report
@@ -90,7 +95,9 @@ def verify(
     backs_MPa = _back_pressures_MPa(texts_of(arguments.back_pressure))
     include = [Path(place) for place in paths_of(arguments.include)]
     recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
+    block_files = expand(arguments.blocks) if paths_of(arguments.blocks) else []
     with _firmware_folder(arguments.firmware) as folder:
+        blocks = given_blocks(folder, block_files)
         ware = arguments.c2000ware
         added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
         with stage_progress() as stage:
@@ -101,6 +108,9 @@ def verify(
         if recordings:
             with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
                 added.append(identified_again(read_compensator(folder), recordings, identified))
+        if blocks:
+            with stage_progress("comparing every input with each of the calibration blocks"):
+                added += blocks_checked(folder, blocks)
         more, mutants = _further_checks(arguments, folder, verification)
         verification = verification.with_checks(regenerated(folder, include), *added, *more)
         if mutants:

@@ -74,6 +74,10 @@ RAMPS = Requirement(
     how="`verify --ramps` with the recordings that valve.json was made from",
 )
 BOARD_FILES = Requirement(id="board-files", title="your board files compile")
+#: Of a firmware in block form: blocks of other valves than the one that lies in its folder.
+CALIBRATION_BLOCK = Requirement(
+    id="calibration-block", title="every input with the calibration block", how="`verify --blocks` with its file"
+)
 MACHINE_CODE = Requirement(
     id="machine-code", title="machine code of other processors, in simulators", how="`verify --machine-code`"
 )

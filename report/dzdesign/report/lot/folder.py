@@ -126,6 +126,8 @@ class _LotFiles:
         ]
         if setting := self.summary.lot_setting:
             self._fitting(setting.file, setting.sha256)
+        if firmware := self.summary.firmware:
+            self._fitting(f"{firmware.folder}/{MANIFEST_NAME}", firmware.manifest_sha256)
         texts = self._compared_valves(rows)
         return Lot(
             tool=self.summary.tool,

@@ -77,6 +77,9 @@ def _verdict(lot: Lot) -> Headline:
         refuted = any(row.status == DOES_NOT_HOLD for row in lot.failed)
         text = f"{words}, {whole(count - done)} NOT"
         return Headline(kind="bad" if refuted else "open", text=text, reasons=reasons)
+    if not lot.summary.verified and lot.summary.firmware:
+        text = f"{words}, each block tried on every input; the firmware itself is NOT VERIFIED"
+        return Headline(kind="open", text=text)
     if not lot.summary.verified:
         return Headline(kind="open", text=f"{words}; their firmware is NOT VERIFIED")
     return Headline(kind="good", text=f"{words}, and the firmware of each is verified")

@@ -12,6 +12,8 @@ from dzdesign.report.lot.budget import LotBudget
 
 #: File of either type below.
 SUMMARY_NAME = "batch.json"
+#: Instead of a valve's name: one setting that is safe for all.
+LOT_SETTING = "the lot setting"
 #: What to do about a file of a lot that is not as it was written.
 AGAIN = "run the batch again, which takes up what is done"
 #: No number of a lot is larger: volts, MPa, percent, shares.
@@ -143,6 +145,20 @@ class LotSettingSummary:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LotFirmware:
+    """The one firmware of a lot whose valves have calibration blocks."""
+
+    folder: Annotated[str, Meta(description="Its folder, beside this file.", pattern=r"^\w+/\w+$", max_length=100)]
+    target: Annotated[str, Meta(description="Its microcontroller.", max_length=100)]
+    manifest_sha256: Annotated[Sha256, Meta(description="SHA-256 of the manifest.json in it.")]
+    block_of: Annotated[
+        str,
+        Meta(description="Whose block it has until another is loaded: the lot setting, or the valve of this name."),
+    ]
+    blocks: Annotated[Names, Meta(description="Files of a valve's folder that hold its own block.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LotSummary(Artefact):
     """What a lot of valves came to, as `dzdesign batch` writes it."""
 
@@ -171,6 +187,10 @@ class LotSummary(Artefact):
     why_no_lot_setting: Annotated[str | None, Meta(description="Why there is none; null if there is one.")]
     budget: Annotated[
         LotBudget | None, Meta(description="Uncertainty budgets of the calibrated valves; null without such a valve.")
+    ] = None
+    firmware: Annotated[
+        LotFirmware | None,
+        Meta(description="The one firmware, of valves with calibration blocks; null where each has a firmware."),
     ] = None
     recorded_units: Annotated[
         RecordedUnits, Meta(description="Units of the valves' recordings; the numbers here are in V and MPa.")

@@ -22,6 +22,7 @@ HASHED = {
     "valve_json_sha256": "valve.json",
     "compensator_json_sha256": "compensator.json",
     "firmware_manifest_sha256": "firmware/manifest.json",
+    "calibration_bin_sha256": "calibration.bin",
 }
 #: Columns of words before those of the sides, and after them.
 FIRST, LAST = ("name", "status", "reason"), ("warnings", "inputs_sha256", *HASHED)

@@ -6,7 +6,7 @@ threshold that bends by at most M may sag below their chord. Nothing is taken of
 
 from dataclasses import replace
 from fractions import Fraction
-from math import floor
+from math import ceil, floor
 
 import numpy as np
 
@@ -29,23 +29,27 @@ def check_above(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> Abo
     continued = _continued(compensator, exact)
     ends = {last, certificate.holds_to_MPa} | {Fraction(repr(dp)) for dp in (continued.dp_MPa if continued else ())}
     drops = pressure_drops(exact, found, ends)
-    middle = found.values * exact.a.per_code_MPa
-    above = drops.made & (middle > last)
+    # A code's middle is a whole number of steps: what it is compared with is brought to codes, exactly.
+    codes, step_MPa = found.values, exact.a.per_code_MPa
+    above = drops.made & (codes > floor(last / step_MPa))
     curve = compensator.valve.sides[exact.side].certified[certificate.guard]
     most = floor(Fraction(repr(curve.offset_V[-1])) / unit_V)
     margin, exceeded = None, 0
     if continued is not None and certificate.holds_to_MPa > last:
         bound = SaggingBound(_as_tests(continued))
-        held = above & (middle <= certificate.holds_to_MPa) & (at_zero > 0)
+        held = above & (codes <= floor(certificate.holds_to_MPa / step_MPa)) & (at_zero > 0)
         known = margin_of_sagging(
             bound, replace(drops, made=held), at_zero + counted_dither(compensator), unit_V
         )
         margin, exceeded = (None, 0) if known is None else (float(known.margin_V), known.exceeded)
         # What lies behind the last node is under no bound, so only no drive at all holds there.
-        exceeded += int(np.sum(held & (middle > Fraction(repr(continued.dp_MPa[-1])))))
+        exceeded += int(np.sum(held & (codes > floor(Fraction(repr(continued.dp_MPa[-1])) / step_MPa))))
     side = compensator.side(exact.sign)
     let_go = floor(side.u_min0_over_u_max * exact.compare_max / compensator.beta_denominator + Fraction(1, 2))
     released = certificate.released_from_MPa
+    not_released = 0
+    if released is not None:
+        not_released = int(np.sum(above & (codes >= ceil(released / step_MPa)) & (at_zero > let_go)))
     return AboveCheck(
         choice=compensator.above,
         certified_to_MPa=float(certificate.holds_to_MPa) if certificate.holds_to_MPa > last else None,
@@ -54,7 +58,7 @@ def check_above(exact: ExactLaw, found: Differences, at_zero: np.ndarray) -> Abo
         over_compensated=exceeded,
         smallest_margin_V=margin,
         rising=int(np.sum(above & (at_zero > most))),
-        not_released=0 if released is None else int(np.sum(above & (middle >= released) & (at_zero > let_go))),
+        not_released=not_released,
     )
 
 

@@ -50,10 +50,10 @@ COUNTED = [field.name for field in fields(Findings)][:15]
 class CompiledCore:
     """One side of the core."""
 
-    def __init__(self, folder: Path, sign: int = 1) -> None:
+    def __init__(self, folder: Path, sign: int = 1, block: bytes | None = None) -> None:
         self.name, self._ending = SOURCES[sign]
-        #: Octets of the calibration block; None of a core with the numbers of its valve in it.
-        self.block = block_of(folder)
+        #: Octets of the calibration block, by default the folder's own; None of a core with its valve's numbers in it.
+        self.block = block_of(folder) if block is None else block
         headers = ["dz_comp.h"]
         if self.block is not None:
             self.name = BLOCK_SOURCE

@@ -1,0 +1,118 @@
+"""`verify --blocks`: a firmware in block form with the calibration blocks of other valves, each on every input.
+
+Stands here and not in verify, which shares no code with what it checks: that a block is the one that follows from its
+compensator.json is asked of the generator itself.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dzdesign.core.artefact_files import read_bytes, sha256_of
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import SourceFile
+from dzdesign.core.errors import InputError, RequirementError
+
+if TYPE_CHECKING:
+    from dzdesign.codegen.calibration.layout import CalibrationBlock
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.verify.exhaustive.block_check import BlockFirmware
+    from dzdesign.verify.requirements import Check
+
+#: Entries of a block that do not follow from a compensator.
+OF_NO_COMPENSATOR = ("serial", "record", "crc32")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GivenBlock:
+    """A calibration block, read, and the compensator that it names."""
+
+    path: Path
+    octets: bytes
+    compensator_json: Path
+
+
+def given_blocks(folder: Path, files: Iterable[Path]) -> list[GivenBlock]:
+    """Read the blocks that a firmware is to be tried with, each once.
+
+    A firmware with the numbers of its valve in it, a file that is no block, and one without its compensator beside it
+    are an `InputError`.
+    """
+    from dzdesign.verify.firmware.folder import read_firmware_manifest
+
+    wanted = list(dict.fromkeys(files))
+    if wanted and read_firmware_manifest(folder).calibration != "block":
+        raise InputError(
+            f"--blocks is for a firmware in block form, and '{folder}' has its valve's numbers in the C; make one with "
+            "`dzdesign codegen --calibration block`, or leave --blocks out"
+        )
+    beside: dict[Path, Mapping[str, Path]] = {}
+    return [_given_block(path, beside) for path in wanted]
+
+
+def blocks_checked(folder: Path, given: Iterable[GivenBlock]) -> "list[Check]":
+    """Try each block with the firmware in `folder` on every input, and return a requirement for each."""
+    from dzdesign.verify.exhaustive.block_check import BlockFirmware
+
+    firmware = BlockFirmware(folder)
+    return [_checked(firmware, each) for each in given]
+
+
+def _checked(firmware: "BlockFirmware", given: GivenBlock) -> "Check":
+    from dzdesign.codegen.calibration.packing import unpack
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows
+    from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
+    from dzdesign.verify.requirements import CALIBRATION_BLOCK
+
+    path, octets, content = given.path, given.octets, read_bytes(given.compensator_json, "compensator file")
+    compensator, digest = read_artefact(content, Compensator, str(given.compensator_json)), sha256_of(content)
+    name, source = f"{CALIBRATION_BLOCK.title}: {path}", SourceFile(source=given.compensator_json.name, sha256=digest)
+    try:
+        found = firmware.check(octets, compensator, source)
+    except RequirementError as error:
+        return CALIBRATION_BLOCK.check(holds=False, name=name, text=str(error))
+    check = found.requirement(str(path), compensator)
+    faults = [] if check.holds else [check.text]
+    follows = (certificate_follows(compensator), bounds_follow(compensator), law_follows(compensator))
+    faults += [f"{each.name}: {each.text}" for each in follows if not each.holds]
+    if fault := other_numbers(unpack(octets, f"'{path}'"), compensator, digest):
+        faults.append(fault)
+    return CALIBRATION_BLOCK.check(holds=not faults, name=check.name, text="; ".join(faults) or check.text)
+
+
+def other_numbers(block: "CalibrationBlock", compensator: "Compensator", digest: str) -> str:
+    """Say which numbers of a block are not those that follow from its compensator; an empty text of none."""
+    from dzdesign.codegen.calibration.block import block_of
+
+    numbers = [name for name in block.__dataclass_fields__ if name not in OF_NO_COMPENSATOR]
+    follows = block_of(compensator, digest)
+    differ = [name for name in numbers if getattr(block, name) != getattr(follows, name)]
+    if not differ:
+        return ""
+    return f"it names this compensator, but numbers differ from those that follow from it: {', '.join(differ)}"
+
+
+def _given_block(path: Path, beside: dict[Path, Mapping[str, Path]]) -> GivenBlock:
+    """Return a block, and the compensator beside it whose hash it names; `beside` keeps the hashes of a folder."""
+    from dzdesign.codegen.calibration.block_files import octets_in_file
+    from dzdesign.codegen.calibration.packing import octets_of, unpack
+
+    octets = octets_in_file(path)
+    digest = octets_of(unpack(octets, f"'{path}'").compensator_sha256).hex()
+    folder = path.absolute().parent
+    if folder not in beside:
+        beside[folder] = _hashes_in(folder)
+    found = beside[folder].get(digest)
+    if found is None:
+        raise InputError(
+            f"'{path}' names a compensator.json with the SHA-256 {digest}, and none of the .json files beside it is "
+            "that; put its compensator.json into the same folder"
+        )
+    return GivenBlock(path=path, octets=octets, compensator_json=found)
+
+
+def _hashes_in(folder: Path) -> Mapping[str, Path]:
+    paths = sorted(path for path in folder.glob("*.json") if path.is_file())
+    return {sha256_of(read_bytes(path, "file beside a block")): path for path in paths}

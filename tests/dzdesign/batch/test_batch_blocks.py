@@ -1,0 +1,125 @@
+"""`batch --calibration block`: one firmware and a block a valve; a valve that needs another firmware fails alone."""
+
+import csv
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from many_valves import write_lot
+
+from dzdesign.block_checks import blocks_checked, given_blocks
+from dzdesign.codegen.calibration.block_files import octets_in_file
+from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.packing import pack, text_of, unpack
+from dzdesign.codegen.project import block_core, generate
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import SourceFile
+from dzdesign.design.compensator import Compensator
+from dzdesign.report.lot.summary import LOT_SETTING
+from dzdesign.verify.exhaustive.block_check import BlockFirmware
+from dzdesign.verify.toolchain import host_compiler
+from tests.dzdesign.batch.test_batch import tree
+from tests.support.synthetic import needs_compiler
+
+pytestmark = [pytest.mark.slow, needs_compiler]
+
+SEED = 7
+#: The last one needs another firmware: of a converter and rates of its own.
+TARGETS = {"V0000": "host", "V0001": "host", "V0002": "cortex-m4"}
+
+
+def batch(folder, output):
+    options = ["--meter-lag", "0.1 s", "--jobs", "1", "--calibration", "block"]
+    return main(["batch", str(folder / "lot.csv"), "-o", str(output), *options])
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The lot's list, what the batch made of it, and the compiler's commands."""
+    folder = tmp_path_factory.mktemp("lot")
+    write_lot(folder, len(TARGETS), 0, SEED)
+    rows = [f"{name},{name}/*.csv,{target},{name}-S" for name, target in TARGETS.items()]
+    (folder / "lot.csv").write_text("\n".join(["name,files,target,record.serial", *rows]), encoding="utf-8")
+    commands, run = [], host_compiler.run_compiler
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(host_compiler, "run_compiler", lambda *given: commands.append(given[0]) or run(*given))
+        assert batch(folder, folder / "out") == 1
+    return folder, folder / "out", commands
+
+
+def valve(output, name):
+    return output / "valves" / name
+
+
+def compensator_of(folder):
+    return read_artefact((folder / "compensator.json").read_bytes(), Compensator, str(folder))
+
+
+def test_one_firmware_and_a_block_a_valve(made):
+    _, output, commands = made
+    projects = [path.parent for path in output.rglob("manifest.json") if (path.parent / "core").is_dir()]
+    assert projects == [output / "lot" / "firmware"]
+    core = block_core(built_for(compensator_of(valve(output, "V0000"))))
+    assert len(core) == 6
+    assert all((projects[0] / name).read_text(encoding="utf-8") == text for name, text in core.items())
+    for name in ("V0000", "V0001"):
+        folder, octets = valve(output, name), octets_in_file(valve(output, name) / "calibration.bin")
+        block = unpack(octets)
+        assert octets == octets_in_file(folder / "calibration.hex") and text_of(block.serial) == f"{name}-S"
+        content = (folder / "compensator.json").read_bytes()
+        alone = generate(compensator_of(folder), "host", content, "block")
+        assert replace(unpack(alone.block), serial=block.serial, crc32=block.crc32) == block
+        found = json.loads((folder / "calibration_check.json").read_bytes())
+        assert found["holds"] and found["made_from"][0]["sha256"] == sha256_of(content)
+        assert found["block_sha256"] == sha256_of(octets)
+    stated = json.loads((output / "batch.json").read_bytes())["firmware"]
+    assert stated["block_of"] == LOT_SETTING and stated["folder"] == "lot/firmware"
+    assert stated["manifest_sha256"] == sha256_of((projects[0] / "manifest.json").read_bytes())
+    # Two different cores, as one valve needs another firmware: each compiled once for checking, whatever the valves.
+    cores = [command for command in commands if "-c" in command and "dz_comp.c" in command]
+    assert len(cores) <= 2
+
+
+def test_a_valve_that_needs_another_firmware_fails_alone_with_the_reason(made):
+    _, output, _ = made
+    with open(output / "valves.csv", encoding="utf-8", newline="") as table:
+        rows = {row["name"]: row for row in csv.DictReader(table)}
+    assert [rows[name]["status"] for name in TARGETS] == ["ok", "ok", "failed"]
+    reason = rows["V0002"]["reason"]
+    assert "another firmware" in reason and "target cortex-m4 instead of host" in reason
+    assert not list(valve(output, "V0002").glob("calibration.*"))
+    octets = (valve(output, "V0001") / "calibration.bin").read_bytes()
+    assert rows["V0001"]["calibration_bin_sha256"] == sha256_of(octets)
+
+
+def test_what_is_done_is_taken_up(made, capsys):
+    folder, output, _ = made
+    before = tree(output)
+    assert batch(folder, output) == 1
+    assert "2 of them done before" in capsys.readouterr().err
+    assert tree(output) == before
+
+
+def test_verify_tries_each_block_with_the_lots_firmware(made):
+    _, output, _ = made
+    firmware = output / "lot" / "firmware"
+    (check,) = blocks_checked(firmware, given_blocks(firmware, [valve(output, "V0001") / "calibration.bin"] * 2))
+    assert check.holds, check.text
+
+
+def test_a_number_that_no_input_shows_is_seen(made, tmp_path):
+    """The drive's debouncing is no part of dz_comp(): the block is accepted, and every input is right."""
+    _, output, _ = made
+    firmware, folder = output / "lot" / "firmware", valve(output, "V0001")
+    octets = (folder / "calibration.bin").read_bytes()
+    edited = pack(replace(unpack(octets), fault_samples=unpack(octets).fault_samples + 1))
+    source = SourceFile(source="compensator.json", sha256="0" * 64)
+    assert BlockFirmware(firmware).check(edited, compensator_of(folder), source).holds
+    (tmp_path / "valve.bin").write_bytes(edited)
+    shutil.copy(folder / "compensator.json", Path(tmp_path) / "any_name.json")
+    (check,) = blocks_checked(firmware, given_blocks(firmware, [tmp_path / "valve.bin"]))
+    assert check.holds is False and "fault_samples" in check.text
