@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dzdesign.block_drives import drives_checked
 from dzdesign.block_identity import beside_another, of_another_valve, repeated
 from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
@@ -62,8 +63,14 @@ def blocks_checked(folder: Path, given: Iterable[GivenBlock]) -> "list[Check]":
     firmware, target, blocks = BlockFirmware(folder), read_firmware_manifest(folder).target, list(given)
     checks = [_checked(firmware, target, each) for each in blocks]
     read = [(each.path, unpack(each.octets, f"'{each.path}'")) for each in blocks]
+    right = [
+        (path, block, _compensator(each)[0])
+        for check, each, (path, block) in zip(checks, blocks, read, strict=True)
+        if check.holds
+    ]
     return [
         *checks,
+        *drives_checked(folder, right),
         *(CALIBRATION_BLOCK.check(holds=False, name=f"{CALIBRATION_BLOCK.title}: {name}", text=fault)
           for name, fault in repeated(read)),
     ]  # fmt: skip
@@ -71,13 +78,11 @@ def blocks_checked(folder: Path, given: Iterable[GivenBlock]) -> "list[Check]":
 
 def _checked(firmware: "BlockFirmware", target: str, given: GivenBlock) -> "Check":
     from dzdesign.codegen.calibration.packing import text_of, unpack
-    from dzdesign.design.compensator import Compensator
     from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows
     from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
     from dzdesign.verify.requirements import CALIBRATION_BLOCK
 
-    path, octets, content = given.path, given.octets, read_bytes(given.compensator_json, "compensator file")
-    compensator, digest = read_artefact(content, Compensator, str(given.compensator_json)), sha256_of(content)
+    path, octets, (compensator, digest) = given.path, given.octets, _compensator(given)
     name, source = f"{CALIBRATION_BLOCK.title}: {path}", SourceFile(source=given.compensator_json.name, sha256=digest)
     try:
         found = firmware.check(octets, compensator, source)
@@ -97,6 +102,14 @@ def _checked(firmware: "BlockFirmware", target: str, given: GivenBlock) -> "Chec
     ))  # fmt: skip
     whose = f"serial number {quoted(serial) if serial else 'none'}, CRC-32 {block.crc32:08x}: "
     return CALIBRATION_BLOCK.check(holds=not faults, name=check.name, text=whose + ("; ".join(faults) or check.text))
+
+
+def _compensator(given: GivenBlock) -> "tuple[Compensator, str]":
+    """Return the compensator beside a block, and the SHA-256 of its file."""
+    from dzdesign.design.compensator import Compensator
+
+    content = read_bytes(given.compensator_json, "compensator file")
+    return read_artefact(content, Compensator, str(given.compensator_json)), sha256_of(content)
 
 
 def _other_target(target: str, compensator: "Compensator") -> str:

@@ -250,7 +250,7 @@ def test_a_drive_without_a_valid_block_is_no_other_firmware(firmware_folder):
         ticks=TICKS, origin=0, u_adc=0, p_a_adc=ZERO, p_b_adc=ZERO, beta=0, compare_a=0, compare_b=0,
         status=STATUS_CALIBRATION,
     )  # fmt: skip
-    with pytest.raises(InputError, match="no valid calibration block.*dzdesign load"):
+    with pytest.raises(InputError, match=r"no valid calibration block.*dzdesign load"):
         _other_firmware(frame, recording)
     recording.add(frame)
     assert "no valid calibration block" in _other_firmware(frame, recording), "of a recording that broke off"
