@@ -244,9 +244,9 @@ def _target_of(compensator: "Compensator", given: str | None) -> str:
 
 
 def _place(target: str, address: str | None, octets: int) -> "Place":
-    from dzdesign.codegen.calibration.places import place_of
+    from dzdesign.codegen.project import target_named
 
-    place = place_of(target)
+    place = target_named(target).block_place
     if address is None:
         return place
     try:

@@ -37,7 +37,8 @@ BIT = {name: 1 << place for place, name in enumerate(FINDINGS)}
 EVENTS = "{zero}" + "." * 170 + "n" + "." * 90 + "p" + "." * 170 + "{zero}" + "." * 20 + "n" + "." * 30 + "T...t...."
 #: What else may come: samples that fail, a trip pin at the start, codes above 12 bits, faults of the coil.
 OTHER_EVENTS = (
-    "p{zero}" + "." * 190 + "n" + "." * 9 + "xxxxxxxxxxxx....", "T......t" + "{zero}" + "." * 9 + "n" + "." * 20, "h" * 12,
+    "p{zero}" + "." * 190 + "n" + "." * 9 + "xxxxxxxxxxxx....",
+    "T......t" + "{zero}" + "." * 9 + "n" + "." * 20, "h" * 12,
     *("p{zero}" + "." * 190 + "n" + "." * 40 + event + "." * 210 for event in "osvqeKT"),
 )  # fmt: skip
 #: What a person may try to get the output back: samples, trip pin, no samples, other commands.
