@@ -45,6 +45,7 @@ def run(arguments: Arguments, json: bool) -> int:
     if arguments.compensator is None or arguments.output is None:
         raise InputError("calibration needs a COMPENSATOR.json and -o FILE, or --read FILE; see --help")
     from dzdesign.codegen.calibration.place_text import elsewhere
+    from dzdesign.codegen.project import target_named
 
     made = calibration(arguments)
     document = _document(made, os.fspath(arguments.output))
@@ -53,8 +54,10 @@ def run(arguments: Arguments, json: bool) -> int:
         return 0
     at = f", at {document['address']} of {made.target}" if made.address is not None else ""
     print(one_line(f"Written: {document['file']}, {document['octets']} octets{at}"))
-    if made.address is not None and (wrong := elsewhere(made.target, made.address)):
-        print(wrong)
+    target = target_named(made.target)
+    if made.address is not None and target.sector:
+        if wrong := elsewhere(made.target, made.address, target.block_place):
+            print(wrong)
     print(one_line(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}"))
     print(f"CRC-32 {document['crc32']}; SHA-256 of its compensator.json {document['compensator_sha256']}")
     return 0

@@ -139,12 +139,14 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
     from dzdesign.codegen.calibration.packing import unpack
     from dzdesign.codegen.calibration.place_text import place_in_words
     from dzdesign.codegen.calibration.reading import reading_of
+    from dzdesign.codegen.project import targets
     from dzdesign.core.recorded_units import AS_COMPUTED
 
     path = Path(arguments.file)
     form = _known_format(arguments.format, READABLE) or path.suffix.lower().removeprefix(".")
     octets, place = placed_in_file(path, arguments.format)
-    block, placed = unpack(octets, f"'{path}'"), place_in_words(place, form) if place else ""
+    sectors = {target.name: target.block_place for target in targets() if target.sector}
+    block, placed = unpack(octets, f"'{path}'"), place_in_words(place, form, sectors) if place else ""
     reading = reading_of(block, f"'{path}'")
     if arguments.compensator is None:
         return ReadCalibration(
@@ -251,9 +253,9 @@ def _target_of(compensator: "Compensator", given: str | None) -> str:
 
 
 def _place(target: str, address: str | None, octets: int) -> "Place":
-    from dzdesign.codegen.calibration.places import place_of
+    from dzdesign.codegen.project import target_named
 
-    place = place_of(target)
+    place = target_named(target).block_place
     if address is None:
         return place
     try:

@@ -12,7 +12,7 @@ from dzdesign.codegen.calibration.a2l import a2l_text
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.layout import members
 from dzdesign.codegen.calibration.packing import OCTETS, pack
-from dzdesign.codegen.calibration.places import place_of
+from dzdesign.codegen.project import target_named
 from tests.support.core_variants import variant
 
 #: Of the extra `test`, where it has a wheel.
@@ -30,7 +30,7 @@ def check(text: str, folder: Path) -> tuple[int, str]:
 
 @pytest.mark.skipif(CHECKER is None, reason="a2ltool has no wheel for this system")
 def test_a_strict_parser_finds_nothing_wrong(tmp_path):
-    text = a2l_text(place_of("f28335"))
+    text = a2l_text(target_named("f28335").block_place)
     status, said = check(text, tmp_path)
     assert status == 0 and "No problems found" in said
     faults = {"U32 0 ": "U33 0 ", "VAL_BLK": "VALBLK", "/end MODULE\n": "", " unit_3 0": " unit_99 0"}
@@ -42,7 +42,7 @@ def test_a_strict_parser_finds_nothing_wrong(tmp_path):
 
 @pytest.mark.parametrize("target", ["f28335", "host"])
 def test_every_number_of_the_block_is_at_its_address(target):
-    place = place_of(target)
+    place = target_named(target).block_place
     block = block_of(variant("bipolar, all options", "wide"), "ab" * 32, serial="V-7 №3", record="lot 12")
     octets, begin = pack(block), place.address * place.unit_octets
     found = re.findall(

@@ -13,8 +13,7 @@ from dzdesign import api
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.block_images import image_of
 from dzdesign.codegen.calibration.packing import pack
-from dzdesign.codegen.calibration.places import place_of
-from dzdesign.codegen.project import generate
+from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
@@ -146,7 +145,7 @@ def test_another_compensator_and_a_changed_number_are_found(written, tmp_path, b
 def test_a_damaged_block_is_one_sentence(block, tmp_path, form, damage, named, capsys):
     file = tmp_path / f"valve.{form}"
     octets = damage(block)
-    file.write_bytes(image_of(octets, form, place_of("f28335")))
+    file.write_bytes(image_of(octets, form, target_named("f28335").block_place))
     assert main(["calibration", "--read", str(file)]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1
