@@ -130,7 +130,7 @@ def _finished(
             for valve in valves
             if valve.name not in unwritten
         },
-        anomalies=[*anomalies_of(found, output, valves), *odd_blocks(designed, firmware, output)],
+        anomalies=[*anomalies_of(found, output, valves), *odd_blocks(len(designed), firmware, output)],
         budget=lot_budget(designed),
         firmware=firmware,
         units=units_of_lot(designed),

@@ -24,7 +24,7 @@ EXAMPLES = (
     "dzdesign calibration --read valve.hex firmware      # does it belong to this firmware's compensator?",
 )
 #: Options that a block is written with.
-OF_WRITING = ("output", "address", "serial", "record")
+OF_WRITING = ("output", "target", "address", "serial", "record")
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class Arguments:
     _: KW_ONLY
     port: Annotated[str, Option("PORT")]
     """Serial port, such as COM5 or /dev/ttyUSB0."""
-    baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=(0.0, 1e9)))] = None
+    baud: Annotated[Text, Option("N", read=number("a number such as 115200, up to 1e9", between=(0.0, 1e9)))] = None
     """Bits per second (default: those of f28335's firmware)."""
 
 

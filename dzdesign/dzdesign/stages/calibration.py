@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
 #: Formats that hold a block.
 READABLE = ("hex", "bin", "txt")
+#: Texts of a block, and the entries of the test record that they are taken from.
+TEXTS = ("serial", "record")
 COMPENSATOR_NAME = "compensator.json"
 
 
@@ -107,6 +109,9 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
         _check_output(output, form)
     if arguments.address is not None and form not in WITH_ADDRESS:
         raise InputError(f"--address is given, but a file of format {form} states none; leave it out")
+    for name in TEXTS:
+        if getattr(arguments, name) is not None and form not in READABLE:
+            raise InputError(f"--{name} is given, but an A2L has the layout of a block alone; leave it out")
     compensator, digest, source = _given(arguments.compensator)
     target = _target_of(compensator, arguments.target)
     place = _place(target, arguments.address, OCTETS)
@@ -179,9 +184,10 @@ def _format_of(output: Path | None, given: str | None) -> str:
         if output is None:
             return "bin"
         if ending not in KNOWN:
+            what = f"ends with '{output.suffix}'{nearest(ending, KNOWN)}" if ending else "has no ending"
             raise InputError(
-                f"'{output}' ends with '{output.suffix}'{nearest(ending, KNOWN)}, expected "
-                f"{', '.join(f'.{name}' for name in KNOWN)}; choose another -o, or say --format"
+                f"'{output}' {what}, expected {', '.join(f'.{name}' for name in KNOWN)}; choose another -o, or say "
+                "--format"
             )
         return ending
     if ending in KNOWN and ending != given:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from many_valves import write_lot
 
+from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.block_checks import blocks_checked, given_blocks
 from dzdesign.codegen.calibration.block_files import octets_in_file
 from dzdesign.codegen.calibration.built_for import built_for
@@ -20,6 +21,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
+from dzdesign.report.lot.valve_folder import read_valve_folder
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
 from tests.dzdesign.batch.test_batch import tree
@@ -49,6 +51,13 @@ def made(tmp_path_factory):
         patch.setattr(host_compiler, "run_compiler", lambda *given: commands.append(given[0]) or run(*given))
         assert batch(folder, folder / "out") == 1
     return folder, folder / "out", commands
+
+
+def test_two_valves_of_one_serial_number_are_named(made):
+    first, second, failed = (read_valve_folder(valve(made[1], name)) for name in TARGETS)
+    assert anomalies_of([first, second, failed], made[1], []) == []
+    (line,) = anomalies_of([first, replace(second, compensator=first.compensator), failed], made[1], [])
+    assert "V0000, V0001" in line and "'V0000-S'" in line
 
 
 def valve(output, name):

@@ -135,7 +135,7 @@ def test_another_compensator_and_a_changed_number_are_found(written, tmp_path, b
     [
         (lambda octets: b"", "DZC1"),
         (lambda octets: octets[:-2], "cut"),
-        (lambda octets: octets + octets, "something follows it"),
+        (lambda octets: octets + octets, "something follows the block"),
         (lambda octets: octets[:4] + b"\2\0" + octets[6:], "layout 2"),
         (lambda octets: octets[:700] + bytes([octets[700] ^ 4]) + octets[701:], "CRC-32"),
         (lambda octets: b'{"schema": "dzdesign.valve/1"}', "DZC1"),
@@ -149,7 +149,15 @@ def test_a_damaged_block_is_one_sentence(block, tmp_path, form, damage, named, c
     assert main(["calibration", "--read", str(file)]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1
-    assert named in said.err or (not octets and "0 runs" in said.err)
+    assert named in said.err or (not octets and "none of its rows" in said.err)
+
+
+@pytest.mark.parametrize("rows", [lambda rows: rows[:4] + rows[5:], lambda rows: rows[:4] + rows[3:]])
+def test_a_row_of_intel_hex_that_is_lost_or_twice_is_said(block, tmp_path, rows, capsys):
+    found = image_of(block, "hex", target_named("f28335").block_place).decode().splitlines()
+    (tmp_path / "valve.hex").write_text("\n".join(rows(found)))
+    assert main(["calibration", "--read", str(tmp_path / "valve.hex")]) == 2
+    assert "do not follow each other" in capsys.readouterr().err
 
 
 def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, block, tmp_path, capsys):
@@ -182,6 +190,11 @@ def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, bloc
         ["valve.hex", "-o", "new.hex"],
         ["--read", "valve.hex", "-o", "new.hex"],
         ["--read", "valve.hex", "--serial", "8"],
+        ["--read", "valve.hex", "--target", "f28335"],
+        ["--read", "."],
+        ["--read", "layout.a2l"],
+        ["compensator.json", "-o", "new.a2l", "--serial", "8"],
+        ["compensator.json", "-o", "new.hex", "--serial", "  "],
         ["--read", "valve.hex", "--format", "txt"],
         ["--read", "valve.hex", "--format", "a2l"],
         ["--read", "nothing.hex"],

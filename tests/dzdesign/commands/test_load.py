@@ -162,8 +162,11 @@ def test_bad_input_is_one_sentence_and_status_2(drive, tmp_path, capsys, monkeyp
         ((cut, "--port", drive.port), "it is cut"),
         ((damaged, "--port", drive.port), "CRC-32"),
         ((tmp_path / "no.bin", "--port", drive.port), "does not exist"),
-        ((block_file(tmp_path, name="valve.s19"), "--port", drive.port), "expected one of .bin, .hex, .txt"),
-        ((block_file(tmp_path), "--port", "/dev/no-such-port"), "can't be opened"),
+        ((block_file(tmp_path, name="valve.s19"), "--port", drive.port), "ends with '.s19'"),
+        ((tmp_path, "--port", drive.port), "is a folder"),
+        ((block_file(tmp_path), "--port", "/dev/no-such-port"), "there is none of this name"),
+        ((block_file(tmp_path), "--port", tmp_path), "it is a folder"),
+        ((block_file(tmp_path), "--port", tmp_path / "cut.bin"), "it is no serial port"),
         ((block_file(tmp_path), "--port", drive.port, "--baud", "fast"), "--baud is 'fast'"),
         ((block_file(tmp_path), "--port", drive.port), "GPIO28"),  # nobody is there
     ):

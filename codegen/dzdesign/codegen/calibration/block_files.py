@@ -34,12 +34,22 @@ def placed_in_file(path: Path, form: str | None = None) -> tuple[bytes, Place | 
     """
     read = READERS[f".{form}"] if form else READERS.get(path.suffix.lower())
     if read is None:
-        known = ", ".join(READERS)
-        raise InputError(f"'{path}' ends with '{path.suffix}'{nearest(path.suffix, READERS)}; expected one of {known}")
+        raise InputError(_no_format(path))
     content = read_bytes(path, "calibration file")
     if len(content) > MOST_OCTETS:
         raise InputError(f"'{path}' has {len(content)} octets, expected a calibration block of a few KiB; {_REMEDY}")
     return read(content, f"'{path}'")
+
+
+def _no_format(path: Path) -> str:
+    """Say what is wrong with a file whose ending tells no format."""
+    known = ", ".join(READERS)
+    if path.is_dir():
+        return f"'{path}' is a folder, expected a calibration file, {known}; name the file in it"
+    if path.suffix.lower() == ".a2l":
+        return f"'{path}' is an A2L, which has the layout of a block and not its octets; expected one of {known}"
+    ending = f"ends with '{path.suffix}'{nearest(path.suffix, READERS)}" if path.suffix else "has no ending"
+    return f"'{path}' {ending}, expected a calibration file, {known}; rename it, or with --read say --format"
 
 
 def _raw(content: bytes, name: str) -> Placed:
@@ -120,7 +130,8 @@ def _ti_txt(content: bytes, name: str) -> Placed:
 def _one_run(runs: Iterable[tuple[int, bytes]], name: str) -> Placed:
     found = [(octets, Place(address=begin)) for begin, octets in runs if octets]
     if len(found) != 1:
-        raise InputError(f"{name}: {len(found)} runs of octets, expected one, the block; {_REMEDY}")
+        fault = "parts that do not follow each other" if found else "octets in none of its rows"
+        raise InputError(f"{name}: {fault}, expected the block alone, without a gap or a row twice; {_REMEDY}")
     return found[0]
 
 
