@@ -55,9 +55,9 @@ def run(arguments: Arguments, json: bool) -> int:
     at = f", at {document['address']} of {made.target}" if made.address is not None else ""
     print(one_line(f"Written: {document['file']}, {document['octets']} octets{at}"))
     target = target_named(made.target)
-    if made.address is not None and target.sector:
-        if wrong := elsewhere(made.target, made.address, target.block_place):
-            print(wrong)
+    sector = target.block_place if target.sector else None
+    if made.address is not None and sector and (wrong := elsewhere(made.target, made.address, sector)):
+        print(wrong)
     print(one_line(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}"))
     print(f"CRC-32 {document['crc32']}; SHA-256 of its compensator.json {document['compensator_sha256']}")
     return 0
