@@ -142,6 +142,18 @@ def test_a_drive_whose_supply_goes_keeps_a_whole_block(drive, tmp_path, capsys, 
     assert load(capsys, block_file(tmp_path), "--port", drive.port)[1]["crc32"] == crc_of(NEW)
 
 
+def test_a_block_of_another_serial_number_than_the_valves_is_not_loaded(drive, tmp_path, capsys):
+    drive.start()
+    file, port = block_file(tmp_path), ("--port", drive.port)
+    status, _, said = load(capsys, file, *port, "--serial", "SN-0")
+    assert status == 2 and "'SN-1'" in said and "'SN-0'" in said
+    status, held, said = load(capsys, *port, "--serial", "SN-1")
+    assert status == 1 and held["serial"] == "SN-0" and "'SN-0'" in said, "the drive holds what it held"
+    status, held, _ = load(capsys, file, *port, "--serial", "SN-1")
+    assert (status, held["serial"], held["serial_before"]) == (0, "SN-1", "SN-0")
+    assert load(capsys, *port, "--serial", "SN-1")[0] == 0
+
+
 @pytest.mark.parametrize(("words", "said"), [(("driving", 1), "still drives"), (("command", 1), "not zero")])
 def test_a_drive_that_is_not_at_rest_refuses(drive, tmp_path, capsys, words, said):
     drive.start(*words)
