@@ -225,7 +225,8 @@ def _print(block: _Block | None, drive: "Drive", session: "LoadSession") -> None
 
     state = drive.state
     if block is not None:
-        print(one_line(f"Loaded and read back: {block.source}; {session.repeats} requests were sent twice"))
+        again = f"; {session.repeats} requests were sent again" if session.repeats else ""
+        print(one_line(f"Loaded and read back: {block.source}{again}"))
     print(f"Block in use: {_place(drive)}")
     if state.block != NO_BLOCK:
         print(f"Serial number: {one_line(drive.serial) or 'none'}")

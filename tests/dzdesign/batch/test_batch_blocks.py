@@ -10,6 +10,7 @@ import pytest
 from many_valves import write_lot
 
 from dzdesign.batch.anomalies import anomalies_of
+from dzdesign.batch.lot_firmware import firmware_left
 from dzdesign.block_checks import blocks_checked, given_blocks
 from dzdesign.codegen.calibration.block_files import octets_in_file
 from dzdesign.codegen.calibration.built_for import built_for
@@ -58,6 +59,13 @@ def test_two_valves_of_one_serial_number_are_named(made):
     assert anomalies_of([first, second, failed], made[1], []) == []
     (line,) = anomalies_of([first, replace(second, compensator=first.compensator), failed], made[1], [])
     assert "V0000, V0001" in line and "'V0000-S'" in line
+
+
+def test_a_lots_firmware_of_an_earlier_run_is_named(made, tmp_path):
+    summary = json.loads((made[1] / "batch.json").read_text("utf-8"))
+    assert summary["firmware"] and not any("lot/firmware" in line for line in summary["anomalies"])
+    (line,) = firmware_left(made[1], None)
+    assert "lot/firmware" in line and firmware_left(tmp_path, None) == []
 
 
 def valve(output, name):

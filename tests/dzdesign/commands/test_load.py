@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import subprocess
 import threading
 import tty
@@ -16,9 +17,11 @@ from dzdesign.codegen.calibration.packing import unpack
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
 from dzdesign.serial_port import PortLine, open_port
+from tests.support.documented_commands import agrees
 from tests.support.loading.bench import SLOTS, build_drive
 from tests.support.loading.device import Device, build_device, firmware_files
 from tests.support.loading.files import COMPILER, blocks, drive_files, refused_blocks
+from tests.support.paths import ROOT
 
 pytestmark = [
     pytest.mark.skipif(not COMPILER, reason="no C compiler (cc, gcc or clang) on the path"),
@@ -113,6 +116,18 @@ def test_a_block_is_loaded_and_read_back_and_outlives_a_restart(drive, tmp_path,
     assert main(["load", "--port", drive.port]) == 0
     out = capsys.readouterr().out
     assert "Serial number: SN-1" in out and crc_of(NEW) in out
+
+
+def test_the_page_shows_what_is_printed(drive, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    block_file(tmp_path, name="valve.hex")
+    drive.start()
+    page = (ROOT / "docs" / "howto" / "load-block.md").read_text("utf-8")
+    shown = re.findall(r"^    dzdesign (load [^\n]*)\n\n```text\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert len(shown) == 2
+    for words, output in shown:
+        assert main(words.replace("COM5", drive.port).split()) == 0
+        assert agrees(output, capsys.readouterr().out.strip("\n"))
 
 
 @pytest.mark.parametrize("words", [("octets", 900), ("words", len(OLD) + 100), ("words", MARK)])
