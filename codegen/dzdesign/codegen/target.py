@@ -22,7 +22,7 @@ RENDERER_NAMES = frozenset(
     | {"core_sources", "core_headers", "firmware_origin", "current", "current_faults"}
     | {"link_sources", "link_headers"}
     | {"block", "block_files", "block_sources", "block_headers", "block_lines", "command_zero", "offset_ticks"}
-    | {"sector", "region", "region_page", "region_file"}
+    | {"sector", "region", "region_page", "region_file", "block_address", "block_words"}
 )
 
 

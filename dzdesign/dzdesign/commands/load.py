@@ -20,6 +20,14 @@ if TYPE_CHECKING:
 
 #: The longest that a look at the line takes: shorter than an answer is waited for.
 LOOK_S = 0.02
+#: Numbers that a drive's firmware is compiled for, by their names in a block and in what the drive says of itself.
+COMPILED_FOR = {
+    "code_max": "the largest converter code",
+    "compare_max": "the largest compare value",
+    "sample_Hz": "samples a second of",
+    "tick_Hz": "PWM periods a second of",
+    "beta_step": "codes between two nodes of beta of",
+}
 EXAMPLES = (
     "dzdesign load valve.hex --port COM5",
     "dzdesign load valve.hex --port COM5 --serial 4711",
@@ -149,16 +157,22 @@ def _check_fit(block: _Block, drive: "Drive") -> None:
 
     ours, state = block.numbers, drive.state
     if (ours.layout, ours.length) != (state.layout, state.length):
-        raise RequirementError(
+        raise InputError(
             f"{block.source} has layout {ours.layout} in {ours.length} words, the drive's firmware takes layout "
             f"{state.layout} in {state.length}; firmware and dzdesign must be of one version"
         )
     if ours.shape != state.shape:
         differs = [text for place, text in enumerate(SHAPE_BITS.values()) if (ours.shape ^ state.shape) >> place & 1]
-        raise RequirementError(
+        raise InputError(
             f"{block.source} is for another kind of drive than the firmware was generated for: they differ in "
             f"'{', '.join(differs)}'; generate firmware and block from designs with the same wiring and outputs"
         )
+    for name, what in COMPILED_FOR.items():
+        if (block_has := getattr(ours, name)) != (drive_has := getattr(state, name)):
+            raise InputError(
+                f"{block.source} is for firmware with {what} {block_has}, the drive's has {drive_has}; design it again "
+                "for the drive's target with `dzdesign design --target`"
+            )
 
 
 def _verified(session: "LoadSession", block: _Block) -> "Drive":

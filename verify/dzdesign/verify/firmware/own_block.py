@@ -11,7 +11,7 @@ from dzdesign.design.firmware_manifest import BLOCK_FILE, FirmwareManifest
 from dzdesign.verify.firmware.manifest import BLOCK_SOURCE
 from dzdesign.verify.requirements import OWN_BLOCK, Check
 from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of
-from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, stored
+from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, discard, stored
 
 ACCEPTANCE, LINKED_HEADER, PROGRAM = "dz_calibration.c", "dz_block.h", "own_block.c"
 
@@ -74,7 +74,11 @@ def _numbers(folder: Path, manifest: FirmwareManifest, block: bytes) -> list[lis
         HOST.compile(name, {name: texts[name], **headers}, HOST.core_flags, f"the block's {name}")
         for name in (ACCEPTANCE, BLOCK_SOURCE, PROGRAM)
     ]
-    printed = HOST.run(HOST.link(objects, "the check of the block"), [str(stored(block))], "dz_calibration_check()")
+    program = HOST.link(objects, "the check of the block")
+    try:
+        printed = HOST.run(program, [str(stored(block))], "dz_calibration_check()")
+    finally:
+        discard(block)
     if [len(line) for line in printed] != [2, 3, 5, 32]:
         raise RequirementError(f"the check of the block printed {len(printed)} lines of numbers, expected 4")
     return printed
