@@ -10,7 +10,7 @@ import pytest
 from many_valves import write_lot
 
 from dzdesign.batch.anomalies import anomalies_of
-from dzdesign.batch.odd_blocks import odd_blocks
+from dzdesign.batch.lot_firmware import firmware_left
 from dzdesign.block_checks import blocks_checked, given_blocks
 from dzdesign.codegen.calibration.block_files import octets_in_file
 from dzdesign.codegen.calibration.built_for import built_for
@@ -64,8 +64,8 @@ def test_two_valves_of_one_serial_number_are_named(made):
 def test_a_lots_firmware_of_an_earlier_run_is_named(made, tmp_path):
     summary = json.loads((made[1] / "batch.json").read_text("utf-8"))
     assert summary["firmware"] and not any("lot/firmware" in line for line in summary["anomalies"])
-    (line,) = odd_blocks(1, None, made[1])
-    assert "lot/firmware" in line and odd_blocks(1, None, tmp_path) == []
+    (line,) = firmware_left(made[1], None)
+    assert "lot/firmware" in line and firmware_left(tmp_path, None) == []
 
 
 def valve(output, name):
@@ -124,8 +124,10 @@ def test_what_is_done_is_taken_up(made, capsys):
 def test_verify_tries_each_block_with_the_lots_firmware(made):
     _, output, _ = made
     firmware = output / "lot" / "firmware"
-    (check,) = blocks_checked(firmware, given_blocks(firmware, [valve(output, "V0001") / "calibration.bin"] * 2))
-    assert check.holds, check.text
+    blocks = given_blocks(firmware, [valve(output, "V0001") / "calibration.bin"] * 2)
+    inputs, drive = blocks_checked(firmware, blocks)
+    assert inputs.holds and drive.holds, (inputs.text, drive.text)
+    assert "'V0001-S'" in inputs.text and drive.name.startswith("the drive functions")
 
 
 def test_a_number_that_no_input_shows_is_seen(made, tmp_path):
