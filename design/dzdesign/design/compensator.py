@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of, to_json_bytes
+from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.result_display import ShownInNotebooks
@@ -23,6 +23,7 @@ from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
+from dzdesign.design.valve_hash import sha256_of_valve
 from dzdesign.design.zero_band import CommandError
 from dzdesign.identify.valve.model import ValveModel
 
@@ -129,7 +130,7 @@ class Compensator(ShownInNotebooks, Artefact):
         for sign in self.signals.signs:
             self._check_side(sign)
         lot_json = to_json({"lot": [as_document(valve) for valve in self.lot]}).encode()
-        object.__setattr__(self, "valve_sha256", sha256_of(to_json_bytes(self.valve)))
+        object.__setattr__(self, "valve_sha256", sha256_of_valve(self.valve))
         object.__setattr__(self, "lot_sha256", sha256_of(lot_json) if self.lot else None)
 
     def _check_codes(self) -> None:
