@@ -198,8 +198,8 @@ def _holds_to(first: int, signals: Signals, margins: TableMargins) -> int | None
     """Return the last of the codes, from the first on, up to which every offset is certified or rounds to no drive."""
     half = 1 / (2 * signals.compare_max * margins.unit)
     unseen = margins.numerators < ceil(half)  # whole numbers below a half of a count
-    for code in margins.may_exceed():
-        if code >= first and not unseen[code] and margins.at(code) < 0:
+    for code in margins.exceeded():
+        if code >= first and not unseen[code]:
             return code - 1 if code > first else None
     return len(margins.limit) - 1
 

@@ -101,14 +101,13 @@ class ExactRow(Sequence[Fraction]):
         order = np.argsort(self.doubles, kind="stable")
         ordered = self.doubles[order]
         starts = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
-        firsts: list[int] = []
-        for begin, end in zip(starts.tolist(), [*starts[1:].tolist(), len(self)], strict=True):
-            firsts.append(begin)
-            if end - begin > 1:  # equal doubles: in the order of the exact numbers
-                firsts += self._sorted_among_equals(order, begin, end)
+        ends = np.append(starts[1:], len(self))
+        larger: list[int] = []  # where, among equal doubles, a larger number begins
+        for group in np.flatnonzero(ends - starts > 1).tolist():
+            larger += self._sorted_among_equals(order, int(starts[group]), int(ends[group]))
+        firsts = np.sort(np.append(starts, larger)).astype(np.intp)
         ranks = np.empty(len(self), dtype=np.intp)
-        lengths = np.diff(np.append(firsts, len(self)))
-        ranks[order] = np.repeat(np.arange(len(firsts)), lengths)
+        ranks[order] = np.repeat(np.arange(firsts.size), np.diff(np.append(firsts, len(self))))
         return ranks, order[firsts]
 
     def _sorted_among_equals(self, order: np.ndarray, begin: int, end: int) -> list[int]:

@@ -81,7 +81,7 @@ def _lower_until_proved(
 ) -> tuple[int, ...]:
     """Lower nodes by single counts until every code is proved, in exact arithmetic, to lie under the ceiling."""
     unit = u_min0 / (denominator * STEP_CODES)
-    for code in TableMargins(limit=ceiling.limit, nodes=nodes, unit=unit).may_exceed():  # lower nodes exceed no other
+    for code in TableMargins(limit=ceiling.limit, nodes=nodes, unit=unit).exceeded():  # lower nodes exceed no other
         index, share = divmod(code, STEP_CODES)
         while (nodes[index] * (STEP_CODES - share) + nodes[index + 1] * share) * unit > ceiling.limit[code]:
             high = index if nodes[index] >= nodes[index + 1] else index + 1

@@ -1,9 +1,9 @@
 """The linear programme of a table of beta, stated once for all valves whose tables have one form."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-from threading import Lock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,12 +11,10 @@ from dzdesign.core.errors import RequirementError
 
 if TYPE_CHECKING:
     import cvxpy as cp
-    from scipy.sparse import csr_array
+    from scipy.sparse import csc_array, csr_array
 
 #: Pressure codes between neighbouring nodes: a power of two, so that the firmware finds a node by a shift.
 STEP_CODES = 64
-#: A programme is solved by whoever has written its numbers into it.
-SOLVING = Lock()
 
 
 def best_nodes(limit: np.ndarray, worth: np.ndarray, trend: str | None, last: int, top: float) -> list[float]:
@@ -38,34 +36,77 @@ def best_nodes(limit: np.ndarray, worth: np.ndarray, trend: str | None, last: in
     RequirementError
         If no nodes lie under the limits.
     """
-    import cvxpy as cp
-
     weights = _node_weights(limit.size)
     gain = weights.T @ worth
     gain[-1] += worth[-1]
-    with SOLVING:
-        problem = _programme(limit.size, trend, last, top)
-        values = {"limit": limit, "gain": gain}
-        for parameter in problem.parameters():
-            parameter.value = values[parameter.name()]
-        # A simplex ends in a vertex: no interior-point fuzz to round away. A start at the last valve's solution could
-        # end in another vertex, so that a table would depend on what was designed before it.
-        problem.solve(solver=cp.HIGHS, warm_start=False)
-        if problem.status != cp.OPTIMAL:
-            raise RequirementError(f"no table of beta lies under the certified offset (solver: {problem.status})")
-        nodes: list[float] = problem.variables()[0].value.tolist()
-    return nodes
+    return _programme(limit.size, trend, last, top).solved(limit, gain)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Programme:
+    """The programme as cvxpy translates it for HiGHS: ``rows @ x <= most``, the first `equal` rows equal to it."""
+
+    rows: "csc_array"
+    equal: int
+    #: Largest values; of a limit the rows that have it, one for each code.
+    most: np.ndarray
+    of_limit: np.ndarray
+
+    def solved(self, limit: np.ndarray, gain: np.ndarray) -> list[float]:
+        """Return the best nodes.
+
+        A simplex ends in a vertex: no interior-point fuzz to round away. It starts anew: from the last valve's vertex
+        it could end in another one, and a table would depend on what was designed before it.
+        """
+        import highspy
+
+        count, size = self.rows.shape
+        model, most = highspy.HighsLp(), self.most.copy()
+        most[self.of_limit] = limit
+        model.num_row_, model.num_col_ = count, size
+        model.col_cost_, model.row_upper_ = -gain, most
+        model.row_lower_ = np.where(np.arange(count) < self.equal, most, -highspy.kHighsInf)
+        model.col_lower_, model.col_upper_ = np.full(size, -highspy.kHighsInf), np.full(size, highspy.kHighsInf)
+        model.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+        model.a_matrix_.start_, model.a_matrix_.index_ = self.rows.indptr, self.rows.indices
+        model.a_matrix_.value_ = self.rows.data
+        solver = highspy.Highs()  # type: ignore[no-untyped-call]
+        solver.setOptionValue("output_flag", False)
+        solver.passModel(model)
+        solver.run()
+        status = solver.getModelStatus()
+        if status != highspy.HighsModelStatus.kOptimal:
+            found = status.name.removeprefix("k").lower()
+            raise RequirementError(f"no table of beta lies under the certified offset (solver: {found})")
+        return list(solver.getSolution().col_value)
 
 
 @lru_cache(maxsize=16)
-def _programme(count: int, trend: str | None, last: int, top: float) -> "cp.Problem":
-    """Return the programme, its numbers left open: cvxpy then translates it for the solver once, not for each valve."""
+def _programme(count: int, trend: str | None, last: int, top: float) -> _Programme:
+    """State the programme once for all valves of one form: translating it takes longer than solving it."""
     import cvxpy as cp
 
     weights = _node_weights(count)
     beta = cp.Variable(weights.shape[1])
-    limit, gain = cp.Parameter(count, name="limit"), cp.Parameter(weights.shape[1], name="gain")
-    return cp.Problem(cp.Maximize(gain @ beta), [weights @ beta <= limit, beta <= top, *_one_way(beta, trend, last)])
+    limit = cp.Parameter(count, value=np.zeros(count))
+    constraints = [weights @ beta <= limit, beta <= top, *_one_way(beta, trend, last)]
+    problem = cp.Problem(cp.Maximize(cp.sum(beta)), constraints)
+    most = _translated(problem)["b"]
+    limit.value = np.arange(1.0, count + 1.0)
+    data = _translated(problem)
+    moved = data["b"] - most
+    of_limit = np.argsort(moved, kind="stable")[-count:]
+    if not np.array_equal(moved[of_limit], limit.value) or np.count_nonzero(moved) != count:
+        raise RuntimeError("cvxpy states the limits of the table otherwise than row by row")
+    return _Programme(rows=data["A"].tocsc(), equal=data["dims"].zero, most=most, of_limit=of_limit)
+
+
+def _translated(problem: "cp.Problem") -> dict[str, Any]:
+    """Return what cvxpy hands to HiGHS."""
+    import cvxpy as cp
+
+    data: dict[str, Any] = problem.get_problem_data(cp.HIGHS)[0]
+    return data
 
 
 @lru_cache(maxsize=16)

@@ -50,7 +50,12 @@ class TableMargins:
         }
         return min(map(self.at, different.values()))
 
-    def may_exceed(self) -> list[int]:
-        """Return the codes, rising, at which the offset may lie above the ceiling: at no other it does."""
-        found: list[int] = np.flatnonzero(self.doubles <= self.error).tolist()
-        return found
+    def exceeded(self) -> list[int]:
+        """Return the codes, rising, at which the offset lies above the ceiling."""
+        up, unit = self.unit.numerator, self.unit.denominator
+        numerators, denominators = self.limit.numerators, self.limit.denominators
+        return [
+            code
+            for code in np.flatnonzero(self.doubles <= self.error).tolist()
+            if numerators[code] * unit < int(self.numerators[code]) * up * denominators[code]
+        ]
