@@ -12,11 +12,12 @@ from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
-from dzdesign.derivation.scaling import drive, evaluate_line
+from dzdesign.derivation.scaling import drive
 from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
 from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
+from dzdesign.design.line_in_beta import line_in_beta
 from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.machine import Machine
@@ -253,25 +254,19 @@ class Compensator(ShownInNotebooks, Artefact):
         """Return the compare value of the law at a code pair, exactly: not rounded, not limited."""
         side, signals, beta = self.side(sign), self.signals, self.law_beta(dp_code, sign)
         from_zero = signals.command.from_zero(command_code, sign)
-        line = evaluate_line(
-            law(self.law),
-            beta=beta,
-            kappa=side.drive_range_over_u_max,
-            u_min0_over_u_max=side.u_min0_over_u_max,
-            n_adc=signals.command.span(sign),
-            n_full=signals.compare_max,
-        )
-        ends = {"zero_band": self.zero_band_codes, "end": self.transition_end}
+        span, u_min0 = signals.command.span(sign), side.u_min0_over_u_max
+        line = line_in_beta(self.law, side.drive_range_over_u_max, u_min0, span, signals.compare_max)
         if from_zero >= self.transition_end:
-            return Fraction(line.slope * from_zero + line.start)
+            return line.counts(from_zero, beta)
+        ends = {"zero_band": self.zero_band_codes, "end": self.transition_end}
         lowered = evaluate_transition(
             beta_opening=beta,
             beta_closing=self.beta(dp_code, sign),
-            u_min0_over_u_max=side.u_min0_over_u_max,
+            u_min0_over_u_max=u_min0,
             share_of_transition=evaluate_share(from_zero, **ends),
             n_full=signals.compare_max,
         )
-        return Fraction(line.slope * evaluate_law_command(from_zero, **ends) + line.start - lowered)
+        return Fraction(line.counts(evaluate_law_command(from_zero, **ends), beta) - lowered)
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return u_O/u_max of the law at a code pair, exactly and before it is limited to 0...1."""

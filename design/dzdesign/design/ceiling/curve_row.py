@@ -4,10 +4,10 @@ The corners, and whatever is to be refused, are left to `OffsetCurve` and `certi
 """
 
 from bisect import bisect_left
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
 from math import ceil, lcm
 
 from dzdesign.design.ceiling.exact_row import ExactRow
@@ -18,6 +18,9 @@ from dzdesign.identify.valve.certified_bound import BoundPiece
 #: Coefficients of 1, x and x².
 Polynomial = tuple[Fraction, Fraction, Fraction]
 NONE = Fraction(0)
+#: Curve, signals, first and last code of the latest rows. Found again by comparing: a hash of that many fractions takes
+#: longer.
+KNOWN: deque[tuple[OffsetCurve, Signals, int, int, ExactRow]] = deque(maxlen=8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,9 +33,17 @@ class _Stretch:
     bound: Polynomial | None
 
 
-@lru_cache(maxsize=8)
 def certified_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
     """Return what is certified at each of the codes, V, as `certified_V` does; kept for whoever proves it again."""
+    for known, of_signals, begin, end, row in tuple(KNOWN):
+        if (begin, end) == (first, last) and (known is curve or known == curve) and of_signals == signals:
+            return row
+    row = _row(curve, signals, first, last)
+    KNOWN.append((curve, signals, first, last, row))
+    return row
+
+
+def _row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
     step, parts = signals.dp_MPa(1), []
     for begin, end, stretch in _stretches(curve, step, first, last):
         part = None if stretch is None else _least(stretch, step, begin, end)
@@ -47,7 +58,7 @@ def certified_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -
 def offset_row(curve: OffsetCurve, signals: Signals, first: int, last: int) -> ExactRow:
     """Return the offset at each of the codes, V, whatever is certified."""
     above = curve.above and replace(curve.above, certified=False)
-    return certified_row(replace(curve, certified=None, above=above), signals, first, last)
+    return _row(replace(curve, certified=None, above=above), signals, first, last)
 
 
 def _stretches(

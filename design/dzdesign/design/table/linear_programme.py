@@ -72,11 +72,10 @@ class _Programme:
         model.a_matrix_.value_ = self.rows.data
         solver = highspy.Highs()  # type: ignore[no-untyped-call]
         solver.setOptionValue("output_flag", False)
-        solver.passModel(model)
-        solver.run()
+        taken = solver.passModel(model), solver.run()  # a model that is refused leaves another one's status
         status = solver.getModelStatus()
-        if status != highspy.HighsModelStatus.kOptimal:
-            found = status.name.removeprefix("k").lower()
+        if set(taken) != {highspy.HighsStatus.kOk} or status != highspy.HighsModelStatus.kOptimal:
+            found = "model refused" if highspy.HighsStatus.kError in taken else status.name.removeprefix("k").lower()
             raise RequirementError(f"no table of beta lies under the certified offset (solver: {found})")
         return list(solver.getSolution().col_value)
 
