@@ -5,10 +5,10 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from dzdesign.batch.valves import Valve
+from dzdesign.codegen.calibration.block import entry_of_record
 from dzdesign.core.errors import InputError, and_more, quoted
 from dzdesign.report.lot.valve_folder import VALVES, ValveFolder
 from dzdesign.report.lot.valve_names import by_name
-from dzdesign.stages.calibration import entry_of_record
 
 #: Names in a sentence.
 NAMED = 5

@@ -45,6 +45,9 @@ def run(arguments: Arguments, json: bool) -> int:
         return _read(arguments, json)
     if arguments.compensator is None or arguments.output is None:
         raise InputError("calibration needs a COMPENSATOR.json and -o FILE, or --read FILE; see --help")
+    from dzdesign.codegen.calibration.place_text import elsewhere
+    from dzdesign.codegen.project import target_named
+
     made = calibration(arguments)
     document = _document(made, os.fspath(arguments.output))
     if json:
@@ -53,6 +56,10 @@ def run(arguments: Arguments, json: bool) -> int:
     at = f", at {document['address']} of {made.target}" if made.address is not None else ""
     what = f"{document['octets']} octets" if document["octets"] is not None else "the layout of a block, of any valve"
     print(one_line(f"Written: {document['file']}, {what}{at}"))
+    target = target_named(made.target)
+    sector = target.block_place if target.sector else None
+    if made.address is not None and sector and (wrong := elsewhere(made.target, made.address, sector)):
+        print(wrong)
     if document["octets"] is None:
         return 0
     print(one_line(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}"))
@@ -102,5 +109,6 @@ def _read_document(found: "ReadCalibration") -> dict[str, Any]:
     return {
         "belongs": found.belongs,
         "difference": found.difference or None,
+        "placed": found.placed or None,
         **asdict(found.reading),
     }

@@ -124,8 +124,10 @@ def test_what_is_done_is_taken_up(made, capsys):
 def test_verify_tries_each_block_with_the_lots_firmware(made):
     _, output, _ = made
     firmware = output / "lot" / "firmware"
-    (check,) = blocks_checked(firmware, given_blocks(firmware, [valve(output, "V0001") / "calibration.bin"] * 2))
-    assert check.holds, check.text
+    blocks = given_blocks(firmware, [valve(output, "V0001") / "calibration.bin"] * 2)
+    inputs, drive = blocks_checked(firmware, blocks)
+    assert inputs.holds and drive.holds, (inputs.text, drive.text)
+    assert "'V0001-S'" in inputs.text and drive.name.startswith("the drive functions")
 
 
 def test_a_number_that_no_input_shows_is_seen(made, tmp_path):

@@ -7,13 +7,13 @@ import re
 import subprocess
 import threading
 import tty
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 from intelhex import IntelHex
 
-from dzdesign.codegen.calibration.packing import unpack
+from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
 from dzdesign.serial_port import PortLine, open_port
@@ -142,6 +142,18 @@ def test_a_drive_whose_supply_goes_keeps_a_whole_block(drive, tmp_path, capsys, 
     assert load(capsys, block_file(tmp_path), "--port", drive.port)[1]["crc32"] == crc_of(NEW)
 
 
+def test_a_block_of_another_serial_number_than_the_valves_is_not_loaded(drive, tmp_path, capsys):
+    drive.start()
+    file, port = block_file(tmp_path), ("--port", drive.port)
+    status, _, said = load(capsys, file, *port, "--serial", "SN-0")
+    assert status == 2 and "'SN-1'" in said and "'SN-0'" in said
+    status, held, said = load(capsys, *port, "--serial", "SN-1")
+    assert status == 1 and held["serial"] == "SN-0" and "'SN-0'" in said, "the drive holds what it held"
+    status, held, _ = load(capsys, file, *port, "--serial", "SN-1")
+    assert (status, held["serial"], held["serial_before"]) == (0, "SN-1", "SN-0")
+    assert load(capsys, *port, "--serial", "SN-1")[0] == 0
+
+
 @pytest.mark.parametrize(("words", "said"), [(("driving", 1), "still drives"), (("command", 1), "not zero")])
 def test_a_drive_that_is_not_at_rest_refuses(drive, tmp_path, capsys, words, said):
     drive.start(*words)
@@ -156,7 +168,17 @@ def test_a_block_that_the_drive_must_not_have_is_refused_and_nothing_changes(dri
     before = drive.memory.read_bytes()
     other_shape = block_file(tmp_path, refused_blocks()[1])
     status, _, error = load(capsys, other_shape, "--port", drive.port)
-    assert status == 1 and "two solenoids" in error
+    assert status == 2 and "two solenoids" in error
+    for change, said in (
+        ({"compare_max": 40_000}, "compare value 40000, the drive's has 60000"),
+        ({"code_max": 1023}, "1023, the drive's has 4095"),
+        ({"sample_Hz": 1000}, "1000, the drive's has 1250"),
+        ({"tick_Hz": 5000}, "5000, the drive's has 2500"),
+        ({"beta_step": 128}, "128, the drive's has 64"),
+    ):
+        other = block_file(tmp_path, pack(replace(unpack(NEW), **change)))
+        status, _, error = load(capsys, other, "--port", drive.port)
+        assert status == 2 and said in error, error
     assert drive.memory.read_bytes() == before, "not even erased"
     status, _, error = load(capsys, block_file(tmp_path, refused_blocks()[0]), "--port", drive.port)
     assert status == 1 and "of the law outside" in error
