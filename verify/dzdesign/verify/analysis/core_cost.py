@@ -47,14 +47,15 @@ class BlockCost:
         hardest = ", ".join(f"{name} {most}" for name, most in zip(CALLS, self.hardest, strict=True))
         text = (
             f"the check of a block takes {self.check_flash_bytes} bytes of flash, {self.check_ram_bytes} of RAM, "
-            f"{self.check_stack_bytes} of stack and {self.check_count} {unit}, the block {self.block_bytes} bytes; most "
-            f"{unit} counted with this block and with the drive functions on that it leaves off: {hardest}"
+            f"{self.check_stack_bytes} of stack and {self.check_count} {unit}, the block {self.block_bytes} bytes; "
+            f"most {unit} counted with this block and with the drive functions on that it leaves off: {hardest}"
         )
         if isinstance(self.bounds, str):
             return f"{text}; of any block: {self.bounds}"
         each = ", ".join(f"{name} {bound.instructions}" for name, bound in zip(CALLS, self.bounds, strict=True))
         stack = max(bound.stack_bytes for bound in self.bounds)
-        return f"{text}; with any block, over all paths of the machine code: {each}, {stack} bytes of stack, no recursion"
+        text += f"; with any block, over all paths of the machine code: {each}"
+        return f"{text}, {stack} bytes of stack, no recursion"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,9 +148,7 @@ def _counted(machine: Machine, core: dict[str, bytes], objects: dict[str, Path],
     return printed[0]
 
 
-def _bounds(
-    machine: Machine, objects: Iterable[Path], core: dict[str, bytes]
-) -> tuple[Bound, Bound, Bound] | str:
+def _bounds(machine: Machine, objects: Iterable[Path], core: dict[str, bytes]) -> tuple[Bound, Bound, Bound] | str:
     """Return the most of each call over all paths of the machine code, of both signs' laws the greater; or why not."""
     if machine.small:
         return "no bound, as a shift takes cycles by its places"

@@ -20,6 +20,8 @@ STORED, LOADED = re.compile(r"\[sp, #-(\d+)\]!"), re.compile(r"\[sp\], #(\d+)")
 MOVED = re.compile(r"^sp, (?:sp, )?#(\d+)\s*$")
 LOOKED_UP = ("tbb", "tbh", "blx", "svc")
 WORD = 4
+NAMED = {"sl": 10, "fp": 11, "ip": 12, "sp": 13, "lr": 14, "pc": 15}
+REGISTERS = {f"r{number}": number for number in range(16)} | NAMED
 #: Place behind a function's last instruction.
 BEYOND = -1
 
@@ -110,13 +112,10 @@ def _grows(name: str, at: Instruction) -> int:
     if what in ("add", "sub") and (moved := MOVED.match(at.operands)):
         return int(moved[1]) * {"sub": 1, "add": -1}[what]
     if at.operands.startswith("sp,") and what != "cmp":
-        raise RequirementError(f"{name}() takes a stack that depends on its data ({at.mnemonic} {at.operands}): no bound")
+        raise RequirementError(f"{name}() takes stack by its data ({at.mnemonic} {at.operands}): no bound")
     if found := STORED.search(at.operands):
         return int(found[1])
     return -int(found[1]) if (found := LOADED.search(at.operands)) else 0
-
-
-REGISTERS = {**{f"r{number}": number for number in range(16)}, "sl": 10, "fp": 11, "ip": 12, "sp": 13, "lr": 14, "pc": 15}
 
 
 def _count(registers: str) -> int:
