@@ -14,7 +14,7 @@ from c_runs import ENTRY, Place, Run
 from c_words import Terms, Unreadable, any_of, flags_of
 from pycparser import c_ast, c_parser
 
-SOLVER, TIMEOUT_S = "z3", 20
+SOLVER, TIMEOUT_S = "z3", 120
 #: Bits of `int` and of `long`, by Frama-C's name of a machine.
 MACHINES = {"x86_64": (32, 64), "x86_16": (16, 32)}
 

@@ -81,8 +81,9 @@ def current_corners(block):
     yield replace(block, current=replace(numbers, supply_high=numbers.supply_low + 1))
     ordered = replace(numbers, open_sum=1, over_sum=2)
     for shift in range(1, 7):
-        for over in (-1, 0):  # the largest current, and one beyond it that only its rounding makes
-            for short, gain in factors(((LARGEST_ERROR + 1) << shift) - (1 << shift >> 1) + over):
+        half = 1 << shift >> 1
+        for over in range(-1, half):  # the largest current, and one beyond it that only its rounding makes
+            for short, gain in factors(((LARGEST_ERROR + 1) << shift) - half + over):
                 made = {"short_sum": short, "current_gain": gain, "current_shift": shift}
                 yield replace(block, current=replace(ordered, **made))
     yield replace(block, current=replace(ordered, short_sum=3, current_gain=1, current_shift=15))
