@@ -20,12 +20,13 @@ from dzdesign.codegen.calibration.layout import NODE_MASK
 from dzdesign.codegen.project import generate
 from dzdesign.core.errors import DzdesignError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.side_law import SideLaw
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.toolchain.machines import HOST
 from tests.support.block_cores import CompiledCheck
 
 DESIGNS, QUICK_DESIGNS = 600, 30
+#: Compiled quickly: there are hundreds.
+LIGHT = replace(HOST, core_flags=("-std=c99", "-O1"), check_flags=("-std=c99", "-O1"))
 #: Every so many-th difference of pressure codes; samples of the drive, ticks of the controller.
 STRIDE, STEPS = 61, 60_000
 
@@ -100,31 +101,29 @@ def examined(name: str, target: str, compensator: Compensator, stride: int = STR
         generate(compensator, target)
     except DzdesignError as error:
         refused_fixed = str(error)
-    forms, nodes = TwoForms(name, compensator), max(len(side.beta) for side in _sides(compensator))
+    forms = TwoForms(name, compensator)
     try:
         octets = forms.block
     except DzdesignError as error:
-        return Findings(name=name, nodes=nodes, refused_block=str(error), refused_fixed=refused_fixed)
+        return Findings(name=name, nodes=forms.nodes, refused_block=str(error), refused_fixed=refused_fixed)
     if bits := _check(built_for(compensator)).findings(octets):
-        return Findings(name=name, nodes=nodes, refused_block=", ".join(sorted(bits)), refused_fixed=refused_fixed)
+        return Findings(
+            name=name, nodes=forms.nodes, refused_block=", ".join(sorted(bits)), refused_fixed=refused_fixed
+        )
     if refused_fixed:
-        return Findings(name=name, nodes=nodes, refused_fixed=refused_fixed)
-    laws = [compared(forms, sign, HOST, stride) for sign in compensator.signals.signs]
-    programs = [drive_program(forms, len(name), (HOST,))]
+        return Findings(name=name, nodes=forms.nodes, refused_fixed=refused_fixed)
+    laws = [compared(forms, sign, LIGHT, stride) for sign in compensator.signals.signs]
+    programs = [drive_program(forms, len(name), (LIGHT,))]
     if compensator.current_drive is not None:
-        programs.append(controller_program(compensator, compensator.current_drive.loop, len(name), (HOST,)))
-    sequences = [program.run(HOST, steps) for program in programs]
+        programs.append(controller_program(compensator, compensator.current_drive.loop, len(name), (LIGHT,)))
+    sequences = [program.run(LIGHT, steps) for program in programs]
     return Findings(
         name=name,
-        nodes=nodes,
+        nodes=forms.nodes,
         inputs=sum(each.inputs + each.edge_inputs for each in laws),
         steps=sum(each.steps for each in sequences),
         unlike=sum(each.unlike for each in (*laws, *sequences)),
     )
-
-
-def _sides(compensator: Compensator) -> list[SideLaw]:
-    return [compensator.side(sign) for sign in compensator.signals.signs]
 
 
 @cache

@@ -6,30 +6,37 @@ The controller is also compared with the exact one, state by state: what is the 
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 from block_equality import missing_of, run_program
+from random_designs import random_designs
 from scoreboard import Row, print_rows, say
 from two_forms import AROUND, TwoForms, block_as_c, two_forms
 
 from dzdesign.codegen.calibration.block import block_of, current_block
 from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
-from dzdesign.codegen.calibration.layout import CalibrationBlock
+from dzdesign.codegen.calibration.layout import NODE_MASK, CalibrationBlock
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.verify.current.current_checks import read_controller
 from dzdesign.verify.current.state_check import check_states, hashes_on
+from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST, Machine
+from tests.support.block_cores import block_folder
 from tests.support.current_loops import LOOPS
 
 PROGRAM = "block_sequences.c"
 #: Samples of the drive and ticks of the controller; of the states against the exact controller.
-STEPS = {HOST.name: 20_000_000, CORTEX_M4.name: 4_000_000, AVR.name: 1_000_000}
-STATES = {HOST.name: 5_000_000, CORTEX_M4.name: 1_000_000, AVR.name: 100_000}
-QUICKER = 100
+STEPS = {HOST.name: 5_000_000, CORTEX_M4.name: 1_000_000, AVR.name: 200_000}
+STATES = {HOST.name: 2_000_000, CORTEX_M4.name: 200_000, AVR.name: 20_000}
+QUICKER = 50
+#: Random designs whose drive is compared with its model.
+MODELLED = 12
 #: Beyond it a state on an AVR is none of `int`'s.
 LAST = 65535
 
@@ -46,14 +53,37 @@ class Sequence:
 
 def print_block_sequences(quick: bool = False, seed: int = 0) -> list[Row]:
     """Compare, print and return the rows."""
-    rows = []
-    for forms in two_forms():
+    rows, designs = [], [*two_forms()]
+    valves = {forms.name: forms.compensator.valve for forms in designs}
+    random = islice(random_designs(valves, seed), MODELLED // (QUICKER if quick else 1))
+    drawn = [TwoForms(f"design {number}", compensator) for number, (_, _, compensator) in enumerate(random)]
+    with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
+        rows += model_rows([*designs, *(forms for forms in drawn if forms.nodes <= NODE_MASK)], Path(folder))
+    for forms in designs:
         rows += _on_machines(f"{forms.name}: drive", drive_program(forms, seed), quick)
         drive = forms.compensator.current_drive
         if drive is not None:
             for name, loop in {"its own": drive.loop, **LOOPS}.items():
                 rows += _controller(f"controller, {name}", forms.compensator, loop, quick, seed)
     print_rows("Drive functions and current controller, block form against fixed form", rows)
+    return rows
+
+
+def model_rows(designs: list[TwoForms], folder: Path) -> list[Row]:
+    """Compare the drive with its model in rational numbers: one firmware, and the block of each design that fits it."""
+    rows, firmware = [], {}
+    for forms in designs:
+        built = built_for(forms.compensator)
+        if built not in firmware:
+            firmware[built] = (forms.name, block_folder(forms.compensator, folder / str(len(firmware))))
+        name, path = firmware[built]
+        (path / BLOCK_FILE).write_bytes(forms.block)
+        found = CompiledDrive(path).check(PreparedDrive(forms.compensator))
+        what = f"{forms.name}: drive unlike its model, firmware of {name}"
+        rows.append(
+            Row(what=what, value=found.faults, limit=0, note=f"{found.ticks} PWM periods {found.first_wrong or ''}")
+        )
+        say(f"{what}: {found.faults}")
     return rows
 
 

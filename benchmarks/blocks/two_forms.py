@@ -85,6 +85,11 @@ class TwoForms:
         ]
 
     @property
+    def nodes(self) -> int:
+        """Nodes of the longer table of beta."""
+        return max(len(self.compensator.side(sign).beta) for sign in self.compensator.signals.signs)
+
+    @property
     def edges(self) -> list[int]:
         """Codes at and beside the ends of the signals' ranges, and beyond the converter's."""
         signals = self.compensator.signals
