@@ -16,7 +16,6 @@ from scoreboard import Row, print_rows, say
 from two_forms import TwoForms, two_forms
 
 from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
-from dzdesign.codegen.calibration.layout import NODE_MASK
 from dzdesign.codegen.project import generate
 from dzdesign.core.errors import DzdesignError
 from dzdesign.design.compensator import Compensator
@@ -42,18 +41,13 @@ class Findings:
     refused_block: str = ""
     refused_fixed: str = ""
 
-    #: Nodes of the longer table of beta.
-    nodes: int = 0
-
-    @property
-    def too_long(self) -> bool:
-        """Whether a block has no room for its table: pressure sensors of unlike spans, the drop of B less A."""
-        return self.nodes > NODE_MASK
+    #: Whether a block has room for it: not where sensor B's span is far above that of A.
+    has_room: bool = True
 
     @property
     def only_block_refused(self) -> bool:
         """Whether the fixed form takes what block form does not, though a block has room for it."""
-        return bool(self.refused_block) and not self.refused_fixed and not self.too_long
+        return bool(self.refused_block) and not self.refused_fixed and self.has_room
 
 
 def print_block_designs(quick: bool = False, seed: int = 0) -> list[Row]:
@@ -72,8 +66,8 @@ def print_block_designs(quick: bool = False, seed: int = 0) -> list[Row]:
         "designs of which block form and fixed form differ": (sum(bool(each.unlike) for each in found), 0, note),
         "designs whose block is refused and that the fixed form takes": (
             sum(each.only_block_refused for each in found), 0, ""),
-        f"designs of more than {NODE_MASK} nodes of beta, for which a block has no room": (
-            sum(each.too_long for each in found), None, "sensors of unlike spans, and the drop B less A"),
+        "designs for which a block has no room": (
+            sum(not each.has_room for each in found), None, "sensor B of a far larger span than sensor A"),
         "designs that neither form takes": (sum(bool(each.refused_fixed) for each in found), None, ""),
     }  # fmt: skip
     rows = [Row(what=what, value=value, limit=limit, note=text) for what, (value, limit, text) in counts.items()]
@@ -105,13 +99,13 @@ def examined(name: str, target: str, compensator: Compensator, stride: int = STR
     try:
         octets = forms.block
     except DzdesignError as error:
-        return Findings(name=name, nodes=forms.nodes, refused_block=str(error), refused_fixed=refused_fixed)
+        return Findings(name=name, has_room=forms.has_room, refused_block=str(error), refused_fixed=refused_fixed)
     if bits := _check(built_for(compensator)).findings(octets):
         return Findings(
-            name=name, nodes=forms.nodes, refused_block=", ".join(sorted(bits)), refused_fixed=refused_fixed
+            name=name, has_room=forms.has_room, refused_block=", ".join(sorted(bits)), refused_fixed=refused_fixed
         )
     if refused_fixed:
-        return Findings(name=name, nodes=forms.nodes, refused_fixed=refused_fixed)
+        return Findings(name=name, has_room=forms.has_room, refused_fixed=refused_fixed)
     laws = [compared(forms, sign, LIGHT, stride) for sign in compensator.signals.signs]
     programs = [drive_program(forms, len(name), (LIGHT,))]
     if compensator.current_drive is not None:
@@ -119,7 +113,7 @@ def examined(name: str, target: str, compensator: Compensator, stride: int = STR
     sequences = [program.run(LIGHT, steps) for program in programs]
     return Findings(
         name=name,
-        nodes=forms.nodes,
+        has_room=forms.has_room,
         inputs=sum(each.inputs + each.edge_inputs for each in laws),
         steps=sum(each.steps for each in sequences),
         unlike=sum(each.unlike for each in (*laws, *sequences)),

@@ -17,7 +17,7 @@ from two_forms import AROUND, TwoForms, block_as_c, two_forms
 from dzdesign.codegen.calibration.block import block_of, current_block
 from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
-from dzdesign.codegen.calibration.layout import NODE_MASK, CalibrationBlock
+from dzdesign.codegen.calibration.layout import CalibrationBlock
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.design.compensator import Compensator
@@ -58,7 +58,7 @@ def print_block_sequences(quick: bool = False, seed: int = 0) -> list[Row]:
     random = islice(random_designs(valves, seed), MODELLED // (QUICKER if quick else 1))
     drawn = [TwoForms(f"design {number}", compensator) for number, (_, _, compensator) in enumerate(random)]
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
-        rows += model_rows([*designs, *(forms for forms in drawn if forms.nodes <= NODE_MASK)], Path(folder))
+        rows += model_rows([*designs, *(forms for forms in drawn if forms.has_room)], Path(folder))
     for forms in designs:
         rows += _on_machines(f"{forms.name}: drive", drive_program(forms, seed), quick)
         drive = forms.compensator.current_drive

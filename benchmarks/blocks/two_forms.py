@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))  # for the valve and options 
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
+from dzdesign.codegen.calibration.layout import NODE_MASK
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_reading import read_artefact
@@ -32,6 +33,7 @@ SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] /
 TARGETS = {"host": "host", "Cortex-M4": "cortex-m4", "AVR": "avr"}
 CALLED = ("comp", "comp_checked", "status", "beta")
 LAW_AND_DRIVE = ("dz_comp.c", "dz_comp_negative.c", "dz_drive.c")
+LARGEST_WEIGHT = 65535
 #: What dz_drive.c and dz_current.c define.
 AROUND = ("drive_init", "drive_sample", "drive_tick", "current_init", "current_calibrate", "current_tick")
 
@@ -85,9 +87,10 @@ class TwoForms:
         ]
 
     @property
-    def nodes(self) -> int:
-        """Nodes of the longer table of beta."""
-        return max(len(self.compensator.side(sign).beta) for sign in self.compensator.signals.signs)
+    def has_room(self) -> bool:
+        """Whether a block has room for the tables of beta and for the weight of sensor B."""
+        nodes = max(len(self.compensator.side(sign).beta) for sign in self.compensator.signals.signs)
+        return nodes <= NODE_MASK and self.compensator.signals.weight_b <= LARGEST_WEIGHT
 
     @property
     def edges(self) -> list[int]:
