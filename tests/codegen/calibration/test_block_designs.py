@@ -45,6 +45,6 @@ NO_ROOM = {
 @pytest.mark.slow
 @pytest.mark.parametrize("what", NO_ROOM)
 def test_what_a_block_has_no_room_for_is_left_to_the_fixed_form(valves, what):
-    compensator = design(valves["two sides"], options_of(NO_ROOM[what], target_named("f28335").inputs()))
-    found = examined("unlike", "f28335", compensator)
+    compensator = design(valves["two sides"], options_of(NO_ROOM[what], target_named("f280049c").inputs()))
+    found = examined("unlike", "f280049c", compensator)
     assert not found.has_room and "--calibration fixed" in found.refused_block and not found.refused_fixed
