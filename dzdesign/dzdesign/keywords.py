@@ -103,7 +103,7 @@ def _checked(argument: Argument, value: Any) -> Any:
     if type(value) in (int, float) and value == 0 and argument.option.example and not argument.is_path:
         return "0" if str in kinds else value  # zero needs no unit
     # A number is read by what it is for, which refuses what can't be one.
-    if argument.is_path and isinstance(value, str) and not value:
+    if argument.is_path and value == "":  # which would be the folder '.'
         raise _of_another_kind(name, value, argument)
     fits = bool({int, float} & kinds) or isinstance(value, tuple(kinds - {Mapping, Iterable}))
     if fits or argument.result_class in (one.__name__ for one in type(value).__mro__):
@@ -117,7 +117,7 @@ def _checked(argument: Argument, value: Any) -> Any:
     else:
         items, wanted = {name: value}, ()
     for place, item in items.items():
-        if not isinstance(item, wanted):
+        if not isinstance(item, wanted) or (argument.is_path and item == ""):
             raise _of_another_kind(place, item, argument)
     return value
 

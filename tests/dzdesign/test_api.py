@@ -112,6 +112,8 @@ def test_bad_input_is_one_sentence(call, words, ramps):
         (lambda: api.design("x", transition=1), "transition: expected text with a unit such as '1 %', got 1"),
         (lambda: api.design("x", accept=["x"]), "accept: expected text, got ['x']"),
         (lambda: api.design("x", target=28335), "target: expected text, got 28335"),
+        (lambda: api.design("x", output=""), "output: expected a path, got ''"),
+        (lambda: api.identify(["x", ""]), "ramps[1]: expected a path, got ''"),
         (lambda: api.design(5), "valve: expected a path, got 5"),
         (lambda: api.generate(None), "compensator: expected a path, got None"),
         (lambda: api.verify(5), "firmware: expected a path, got 5"),
