@@ -38,6 +38,8 @@ class Requirement:
 
 FILES = Requirement(id="files-as-generated", title="files as generated")
 MANIFEST = Requirement(id="manifest", title="the manifest says what is in the firmware")
+#: Of an output that is no C firmware.
+OUTPUT_MANIFEST = Requirement(id="output-manifest", title="the manifest says what the output was made from")
 COMPILES = Requirement(id="compiles", title="compiles without a warning")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
 MONOTONE = Requirement(id="monotone", title="within range, monotone")
