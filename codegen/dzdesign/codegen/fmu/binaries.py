@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -19,6 +19,8 @@ FLAGS = (
     "-O2", "-std=c99", "-shared", "-fPIC", "-nostdlib", "-g0", "-s", "-fvisibility=hidden", "-ffp-contract=off",
     "-fno-sanitize=all", "-fno-stack-protector", "-Wall", "-Wextra", "-Werror",
 )  # fmt: skip
+#: Folder with an empty stdlib.h, which the standard's headers include and need nothing of.
+NO_LIBRARY = "no_library"
 #: Seconds; the first compilation for a platform fills ziglang's cache.
 LONGEST_S = 300
 #: Compilers side by side.
@@ -32,7 +34,6 @@ class Platform:
     triple: str
     folders: Mapping[Fmi, str]
     ending: str
-    flags: tuple[str, ...] = ()
 
 
 #: FMI 2 has no names for processors but those of the PC.
@@ -69,6 +70,8 @@ def binaries_of(identifier: str, fmi: Fmi, sources: Mapping[str, bytes]) -> dict
         folder = Path(place)
         for name, content in sources.items():
             (folder / name).write_bytes(content)
+        (folder / NO_LIBRARY).mkdir()
+        (folder / NO_LIBRARY / "stdlib.h").write_bytes(b"")
         compiled = pool.map(lambda platform: _compiled(folder, identifier, platform), wanted)
         return {
             f"binaries/{platform.folders[fmi]}/{identifier}.{platform.ending}": content
@@ -81,14 +84,14 @@ def _compiled(folder: Path, identifier: str, platform: Platform) -> bytes:
     made = folder / platform.triple
     made.mkdir()
     name = f"{identifier}.{platform.ending}"
-    named: dict[str, Callable[[], tuple[str, ...]]] = {
-        "so": lambda: (f"-Wl,-soname,{name}", "-Wl,-z,noexecstack"),
-        "dll": lambda: (),
-        "dylib": lambda: (f"-Wl,-install_name,@rpath/{name}",),
+    named = {
+        "so": (f"-Wl,-soname,{name}", "-Wl,-z,noexecstack"),
+        "dll": ("-Wl,--no-entry",),
+        "dylib": (f"-Wl,-install_name,@rpath/{name}",),
     }
     command = [
-        sys.executable, "-m", "ziglang", "cc", "-target", platform.triple, *FLAGS, *platform.flags,
-        *named[platform.ending](), "-I.", SOURCE, "-o", f"{platform.triple}/{name}",
+        sys.executable, "-m", "ziglang", "cc", "-target", platform.triple, *FLAGS,
+        *named[platform.ending], "-I.", "-isystem", NO_LIBRARY, SOURCE, "-o", f"{platform.triple}/{name}",
     ]  # fmt: skip
     try:
         done = subprocess.run(
