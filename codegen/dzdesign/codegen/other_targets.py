@@ -47,6 +47,12 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
             module="dzdesign.codegen.structured_text.files",
             options={"dialect": ("codesys", "twincat"), "interface": ("plc", "codes")},
         ),
+        OtherTarget(
+            name="fmu",
+            description="FMUs for simulation tools, FMI 2.0 and 3.0: the compensator and, with --plant, the plant",
+            module="dzdesign.codegen.fmu.files",
+            options={"plant": ()},
+        ),
     )
 }
 #: Options of `codegen` that a firmware alone has.

@@ -33,12 +33,14 @@ class GenerateArguments(DesignChoices):
     output: Annotated[AnyPath | None, Option("DIR", command_default="firmware", short="-o")] = None
     """Folder to write, with the C project or the output."""
     target: Annotated[Text, Option("NAME", choices=ALL_TARGETS)] = None
-    """Microcontroller (default: that of the design; of a VALVE.json f28335), or another output: iec61131."""
+    """Microcontroller (default: that of the design; of a VALVE.json f28335), or another output: iec61131, fmu."""
     dialect: Annotated[Text, Option("NAME")] = None
     """Of iec61131, dialect of the PLC's tool: codesys (default), twincat."""
     interface: Annotated[Text, Option("NAME")] = None
     """Of iec61131, what the function block takes: plc, command in 0.01 % and pressures in 0.1 bar (default), or
     codes, the converter codes that the compensator was designed for."""
+    plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
+    """Of fmu, file with a plant, like examples/paper_valve/plant.toml: also make an FMU of the plant."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
     """Where the numbers of the valve stand: fixed in the core (default), or in a block of data that it is handed."""
     vectors: Annotated[int | str, Option("N", read=whole_number("a whole number up to 99999", digits=5))] = "0"
@@ -108,7 +110,19 @@ def _of_other_targets(arguments: GenerateArguments) -> "dict[str, str | None]":
     """Return the options that are of one output that is no C firmware alone, as they were given."""
     from dzdesign.codegen.other_targets import OTHER_TARGETS
 
-    return {name: getattr(arguments, name) for other in OTHER_TARGETS.values() for name in other.options}
+    given = {name: getattr(arguments, name) for other in OTHER_TARGETS.values() for name in other.options}
+    return given | {"plant": None if arguments.plant is None else _plant_text(Path(arguments.plant))}
+
+
+def _plant_text(path: Path) -> str:
+    """Return a plant file's parameters as the setting that stands in a manifest: JSON, those by default included."""
+    import json
+    from dataclasses import asdict
+
+    from dzdesign.terminal.progress import say
+    from dzdesign.verify.closed_loop.plant import read_plant
+
+    return json.dumps({name: float(value) for name, value in asdict(read_plant(path, say)).items()})
 
 
 def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bytes | None, bool]":

@@ -12,6 +12,10 @@ Causality = Literal["input", "output", "parameter", "local", "independent"]
 SETTINGS: Mapping[str, str] = {"input": "ALWAYS", "parameter": "BEFORE_START"}
 
 
+#: Of the core's 16 bits; beyond the converter's own none is valid.
+LARGEST_CODE = 65535.0
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variable:
     """One variable of an FMU."""
@@ -70,7 +74,6 @@ def compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
     u_max, two = float(c.u_max_V), len(signals.signs) == 2
     volts = ("u_i", "p_A", "p_B")
     inputs = (*volts, "u_i_code", "p_A_code", "p_B_code")
-    codes = (0.0, float(signals.code_max))
 
     def add(name: str, description: str, causality: Causality, **how: object) -> None:
         found.append(
@@ -86,7 +89,7 @@ def compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
         ("p_B_code", "pressure sensor B", signals.pressure_b.zero_code),
     ):
         add(name, f"Converter code of the {what}, where codes is true.", "input", kind="integer",
-            start=float(zero), range=codes)  # fmt: skip
+            start=float(zero), range=(0.0, LARGEST_CODE))  # fmt: skip
     add("codes", "True: the inputs are the converter's codes; false: V and MPa, which an ideal converter reads.",
         "parameter", kind="boolean", start=0.0)  # fmt: skip
     for sign in signals.signs:

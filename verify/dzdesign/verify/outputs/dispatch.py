@@ -1,7 +1,7 @@
 """`verify` of an output: what is checked of each, and which room checks the rest of its kind."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 
@@ -30,13 +30,18 @@ class OutputKind:
 
     #: Module with ``checks``, a `CheckOutput`.
     module: str
-    #: Options of `verify`, as flags such as --machine-code, that make sense for it beside --output and --ramps.
-    options: tuple[str, ...] = ()
+    #: Options of `verify`, as flags such as --machine-code, that make sense for it beside --output and --ramps, to the
+    #: module with the ``checks`` that are made where one is given.
+    options: Mapping[str, str] = field(default_factory=dict)
 
 
 #: Target, as the manifest names it, to its checks.
 KINDS: Mapping[str, OutputKind] = {
     "iec61131": OutputKind(module="dzdesign.verify.structured_text.checks"),
+    "fmu": OutputKind(
+        module="dzdesign.verify.fmu.checks",
+        options={"--machine-code": "dzdesign.verify.fmu.other_machines"},
+    ),
 }
 
 
@@ -78,9 +83,10 @@ def verify_output(folder: Path, options: Sequence[str] = (), say: Say = lambda _
     for flag in (flag for flag in options if flag not in kind.options):
         raise InputError(f"{flag} is for a C firmware, and '{folder}' is an output for {manifest.target}; leave it out")
     compensator = read_compensator(folder)
-    check: CheckOutput = import_module(kind.module).checks
     unchanged = files_unchanged(folder, manifest)
-    found = check(folder, manifest, compensator, say)
+    modules = (kind.module, *(kind.options[flag] for flag in options))
+    rooms: list[CheckOutput] = [import_module(module).checks for module in modules]
+    found = [check(folder, manifest, compensator, say) for check in rooms]
     of_all: tuple[Check, ...] = (
         certificate_follows(compensator),
         bounds_follow(compensator),
@@ -95,9 +101,14 @@ def verify_output(folder: Path, options: Sequence[str] = (), say: Say = lambda _
             target=manifest.target,
             settings=manifest.settings,
             origin=manifest.origin,
-            checks=(unchanged, manifest_follows(folder, manifest, compensator), *found.checks, *of_all),
-            inputs=found.inputs,
-            versions=found.versions,
+            checks=(
+                unchanged,
+                manifest_follows(folder, manifest, compensator),
+                *(check for each in found for check in each.checks),
+                *of_all,
+            ),
+            inputs=tuple(tried for each in found for tried in each.inputs),
+            versions={tool: version for each in found for tool, version in each.versions.items()},
         )
     )
 
