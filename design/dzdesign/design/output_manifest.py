@@ -13,6 +13,9 @@ from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import Artefact, Sha256
 from dzdesign.design.firmware_manifest import FirmwareOrigin, Text
 
+#: Characters of a setting in a sentence.
+LONGEST_SETTING = 20
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputManifest(Artefact):
@@ -30,3 +33,10 @@ class OutputManifest(Artefact):
     law: Annotated[Text, Meta(description="Name of the law, as compensator.json has it.")]
     origin: Annotated[FirmwareOrigin, Meta(description="Hashes of everything it was made from.")]
     files: Annotated[Mapping[Text, Sha256], Meta(description="File to the SHA-256 of its bytes, as generated.")]
+
+    @property
+    def settings_in_words(self) -> str:
+        """Return the settings behind commas; of a long one, such as a plant, the name alone."""
+        words = (f"{name} {value}" if len(value) <= LONGEST_SETTING else f"with a {name}"
+                 for name, value in self.settings.items() if value)  # fmt: skip
+        return "".join(f", {word}" for word in words)

@@ -234,7 +234,7 @@ def print_output(output: "Output", console: "Console | None" = None, folder: str
     """Print the files of an output that is no C firmware, and in which folder they are."""
     console = console or new_console()
     place = f", in {folder}" if folder else ""
-    settings = "".join(f", {name} {value}" for name, value in output.manifest.settings.items() if value)
+    settings = output.manifest.settings_in_words
     put_line(console, f"Output for {output.manifest.target}{settings}, law {output.manifest.law}{place}:")
     for name in output.contents:
         put_line(console, f"  {name}")

@@ -101,7 +101,7 @@ def model_description(model: Model, fmi: Fmi, token: str) -> str:
     children = [
         *interface,
         _units(model, fmi),
-        _element("LogCategories", {}, [_element("Category", {"name": "logStatusError", "description": "Refused calls."})]),
+        _element("LogCategories", {}, [_element("Category", {"name": "logStatusError"})]),
         _element("DefaultExperiment", {"startTime": "0", "stopTime": model.stop_s, "stepSize": model.step_s}),
         _element("ModelVariables", {}, [_variable(model, each, fmi) for each in model.of(fmi)]),
         _structure(model, fmi),

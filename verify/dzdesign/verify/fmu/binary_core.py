@@ -7,7 +7,6 @@ from importlib.resources import files
 from pathlib import Path
 
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.errors import RequirementError
 from dzdesign.verify.fmu.fmu_file import FmuFile
 from dzdesign.verify.toolchain.compiled_core import CHECK, Findings, findings_of
 from dzdesign.verify.toolchain.host_compiler import find_zig
@@ -103,8 +102,8 @@ class FmuCore:
         """SHA-256 of the binary."""
         return sha256_of(self._binary)
 
-    def check(self, prepared: bytes) -> Findings:
-        """Try every input; a binary that refuses a call, crashes or hangs is a `RequirementError`."""
+    def check(self, prepared: bytes, *, sample: bool = False) -> Findings:
+        """Try what was prepared; a binary that refuses a call, crashes or hangs is a `RequirementError`."""
         ending, machine, what = ENDINGS[self._sign], self._machine, f"{self._fmu.name}"
         called = {"DZ_CORE": "comp", "DZ_STATUS": "status", "DZ_BETA": "beta"}
         names = tuple(f"-D{macro}=dz_{name}{ending}" for macro, name in called.items())
@@ -121,10 +120,6 @@ class FmuCore:
             machine.compile(name, check, flags, f"the check of {what}") for name in check if name.endswith(".c")
         ]
         program = machine.link(objects, f"the check of {what}")
-        printed = machine.run(program, [f"{self._drive}{stored(prepared)}"], what)
+        arguments = [f"{self._drive}{stored(prepared)}", *(["sample"] if sample else [])]
+        printed = machine.run(program, arguments, what)
         return findings_of(printed, self.sha256, f"{what} on the {machine.name}")
-
-
-def refusing(what: str) -> RequirementError:
-    """Return the error of a binary that is missing."""
-    return RequirementError(f"{what} has no binary for this machine")

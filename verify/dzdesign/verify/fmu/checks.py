@@ -67,7 +67,7 @@ def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say
         found += [drive_check(fmu, binary, compensator), physical_check(fmu, binary, compensator)]
         if plant:
             say(f"running {fmu.name} with the plant's FMU")
-            found.append(closed_loop_check(folder, fmu, fmus["dz_plant", fmi], plant, compensator))
+            found.append(closed_loop_check(fmu, fmus["dz_plant", fmi], plant, compensator))
     return OutputChecks(checks=tuple(found), inputs=tuple(tried))
 
 
@@ -84,7 +84,7 @@ def plant_of(manifest: OutputManifest) -> dict[str, float]:
 def every_input(core: FmuCore, compensator: Compensator, sign: int) -> InputCheck:
     """Compare one side of the law behind an FMU's getters with the exact law on every input."""
     prepared = PreparedInputs(ExactLaw(compensator, sign))
-    return input_check(prepared, core, core.check(prepared.everything()))
+    return input_check(prepared, core.sha256, core.check(prepared.everything()))
 
 
 def named(check: Check, prefix: str) -> Check:

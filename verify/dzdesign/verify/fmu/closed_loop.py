@@ -1,7 +1,6 @@
 """Compensator and plant coupled, as FMUs, against the closed loop that `verify` runs of the same law and plant."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
@@ -24,12 +23,12 @@ SIDES: Mapping[int, Side] = {1: "positive", -1: "negative"}
 
 
 def closed_loop_check(
-    folder: Path, fmu: FmuFile, plant_fmu: FmuFile, plant: Mapping[str, float], compensator: Compensator
+    fmu: FmuFile, plant_fmu: FmuFile, plant: Mapping[str, float], compensator: Compensator
 ) -> Check:
     """Compare the flow at the end of every PWM period, at the least and the largest tested pressure drop."""
     name = f"FMI {fmu.fmi}.0: {FMU_CLOSED_LOOP.title}"
     try:
-        worst, periods, text = _compared(folder, fmu, plant_fmu, Plant(**plant), compensator)
+        worst, periods, text = _compared(fmu, plant_fmu, Plant(**plant), compensator)
     except RequirementError as error:
         return FMU_CLOSED_LOOP.check(holds=False, text=str(error), name=name)
     words = f"{periods} PWM periods, flow apart by at most {worst:.2g} of the largest, {TOLERANCE:g} allowed{text}"
@@ -37,7 +36,7 @@ def closed_loop_check(
 
 
 def _compared(
-    folder: Path, fmu: FmuFile, plant_fmu: FmuFile, plant: Plant, compensator: Compensator
+    fmu: FmuFile, plant_fmu: FmuFile, plant: Plant, compensator: Compensator
 ) -> tuple[float, int, str]:
     """Return the largest distance over the largest flow, how many periods were run, and where compare values differ."""
     binaries = fmu.binary_here(), plant_fmu.binary_here()
@@ -45,7 +44,8 @@ def _compared(
         raise RequirementError(f"{fmu.name} has no binary for this machine")
     step_s, signals = 1 / compensator.signals.tick_Hz, compensator.signals
     times = np.arange(0, COURSE[-1][0], step_s)
-    share = np.interp(times, *zip(*COURSE, strict=True))
+    corners = np.array(COURSE)
+    share = np.interp(times, corners[:, 0], corners[:, 1])
     worst, periods, others = 0.0, 0, 0
     with firmware_folder(fmu) as firmware:
         for sign in signals.signs:

@@ -1,4 +1,4 @@
-"""What an FMU says of itself against what it was made from: its manifest, its files, the description of its variables."""
+"""What an FMU says of itself against what it was made from: its manifest, files and variables."""
 
 from collections.abc import Iterator, Mapping
 

@@ -79,7 +79,7 @@ def read_fmu(path: Path) -> FmuFile:
     try:
         with ZipFile(BytesIO(content)) as packed:
             if sum(entry.file_size for entry in packed.infolist()) > LARGEST_OCTETS:
-                raise InputError(f"'{path}' unpacks to more than {LARGEST_OCTETS // 2**20} MB, which no FMU of ours does")
+                raise InputError(f"'{path}' unpacks to more than {LARGEST_OCTETS // 2**20} MB, as no FMU of dzdesign")
             files = {entry.filename: packed.read(entry) for entry in packed.infolist()}
         document = ElementTree.fromstring(files[DESCRIPTION])
         manifest = json.loads(files[f"{EXTRA}/manifest.json"])

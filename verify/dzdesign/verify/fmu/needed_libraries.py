@@ -59,8 +59,9 @@ def _of_pe(content: bytes) -> list[str]:
     ]
 
     def place(address: int) -> int:
-        return next(raw + address - start for length, start, raw_size, raw in table
-                    if start <= address < start + max(length, raw_size))  # fmt: skip
+        places = (raw + address - start for length, start, raw_size, raw in table
+                  if start <= address < start + max(length, raw_size))  # fmt: skip
+        return int(next(places))
 
     found, entry = [], place(imports)
     while name := struct.unpack_from("<I", content, entry + 12)[0]:

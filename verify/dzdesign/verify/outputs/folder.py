@@ -16,8 +16,6 @@ from dzdesign.verify.requirements import FILES, OUTPUT_MANIFEST, Check
 
 #: Files that a sentence names.
 MOST_NAMED = 5
-#: Characters of a setting in a sentence; longer ones, such as a plant, are named elsewhere.
-LONGEST_SETTING = 20
 
 
 def holds_output(folder: Path) -> bool:
@@ -57,7 +55,7 @@ def manifest_follows(folder: Path, manifest: OutputManifest, compensator: Compen
     if faults:
         text = f"{and_more(faults, 1)}; make the output again with `dzdesign codegen`"
         return OUTPUT_MANIFEST.check(holds=False, text=text)
-    settings = "".join(f", {name} {value}" for name, value in manifest.settings.items() if 0 < len(value) <= LONGEST_SETTING)
+    settings = manifest.settings_in_words
     return OUTPUT_MANIFEST.check(holds=True, text=f"law, target{settings} and hashes as it says")
 
 
