@@ -117,7 +117,7 @@ def test_the_coupled_fmus_run_as_the_closed_loop(fmu, plant_fmu, compensator):
         ("value[V_K_I_N_A] * (model->played_A - mean)", "value[V_K_I_N_A] * 0.0 * (model->played_A - mean)"),
         ("smaller(larger(model->value[V_COMPARE] / COUNTS, 0.0), 1.0);\n}", "0.999 * model->value[V_COMPARE] / COUNTS;\n}"),
         ("value[V_PRESSURE_FORCE_N_MPA] * dp", "value[V_PRESSURE_FORCE_N_MPA] * value[V_SUPPLY]"),
-        ("sum *= sum;", "sum *= sum * 0.9999;"),
+        ("term *= -share /", "term *= -1.002 * share /"),
         ("on ? model->value[V_U_MAX_V] : 0.0", "on ? 0.0 : model->value[V_U_MAX_V]"),
     ),
     ids=("spring", "play", "duty", "droop", "coil", "phase"),
@@ -126,6 +126,11 @@ def test_a_wrong_plant_is_found(one, one_plant, compensator, old, new):
     wrong = with_binary(one_plant, edited(one_plant, "dz_fmu.c", old, new))
     found = closed_loop_check(one, wrong, asdict(PLANT), compensator)
     assert found.holds is False and "apart" in found.text
+
+
+def test_a_coil_that_is_fast_beside_a_step_is_exact_too(one, one_plant, compensator):
+    fast = with_binary(one_plant, edited(one_plant, "dz_fmu.c", "BEFORE_START, 0.04}", "BEFORE_START, 0.0004}"))
+    assert closed_loop_check(one, fast, {**asdict(PLANT), "L_c_H": 0.0004}, compensator).holds is True
 
 
 def faults_of(fmu, compensator):
