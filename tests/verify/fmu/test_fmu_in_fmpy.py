@@ -2,14 +2,12 @@
 
 import shutil
 
+import fmpy
 import numpy as np
 import pytest
-
-fmpy = pytest.importorskip("fmpy")
-
-from fmpy.fmi2 import FMU2Model, FMU2Slave  # noqa: E402
-from fmpy.fmi3 import FMU3Model, FMU3Slave  # noqa: E402
-from fmpy.validation import validate_fmu  # noqa: E402
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+from fmpy.validation import validate_fmu
 
 ZERO, FULL_V, STEP_S = 0.0, 10.0, 1 / 2500
 
@@ -88,9 +86,8 @@ def test_model_exchange_shows_an_input_at_once(path, fmi):
         assert one.integer("compare") == before[0]
 
 
+@pytest.mark.parametrize("fmi", (3,), indirect=True)
 def test_event_mode_of_fmi_3_takes_the_step_of_delay_away(path, fmi):
-    if fmi == 2:
-        pytest.skip("FMI 2 has no Event Mode in Co-Simulation")
     with Importer(path, fmi, events=True) as one:
         one.give(u_i=ZERO, p_A=3.0, p_B=1.0)
         before = one.integer("compare")
@@ -103,6 +100,15 @@ def test_event_mode_of_fmi_3_takes_the_step_of_delay_away(path, fmi):
         *_, defined, next_time = one.fmu.updateDiscreteStates()
         assert one.integer("compare") > before
         assert defined and next_time == pytest.approx(2 * STEP_S)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), (("m_e_kg", 0.0), ("L_c_H", 1e-9), ("overlap_mm", 3.0), ("K_a", float("nan")), ("preload_N", -1.0))
+)
+def test_parameters_that_are_no_plant_end_the_initialization(fmu_folder, fmi, name, value):
+    with pytest.raises(Exception, match="ExitInitializationMode"):
+        fmpy.simulate_fmu(str(fmu_folder / f"dz_plant_fmi{fmi}.fmu"), fmi_type="CoSimulation", stop_time=0.001,
+                          output_interval=STEP_S, start_values={name: value})  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ("ModelExchange", "CoSimulation"))
