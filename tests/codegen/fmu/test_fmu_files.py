@@ -116,7 +116,8 @@ def test_the_plants_parameters_are_those_of_its_file():
 
 
 @pytest.mark.parametrize(
-    "setting", ("no JSON", "[]", "{}", json.dumps({**asdict(PLANT), "K_b": 1}), json.dumps({**asdict(PLANT), "K_a": "x"}))
+    "setting",
+    ("no JSON", "[]", "{}", json.dumps({**asdict(PLANT), "K_b": 1}), json.dumps({**asdict(PLANT), "K_a": "x"})),
 )
 def test_what_is_no_plant_is_refused(setting, no_binary):
     with pytest.raises(InputError, match="plant"):

@@ -4,7 +4,7 @@ import pytest
 
 from dzdesign.codegen.fmu import binaries
 from dzdesign.verify.fmu.fmu_file import read_fmu
-from tests.support.host_fmus import full_compensator, fmus_of, host_platforms, written
+from tests.support.host_fmus import fmus_of, full_compensator, host_platforms, written
 
 
 @pytest.fixture(scope="session")

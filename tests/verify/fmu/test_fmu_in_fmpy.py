@@ -1,4 +1,4 @@
-"""The FMUs in a tool of somebody else's, FMPy: valid, with the delay that each kind is said to have, and their sources."""
+"""The FMUs in FMPy, a tool of somebody else's: valid, with the delay that each kind is said to have, and sources."""
 
 import shutil
 
@@ -103,7 +103,8 @@ def test_event_mode_of_fmi_3_takes_the_step_of_delay_away(path, fmi):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), (("m_e_kg", 0.0), ("L_c_H", 1e-9), ("overlap_mm", 3.0), ("K_a", float("nan")), ("preload_N", -1.0))
+    ("name", "value"),
+    (("m_e_kg", 0.0), ("L_c_H", 1e-9), ("overlap_mm", 3.0), ("K_a", float("nan")), ("preload_N", -1.0)),
 )
 def test_parameters_that_are_no_plant_end_the_initialization(fmu_folder, fmi, name, value):
     with pytest.raises(Exception, match="ExitInitializationMode"):

@@ -39,7 +39,9 @@ def test_every_library_is_named(made, names):
     assert needed_libraries(made(*names)) == list(names)
 
 
-@pytest.mark.parametrize("content", (b"", b"\x7fELF\x02", b"MZ", pe("a.dll")[:80], mach_o("a")[:40], b"#!/bin/sh\n" * 9))
+@pytest.mark.parametrize(
+    "content", (b"", b"\x7fELF\x02", b"MZ", pe("a.dll")[:80], mach_o("a")[:40], b"#!/bin/sh\n" * 9)
+)
 def test_what_is_no_binary_is_refused(content):
     with pytest.raises(ValueError):
         needed_libraries(content)
