@@ -7,25 +7,22 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import asdict
-from fractions import Fraction
 from pathlib import Path
 from time import perf_counter
 
-from firmware import example_valve
 from scoreboard import Row, print_rows, say
 
+sys.path.insert(0, str(Path(__file__).parents[2]))  # for the compensator that the tests share
+
 from dzdesign.codegen.other_targets import generate_output, write_output
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.designing import design
-from dzdesign.design.options import DesignOptions
-from dzdesign.design.signals import PressureSignal, Signals
 from dzdesign.example import example_folder
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.fmu import checks, other_machines
 from dzdesign.verify.output_evidence import OutputChecks
 from dzdesign.verify.outputs.folder import read_output_manifest
 from dzdesign.verify.requirements import FMU_CLOSED_LOOP
+from tests.support.golden_firmware import golden_compensator
 
 STEP_S, STOP_S = 1 / 2500, 0.1
 
@@ -33,10 +30,7 @@ STEP_S, STOP_S = 1 / 2500, 0.1
 def print_fmus(quick: bool = False, seed: int = 0) -> list[Row]:
     """Make and check the FMUs, print and return the rows; quick: on this machine alone."""
     del seed
-    none = (Fraction(0), Fraction(0))
-    sensor = PressureSignal(zero_code=0, full_code=4095, valid_codes=(0, 4095), error_MPa=none)  # every code a pressure
-    signals = Signals(pressure_a=sensor, pressure_b=sensor)
-    compensator = design(example_valve(), DesignOptions(signals=signals))
+    compensator = golden_compensator("host")  # every code of its sensors is a pressure
     plant = json.dumps(asdict(read_plant(example_folder() / "plant.toml")))
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as place:
         folder = Path(place) / "fmus"

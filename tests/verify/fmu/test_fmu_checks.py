@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,7 +12,7 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.fmu.binary_core import FmuCore
-from dzdesign.verify.fmu.checks import drive_check, physical_check
+from dzdesign.verify.fmu.checks import drive_check, physical_check, plant_of
 from dzdesign.verify.fmu.closed_loop import closed_loop_check
 from dzdesign.verify.fmu.descriptions import compensator_faults, file_faults, library_faults, plant_faults
 from dzdesign.verify.fmu.fmu_file import read_fmu
@@ -188,6 +189,12 @@ def test_what_is_no_fmu_is_refused(tmp_path):
     path.write_bytes(b"PK")
     with pytest.raises(InputError, match="no FMU"):
         read_fmu(path)
+
+
+@pytest.mark.parametrize("text", ("{", "[]", '{"K_b": 1}', '{"K_a": "x"}', '{"K_a": -1}'))
+def test_a_setting_that_is_no_plant_is_refused(text):
+    with pytest.raises(InputError, match="plant"):
+        plant_of(SimpleNamespace(settings={"plant": text}))
 
 
 def test_the_manifest_of_an_fmu_names_compiler_and_compensator(fmu, compensator):

@@ -23,6 +23,8 @@ FLAGS = (
 NO_LIBRARY = "no_library"
 #: Seconds; the first compilation for a platform fills ziglang's cache.
 LONGEST_S = 300
+#: Variables by which the compiler takes other headers or options than those of the command.
+REDIRECTING = ("CPATH", "C_INCLUDE_PATH", "CCC_OVERRIDE_OPTIONS")
 #: Compilers side by side.
 WORKERS = 2
 
@@ -96,7 +98,7 @@ def _compiled(folder: Path, identifier: str, platform: Platform) -> bytes:
     try:
         done = subprocess.run(
             command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=LONGEST_S,
-            env={**os.environ, "SOURCE_DATE_EPOCH": "0"},
+            env={name: value for name, value in os.environ.items() if name not in REDIRECTING},
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:
         raise InputError(f"ziglang can't compile the FMU for {platform.triple}: {error}") from error

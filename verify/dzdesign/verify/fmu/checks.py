@@ -13,6 +13,7 @@ from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify import requirements
+from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.evidence import InputCheck
 from dzdesign.verify.exhaustive.all_inputs import input_check, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_samples
@@ -75,10 +76,12 @@ def plant_of(manifest: OutputManifest) -> dict[str, float]:
     """Return the parameters of the plant that the FMUs were made with; empty without one."""
     text = manifest.settings.get("plant", "")
     try:
-        plant = json.loads(text) if text else {}
-        return {str(name): float(value) for name, value in plant.items()}
-    except (ValueError, AttributeError, TypeError) as error:
+        plant = {str(name): float(value) for name, value in (json.loads(text) if text else {}).items()}
+        if plant:
+            Plant(**plant)
+    except (ValueError, AttributeError, TypeError, InputError) as error:
         raise InputError(f"the manifest's setting plant is no plant: {error}; make the FMUs again") from error
+    return plant
 
 
 def every_input(core: FmuCore, compensator: Compensator, sign: int) -> InputCheck:
