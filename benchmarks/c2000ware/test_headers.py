@@ -11,6 +11,7 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
+from dzdesign.design.firmware_manifest import Calibration
 from dzdesign.verify.firmware.c2000ware import HEADERS, PRELUDE, check_against_c2000ware
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 from tests.codegen.f28335.test_f28335_current import CURRENT_VALUES, SUPPLY_VALUES
@@ -57,25 +58,27 @@ DRIVERLIB_PRELUDE = """\
 """
 
 
-def firmware(folder: Path, target: str, drive: str) -> Path:
+def firmware(folder: Path, target: str, drive: str, calibration: Calibration = "fixed") -> Path:
     """Write a target's whole firmware."""
     compensator = golden_compensator(target)
     if sensor := SENSOR_OF[drive]:
         compensator = with_current(compensator, target_named(target), sensor)
-    made = generate(compensator, target)
-    write_folder(folder / "fw", made.files, made.manifest)
+    made = generate(compensator, target, calibration=calibration)
+    write_folder(folder / "fw", made.contents, made.manifest)
     return folder / "fw"
 
 
+@pytest.mark.parametrize("calibration", ["fixed", "block"])
 @pytest.mark.parametrize("drive", SENSOR_OF)
-def test_the_f28335_compiles_against_them(drive, tmp_path):
-    check = check_against_c2000ware(firmware(tmp_path, "f28335", drive), WARE)
+def test_the_f28335_compiles_against_them(drive, calibration, tmp_path):
+    check = check_against_c2000ware(firmware(tmp_path, "f28335", drive, calibration), WARE)
     assert check.holds, check.text
 
 
+@pytest.mark.parametrize("calibration", ["fixed", "block"])
 @pytest.mark.parametrize("drive", SENSOR_OF)
-def test_the_f280049c_compiles_against_them(drive, tmp_path):
-    folder = firmware(tmp_path, "f280049c", drive)
+def test_the_f280049c_compiles_against_them(drive, calibration, tmp_path):
+    folder = firmware(tmp_path, "f280049c", drive, calibration)
     (tmp_path / "prelude.h").write_text(DRIVERLIB_PRELUDE, encoding="utf-8")
     headers = ("driverlib/f28004x/driverlib", "device_support/f28004x/common/include")
     command = [host_compiler(), "-std=gnu99", "-fsyntax-only", "-Wall", "-Werror", "-include", tmp_path / "prelude.h"]

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dzdesign.block_drives import drives_checked
+from dzdesign.block_identity import beside_another, of_another_valve, repeated
 from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import InputError, RequirementError, quoted
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock
@@ -53,21 +55,34 @@ def given_blocks(folder: Path, files: Iterable[Path]) -> list[GivenBlock]:
 
 def blocks_checked(folder: Path, given: Iterable[GivenBlock]) -> "list[Check]":
     """Try each block with the firmware in `folder` on every input, and return a requirement for each."""
-    from dzdesign.verify.exhaustive.block_check import BlockFirmware
-
-    firmware = BlockFirmware(folder)
-    return [_checked(firmware, each) for each in given]
-
-
-def _checked(firmware: "BlockFirmware", given: GivenBlock) -> "Check":
     from dzdesign.codegen.calibration.packing import unpack
-    from dzdesign.design.compensator import Compensator
+    from dzdesign.verify.exhaustive.block_check import BlockFirmware
+    from dzdesign.verify.firmware.folder import read_firmware_manifest
+    from dzdesign.verify.requirements import CALIBRATION_BLOCK
+
+    firmware, target, blocks = BlockFirmware(folder), read_firmware_manifest(folder).target, list(given)
+    checks = [_checked(firmware, target, each) for each in blocks]
+    read = [(each.path, unpack(each.octets, f"'{each.path}'")) for each in blocks]
+    right = [
+        (path, block, _compensator(each)[0])
+        for check, each, (path, block) in zip(checks, blocks, read, strict=True)
+        if check.holds
+    ]
+    return [
+        *checks,
+        *drives_checked(folder, right),
+        *(CALIBRATION_BLOCK.check(holds=False, name=f"{CALIBRATION_BLOCK.title}: {name}", text=fault)
+          for name, fault in repeated(read)),
+    ]  # fmt: skip
+
+
+def _checked(firmware: "BlockFirmware", target: str, given: GivenBlock) -> "Check":
+    from dzdesign.codegen.calibration.packing import text_of, unpack
     from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows
     from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
     from dzdesign.verify.requirements import CALIBRATION_BLOCK
 
-    path, octets, content = given.path, given.octets, read_bytes(given.compensator_json, "compensator file")
-    compensator, digest = read_artefact(content, Compensator, str(given.compensator_json)), sha256_of(content)
+    path, octets, (compensator, digest) = given.path, given.octets, _compensator(given)
     name, source = f"{CALIBRATION_BLOCK.title}: {path}", SourceFile(source=given.compensator_json.name, sha256=digest)
     try:
         found = firmware.check(octets, compensator, source)
@@ -77,9 +92,37 @@ def _checked(firmware: "BlockFirmware", given: GivenBlock) -> "Check":
     faults = [] if check.holds else [check.text]
     follows = (certificate_follows(compensator), bounds_follow(compensator), law_follows(compensator))
     faults += [f"{each.name}: {each.text}" for each in follows if not each.holds]
-    if fault := other_numbers(unpack(octets, f"'{path}'"), compensator, digest):
-        faults.append(fault)
-    return CALIBRATION_BLOCK.check(holds=not faults, name=check.name, text="; ".join(faults) or check.text)
+    block = unpack(octets, f"'{path}'")
+    serial = text_of(block.serial)
+    faults += filter(None, (
+        other_numbers(block, compensator, digest),
+        _other_target(target, compensator),
+        of_another_valve(serial, compensator),
+        beside_another(path, octets),
+    ))  # fmt: skip
+    whose = f"serial number {quoted(serial) if serial else 'none'}, CRC-32 {block.crc32:08x}: "
+    return CALIBRATION_BLOCK.check(holds=not faults, name=check.name, text=whose + ("; ".join(faults) or check.text))
+
+
+def _compensator(given: GivenBlock) -> "tuple[Compensator, str]":
+    """Return the compensator beside a block, and the SHA-256 of its file."""
+    from dzdesign.design.compensator import Compensator
+
+    content = read_bytes(given.compensator_json, "compensator file")
+    return read_artefact(content, Compensator, str(given.compensator_json)), sha256_of(content)
+
+
+def _other_target(target: str, compensator: "Compensator") -> str:
+    """Say that a compensator's codes are other voltages or times at the firmware's target: no block tells that."""
+    from dzdesign.codegen.project import target_named
+
+    if compensator.target is None:
+        return ""  # its law can't be derived again, which is said
+    try:
+        target_named(target).check_designed_for(compensator.target)
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 def other_numbers(block: "CalibrationBlock", compensator: "Compensator", digest: str) -> str:
@@ -87,7 +130,7 @@ def other_numbers(block: "CalibrationBlock", compensator: "Compensator", digest:
     from dzdesign.codegen.calibration.block import block_of
 
     numbers = [name for name in block.__dataclass_fields__ if name not in OF_NO_COMPENSATOR]
-    follows = block_of(compensator, digest)
+    follows = block_of(compensator, digest, serial="", record="")
     differ = [name for name in numbers if getattr(block, name) != getattr(follows, name)]
     if not differ:
         return ""

@@ -1,5 +1,6 @@
 """A serial port of this machine, opened for one program alone."""
 
+import errno
 import sys
 import time
 from typing import TYPE_CHECKING
@@ -25,8 +26,18 @@ def open_port(name: str, baud: float, look_s: float) -> "serial.Serial":
     except (OSError, ValueError) as error:
         known = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
         raise InputError(
-            f"the port '{name}' can't be opened at {baud:g} bit/s ({error}); ports of this machine: {known}"
+            f"the port '{name}' can't be opened at {baud:g} bit/s: {_reason(error)}; ports of this machine: {known}"
         ) from error
+
+
+def _reason(error: Exception) -> str:
+    """Return why a port did not open, in words where the system's are long; others as pyserial has them."""
+    known = {errno.ENOENT: "there is none of this name", errno.EISDIR: "it is a folder"}
+    known[errno.EACCES] = "this user may not open it"
+    code = getattr(error, "errno", None)
+    if code is None and str(errno.ENOTTY) in str(error) and "configure port" in str(error):
+        return "it is no serial port"
+    return known.get(code or 0, str(error))
 
 
 class PortLine:

@@ -7,7 +7,6 @@ from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.block_images import FORMATS
 from dzdesign.codegen.calibration.layout import members
 from dzdesign.codegen.calibration.packing import OCTETS, pack
-from dzdesign.codegen.calibration.places import SECTORS
 from tests.support.core_variants import variant
 from tests.support.paths import ROOT
 
@@ -49,9 +48,7 @@ def test_a_block_is_read_by_the_table_alone():
     assert covered == OCTETS
 
 
-def test_the_page_states_size_sectors_and_formats():
+def test_the_page_states_size_and_formats():
     page = PAGE.read_text(encoding="utf-8")
     assert f"a block of {OCTETS} octets" in page and "<!-- made: calibration -->" in page
-    for target, place in SECTORS.items():
-        assert f"| {target} | word `{place.address:#x}` |" in page and place.unit_octets == 2
     assert all(f"| `.{name}` |" in page for name in FORMATS)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
+from dzdesign.codegen.calibration.places import Place
 from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.design.current.circuit import CurrentSampling
@@ -21,17 +22,27 @@ RENDERER_NAMES = frozenset(
     | {"core_sources", "core_headers", "firmware_origin", "current", "current_faults"}
     | {"link_sources", "link_headers"}
     | {"block", "block_files", "block_sources", "block_headers", "block_lines", "command_zero", "offset_ticks"}
-    | {"sector", "region", "region_page", "region_file"}
+    | {"sector", "region", "region_page", "region_file", "block_address", "block_words"}
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlashSector:
-    """A memory range of a vendor's linker file, its page, and that file."""
+    """A flash sector for calibration blocks: a memory range of a vendor's linker file that it places nothing in.
+
+    `address` and `words` count words of 16 bits.
+    """
 
     region: str
     page: int
     file: str
+    address: int
+    words: int
+
+    @property
+    def place(self) -> Place:
+        """Where a block begins in it."""
+        return Place(address=self.address, unit_octets=2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +81,7 @@ class Target:
     current_sampling: CurrentSampling | None = None
     #: Output paths of the files that are the user's to fill in; the rest is generated again as it is.
     board: frozenset[str] = frozenset()
-    #: Where a calibration block has a flash sector of its own: the memory range of the vendor's linker file.
+    #: Where a calibration block has a flash sector of its own.
     sector: FlashSector | None = None
     #: The serial line of its telemetry, if it sends any.
     link: Link | None = None
@@ -106,6 +117,11 @@ class Target:
     def folder(self) -> str:
         """Name of the target's folder: an identifier, because it is a package."""
         return folder_of(self.name)
+
+    @property
+    def block_place(self) -> Place:
+        """Where a calibration block lies; address 0, in octets, where it has no sector of its own."""
+        return self.sector.place if self.sector else Place()
 
     def inputs(self) -> TargetInputs:
         """Return the converter and timer that a compensator for this target is designed for."""

@@ -1,11 +1,12 @@
-"""What is odd in a lot though each of its valves is in order: a recording that two share, valves of another lot."""
+"""What is odd in a lot though each of its valves is in order: what two of them share, and valves of another lot."""
 
 import os
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from dzdesign.batch.valves import Valve
-from dzdesign.core.errors import InputError, and_more
+from dzdesign.codegen.calibration.block import entry_of_record
+from dzdesign.core.errors import InputError, and_more, quoted
 from dzdesign.report.lot.valve_folder import VALVES, ValveFolder
 from dzdesign.report.lot.valve_names import by_name
 
@@ -17,7 +18,8 @@ def anomalies_of(found: Sequence[ValveFolder], folder: Path, valves: Sequence[Va
     """Return sentences on a lot as read back from its folder, and as it was given, with patterns of recordings."""
     overlapping = _overlapping(valves)
     names = {each.name for each in found}
-    return [*overlapping.values(), *_shared_recordings(found, overlapping), *_left_over(names, folder)]
+    shared = (*_shared_recordings(found, overlapping), *_shared_serials(found, overlapping))
+    return [*overlapping.values(), *shared, *_left_over(names, folder)]
 
 
 def _overlapping(valves: Sequence[Valve]) -> dict[tuple[str, ...], str]:
@@ -57,6 +59,20 @@ def _shared_recordings(found: Sequence[ValveFolder], known: Collection[tuple[str
         "name of another valve? Their firmware is that valve's; record the ramp test again"
         for names in groups
         if len(names) > 1 and names not in known
+    ]
+
+
+def _shared_serials(found: Sequence[ValveFolder], known: Collection[tuple[str, ...]]) -> list[str]:
+    """A block is told from another valve's by its serial number."""
+    owners: dict[str, list[str]] = {}
+    for each in found:
+        if each.compensator and (serial := entry_of_record(each.compensator, "serial")):
+            owners.setdefault(serial, []).append(each.name)
+    return [
+        f"{and_more(names, NAMED)} have the same serial number, {quoted(serial)}, and by it their blocks can't be told "
+        "apart; correct record.serial"
+        for serial, names in owners.items()
+        if len(names) > 1 and tuple(names) not in known
     ]
 
 

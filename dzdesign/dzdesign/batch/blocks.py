@@ -30,15 +30,13 @@ def write_block(compensator: "Compensator", target: str, folder: Path) -> tuple[
     from dzdesign.codegen.calibration.block_images import image_of
     from dzdesign.codegen.calibration.built_for import built_for
     from dzdesign.codegen.calibration.packing import pack
-    from dzdesign.codegen.calibration.places import place_of
-    from dzdesign.stages.calibration import entry_of_record
+    from dzdesign.codegen.project import target_named
 
     name = "compensator.json"
     digest = sha256_of((folder / name).read_bytes())
-    serial, record = (entry_of_record(compensator, entry) for entry in ("serial", "record"))
-    octets = pack(block_of(compensator, digest, serial=serial, record=record))
+    octets = pack(block_of(compensator, digest))
     (folder / BLOCK_FILE).write_bytes(octets)
-    (folder / BLOCK_IMAGE).write_bytes(image_of(octets, "hex", place_of(target)))
+    (folder / BLOCK_IMAGE).write_bytes(image_of(octets, "hex", target_named(target).block_place))
     found = _firmware(built_for(compensator)).check(octets, compensator, SourceFile(source=name, sha256=digest))
     (folder / found.FILE_NAME).write_bytes(to_json_bytes(found))
     if found.holds:

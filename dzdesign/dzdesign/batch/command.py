@@ -11,6 +11,7 @@ from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
 from dzdesign.batch.lot_firmware import needing_another, write_lot_firmware
+from dzdesign.batch.odd_blocks import odd_blocks
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import (
@@ -129,7 +130,7 @@ def _finished(
             for valve in valves
             if valve.name not in unwritten
         },
-        anomalies=anomalies_of(found, output, valves),
+        anomalies=[*anomalies_of(found, output, valves), *odd_blocks(len(designed), firmware, output)],
         budget=lot_budget(designed),
         firmware=firmware,
         units=units_of_lot(designed),

@@ -12,6 +12,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware
 from dzdesign.report.lot.valve_folder import FIRMWARE, ValveFolder
+from dzdesign.report.lot.valve_names import by_name
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.built_for import BuiltFor
@@ -78,7 +79,7 @@ def write_lot_firmware(
 
     if not designed:
         return None
-    first = min(designed)
+    first = min(designed, key=by_name)
     project = project_of(designed[first])
     fits = setting is not None and project_of(setting) == project
     compensator = setting if setting is not None and fits else designed[first]

@@ -24,7 +24,7 @@ EXAMPLES = (
     "dzdesign calibration --read valve.hex firmware      # does it belong to this firmware's compensator?",
 )
 #: Options that a block is written with.
-OF_WRITING = ("output", "address", "serial", "record")
+OF_WRITING = ("output", "target", "address", "serial", "record")
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,9 @@ def run(arguments: Arguments, json: bool) -> int:
         return _read(arguments, json)
     if arguments.compensator is None or arguments.output is None:
         raise InputError("calibration needs a COMPENSATOR.json and -o FILE, or --read FILE; see --help")
+    from dzdesign.codegen.calibration.place_text import elsewhere
+    from dzdesign.codegen.project import target_named
+
     made = calibration(arguments)
     document = _document(made, os.fspath(arguments.output))
     if json:
@@ -51,6 +54,10 @@ def run(arguments: Arguments, json: bool) -> int:
         return 0
     at = f", at {document['address']} of {made.target}" if made.address is not None else ""
     print(one_line(f"Written: {document['file']}, {document['octets']} octets{at}"))
+    target = target_named(made.target)
+    sector = target.block_place if target.sector else None
+    if made.address is not None and sector and (wrong := elsewhere(made.target, made.address, sector)):
+        print(wrong)
     print(one_line(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}"))
     print(f"CRC-32 {document['crc32']}; SHA-256 of its compensator.json {document['compensator_sha256']}")
     return 0
@@ -93,5 +100,6 @@ def _read_document(found: "ReadCalibration") -> dict[str, Any]:
     return {
         "belongs": found.belongs,
         "difference": found.difference or None,
+        "placed": found.placed or None,
         **asdict(found.reading),
     }

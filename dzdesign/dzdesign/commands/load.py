@@ -7,7 +7,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dzdesign.core.errors import DzdesignError, InputError, RequirementError, one_line
+from dzdesign.core.errors import DzdesignError, InputError, RequirementError, one_line, quoted
 from dzdesign.core.option_readers import number
 from dzdesign.core.options import AnyPath, Option, Text, read_options
 from dzdesign.serial_port import PortLine, open_port
@@ -20,7 +20,19 @@ if TYPE_CHECKING:
 
 #: The longest that a look at the line takes: shorter than an answer is waited for.
 LOOK_S = 0.02
-EXAMPLES = ("dzdesign load valve.hex --port COM5", "dzdesign load --port COM5")
+#: Numbers that a drive's firmware is compiled for, by their names in a block and in what the drive says of itself.
+COMPILED_FOR = {
+    "code_max": "the largest converter code",
+    "compare_max": "the largest compare value",
+    "sample_Hz": "samples a second of",
+    "tick_Hz": "PWM periods a second of",
+    "beta_step": "codes between two nodes of beta of",
+}
+EXAMPLES = (
+    "dzdesign load valve.hex --port COM5",
+    "dzdesign load valve.hex --port COM5 --serial 4711",
+    "dzdesign load --port COM5",
+)
 
 
 @dataclass(frozen=True)
@@ -32,8 +44,10 @@ class Arguments:
     _: KW_ONLY
     port: Annotated[str, Option("PORT")]
     """Serial port, such as COM5 or /dev/ttyUSB0."""
-    baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=(0.0, 1e9)))] = None
+    baud: Annotated[Text, Option("N", read=number("a number such as 115200, up to 1e9", between=(0.0, 1e9)))] = None
     """Bits per second (default: those of f28335's firmware)."""
+    serial: Annotated[Text, Option("TEXT")] = None
+    """Serial number on the valve: a block of another valve is not loaded, and a drive that holds one ends with 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +68,12 @@ class _Block:
 
         return octets_of(self.numbers.compensator_sha256)
 
+    @property
+    def serial(self) -> str:
+        from dzdesign.codegen.calibration.packing import text_of
+
+        return text_of(self.numbers.serial)
+
 
 def run(arguments: Arguments, json: bool) -> int:
     """Load a block and read back what the drive holds; what the drive refuses is a `RequirementError`."""
@@ -61,17 +81,29 @@ def run(arguments: Arguments, json: bool) -> int:
     from dzdesign.codegen.project import DEFAULT_TARGET, target_named
 
     block = None if arguments.block is None else _block_of(Path(arguments.block))
+    if block is not None and arguments.serial not in (None, block.serial):
+        raise InputError(
+            f"{block.source} is the block of serial number {quoted(block.serial)}, and --serial says that the valve "
+            f"has {quoted(arguments.serial)}; nothing was sent: take the block of this valve"
+        )
     link = target_named(DEFAULT_TARGET).link
     baud = read_options(arguments, ["baud"])["baud"] or (link.baud if link else 0)
     with open_port(arguments.port, baud, LOOK_S) as port:
         session = LoadSession(PortLine(port), secrets.randbelow(256))
-        drive = _asked(session, arguments.port, baud)
+        drive = before = _asked(session, arguments.port, baud)
         if block is not None:
-            drive = _load(session, block, drive, arguments.port)
+            drive = _load(session, block, before, arguments.port)
     if json:
-        print_json(_document(drive, session))
+        print_json({**_document(drive, session), "serial_before": before.serial})
     else:
         _print(block, drive, session)
+        if drive.serial != before.serial:
+            print(f"Replaced: the block of serial number {one_line(before.serial) or 'none'}")
+    if arguments.serial not in (None, drive.serial):
+        raise RequirementError(
+            f"the drive on {arguments.port} holds the block of serial number {quoted(drive.serial)}, expected "
+            f"{quoted(arguments.serial)} of --serial; load the block of this valve"
+        )
     return 0
 
 
@@ -125,16 +157,22 @@ def _check_fit(block: _Block, drive: "Drive") -> None:
 
     ours, state = block.numbers, drive.state
     if (ours.layout, ours.length) != (state.layout, state.length):
-        raise RequirementError(
+        raise InputError(
             f"{block.source} has layout {ours.layout} in {ours.length} words, the drive's firmware takes layout "
             f"{state.layout} in {state.length}; firmware and dzdesign must be of one version"
         )
     if ours.shape != state.shape:
         differs = [text for place, text in enumerate(SHAPE_BITS.values()) if (ours.shape ^ state.shape) >> place & 1]
-        raise RequirementError(
+        raise InputError(
             f"{block.source} is for another kind of drive than the firmware was generated for: they differ in "
             f"'{', '.join(differs)}'; generate firmware and block from designs with the same wiring and outputs"
         )
+    for name, what in COMPILED_FOR.items():
+        if (block_has := getattr(ours, name)) != (drive_has := getattr(state, name)):
+            raise InputError(
+                f"{block.source} is for firmware with {what} {block_has}, the drive's has {drive_has}; design it again "
+                "for the drive's target with `dzdesign design --target`"
+            )
 
 
 def _verified(session: "LoadSession", block: _Block) -> "Drive":
@@ -201,7 +239,8 @@ def _print(block: _Block | None, drive: "Drive", session: "LoadSession") -> None
 
     state = drive.state
     if block is not None:
-        print(one_line(f"Loaded and read back: {block.source}; {session.repeats} requests were sent twice"))
+        again = f"; {session.repeats} requests were sent again" if session.repeats else ""
+        print(one_line(f"Loaded and read back: {block.source}{again}"))
     print(f"Block in use: {_place(drive)}")
     if state.block != NO_BLOCK:
         print(f"Serial number: {one_line(drive.serial) or 'none'}")

@@ -21,7 +21,7 @@ from dzdesign.terminal.progress import say
 if TYPE_CHECKING:
     import serial
 
-    from dzdesign.codegen.telemetry.frame import FrameReader
+    from dzdesign.codegen.telemetry.frame import Frame, FrameReader
     from dzdesign.codegen.telemetry.recording import Recording
 
 #: A line with a firmware on it shows a frame within this time.
@@ -109,16 +109,23 @@ def _record(
             return f"the port broke ({error})"
         for frame in reader.feed(octets):
             if frame.origin != recording.scalings.origin:
-                return _other_firmware(frame.origin, recording)
+                return _other_firmware(frame, recording)
             first = first or time.monotonic()
             recording.add(frame)
     return ""
 
 
-def _other_firmware(origin: int, recording: "Recording") -> str:
+def _other_firmware(frame: "Frame", recording: "Recording") -> str:
     """Refuse frames whose scalings are not known; what came before them, if anything did, is worth keeping."""
+    from dzdesign.codegen.telemetry.frame import STATUS_BITS, STATUS_CALIBRATION
+
+    if frame.status & STATUS_CALIBRATION:  # such a drive names no compensator, whatever is given
+        text = f"the drive reports '{STATUS_BITS[STATUS_CALIBRATION]}' (status {STATUS_CALIBRATION}): its output is off"
+        if recording:
+            return text
+        raise InputError(f"{text}; load its valve's block, `dzdesign load BLOCK --port ...`, and record then")
     own = recording.scalings.origin
-    text = f"the frames are of the compensator whose SHA-256 begins with {origin:04x}, not {own:04x}"
+    text = f"the frames are of the compensator whose SHA-256 begins with {frame.origin:04x}, not {own:04x}"
     if recording:
         return text
     raise InputError(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.block_checks import other_numbers
+from dzdesign.block_identity import of_another_valve
 from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, sha256_of, write_file
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import AnyPath, Option, Text
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
 #: Formats that hold a block.
 READABLE = ("hex", "bin", "txt")
+#: Texts of a block, and the entries of the test record that they are taken from.
+TEXTS = ("serial", "record")
 COMPENSATOR_NAME = "compensator.json"
 
 
@@ -77,6 +80,8 @@ class ReadCalibration:
     """What a block says, and whether it is that of the compensator beside it: None where none was given."""
 
     reading: "CalibrationReading"
+    #: Where the file has a programmer write the block; empty of a raw file, which does not say.
+    placed: str
     compared_with: str
     belongs: bool | None
     #: Why it is not.
@@ -104,15 +109,16 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
         _check_output(output, form)
     if arguments.address is not None and form not in WITH_ADDRESS:
         raise InputError(f"--address is given, but a file of format {form} states none; leave it out")
+    for name in TEXTS:
+        if getattr(arguments, name) is not None and form not in READABLE:
+            raise InputError(f"--{name} is given, but an A2L has the layout of a block alone; leave it out")
     compensator, digest, source = _given(arguments.compensator)
     target = _target_of(compensator, arguments.target)
     place = _place(target, arguments.address, OCTETS)
     _refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
-    serial, record = (
-        entry_of_record(compensator, name) if (given := getattr(arguments, name)) is None else given
-        for name in ("serial", "record")
-    )
-    octets = pack(block_of(compensator, digest, serial=serial, record=record))
+    if fault := of_another_valve(arguments.serial or "", compensator):
+        raise InputError(f"--serial: {fault}; leave it out, or give the compensator.json of that valve")
+    octets = pack(block_of(compensator, digest, serial=arguments.serial, record=arguments.record))
     made = CalibrationImage(
         content=image_of(octets, form, place),
         block=unpack(octets),
@@ -134,20 +140,28 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
         If the file is no calibration block, is damaged, or holds numbers that no firmware accepts. That it is not the
         block of the compensator is no error: see ``belongs``.
     """
-    from dzdesign.codegen.calibration.block_files import octets_in_file
+    from dzdesign.codegen.calibration.block_files import placed_in_file
     from dzdesign.codegen.calibration.packing import unpack
+    from dzdesign.codegen.calibration.place_text import place_in_words
     from dzdesign.codegen.calibration.reading import reading_of
+    from dzdesign.codegen.project import targets
     from dzdesign.core.recorded_units import AS_COMPUTED
 
     path = Path(arguments.file)
-    block = unpack(octets_in_file(path, _known_format(arguments.format, READABLE)), f"'{path}'")
+    form = _known_format(arguments.format, READABLE) or path.suffix.lower().removeprefix(".")
+    octets, place = placed_in_file(path, arguments.format)
+    sectors = {target.name: target.block_place for target in targets() if target.sector}
+    block, placed = unpack(octets, f"'{path}'"), place_in_words(place, form, sectors) if place else ""
     reading = reading_of(block, f"'{path}'")
     if arguments.compensator is None:
-        return ReadCalibration(reading=reading, compared_with="", belongs=None, difference="", units=AS_COMPUTED)
+        return ReadCalibration(
+            reading=reading, placed=placed, compared_with="", belongs=None, difference="", units=AS_COMPUTED
+        )
     compensator, digest, source = _given(arguments.compensator)
     difference = _difference(block, reading, compensator, digest)
     return ReadCalibration(
         reading=reading,
+        placed=placed,
         compared_with=source,
         belongs=not difference,
         difference=difference,
@@ -170,9 +184,10 @@ def _format_of(output: Path | None, given: str | None) -> str:
         if output is None:
             return "bin"
         if ending not in KNOWN:
+            what = f"ends with '{output.suffix}'{nearest(ending, KNOWN)}" if ending else "has no ending"
             raise InputError(
-                f"'{output}' ends with '{output.suffix}'{nearest(ending, KNOWN)}, expected "
-                f"{', '.join(f'.{name}' for name in KNOWN)}; choose another -o, or say --format"
+                f"'{output}' {what}, expected {', '.join(f'.{name}' for name in KNOWN)}; choose another -o, or say "
+                "--format"
             )
         return ending
     if ending in KNOWN and ending != given:
@@ -244,9 +259,9 @@ def _target_of(compensator: "Compensator", given: str | None) -> str:
 
 
 def _place(target: str, address: str | None, octets: int) -> "Place":
-    from dzdesign.codegen.calibration.places import place_of
+    from dzdesign.codegen.project import target_named
 
-    place = place_of(target)
+    place = target_named(target).block_place
     if address is None:
         return place
     try:
@@ -255,17 +270,10 @@ def _place(target: str, address: str | None, octets: int) -> "Place":
         raise InputError(f"--address is {quoted(address)}, expected a whole number such as 0x330000") from error
 
 
-def entry_of_record(compensator: "Compensator", name: str) -> str:
-    """Return a text of the block: that entry of the test record; one setting for a lot is of no valve."""
-    if compensator.lot:
-        return ""
-    return next((text for key, text in compensator.valve.record.items() if key.casefold() == name), "")
-
-
 def _difference(
     block: "CalibrationBlock", reading: "CalibrationReading", compensator: "Compensator", digest: str
 ) -> str:
     """Say why a block is not that of a compensator: another file, or numbers that do not follow from it."""
     if reading.compensator_sha256 != digest:
         return f"its compensator.json has the SHA-256 {digest}, the block names {reading.compensator_sha256}"
-    return other_numbers(block, compensator, digest)
+    return other_numbers(block, compensator, digest) or of_another_valve(reading.serial, compensator)

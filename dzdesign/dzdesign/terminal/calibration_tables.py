@@ -34,6 +34,8 @@ def print_calibration(found: "ReadCalibration", console: "Console | None" = None
         why = f": {found.difference}" if found.difference else ""
         put_line(console, f"{which} of {found.compared_with}{why}")
     put_line(console, f"Layout {reading.layout}, {reading.length_words} words, CRC-32 {reading.crc32}")
+    if found.placed:
+        put_line(console, f"The file places it at {found.placed}")
     kind = "; ".join(reading.shape) or "one solenoid, duty as output"
     put_line(
         console,

@@ -12,12 +12,12 @@ from dzdesign.codegen.calibration.a2l import a2l_text
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.layout import members
 from dzdesign.codegen.calibration.packing import OCTETS, pack
-from dzdesign.codegen.calibration.places import place_of
+from dzdesign.codegen.project import target_named
 from tests.support.core_variants import variant
 
 #: Of the extra `test`, where it has a wheel.
 CHECKER = shutil.which("a2ltool", path=Path(sys.executable).parent)
-WIDTHS = {"U8": 1, "U16": 2, "U32": 4, "U64": 8}
+WIDTHS = {"U8": 1, "U16": 2, "U32": 4, "U64": 8, "S32": 4}
 
 
 def check(text: str, folder: Path) -> tuple[int, str]:
@@ -30,7 +30,7 @@ def check(text: str, folder: Path) -> tuple[int, str]:
 
 @pytest.mark.skipif(CHECKER is None, reason="a2ltool has no wheel for this system")
 def test_a_strict_parser_finds_nothing_wrong(tmp_path):
-    text = a2l_text(place_of("f28335"))
+    text = a2l_text(target_named("f28335").block_place)
     status, said = check(text, tmp_path)
     assert status == 0 and "No problems found" in said
     faults = {"U32 0 ": "U33 0 ", "VAL_BLK": "VALBLK", "/end MODULE\n": "", " unit_3 0": " unit_99 0"}
@@ -42,21 +42,25 @@ def test_a_strict_parser_finds_nothing_wrong(tmp_path):
 
 @pytest.mark.parametrize("target", ["f28335", "host"])
 def test_every_number_of_the_block_is_at_its_address(target):
-    place = place_of(target)
+    place = target_named(target).block_place
     block = block_of(variant("bipolar, all options", "wide"), "ab" * 32, serial="V-7 №3", record="lot 12")
     octets, begin = pack(block), place.address * place.unit_octets
     found = re.findall(
-        r"/begin CHARACTERISTIC (\S+) \"[^\"]+\"\n(VALUE|VAL_BLK|ASCII) (0x[0-9a-f]+) (U\d+) 0 \S+ 0 (\d+)\n"
+        r"/begin CHARACTERISTIC (\S+) \"[^\"]+\"\n(VALUE|VAL_BLK|ASCII) (0x[0-9a-f]+) ([US]\d+) 0 \S+ (-?\d+) (\d+)\n"
         r"(?:(?:NUMBER|MATRIX_DIM) ([\d ]+)\n)?READ_ONLY\n/end CHARACTERISTIC\n",
         a2l_text(place),
     )
     assert [name for name, *_ in found] == [member.path for member in members()]
     end = begin
-    for name, kind, at, layout, most, dimensions in found:
+    for name, kind, at, layout, least, most, dimensions in found:
         width, count = WIDTHS[layout], 1
         for dimension in dimensions.split():
             count *= int(dimension)
-        assert int(at, 16) == end and int(most) == 256**width - 1 and (count > 1) == (kind != "VALUE")
+        assert int(at, 16) == end and (count > 1) == (kind != "VALUE")
+        # A slope below zero is one for an XCP tool too.
+        signed = name.endswith(".slope")
+        assert (layout[0] == "S") is signed and int(most) - int(least) == 256**width - 1
+        assert int(least) == (-(256**width) // 2 if signed else 0)
         piece = octets[end - begin : end - begin + width * count]
         end += width * count
         if kind == "ASCII":

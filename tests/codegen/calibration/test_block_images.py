@@ -4,17 +4,16 @@ import pytest
 
 from dzdesign.codegen.calibration.block_files import octets_in_file
 from dzdesign.codegen.calibration.block_images import FORMATS, image_of
-from dzdesign.codegen.calibration.places import SECTORS, Place, place_of
-from dzdesign.codegen.project import targets
+from dzdesign.codegen.calibration.places import Place
+from dzdesign.codegen.project import target_named
 from dzdesign.core.errors import InputError
 from tests.support.block_reader import hex_memory, ti_txt_memory
-from tests.support.paths import ROOT
 
 OCTETS = bytes(range(256)) * 10 + b"last"
 PLACES = {
-    "f28335": place_of("f28335"),
-    "f280049c": place_of("f280049c"),
-    "octets from 0": place_of("host"),
+    "f28335": target_named("f28335").block_place,
+    "f280049c": target_named("f280049c").block_place,
+    "octets from 0": target_named("host").block_place,
     "words over a segment's end": Place(address=0x31_FFFE, unit_octets=2),
     "octets over a segment's end": Place(address=0x0800_FFF4),
     "last words": Place(address=2**31 - len(OCTETS) // 2, unit_octets=2),
@@ -89,10 +88,3 @@ def test_an_address_has_room_behind_it_in_every_format(place, address, right):
         return
     with pytest.raises(InputError, match="--address is"):
         place.at(address, 12)
-
-
-def test_the_sectors_are_of_targets():
-    regions = {target.name: target.sector.region for target in targets() if target.sector}
-    assert set(SECTORS) == set(regions) and place_of("host") == Place()
-    page = (ROOT / "docs" / "reference" / "calibration.md").read_text(encoding="utf-8")
-    assert all(f"`{region}`" in page for region in regions.values())

@@ -44,21 +44,21 @@ def test_each_format_gives_the_octets_wherever_they_lie(tmp_path, name, content)
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.s19", b"", "expected one of .bin, .hex, .txt"),
+        ("a.s19", b"", "expected a calibration file, .bin, .hex, .txt"),
         ("a.bin", bytes(MOST_OCTETS + 1), "a few KiB"),
         ("a.hex", b":0100000001FF", "does not end with the record"),
         ("a.hex", hex_text((0, OCTETS)).replace(":10001000", ":10001001").encode(), "not Intel HEX"),
         ("a.hex", b"S1\n:00000001FF\n", "not Intel HEX"),
         ("a.hex", b"\xff\n:00000001FF\n", "no ASCII"),
-        ("a.hex", b":00000001FF\n", "0 runs"),
-        ("a.hex", hex_text((0, OCTETS), (5000, OCTETS)).encode(), "2 runs"),
-        ("a.txt", ti_text((0, OCTETS), (5000, OCTETS)).encode(), "2 runs"),
+        ("a.hex", b":00000001FF\n", "octets in none of its rows"),
+        ("a.hex", hex_text((0, OCTETS), (5000, OCTETS)).encode(), "parts that do not follow each other"),
+        ("a.txt", ti_text((0, OCTETS), (5000, OCTETS)).encode(), "parts that do not follow each other"),
         ("a.txt", ti_text((0, OCTETS), end="").encode(), "does not end with 'q'"),
         ("a.txt", ti_text((0, OCTETS), end="q\n00\n").encode(), "follows the 'q'"),
         ("a.txt", b"00 01\nq\n", "row 1"),
         ("a.txt", b"@0000\n00 1\nq\n", "row 2"),
         ("a.txt", b"@0000 00\nq\n", "row 1"),
-        ("a.txt", b"q\n", "0 runs"),
+        ("a.txt", b"q\n", "octets in none of its rows"),
     ],
 )
 def test_a_file_with_an_error_is_refused(tmp_path, name, content, said):

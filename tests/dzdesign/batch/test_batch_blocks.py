@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from many_valves import write_lot
 
+from dzdesign.batch.anomalies import anomalies_of
+from dzdesign.batch.odd_blocks import odd_blocks
 from dzdesign.block_checks import blocks_checked, given_blocks
 from dzdesign.codegen.calibration.block_files import octets_in_file
 from dzdesign.codegen.calibration.built_for import built_for
@@ -20,6 +22,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
+from dzdesign.report.lot.valve_folder import read_valve_folder
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
 from tests.dzdesign.batch.test_batch import tree
@@ -49,6 +52,20 @@ def made(tmp_path_factory):
         patch.setattr(host_compiler, "run_compiler", lambda *given: commands.append(given[0]) or run(*given))
         assert batch(folder, folder / "out") == 1
     return folder, folder / "out", commands
+
+
+def test_two_valves_of_one_serial_number_are_named(made):
+    first, second, failed = (read_valve_folder(valve(made[1], name)) for name in TARGETS)
+    assert anomalies_of([first, second, failed], made[1], []) == []
+    (line,) = anomalies_of([first, replace(second, compensator=first.compensator), failed], made[1], [])
+    assert "V0000, V0001" in line and "'V0000-S'" in line
+
+
+def test_a_lots_firmware_of_an_earlier_run_is_named(made, tmp_path):
+    summary = json.loads((made[1] / "batch.json").read_text("utf-8"))
+    assert summary["firmware"] and not any("lot/firmware" in line for line in summary["anomalies"])
+    (line,) = odd_blocks(1, None, made[1])
+    assert "lot/firmware" in line and odd_blocks(1, None, tmp_path) == []
 
 
 def valve(output, name):

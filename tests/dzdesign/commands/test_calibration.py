@@ -13,8 +13,7 @@ from dzdesign import api
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.block_images import image_of
 from dzdesign.codegen.calibration.packing import pack
-from dzdesign.codegen.calibration.places import place_of
-from dzdesign.codegen.project import generate
+from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
@@ -90,6 +89,25 @@ def test_a_file_is_read_back(written, name, capsys):
     assert "V-7" in page and digest in page and "Is the block of" in page
 
 
+@pytest.mark.parametrize(
+    ("name", "words", "placed"),
+    [
+        ("a.hex", [], "word 0x330000, where f28335"),
+        ("a.txt", [], "octet 0x660000, where f28335"),
+        ("a.hex", ["--address", "0x300000"], "word 0x300000, WHERE NO"),
+        ("a.hex", ["--target", "host", "--address", "0x660000"], "octet 0x660000, WHERE NO"),
+        ("a.bin", [], None),
+    ],
+)
+def test_a_file_says_where_a_programmer_writes_the_block(written, tmp_path, unproven, capsys, name, words, placed):
+    file = str(tmp_path / name)
+    assert main(["calibration", str(written / "compensator.json"), "-o", file, *words]) == 0
+    assert ("NOT 0x330000" in capsys.readouterr().out) is ("0x300000" in words)
+    assert main(["calibration", "--read", file, str(written), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)["placed"]
+    assert said is None if placed is None else said.startswith(placed)
+
+
 def test_a_firmware_folder_stands_for_its_compensator(written, tmp_path, capsys):
     (tmp_path / "compensator.json").write_bytes((written / "compensator.json").read_bytes())
     assert main(["calibration", "--read", str(written / "valve.hex"), str(tmp_path), "--json"]) == 0
@@ -117,7 +135,7 @@ def test_another_compensator_and_a_changed_number_are_found(written, tmp_path, b
     [
         (lambda octets: b"", "DZC1"),
         (lambda octets: octets[:-2], "cut"),
-        (lambda octets: octets + octets, "something follows it"),
+        (lambda octets: octets + octets, "something follows the block"),
         (lambda octets: octets[:4] + b"\2\0" + octets[6:], "layout 2"),
         (lambda octets: octets[:700] + bytes([octets[700] ^ 4]) + octets[701:], "CRC-32"),
         (lambda octets: b'{"schema": "dzdesign.valve/1"}', "DZC1"),
@@ -127,11 +145,19 @@ def test_another_compensator_and_a_changed_number_are_found(written, tmp_path, b
 def test_a_damaged_block_is_one_sentence(block, tmp_path, form, damage, named, capsys):
     file = tmp_path / f"valve.{form}"
     octets = damage(block)
-    file.write_bytes(image_of(octets, form, place_of("f28335")))
+    file.write_bytes(image_of(octets, form, target_named("f28335").block_place))
     assert main(["calibration", "--read", str(file)]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1
-    assert named in said.err or (not octets and "0 runs" in said.err)
+    assert named in said.err or (not octets and "none of its rows" in said.err)
+
+
+@pytest.mark.parametrize("rows", [lambda rows: rows[:4] + rows[5:], lambda rows: rows[:4] + rows[3:]])
+def test_a_row_of_intel_hex_that_is_lost_or_twice_is_said(block, tmp_path, rows, capsys):
+    found = image_of(block, "hex", target_named("f28335").block_place).decode().splitlines()
+    (tmp_path / "valve.hex").write_text("\n".join(rows(found)))
+    assert main(["calibration", "--read", str(tmp_path / "valve.hex")]) == 2
+    assert "do not follow each other" in capsys.readouterr().err
 
 
 def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, block, tmp_path, capsys):
@@ -164,6 +190,11 @@ def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, bloc
         ["valve.hex", "-o", "new.hex"],
         ["--read", "valve.hex", "-o", "new.hex"],
         ["--read", "valve.hex", "--serial", "8"],
+        ["--read", "valve.hex", "--target", "f28335"],
+        ["--read", "."],
+        ["--read", "layout.a2l"],
+        ["compensator.json", "-o", "new.a2l", "--serial", "8"],
+        ["compensator.json", "-o", "new.hex", "--serial", "  "],
         ["--read", "valve.hex", "--format", "txt"],
         ["--read", "valve.hex", "--format", "a2l"],
         ["--read", "nothing.hex"],
@@ -228,24 +259,32 @@ def test_an_options_file_for_all_commands_is_taken(written, tmp_path, capsys, un
     assert (said["address"], said["serial"], said["record"]) == ("0x320000", "", "")
 
 
-def test_serial_and_record_come_from_the_test_record_unless_given(unproven):
+def test_serial_and_record_come_from_the_test_record_unless_given(unproven, tmp_path):
     compensator = variant("default", "wide")
     record = {"Serial": "4711 №", "record": "lot 12", "oil": "HLP 46"}
     compensator = replace(compensator, valve=replace(compensator.valve, record=record))
     by_record, given, none = (
         members_of(pack(api.calibration(compensator, **words).block))
-        for words in ({}, {"serial": "8", "record": "shelf 3"}, {"serial": "", "record": ""})
+        for words in ({}, {"serial": "4711 №", "record": "shelf 3"}, {"serial": "", "record": ""})
     )
     assert (by_record["serial"], by_record["record"]) == ("4711 №".encode(), b"lot 12")
-    assert (given["serial"], given["record"]) == (b"8", b"shelf 3")
+    assert (given["serial"], given["record"]) == ("4711 №".encode(), b"shelf 3")
     assert (none["serial"], none["record"]) == (b"", b"")
+    # Another number would make this valve's law pass for that of another valve.
+    with pytest.raises(api.InputError, match=r"'8'.*'4711 №'"):
+        api.calibration(compensator, serial="8")
+    document = to_json_bytes(compensator)
+    (tmp_path / "valve.bin").write_bytes(pack(block_of(compensator, sha256_of(document), serial="8")))
+    (tmp_path / "compensator.json").write_bytes(document)
+    found = api.read_calibration(tmp_path / "valve.bin", tmp_path)
+    assert found.belongs is False and "'8'" in found.difference
     # One setting for a lot is designed from one valve, whose number is not that of the others.
     sides = {1: compensator.valve.sides["positive"]}
     lot = tuple(LotValve.of(name, "0" * 64, sides, {1: "closing"}) for name in ("V-1", "V-2"))
     of_lot = members_of(pack(api.calibration(replace(compensator, lot=lot)).block))
     assert (of_lot["serial"], of_lot["record"]) == (b"", b"")
     with pytest.raises(api.InputError, match="at most 24; shorten it"):
-        api.calibration(compensator, serial="x" * 25)
+        api.calibration(variant("default", "wide"), serial="x" * 25)
 
 
 def test_the_page_is_in_the_units_of_the_recordings_where_the_compensator_is_known(tmp_path, capsys):

@@ -3,22 +3,25 @@
 import contextlib
 import json
 import os
+import re
 import subprocess
 import threading
 import tty
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 from intelhex import IntelHex
 
-from dzdesign.codegen.calibration.packing import unpack
+from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
 from dzdesign.serial_port import PortLine, open_port
+from tests.support.documented_commands import agrees
 from tests.support.loading.bench import SLOTS, build_drive
 from tests.support.loading.device import Device, build_device, firmware_files
 from tests.support.loading.files import COMPILER, blocks, drive_files, refused_blocks
+from tests.support.paths import ROOT
 
 pytestmark = [
     pytest.mark.skipif(not COMPILER, reason="no C compiler (cc, gcc or clang) on the path"),
@@ -115,6 +118,18 @@ def test_a_block_is_loaded_and_read_back_and_outlives_a_restart(drive, tmp_path,
     assert "Serial number: SN-1" in out and crc_of(NEW) in out
 
 
+def test_the_page_shows_what_is_printed(drive, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    block_file(tmp_path, name="valve.hex")
+    drive.start()
+    page = (ROOT / "docs" / "howto" / "load-block.md").read_text("utf-8")
+    shown = re.findall(r"^    dzdesign (load [^\n]*)\n\n```text\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert len(shown) == 2
+    for words, output in shown:
+        assert main(words.replace("COM5", drive.port).split()) == 0
+        assert agrees(output, capsys.readouterr().out.strip("\n"))
+
+
 @pytest.mark.parametrize("words", [("octets", 900), ("words", len(OLD) + 100), ("words", MARK)])
 def test_a_drive_whose_supply_goes_keeps_a_whole_block(drive, tmp_path, capsys, monkeypatch, words):
     monkeypatch.setattr("dzdesign.codegen.loading.session.TRIES", 2)
@@ -125,6 +140,18 @@ def test_a_drive_whose_supply_goes_keeps_a_whole_block(drive, tmp_path, capsys, 
     status, held, _ = load(capsys, "--port", drive.port)
     assert status == 0 and held["crc32"] in ((crc_of(OLD), crc_of(NEW)) if words[1] == MARK else (crc_of(OLD),))
     assert load(capsys, block_file(tmp_path), "--port", drive.port)[1]["crc32"] == crc_of(NEW)
+
+
+def test_a_block_of_another_serial_number_than_the_valves_is_not_loaded(drive, tmp_path, capsys):
+    drive.start()
+    file, port = block_file(tmp_path), ("--port", drive.port)
+    status, _, said = load(capsys, file, *port, "--serial", "SN-0")
+    assert status == 2 and "'SN-1'" in said and "'SN-0'" in said
+    status, held, said = load(capsys, *port, "--serial", "SN-1")
+    assert status == 1 and held["serial"] == "SN-0" and "'SN-0'" in said, "the drive holds what it held"
+    status, held, _ = load(capsys, file, *port, "--serial", "SN-1")
+    assert (status, held["serial"], held["serial_before"]) == (0, "SN-1", "SN-0")
+    assert load(capsys, *port, "--serial", "SN-1")[0] == 0
 
 
 @pytest.mark.parametrize(("words", "said"), [(("driving", 1), "still drives"), (("command", 1), "not zero")])
@@ -141,7 +168,17 @@ def test_a_block_that_the_drive_must_not_have_is_refused_and_nothing_changes(dri
     before = drive.memory.read_bytes()
     other_shape = block_file(tmp_path, refused_blocks()[1])
     status, _, error = load(capsys, other_shape, "--port", drive.port)
-    assert status == 1 and "two solenoids" in error
+    assert status == 2 and "two solenoids" in error
+    for change, said in (
+        ({"compare_max": 40_000}, "compare value 40000, the drive's has 60000"),
+        ({"code_max": 1023}, "1023, the drive's has 4095"),
+        ({"sample_Hz": 1000}, "1000, the drive's has 1250"),
+        ({"tick_Hz": 5000}, "5000, the drive's has 2500"),
+        ({"beta_step": 128}, "128, the drive's has 64"),
+    ):
+        other = block_file(tmp_path, pack(replace(unpack(NEW), **change)))
+        status, _, error = load(capsys, other, "--port", drive.port)
+        assert status == 2 and said in error, error
     assert drive.memory.read_bytes() == before, "not even erased"
     status, _, error = load(capsys, block_file(tmp_path, refused_blocks()[0]), "--port", drive.port)
     assert status == 1 and "of the law outside" in error
@@ -162,8 +199,11 @@ def test_bad_input_is_one_sentence_and_status_2(drive, tmp_path, capsys, monkeyp
         ((cut, "--port", drive.port), "it is cut"),
         ((damaged, "--port", drive.port), "CRC-32"),
         ((tmp_path / "no.bin", "--port", drive.port), "does not exist"),
-        ((block_file(tmp_path, name="valve.s19"), "--port", drive.port), "expected one of .bin, .hex, .txt"),
-        ((block_file(tmp_path), "--port", "/dev/no-such-port"), "can't be opened"),
+        ((block_file(tmp_path, name="valve.s19"), "--port", drive.port), "ends with '.s19'"),
+        ((tmp_path, "--port", drive.port), "is a folder"),
+        ((block_file(tmp_path), "--port", "/dev/no-such-port"), "there is none of this name"),
+        ((block_file(tmp_path), "--port", tmp_path), "it is a folder"),
+        ((block_file(tmp_path), "--port", tmp_path / "cut.bin"), "it is no serial port"),
         ((block_file(tmp_path), "--port", drive.port, "--baud", "fast"), "--baud is 'fast'"),
         ((block_file(tmp_path), "--port", drive.port), "GPIO28"),  # nobody is there
     ):

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_RELEASED, Frame
-from dzdesign.codegen.telemetry.recording import COLUMNS, scalings_of
+from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_CALIBRATION, STATUS_RELEASED, Frame
+from dzdesign.codegen.telemetry.recording import COLUMNS, Recording, scalings_of
+from dzdesign.commands.monitor import _other_firmware
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import read_ramp_file
@@ -240,6 +241,19 @@ def test_another_firmware_is_refused(bench):
     bench.send([bench.frame(0, origin=bench.origin ^ 1)])
     status, _, said = bench.end()
     assert status == 2 and "not " + f"{bench.origin:04x}" in said and not bench.output.exists()
+
+
+def test_a_drive_without_a_valid_block_is_no_other_firmware(firmware_folder):
+    """It names no compensator, so that none that could be given would be its own."""
+    recording = Recording(scalings_of(firmware_folder))
+    frame = Frame(
+        ticks=TICKS, origin=0, u_adc=0, p_a_adc=ZERO, p_b_adc=ZERO, beta=0, compare_a=0, compare_b=0,
+        status=STATUS_CALIBRATION,
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"no valid calibration block.*dzdesign load"):
+        _other_firmware(frame, recording)
+    recording.add(frame)
+    assert "no valid calibration block" in _other_firmware(frame, recording), "of a recording that broke off"
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ int device_verbose;
 void (*device_on_eint)(void);
 void (*device_on_service)(void);
 struct model model;
+int device_side = 1;
 
 static const char *name_of(uint32_t value)
 {
@@ -237,9 +238,11 @@ void device_eint(void)
  * those of driver.c and of solenoid.h. */
 static void convert(char event)
 {
+    const uint16_t command =
+        (uint16_t)(model.half ? 1000u : model.zero ? 0u : model.centre ? 2048u : 100u * (++model.samples % 41u));
     const uint16_t inputs[5] = {
-        (uint16_t)((event == 'h') ? 5000u : (model.half ? 1000u : model.zero ? 0u : 100u * (++model.samples % 41u))),
-        model.half ? (uint16_t)900u : (uint16_t)1u, model.half ? (uint16_t)100u : (uint16_t)2u, 4000u,
+        (event == 'h') ? (uint16_t)5000u : command, model.half ? (uint16_t)900u : model.sound ? (uint16_t)2000u : (uint16_t)1u,
+        model.half ? (uint16_t)100u : model.sound ? (uint16_t)(800u + (command / 2u)) : (uint16_t)2u, 4000u,
         code_at(SOLENOID_SUPPLY_V * 0.075, FULL_V)};
     unsigned number, last = 0u;
 
@@ -311,6 +314,8 @@ struct tick device_period(char event)
 
     model.zero = (event == 'z') || (model.zero && (event != 'n'));
     model.half = (event == 'm') || (model.half && (event != 'n'));
+    model.centre = (event == 'c') || (model.centre && (event != 'n'));
+    model.sound = (event == 'p') || model.sound;
     model.trip_pin_low[0] = (event == 'T') || (model.trip_pin_low[0] && (event != 't'));
     model.trip_pin_low[1] = (event == 'K') || (model.trip_pin_low[1] && (event != 'k'));
     solenoid_event(&solenoid, event);

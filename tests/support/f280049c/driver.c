@@ -5,6 +5,8 @@
  *                                 . nothing special, x no conversion, h a code above 12 bits, b converter busy,
  *                                 z the command is zero from here, n no longer, T the trip pin goes low, t high,
  *                                 K, k the same for the second trip pin, m codes that make 20000 from here,
+ *                                 c the command is in the middle of its codes from here, n no longer, p pressures that a
+ *                                 4-20 mA sensor gives from here,
  *                                 B the stand-in core drives solenoid B from here, A solenoid A
  *   driver watchdog               how often the main loop serves the watchdog without and with an interrupt
  */
@@ -41,6 +43,9 @@ static void run(const char *events)
         printf("tick event=%c output=%s duty=%u served=%u cmpa=%u without=%u released=%u fault=%u duty_b=%u tripped_b=%u", *events,
                tick.output, (unsigned)tick.duty, tick.served, (unsigned)model.cmpa[0], dz_state.ticks_without_sample,
                dz_state.released, dz_state.fault, (unsigned)tick.duty_b, (unsigned)model.tripped[1]);
+#ifdef DZ_FAULT_CALIBRATION
+        printf(" calibration=%u", dz_state.calibration);
+#endif
 #ifdef DZ_CURRENT_REST_TICKS
         printf(" converted=%u before=%u first=%u apart=%u current=%u sum=%u offset=%u current_faults=%u set_point=%u forced=%u",
                tick.converted, tick.before, tick.first, tick.apart, tick.current_mA, dz_state.current_sum,

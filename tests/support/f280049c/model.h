@@ -15,7 +15,7 @@ struct model
     uint32_t trigger_period, trigger_prescale, trigger_source, burst_trigger, burst_size, sync_out, xbar[2];
     bool in_phase, at_once, trigger_soca, burst, priority;
     bool soca, converter, interrupt, interrupt_flag, pie, pie_blocked, tripped[2], trip_pin_low[2], adc_flag[2], adc_overflow;
-    bool adc_busy, zero, half, reset_by_watchdog, no_crystal;
+    bool adc_busy, zero, half, centre, sound, reset_by_watchdog, no_crystal;
     void (*isr)(void);
 };
 

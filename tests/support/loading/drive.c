@@ -34,6 +34,9 @@ int drive_never_holds;    /* the interrupt does not come */
 int drive_bad_word = -1;  /* a word of the memory that takes nothing */
 unsigned drive_uses, drive_wrong_uses; /* times that a block was taken into use; while the output was not held */
 unsigned long drive_words; /* erased and written so far */
+int drive_erase_ticks;     /* that an erase takes, in which nothing else runs but the interrupt */
+int drive_late_ticks;      /* so many went by in erases, and nobody else has seen them yet */
+unsigned drive_erases;
 
 static uint16_t random_word(void)
 {
@@ -85,6 +88,9 @@ uint16_t dz_store_erase(uint16_t slot)
         return DZ_STORE_BUSY;
     }
     busy_left = busy;
+    drive_erases++;
+    ticks = (uint16_t)(ticks + (unsigned)drive_erase_ticks);
+    drive_late_ticks += drive_erase_ticks;
     /* As flash does it: first all bits to 0, then all to 1. */
     for (unsigned at = 0u; at < WORDS; at++)
     {
@@ -143,6 +149,8 @@ void drive_power_on(unsigned seed, unsigned busy_polls)
     drive_octets_left = drive_words_left = -1;
     drive_driving = drive_command = drive_new_command = drive_never_holds = 0;
     drive_bad_word = -1;
+    drive_erase_ticks = drive_late_ticks = 0;
+    drive_erases = 0u;
     random_state = seed;
     busy = busy_left = (uint16_t)busy_polls;
     hold = 0u;

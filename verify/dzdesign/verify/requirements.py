@@ -76,6 +76,10 @@ RAMPS = Requirement(
     how="`verify --ramps` with the recordings that valve.json was made from",
 )
 BOARD_FILES = Requirement(id="board-files", title="your board files compile")
+#: Of a firmware in block form.
+OWN_BLOCK = Requirement(
+    id="block-accepted", title="the firmware accepts its calibration block, and refuses it damaged"
+)
 #: Of a firmware in block form: blocks of other valves than the one that lies in its folder.
 CALIBRATION_BLOCK = Requirement(
     id="calibration-block", title="every input with the calibration block", how="`verify --blocks` with its file"

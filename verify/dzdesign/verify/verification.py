@@ -29,6 +29,7 @@ from dzdesign.verify.firmware.compensator_checks import certificate_follows, law
 from dzdesign.verify.firmware.compilation import board_compiles, changed_board_files, check_include, compiles_strictly
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.manifest import manifest_follows
+from dzdesign.verify.firmware.own_block import own_block_accepted
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
 from dzdesign.verify.firmware.unchanged_files import differing_files, files_unchanged, user_files
 from dzdesign.verify.integrator.comparison import compare_with_integrator
@@ -103,6 +104,7 @@ def verify(
     checks = (
         files_unchanged(folder, manifest),
         manifest_follows(folder, manifest, compensator),
+        *own_block_accepted(folder, manifest),
         *vectors_follow(folder, manifest, compensator),
         *core.checks,
         *current.checks,

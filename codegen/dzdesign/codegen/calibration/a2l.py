@@ -13,6 +13,7 @@ from dzdesign.codegen.calibration.places import Place
 HEAD = f"ASAP2_VERSION 1 71\n/* dzdesign: layout {LAYOUT} of the calibration block */\n"
 #: Bits of a number to its type in A2L.
 TYPES = {8: "UBYTE", 16: "UWORD", 32: "ULONG", 64: "A_UINT64"}
+SIGNED_TYPES = {32: "SLONG"}
 #: Members that are octets, and whether they are a text.
 OF_OCTETS = {"compensator_sha256": False, "serial": True, "record": True}
 
@@ -33,12 +34,18 @@ def a2l_text(place: Place) -> str:
         "/end MOD_COMMON",
     ]
     for bits, kind in TYPES.items():
-        lines += [f"/begin RECORD_LAYOUT U{bits}", f"FNC_VALUES 1 {kind} ROW_DIR DIRECT", "/end RECORD_LAYOUT"]
+        lines += _record_layout(f"U{bits}", kind)
+    for bits, kind in SIGNED_TYPES.items():
+        lines += _record_layout(f"S{bits}", kind)
     for unit, name in methods.items():
         lines += [f'/begin COMPU_METHOD {name} "" IDENTICAL "%20.0" "{unit}"', "/end COMPU_METHOD"]
     for member in members():
         lines += _characteristic(member, place, methods)
     return HEAD + "\n".join([*lines, "/end MODULE", "/end PROJECT", ""])
+
+
+def _record_layout(name: str, kind: str) -> list[str]:
+    return [f"/begin RECORD_LAYOUT {name}", f"FNC_VALUES 1 {kind} ROW_DIR DIRECT", "/end RECORD_LAYOUT"]
 
 
 def _characteristic(member: Member, place: Place, methods: dict[str, str]) -> Iterator[str]:
@@ -48,7 +55,10 @@ def _characteristic(member: Member, place: Place, methods: dict[str, str]) -> It
     kind = "ASCII" if OF_OCTETS.get(member.path) else "VAL_BLK" if count > 1 else "VALUE"
     method = methods.get(entry.unit, "NO_COMPU_METHOD")
     yield f'/begin CHARACTERISTIC {member.path} "{entry.text}"'
-    yield f"{kind} {_address(place, 2 * member.at)} U{bits} 0 {method} 0 {2**bits - 1}"
+    layout, low, high = f"U{bits}", 0, 2**bits - 1
+    if entry.signed:
+        layout, low, high = f"S{bits}", -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
+    yield f"{kind} {_address(place, 2 * member.at)} {layout} 0 {method} {low} {high}"
     if kind == "ASCII":
         yield f"NUMBER {count}"
     elif count > 1:

@@ -37,13 +37,26 @@ ALTERNATIVE = "generate it with --calibration fixed"
 Part = TypeVar("Part", SideBlock, CurrentBlock)
 
 
-def block_of(compensator: Compensator, digest: str, *, serial: str = "", record: str = "") -> CalibrationBlock:
+def entry_of_record(compensator: Compensator, name: str) -> str:
+    """Return a text of the block: that entry of the test record; one setting for a lot is of no valve."""
+    if compensator.lot:
+        return ""
+    return next((text for key, text in compensator.valve.record.items() if key.casefold() == name), "")
+
+
+def block_of(
+    compensator: Compensator, digest: str, *, serial: str | None = None, record: str | None = None
+) -> CalibrationBlock:
     """Return the block of a compensator whose file has the SHA-256 `digest`.
 
-    More nodes of beta or of the play than a block has room for, a longer text, and numbers that its own firmware would
-    refuse are an `InputError`.
+    Serial number and record are by default those of the valve's test record. More nodes of beta or of the play than a
+    block has room for, a longer text, and numbers that its own firmware would refuse are an `InputError`.
     """
     built = built_for(compensator)
+    serial, record = (
+        entry_of_record(compensator, name) if given is None else given
+        for name, given in (("serial", serial), ("record", record))
+    )
     block = _numbers(compensator, built, digest, serial, record)
     if refused := refusals(block, built):
         rules = "; ".join(f"{name}: {', '.join(rules)}" for name, rules in refused.items())

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from dzdesign.codegen.calibration.block_source import block_lines
-from dzdesign.codegen.calibration.layout import CalibrationBlock
+from dzdesign.codegen.calibration.layout import LENGTH_WORDS, CalibrationBlock
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.core.files import Values
 from dzdesign.codegen.target import Target
@@ -29,7 +29,8 @@ def block_values(compensator: Compensator, block: CalibrationBlock | None, targe
     }
     if target.sector:
         sector = target.sector
-        return {**values, "region": sector.region, "region_page": sector.page, "region_file": sector.file}
+        place = {"block_address": f"{sector.address:#x}", "block_words": LENGTH_WORDS}
+        return {**values, **place, "region": sector.region, "region_page": sector.page, "region_file": sector.file}
     return values
 
 

@@ -43,11 +43,11 @@ def unpack(octets: bytes, name: str = "the calibration block") -> CalibrationBlo
     if len(octets) >= LENGTH_AT and layout != LAYOUT:
         raise InputError(f"{name}: layout {layout}, but this version reads layout {LAYOUT}; {remedy}")
     length = int.from_bytes(octets[LENGTH_AT : LENGTH_AT + 2], "little")
-    if len(octets) != OCTETS or length != LENGTH_WORDS:
-        raise InputError(
-            f"{name}: {len(octets)} octets, of which it states {2 * length}; expected {OCTETS}: it is cut, or "
-            f"something follows it; {remedy}"
-        )
+    if len(octets) != OCTETS:
+        fault = "it is cut" if len(octets) < OCTETS else "something follows the block"
+        raise InputError(f"{name}: {len(octets)} octets, expected {OCTETS}: {fault}; {remedy}")
+    if length != LENGTH_WORDS:
+        raise InputError(f"{name}: the block states {length} words, expected {LENGTH_WORDS}: it is damaged; {remedy}")
     stated, found = int.from_bytes(octets[-CRC_OCTETS:], "little"), zlib.crc32(octets[:-CRC_OCTETS])
     if stated != found:
         raise InputError(f"{name}: the CRC-32 is {stated:08x}, expected {found:08x}: it is damaged; {remedy}")
@@ -68,8 +68,9 @@ def text_words(text: str, words: int, what: str) -> tuple[int, ...]:
     octets = text.encode()
     if len(octets) > 2 * words:
         raise InputError(f"{what} '{text}' has {len(octets)} octets in UTF-8, expected at most {2 * words}; shorten it")
-    if not text.isprintable():
-        raise InputError(f"{what} {text!r} has characters that can't be printed, expected a plain text")
+    if not text.isprintable() or text.isspace():
+        fault = "is blank" if text.isspace() else "has characters that can't be printed"
+        raise InputError(f"{what} {text!r} {fault}, expected a plain text")
     return octet_words(octets.ljust(2 * words, b"\0"))
 
 

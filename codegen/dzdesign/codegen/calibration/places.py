@@ -1,6 +1,5 @@
 """Where a calibration block lies in a target's memory, and how that target's tools count addresses."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dzdesign.core.errors import InputError
@@ -27,16 +26,3 @@ class Place:
                 f"--address is {address:#x}, expected a multiple of {step} up to {last - last % step:#x}, in {unit}"
             )
         return Place(address=address, unit_octets=self.unit_octets)
-
-
-#: The flash sectors that the linker files of TI keep for data: FLASHB of F28335.cmd, and sector 8 of bank 1 of
-#: 28004x_generic_flash_lnk.cmd, which can be erased while the firmware runs from bank 0.
-SECTORS: Mapping[str, Place] = {
-    "f28335": Place(address=0x33_0000, unit_octets=2),
-    "f280049c": Place(address=0x09_8000, unit_octets=2),
-}
-
-
-def place_of(target: str) -> Place:
-    """Return where a target's block lies; address 0, in octets, where the target has no sector for it."""
-    return SECTORS.get(target, Place())

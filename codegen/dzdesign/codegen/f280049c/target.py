@@ -86,5 +86,8 @@ TARGET = c2000_target(
         gain_codes=GAIN_CODES,
         noise_codes=peak_noise_codes(SNR_DB, 2**ADC_BITS),
     ),
-    sector=FlashSector(region="FLASH_BANK1_SEC8", page=0, file="28004x_generic_flash_lnk.cmd"),
+    # Of bank 1, which can be erased while the firmware runs from bank 0.
+    sector=FlashSector(
+        region="FLASH_BANK1_SEC8", page=0, file="28004x_generic_flash_lnk.cmd", address=0x09_8000, words=0x1000
+    ),
 )

@@ -162,6 +162,6 @@ TARGET = c2000_target(
     converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
     sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
     block_sources=("dz_active.c", "dz_active.h"),
-    sector=FlashSector(region="FLASHB", page=1, file="F28335.cmd"),
+    sector=FlashSector(region="FLASHB", page=1, file="F28335.cmd", address=0x33_0000, words=0x8000),
     link=LINK,
 )

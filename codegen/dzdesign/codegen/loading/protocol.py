@@ -26,6 +26,8 @@ FRAME_OCTETS = HEADER_OCTETS + MOST_PAYLOAD + CRC_OCTETS
 SEQUENCES = 1 << 8
 #: Within a frame two octets are at most this far apart; a load without a request for this time is over.
 OCTET_S, LOAD_S = 0.1, 2.0
+#: The longest that a drive may be silent in an erase, and in all else: one that waits for its flash answers nobody.
+ERASE_S, SILENT_S = 20.0, 3.0
 #: An interrupt holds the output low within this time.
 HOLD_S = 0.02
 #: Octets of the serial number that a drive states.
@@ -124,6 +126,11 @@ class DriveState:
     layout: Annotated[int, Number(bits=16, text="layout version of blocks that this firmware takes")]
     length: Annotated[int, Number(bits=16, text="their length in words")]
     shape: Annotated[int, Number(bits=16, text="their shape")]
+    code_max: Annotated[int, Number(bits=16, text="largest code of the converter that they must be for")]
+    compare_max: Annotated[int, Number(bits=16, text="the same of counts at 100 % duty")]
+    sample_Hz: Annotated[int, Number(bits=16, text="the same of samples a second")]
+    tick_Hz: Annotated[int, Number(bits=16, text="the same of PWM periods a second")]
+    beta_step: Annotated[int, Number(bits=16, text="the same of codes between two nodes of beta")]
     crc: Annotated[int, Number(bits=32, text="CRC-32 of the block in use")]
     origin: Annotated[int, Number(bits=32, text="start of its compensator's SHA-256")]
 
@@ -216,6 +223,8 @@ def protocol_context(tick_Hz: int) -> dict[str, object]:
         "hold_ticks": round(HOLD_S * tick_Hz),
         "octet_ms": round(1000 * OCTET_S),
         "load_s": f"{LOAD_S:g}",
+        "erase_s": f"{ERASE_S:g}",
+        "silent_s": f"{SILENT_S:g}",
         "serial_octets": SERIAL_OCTETS,
         "linked": LINKED,
         "no_block": f"0x{NO_BLOCK:04X}",

@@ -6,9 +6,11 @@ from typing import Protocol
 
 from dzdesign.codegen.calibration.files import FINDINGS
 from dzdesign.codegen.loading.protocol import (
+    ERASE_S,
     MOST_WORDS,
     REPLY,
     SEQUENCES,
+    SILENT_S,
     DriveState,
     Frame,
     FrameReader,
@@ -19,7 +21,8 @@ from dzdesign.codegen.loading.protocol import (
 from dzdesign.core.errors import InputError, RequirementError
 
 #: A reply comes within this time, or its request is sent again, so often.
-REPLY_S, TRIES = 0.3, 10
+REPLY_S = 0.3
+TRIES, TRIES_IN_ERASE = round(SILENT_S / REPLY_S), round(ERASE_S / REPLY_S)
 #: The longest that a drive may say that it is still busy: an erase of flash takes seconds.
 BUSY_S = 60.0
 #: A load that lost its place (the drive's time was over, another sender) begins anew so often.
@@ -130,8 +133,9 @@ class LoadSession:
         """Send a request until its reply comes; busy is no reply yet."""
         self._sequence = (self._sequence + 1) % SEQUENCES
         octets = Frame(type=request, sequence=self._sequence, payload=payload).octets()
+        tries = TRIES_IN_ERASE if request == Request.BEGIN else TRIES
         begin, unanswered = self._line.now(), 0
-        while unanswered < TRIES:
+        while unanswered < tries:
             self._line.write(octets)
             unanswered += 1
             for frame in self._frames_until(self._line.now() + REPLY_S):
@@ -145,7 +149,7 @@ class LoadSession:
             self.repeats += 1
             if self._line.now() - begin > BUSY_S:
                 raise RefusedError(Reason.BUSY, 0)
-        raise NoReplyError(f"no answer to {request.name} in {TRIES} tries")
+        raise NoReplyError(f"no answer to {request.name} in {tries} tries")
 
     def _frames_until(self, end: float) -> Iterator[Frame]:
         while (left := end - self._line.now()) > 0:

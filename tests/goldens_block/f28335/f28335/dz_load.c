@@ -52,14 +52,21 @@ void dz_load_end(struct dz_load *load, uint16_t reason, uint16_t detail, uint16_
     (void)dz_load_hold(0u);
 }
 
+/* The next request is due, in a time that counts from the next pass on: `ticks` is of before the store was called. */
+static void receive_on(struct dz_load *load, uint16_t ticks)
+{
+    dz_load_go_on(load, DZ_LOAD_STEP_RECEIVING, ticks);
+    load->anew = 1u;
+    dz_load_answer_last(load, DZ_LOAD_REASON_DONE, 0u);
+}
+
 static void erase_slot(struct dz_load *load, uint16_t ticks)
 {
     const uint16_t outcome = dz_store_erase(load->slot);
 
     if (outcome == DZ_STORE_DONE)
     {
-        dz_load_go_on(load, DZ_LOAD_STEP_RECEIVING, ticks);
-        dz_load_answer_last(load, DZ_LOAD_REASON_DONE, 0u);
+        receive_on(load, ticks);
     }
     else if (outcome != DZ_STORE_BUSY)
     {
@@ -84,8 +91,7 @@ static void write_words(struct dz_load *load, uint16_t ticks)
                                                    load->count * sizeof load->data[0]) == 0))
     {
         load->words = (uint16_t)(load->words + load->count);
-        dz_load_go_on(load, DZ_LOAD_STEP_RECEIVING, ticks);
-        dz_load_answer_last(load, DZ_LOAD_REASON_DONE, 0u);
+        receive_on(load, ticks);
     }
     else
     {
@@ -198,6 +204,11 @@ static void step(struct dz_load *load, uint16_t ticks)
 
 void dz_load_poll(struct dz_load *load, uint16_t ticks)
 {
+    if (load->anew != 0u)
+    {
+        load->since = ticks;
+        load->anew = 0u;
+    }
     /* There is one place for a reply: what may fill it waits until the last one is sent. The step comes first, so that
      * no flood of frames keeps a load from its end. */
     if ((load->step == DZ_LOAD_STEP_RECEIVING) || ((load->step != DZ_LOAD_STEP_IDLE) && (load->reply_octets == 0u)))

@@ -55,6 +55,7 @@ struct dz_load
     uint16_t used;         /* slot 0 or 1, DZ_LOAD_LINKED or DZ_SLOTS_NONE: where it lies */
     uint16_t step;         /* what the load does now, 0: there is none */
     uint16_t since;        /* ticks, modulo 65536, when it began to */
+    uint16_t anew;         /* 1: a function of the store has just returned, and may have taken seconds */
     uint16_t ended;        /* DZ_LOAD_REASON_... that the last load ended with */
     uint16_t slot;         /* that the new block goes into */
     uint16_t words;        /* of the new block that are there */

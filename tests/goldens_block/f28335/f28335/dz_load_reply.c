@@ -63,6 +63,11 @@ void dz_load_answer_query(struct dz_load *load, uint16_t sequence)
     at = dz_load_put_16(load->reply, at, DZ_CALIBRATION_LAYOUT);
     at = dz_load_put_16(load->reply, at, DZ_CALIBRATION_WORDS);
     at = dz_load_put_16(load->reply, at, DZ_CALIBRATION_SHAPE);
+    at = dz_load_put_16(load->reply, at, DZ_ADC_CODE_MAX);
+    at = dz_load_put_16(load->reply, at, DZ_COMPARE_MAX);
+    at = dz_load_put_16(load->reply, at, DZ_SAMPLE_HZ);
+    at = dz_load_put_16(load->reply, at, DZ_TICK_HZ);
+    at = dz_load_put_16(load->reply, at, DZ_BETA_STEP);
     at = dz_load_put_32(load->reply, at, (block != NULL) ? block->crc32 : 0u);
     at = dz_load_put_32(load->reply, at, dz_load_origin(block));
     for (i = 0u; i < (DZ_LOAD_SERIAL_OCTETS / 2u); i++)

@@ -10,14 +10,20 @@
  * - with the supply lost at any moment, no word changes but those of the slot that is being erased or written;
  * - they are called by the main loop only, and only while the output is held low (dz_active.h);
  * - they may take their time in one of two ways: return DZ_STORE_BUSY, and be called again with the same arguments; or
- *   return late, and serve the watchdog meanwhile.
+ *   return late, and serve the watchdog meanwhile. Who returns late answers nobody: an erase has 20 s, then
+ *   `dzdesign load` gives up; a write has 3 s;
+ * - after DZ_STORE_DONE the memory can be read at once: what was written is read back and compared.
  *
- * Flash of the TMS320F28335, with the Flash API of TI (SPRC848 and its manual SPNU422, from TI):
+ * Flash of the TMS320F28335, with TI's Flash API for it (C2000Ware, libraries/flash_api):
  * - a sector a slot, which nothing else of the program lies in, the linked block neither (dz_calibration.cmd): erase is
- *   Flash_Erase(), write is Flash_Program();
- * - the API runs from RAM and turns the flash off: whatever runs meanwhile must lie in RAM too. dz_isr() does, and while
- *   the output is held it calls nothing that lies in flash and reads no block;
- * - Flash_CallbackPtr, called by the API meanwhile, is the place of ServiceDog(), both in RAM: an erase takes seconds. */
+ *   Flash_Erase(), write is Flash_Program(); dz_store_slot() returns the start of the sector;
+ * - the API runs from RAM and takes the whole flash meanwhile: whatever else runs must lie in RAM too, what calls the API
+ *   included. dz_isr() does, and while the output is held it calls nothing that lies in flash and reads no block. Every
+ *   other interrupt that you add must lie in RAM, or be off. With all of them off the output stays held: the trip zone
+ *   needs none;
+ * - Flash_CallbackPtr, called by the API meanwhile, is the place of ServiceDog(), both in RAM: an erase takes seconds, the
+ *   watchdog's time is some milliseconds, and the main loop, which serves it else, waits for the API;
+ * - dz_store_init() sets the API up and erases nothing: what the slots hold is the drive's block. */
 #ifndef DZ_STORE_H
 #define DZ_STORE_H
 

@@ -7,6 +7,11 @@
 #define DZ_CALIBRATION_LAYOUT 1u
 #define DZ_CALIBRATION_WORDS 80u
 #define DZ_CALIBRATION_SHAPE 0u
+#define DZ_ADC_CODE_MAX 4095u
+#define DZ_COMPARE_MAX 60000u
+#define DZ_SAMPLE_HZ 1250u
+#define DZ_TICK_HZ 2500u
+#define DZ_BETA_STEP 64u
 
 struct dz_calibration
 {

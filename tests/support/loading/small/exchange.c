@@ -56,6 +56,10 @@ static void print(const uint16_t *numbers, uint16_t count)
     for (uint16_t i = 0u; i < count; i++)
     {
         printf("%04X", (unsigned)numbers[i]);
+        if ((i % 48u) == 47u)
+        {
+            printf("\n"); /* simavr cuts lines of more than 255 characters */
+        }
     }
     printf("\n");
 }
