@@ -62,7 +62,8 @@ class VerifyArguments:
     mutate: Annotated[bool, Option(group=CHECKS)] = False
     """Also make the C wrong in every place, and count what is caught."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
-    """Also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr."""
+    """Also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr; of FMUs every input
+    in Wine and in QEMU."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
     """Also prove by Frama-C that nothing overflows a 16-bit int."""
 

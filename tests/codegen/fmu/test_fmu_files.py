@@ -145,6 +145,16 @@ def test_without_ziglang_it_is_said_how_to_install_it(monkeypatch):
         binaries._version.cache_clear()
 
 
+def test_a_ziglang_that_is_too_old_is_refused(monkeypatch):
+    monkeypatch.setattr(binaries, "version", lambda name: "0.13.0")
+    binaries._version.cache_clear()
+    try:
+        with pytest.raises(InputError, match=r"0\.13\.0 .* expected 0\.17"):
+            fmus_of(full_compensator(), None)
+    finally:
+        binaries._version.cache_clear()
+
+
 def test_c_that_does_not_compile_is_named_with_the_platform(monkeypatch):
     monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
     with pytest.raises(InputError, match="can't compile"):

@@ -1,12 +1,14 @@
 """Binaries of an FMU for every platform, compiled by ziglang from one machine; they need no library."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,6 +21,8 @@ FLAGS = (
     "-O2", "-std=c99", "-shared", "-fPIC", "-nostdlib", "-g0", "-s", "-fvisibility=hidden", "-ffp-contract=off",
     "-fno-sanitize=all", "-fno-stack-protector", "-Wall", "-Wextra", "-Werror",
 )  # fmt: skip
+#: Of ziglang: 0.13 wants a library's entry point of every DLL.
+OLDEST = (0, 17)
 #: Folder with an empty stdlib.h, which the standard's headers include and need nothing of.
 NO_LIBRARY = "no_library"
 #: Seconds; the first compilation for a platform fills ziglang's cache.
@@ -59,9 +63,13 @@ def _version() -> str:
         raise InputError(
             'binaries of an FMU are compiled by ziglang, which is not installed; run `pip install "dzdesign[fmu]"`'
         )
-    from importlib.metadata import version
-
-    return version("ziglang")
+    found = version("ziglang")
+    if tuple(int(part) for part in re.findall(r"\d+", found)[:2]) < OLDEST:
+        raise InputError(
+            f"ziglang {found} can't link the FMUs' binaries without a library, expected {OLDEST[0]}.{OLDEST[1]} or "
+            'later; run `pip install --upgrade "dzdesign[fmu]"`'
+        )
+    return found
 
 
 def binaries_of(identifier: str, fmi: Fmi, sources: Mapping[str, bytes]) -> dict[str, bytes]:
