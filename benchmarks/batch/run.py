@@ -1,13 +1,17 @@
 """Benchmark of `dzdesign batch`: a lot of 1000 valves, 10 of them broken; ``run.py [--quick] [--only blocks]``.
 
+``--valves N`` takes another number of valves.
+
 Exit status 1 if a limit is missed.
 """
 
+import argparse
 import csv
 import os
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -38,9 +42,9 @@ def timed_batch(lot: Path, output: Path, jobs: int) -> tuple[float, list[dict[st
         return seconds, list(csv.DictReader(table))
 
 
-def print_lot(*, quick: bool, seed: int) -> list[Row]:
+def print_lot(*, quick: bool, seed: int, valves: int | None = None) -> list[Row]:
     """Print and return the rows: what became of each valve, and what it took."""
-    count = 60 if quick else 1000
+    count = valves or (60 if quick else 1000)
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         say(f"writing the ramp tests of {count} valves")
@@ -76,10 +80,16 @@ def print_lot(*, quick: bool, seed: int) -> list[Row]:
     return rows
 
 
+PARTS = {"lot": print_lot, "blocks": print_blocks}
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the benchmark and print what missed its limit."""
-    parts = {"lot": (print_lot, 7), "blocks": (print_blocks, 7)}
-    return run_parts(__doc__.splitlines()[0], parts, "60 valves, 6 with blocks", arguments)
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("--valves", type=int)
+    chosen, others = parser.parse_known_args(arguments)
+    parts = {name: (partial(part, valves=chosen.valves), 7) for name, part in PARTS.items()}
+    return run_parts(__doc__.splitlines()[0], parts, "60 valves, 6 with blocks", others)
 
 
 if __name__ == "__main__":

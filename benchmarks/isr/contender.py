@@ -23,6 +23,8 @@ class Contender:
         True for the product's own.
     fast : bool
         False for soft floating point in doubles, with which all inputs on an emulated Cortex-M4 take hours.
+    prelude : str
+        C ahead of the program that counts, where that calls something else or with more than the codes.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Contender:
     sources: Mapping[str, str]
     ours: bool = False
     fast: bool = True
+    prelude: str = ""
 
 
 def our_forms(compensator: Compensator) -> list[Contender]:

@@ -103,6 +103,8 @@ def _checked(argument: Argument, value: Any) -> Any:
     if type(value) in (int, float) and value == 0 and argument.option.example and not argument.is_path:
         return "0" if str in kinds else value  # zero needs no unit
     # A number is read by what it is for, which refuses what can't be one.
+    if argument.is_path and isinstance(value, str) and not value:
+        raise _of_another_kind(name, value, argument)
     fits = bool({int, float} & kinds) or isinstance(value, tuple(kinds - {Mapping, Iterable}))
     if fits or set(argument.result_class.split(" | ")) & {one.__name__ for one in type(value).__mro__}:
         return value

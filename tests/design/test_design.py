@@ -9,7 +9,7 @@ import pytest
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.design.beta_table import offset_ceiling
+from dzdesign.design.ceiling.offset_ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design

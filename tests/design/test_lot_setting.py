@@ -8,7 +8,7 @@ import pytest
 from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.beta_table import offset_ceiling
+from dzdesign.design.ceiling.offset_ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
 from dzdesign.design.lot.setting import lot_setting

@@ -11,7 +11,7 @@ from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.dither import Dither, DrivenDither
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
-from dzdesign.design.beta_table import offset_ceiling
+from dzdesign.design.ceiling.offset_ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design

@@ -15,7 +15,7 @@ from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
 from dzdesign.codegen.calibration.files import block_core_files
 from dzdesign.codegen.calibration.in_project import block_templates, block_values
 from dzdesign.codegen.calibration.layout import CalibrationBlock
-from dzdesign.codegen.calibration.packing import pack
+from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.current_files import CURRENT_HEADERS, CURRENT_SOURCES, FAULT_BITS, current_files
 from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, CoreFile, Values, core_files
@@ -225,6 +225,7 @@ def target_files(
         "firmware_origin": f"0x{banner.digest[:4].upper()}",
         "lot_setting": banner.lot,
         "core_cost": MEASURED.get(target.name, MEASURED[STAND_IN]),
+        "block_octets": OCTETS,
         "cost_is_of_another": target.name not in MEASURED,
         "certificate_reach": fill(reach_of_certificate(compensator), README_COLUMNS),
     }

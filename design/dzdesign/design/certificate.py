@@ -6,15 +6,22 @@ from a file: a file can be edited, and the firmware's header would go on promisi
 
 from dataclasses import fields
 from fractions import Fraction
+from math import ceil
+
+import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import in_units
-from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, OffsetCurve, offset_ceiling, pressures_MPa
+from dzdesign.design.ceiling.curve_row import offset_row
+from dzdesign.design.ceiling.offset_ceiling import OffsetCeiling, offset_ceiling
+from dzdesign.design.ceiling.offset_curve import OffsetCurve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.side_law import Certificate
 from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.design.table.linear_programme import STEP_CODES
+from dzdesign.design.table.table_margins import TableMargins
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
 from dzdesign.identify.valve.side_model import SideModel
 
@@ -40,9 +47,10 @@ def certify(
     table is of nodes of beta over `denominator`, `u_min0` is the law's over u_max. An offset above the ceiling is
     refused.
     """
-    margin = _smallest_margin(ceiling, table, u_min0, denominator, lets_go=curve.above is not None)
-    losses = _losses_V(curve, ceiling, signals, table, u_min0 * u_max_V / denominator)
-    holds_to, released_from = _above(curve, ceiling, signals, table, u_min0 / denominator)
+    margins = TableMargins(limit=ceiling.limit, nodes=table, unit=u_min0 / (denominator * STEP_CODES))
+    margin = _smallest_margin(margins, ceiling.certified, lets_go=curve.above is not None)
+    losses = _losses_V(curve, ceiling.certified, signals, margins, u_max_V)
+    holds_to, released_from = _above(curve, ceiling.certified, signals, margins)
     return Certificate(
         confidence=side.certificate.confidence,
         guard=guard,
@@ -151,60 +159,58 @@ def _remedy(side: SideModel, guard: str) -> str:
     )
 
 
-def _smallest_margin(
-    ceiling: OffsetCeiling, table: tuple[int, ...], u_min0: Fraction, denominator: int, *, lets_go: bool
-) -> Fraction:
+def _smallest_margin(margins: TableMargins, certified: range, *, lets_go: bool) -> Fraction:
     """Return the least distance over u_max between ceiling and offset on the certified codes.
 
     On no code it is negative: those outside the tests may be read at a tested pressure drop. But for an offset that is
     let go above them, which is the least that the table has.
     """
-    scale = denominator * STEP_CODES
-    above, margins = ceiling.certified.stop, []
-    for code, limit in enumerate(ceiling.limit):
-        index, share = divmod(code, STEP_CODES)
-        beta = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, scale)
-        margin = limit - beta * u_min0
-        let_go = lets_go and code >= above and beta <= Fraction(1, denominator)
-        margins.append(max(margin, Fraction(0)) if let_go else margin)
-    if min(margins) < 0:
-        raise RequirementError(f"the offset exceeds the certified one by {float(-min(margins)):.2e} of u_max")
-    return min(margins[code] for code in ceiling.certified or range(len(margins)))
+    codes = np.arange(len(margins.limit))
+    let_go = (codes >= certified.stop) & (margins.numerators <= STEP_CODES) & lets_go
+    held = codes[~let_go]
+    if held.size and (least := margins.least(held)) < 0:
+        raise RequirementError(f"the offset exceeds the certified one by {float(-least):.2e} of u_max")
+    if certified:
+        return margins.least(codes[certified.start : certified.stop])
+    least = margins.least(codes)
+    return max(least, Fraction(0)) if let_go.any() else least
 
 
 def _above(
-    curve: OffsetCurve, ceiling: OffsetCeiling, signals: Signals, table: tuple[int, ...], unit: Fraction
+    curve: OffsetCurve, certified: range, signals: Signals, margins: TableMargins
 ) -> tuple[Fraction, Fraction | None]:
     """Return up to which pressure drop the certificate holds, and from which on the offset is let go, MPa.
 
     Above the tests it holds as far as the continued bound does, code by code, and where the drive is zero whatever the
-    threshold. An offset that is let go is one `unit` of beta over u_max.
+    threshold. An offset that is let go is one unit of beta.
     """
-    tests_end = curve.dp_MPa[-1]
-    if curve.above is None:
+    tests_end, count = curve.dp_MPa[-1], len(margins.limit)
+    if curve.above is None or certified.stop >= count:
         return tests_end, None
-    holds_to, released_from, holds = tests_end, None, curve.above.certified
-    pressures = pressures_MPa(signals, 0, len(ceiling.limit) - 1)
-    for code in range(ceiling.certified.stop, len(ceiling.limit)):
-        index, share = divmod(code, STEP_CODES)
-        offset = unit * Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
-        limit, here = ceiling.limit[code], max(pressures[code], tests_end)
-        holds = holds and (offset <= limit or offset * signals.compare_max < Fraction(1, 2))
-        holds_to = here if holds else holds_to
-        if offset > unit:
-            released_from = None
-        elif released_from is None:
-            released_from = here
-    return holds_to, released_from
+    last = _holds_to(certified.stop, signals, margins) if curve.above.certified else None
+    holds_to = tests_end if last is None else max(signals.dp_MPa(last), tests_end)
+    driven = np.flatnonzero(margins.numerators[certified.stop :] > STEP_CODES)
+    released_from = certified.stop + (int(driven[-1]) + 1 if driven.size else 0)
+    return holds_to, max(signals.dp_MPa(released_from), tests_end) if released_from < count else None
+
+
+def _holds_to(first: int, signals: Signals, margins: TableMargins) -> int | None:
+    """Return the last of the codes, from the first on, up to which every offset is certified or rounds to no drive."""
+    half = 1 / (2 * signals.compare_max * margins.unit)
+    unseen = margins.numerators < ceil(half)  # whole numbers below a half of a count
+    for code in margins.exceeded():
+        if code >= first and not unseen[code]:
+            return code - 1 if code > first else None
+    return len(margins.limit) - 1
 
 
 def _losses_V(
-    curve: OffsetCurve, ceiling: OffsetCeiling, signals: Signals, table: tuple[int, ...], unit_V: Fraction
+    curve: OffsetCurve, certified: range, signals: Signals, margins: TableMargins, u_max_V: Fraction
 ) -> list[float]:
     """Return by how much the table's offset lies under the certified curve at each certified code, V."""
-    losses, pressures = [], pressures_MPa(signals, 0, len(ceiling.limit) - 1)
-    for code in ceiling.certified or range(1):
-        index, share = divmod(code, STEP_CODES)
-        numerator = Fraction(table[index] * (STEP_CODES - share) + table[index + 1] * share, STEP_CODES)
-        losses.append(float(curve.at(pressures[code]) - numerator * unit_V))
-    return losses
+    codes, unit_V = certified or range(1), margins.unit * u_max_V
+    offset = offset_row(curve, signals, codes.start, codes.stop - 1)
+    table = margins.numerators[codes.start : codes.stop].tolist()
+    up, unit = unit_V.numerator, unit_V.denominator
+    triples = zip(offset.numerators, offset.denominators, table, strict=True)
+    return [(value * unit - beta * up * by) / (by * unit) for value, by, beta in triples]

@@ -7,22 +7,24 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of, to_json_bytes
+from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
-from dzdesign.derivation.scaling import drive, evaluate_line
+from dzdesign.derivation.scaling import drive
 from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
 from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
+from dzdesign.design.line_in_beta import line_in_beta
 from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
+from dzdesign.design.valve_hash import sha256_of_valve
 from dzdesign.design.zero_band import CommandError
 from dzdesign.identify.valve.model import ValveModel
 
@@ -129,7 +131,7 @@ class Compensator(ShownInNotebooks, Artefact):
         for sign in self.signals.signs:
             self._check_side(sign)
         lot_json = to_json({"lot": [as_document(valve) for valve in self.lot]}).encode()
-        object.__setattr__(self, "valve_sha256", sha256_of(to_json_bytes(self.valve)))
+        object.__setattr__(self, "valve_sha256", sha256_of_valve(self.valve))
         object.__setattr__(self, "lot_sha256", sha256_of(lot_json) if self.lot else None)
 
     def _check_codes(self) -> None:
@@ -252,25 +254,19 @@ class Compensator(ShownInNotebooks, Artefact):
         """Return the compare value of the law at a code pair, exactly: not rounded, not limited."""
         side, signals, beta = self.side(sign), self.signals, self.law_beta(dp_code, sign)
         from_zero = signals.command.from_zero(command_code, sign)
-        line = evaluate_line(
-            law(self.law),
-            beta=beta,
-            kappa=side.drive_range_over_u_max,
-            u_min0_over_u_max=side.u_min0_over_u_max,
-            n_adc=signals.command.span(sign),
-            n_full=signals.compare_max,
-        )
-        ends = {"zero_band": self.zero_band_codes, "end": self.transition_end}
+        span, u_min0 = signals.command.span(sign), side.u_min0_over_u_max
+        line = line_in_beta(self.law, side.drive_range_over_u_max, u_min0, span, signals.compare_max)
         if from_zero >= self.transition_end:
-            return Fraction(line.slope * from_zero + line.start)
+            return line.counts(from_zero, beta)
+        ends = {"zero_band": self.zero_band_codes, "end": self.transition_end}
         lowered = evaluate_transition(
             beta_opening=beta,
             beta_closing=self.beta(dp_code, sign),
-            u_min0_over_u_max=side.u_min0_over_u_max,
+            u_min0_over_u_max=u_min0,
             share_of_transition=evaluate_share(from_zero, **ends),
             n_full=signals.compare_max,
         )
-        return Fraction(line.slope * evaluate_law_command(from_zero, **ends) + line.start - lowered)
+        return Fraction(line.counts(evaluate_law_command(from_zero, **ends), beta) - lowered)
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return u_O/u_max of the law at a code pair, exactly and before it is limited to 0...1."""

@@ -1,19 +1,19 @@
 """`design`: a `ValveModel` and an engineer's choices in, a proved `Compensator` out."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import errors_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
-from dzdesign.design.beta_table import STEP_CODES, OffsetCeiling, choose_beta_table, offset_ceiling
 from dzdesign.design.broken_sensor import ACCEPTED, refuse_hidden_failures
+from dzdesign.design.ceiling.exact_row import ExactRow
+from dzdesign.design.ceiling.offset_ceiling import OffsetCeiling, offset_ceiling
 from dzdesign.design.certificate import certify, guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
@@ -28,6 +28,9 @@ from dzdesign.design.play import with_play
 from dzdesign.design.quantise import Units, finest_units, fits
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.design.table.beta_table import choose_beta_table
+from dzdesign.design.table.linear_programme import STEP_CODES
+from dzdesign.design.valve_hash import sha256_of_valve
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.reading_flow import default_reading_flow
 from dzdesign.identify.valve.side_model import SideModel
@@ -78,7 +81,8 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
         side = valve.positive if sign > 0 else valve.sides["negative"]
         allowance = allowance_of(signals, options.machine, sign=sign, dither_counts=reserve)
         laws[sign] = _side_law(side, options, u_max, units, transition_codes, allowance)
-    digest, request = sha256_of(to_json_bytes(valve) if valve_bytes is None else valve_bytes), options.request
+    digest = sha256_of_valve(valve) if valve_bytes is None else sha256_of(valve_bytes)
+    request = options.request
     compensator = Compensator(
         tool=THIS_TOOL,
         made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=digest),),
@@ -199,9 +203,9 @@ def _side_law(
     )
 
 
-def _refuse_no_offset(limits: Sequence[Fraction], options: DesignOptions) -> None:
+def _refuse_no_offset(limits: ExactRow, options: DesignOptions) -> None:
     """Refuse limits of the offset, over u_max, that leave none at some pressure drop."""
-    if min(limits) > 0:
+    if limits.least() > 0:
         return
     raise InputError(
         "dither and declared machine leave no offset under the certified one; make the dither smaller, declare "

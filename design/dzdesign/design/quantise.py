@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from math import gcd
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.beta_table import STEP_CODES
 from dzdesign.design.signals import Signals
+from dzdesign.design.table.linear_programme import STEP_CODES
 
 #: Finest and coarsest, as powers of two. Beta stays below 2, so a node fits 16 bits; a coefficient over 2^16 is finer
 #: than half a count of a PWM of 60 000.

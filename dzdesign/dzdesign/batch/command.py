@@ -10,8 +10,8 @@ from pathlib import Path
 from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
-from dzdesign.batch.lot_firmware import needing_another, write_lot_firmware
-from dzdesign.batch.odd_blocks import odd_blocks
+from dzdesign.batch.lot_firmware import firmware_left, needing_another, write_lot_firmware
+from dzdesign.batch.odd_blocks import foreign_block
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import (
@@ -130,7 +130,11 @@ def _finished(
             for valve in valves
             if valve.name not in unwritten
         },
-        anomalies=[*anomalies_of(found, output, valves), *odd_blocks(len(designed), firmware, output)],
+        anomalies=[
+            *anomalies_of(found, output, valves),
+            *firmware_left(output, firmware),
+            *foreign_block(firmware, len(designed)),
+        ],
         budget=lot_budget(designed),
         firmware=firmware,
         units=units_of_lot(designed),

@@ -94,3 +94,13 @@ def write_lot_firmware(
         block_of=LOT_SETTING if fits else first,
         blocks=(BLOCK_FILE, BLOCK_IMAGE),
     )
+
+
+def firmware_left(output: Path, firmware: LotFirmware | None) -> list[str]:
+    """Return what to say of a lot's firmware that this run did not write: it would pass for one of this lot."""
+    if firmware is not None or not (output / LOT / FIRMWARE / MANIFEST_NAME).is_file():
+        return []
+    return [
+        f"the folder '{LOT}/{FIRMWARE}' is left of an earlier run with --calibration block, and none of these valves "
+        "has a block for it; take it away, or give --calibration block again"
+    ]

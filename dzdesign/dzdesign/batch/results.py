@@ -7,12 +7,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from dzdesign.batch.blocks import BLOCK_IMAGE
 from dzdesign.batch.calibration import Outcome
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.design.firmware_manifest import BLOCK_FILE
+from dzdesign.design.compensator import Compensator
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.folder import is_lot
 from dzdesign.report.lot.summary import FAILED, SUMMARY_NAME, LotSummary, UnfinishedLot
 from dzdesign.report.lot.valve_folder import (
@@ -69,10 +69,13 @@ class Results:
         write_folder(self.of(outcome.name), files, replace(outcome.manifest, board=board))
 
     def refuse(self, name: str, reason: str) -> None:
-        """Turn a calibrated valve into a failed one, without its block; the next run tries it again."""
+        """Turn a calibrated valve into a failed one, without its block and what was found of it.
+
+        The next run tries it again.
+        """
         folder = self.of(name)
         manifest = replace(read_manifest(folder), status=FAILED, reason=reason, inputs_sha256=None)
-        kept = [file for file in manifest.files if file not in (BLOCK_FILE, BLOCK_IMAGE)]
+        kept = [file for file in manifest.files if file in (ValveModel.FILE_NAME, Compensator.FILE_NAME)]
         self.write(Outcome(manifest=manifest, files={file: (folder / file).read_bytes() for file in kept}))
 
     def read(self, name: str, unwritten: Mapping[str, str]) -> ValveFolder:

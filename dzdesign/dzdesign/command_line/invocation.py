@@ -50,10 +50,20 @@ def parse(argv: list[str]) -> Invocation:
             given[key] = [value] if argument.is_repeatable and isinstance(value, str) else value
         elif key not in given and argument.option.command_default:
             given[key] = argument.option.command_default
+        if argument.is_path:
+            _refuse_empty(argument, given.get(key), options_file if key in from_file else "")
     return Invocation(
         command=name, arguments=command_module(name).Arguments(**given), json=json, quiet=quiet, verbose=verbose,
         options_file=options_file, from_file=from_file,
     )  # fmt: skip
+
+
+def _refuse_empty(argument: Argument, value: Value | None, options_file: str) -> None:
+    """Refuse a path without a letter, such as of a shell's variable that is not set: it would be the folder '.'."""
+    if "" in (value if isinstance(value, list) else [value]):
+        name = argument.option.metavar if argument.is_positional else argument.flag
+        where = f"'{options_file}': {name.removeprefix('--')}" if options_file else name
+        raise InputError(f"{where} is empty, expected the name of a file or folder")
 
 
 def _command_in(argv: list[str]) -> str | None:

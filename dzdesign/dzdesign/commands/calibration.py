@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import AnyPath, Option, flag_of
 from dzdesign.stages.calibration import (
+    READABLE,
     CalibrationArguments,
     ReadCalibrationArguments,
     calibration,
@@ -53,11 +54,14 @@ def run(arguments: Arguments, json: bool) -> int:
         print_json(document)
         return 0
     at = f", at {document['address']} of {made.target}" if made.address is not None else ""
-    print(one_line(f"Written: {document['file']}, {document['octets']} octets{at}"))
+    what = f"{document['octets']} octets" if document["octets"] is not None else "the layout of a block, of any valve"
+    print(one_line(f"Written: {document['file']}, {what}{at}"))
     target = target_named(made.target)
     sector = target.block_place if target.sector else None
     if made.address is not None and sector and (wrong := elsewhere(made.target, made.address, sector)):
         print(wrong)
+    if document["octets"] is None:
+        return 0
     print(one_line(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}"))
     print(f"CRC-32 {document['crc32']}; SHA-256 of its compensator.json {document['compensator_sha256']}")
     return 0
@@ -80,14 +84,19 @@ def _read(arguments: Arguments, json: bool) -> int:
 
 
 def _document(made: "CalibrationImage", file: str) -> dict[str, Any]:
+    """Return what was written; of a file without a block nothing that only a block has."""
     from dzdesign.codegen.calibration.packing import OCTETS, octets_of, text_of
 
     block = made.block
-    return {
+    place = {
         "file": file,
         "format": made.format,
         "target": made.target,
         "address": None if made.address is None else f"{made.address:#x}",
+    }
+    if made.format not in READABLE:
+        return place | dict.fromkeys(("octets", "serial", "record", "crc32", "compensator_sha256"))
+    return place | {
         "octets": OCTETS,
         "serial": text_of(block.serial),
         "record": text_of(block.record),

@@ -62,7 +62,7 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         compensator = design(identified, valve_bytes=valve_json)
         compensator_json = to_json_bytes(compensator).decode()
         firmware = generate(compensator, "host", compensator_json.encode())
-        write_folder(Path(scratch) / "firmware", firmware.files, firmware.manifest)
+        write_folder(Path(scratch) / "firmware", firmware.contents, firmware.manifest)
         say(f"{name}: closed loop")
         loop = ClosedLoop(valve.plant, Path(scratch) / "firmware", compensator)
         runs = run_valve(valve, loop, compensator)

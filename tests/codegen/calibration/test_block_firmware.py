@@ -10,6 +10,7 @@ from dzdesign.codegen.calibration.block import block_of, current_block
 from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.packing import pack, unpack
+from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
@@ -22,6 +23,7 @@ from tests.codegen.core.test_misra import findings
 from tests.support.block_cores import block_folder
 from tests.support.core_variants import variant
 from tests.support.current_loops import PLAIN, SUPPLY
+from tests.support.example_coil import SENSORS, with_current
 from tests.support.golden_firmware import BLOCK_GOLDENS, differences, golden_block_files
 from tests.support.synthetic import needs_compiler
 
@@ -111,6 +113,7 @@ SEEDED = {
     "a product of signed numbers": ("dz_drive.c", "(uint32_t)asked *", "(uint32_t)asked + (uint32_t)(asked * 65536) *"),
     "a node too many": ("dz_calibration.c", "index < DZ_CALIBRATION_NODES", "index <= DZ_CALIBRATION_NODES"),
 }  # fmt: skip
+SEEDED_CURRENT = ("(place >> shift) & DZ_CALIBRATION_SUPPLY_MASK", "place >> shift")
 
 
 @pytest.mark.slow
@@ -126,6 +129,21 @@ def test_no_octets_of_a_block_make_anything_undefined(tmp_path):
         path.write_text(text.replace(old, new))
         assert prove_any_block(folder, ("x86_16",)).alarms, file
         path.write_text(text)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which(PROGRAM) is None, reason="no frama-c on the path")
+def test_no_octets_of_a_block_make_the_current_controller_undefined(tmp_path):
+    compensator = with_current(variant("default", "wide"), TARGET, SENSORS["supply measured"])
+    folder = block_folder(compensator, tmp_path / "fw")
+    proof = prove_any_block(folder)
+    assert proof.alarms == () and "dz_current_tick" in proof.functions
+    path = folder / "core" / "dz_current.c"
+    text = path.read_text()
+    assert SEEDED_CURRENT[0] in text
+    path.write_text(text.replace(*SEEDED_CURRENT))
+    found = prove_any_block(folder, ("x86_16",)).alarms
+    assert {each.file for each in found} == {"dz_current.c"}
 
 
 def test_a_current_controller_has_its_block():

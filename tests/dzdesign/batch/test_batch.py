@@ -25,7 +25,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.design.beta_table import DECIMALS
+from dzdesign.design.ceiling.offset_curve import DECIMALS
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.lot.setting import lot_setting

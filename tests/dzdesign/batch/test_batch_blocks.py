@@ -5,12 +5,13 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from many_valves import write_lot
 
 from dzdesign.batch.anomalies import anomalies_of
-from dzdesign.batch.odd_blocks import odd_blocks
+from dzdesign.batch.lot_firmware import firmware_left
 from dzdesign.block_checks import blocks_checked, given_blocks
 from dzdesign.codegen.calibration.block_files import octets_in_file
 from dzdesign.codegen.calibration.built_for import built_for
@@ -19,7 +20,7 @@ from dzdesign.codegen.project import block_core, generate
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import SourceFile
+from dzdesign.core.artefact_types import SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
 from dzdesign.report.lot.valve_folder import read_valve_folder
@@ -35,8 +36,8 @@ SEED = 7
 TARGETS = {"V0000": "host", "V0001": "host", "V0002": "cortex-m4"}
 
 
-def batch(folder, output):
-    options = ["--meter-lag", "0.1 s", "--jobs", "1", "--calibration", "block"]
+def batch(folder, output, *more):
+    options = ["--meter-lag", "0.1 s", "--jobs", "1", "--calibration", "block", *more]
     return main(["batch", str(folder / "lot.csv"), "-o", str(output), *options])
 
 
@@ -64,8 +65,8 @@ def test_two_valves_of_one_serial_number_are_named(made):
 def test_a_lots_firmware_of_an_earlier_run_is_named(made, tmp_path):
     summary = json.loads((made[1] / "batch.json").read_text("utf-8"))
     assert summary["firmware"] and not any("lot/firmware" in line for line in summary["anomalies"])
-    (line,) = odd_blocks(1, None, made[1])
-    assert "lot/firmware" in line and odd_blocks(1, None, tmp_path) == []
+    (line,) = firmware_left(made[1], None)
+    assert "lot/firmware" in line and firmware_left(tmp_path, None) == []
 
 
 def valve(output, name):
@@ -108,7 +109,8 @@ def test_a_valve_that_needs_another_firmware_fails_alone_with_the_reason(made):
     assert [rows[name]["status"] for name in TARGETS] == ["ok", "ok", "failed"]
     reason = rows["V0002"]["reason"]
     assert "another firmware" in reason and "target cortex-m4 instead of host" in reason
-    assert not list(valve(output, "V0002").glob("calibration.*"))
+    left = {path.name for path in valve(output, "V0002").iterdir()}  # nothing that was found of a block it has not
+    assert left == {"manifest.json", "valve.json", "compensator.json", "reason.txt"}
     octets = (valve(output, "V0001") / "calibration.bin").read_bytes()
     assert rows["V0001"]["calibration_bin_sha256"] == sha256_of(octets)
 
@@ -124,8 +126,37 @@ def test_what_is_done_is_taken_up(made, capsys):
 def test_verify_tries_each_block_with_the_lots_firmware(made):
     _, output, _ = made
     firmware = output / "lot" / "firmware"
-    (check,) = blocks_checked(firmware, given_blocks(firmware, [valve(output, "V0001") / "calibration.bin"] * 2))
-    assert check.holds, check.text
+    blocks = given_blocks(firmware, [valve(output, "V0001") / "calibration.bin"] * 2)
+    inputs, drive = blocks_checked(firmware, blocks)
+    assert inputs.holds and drive.holds, (inputs.text, drive.text)
+    assert "'V0001-S'" in inputs.text and drive.name.startswith("the drive functions")
+
+
+@pytest.mark.parametrize("holds", [True, False])
+def test_what_is_verified_is_the_valves_block_and_no_firmware_stays(made, holds, tmp_path, monkeypatch):
+    """The verification itself has tests of its own; here it only looks at what it is given."""
+    folder, _, _ = made
+    (tmp_path / "lot.csv").write_text(f"name,files,target,record.serial\nV0001,{folder}/V0001/*.csv,host,S1\n", "utf-8")
+    given = []
+
+    def look(arguments, identified):
+        given.append((unpack((arguments.firmware / "calibration.bin").read_bytes()), identified))
+        (arguments.output / "verification.json").parent.mkdir()
+        (arguments.output / "verification.json").write_text("{}", encoding="utf-8")
+        fault = SimpleNamespace(holds=holds, name="drive", text="one code off")
+        return SimpleNamespace(holds=holds, evidence=SimpleNamespace(all_checks=[fault]))
+
+    monkeypatch.setattr("dzdesign.stages.verify.verify", look)
+    assert batch(tmp_path, tmp_path / "out", "--verify") == (0 if holds else 1)
+    alone, ((verified, identified),) = valve(tmp_path / "out", "V0001"), given
+    block = unpack((alone / "calibration.bin").read_bytes())
+    assert text_of(block.serial) == "S1" and block.crc32 != verified.crc32
+    assert replace(verified, serial=block.serial, crc32=block.crc32) == block
+    assert to_json_bytes(identified) == (alone / "valve.json").read_bytes()
+    assert (alone / "evidence" / "verification.json").is_file() and not (alone / "firmware").exists()
+    with open(tmp_path / "out" / "valves.csv", encoding="utf-8", newline="") as table:
+        (row,) = csv.DictReader(table)
+    assert (row["status"], row["reason"]) == (("ok", "") if holds else ("does not hold", "drive: one code off"))
 
 
 def test_a_number_that_no_input_shows_is_seen(made, tmp_path):

@@ -25,11 +25,14 @@ from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.identify import IdentifyChoices
 from tests.support.crashing_work import die_over_bad
 from tests.support.paths import ROOT
+from tests.support.synthetic import needs_compiler
 
 pytestmark = pytest.mark.slow
 
 COUNT, SEED = 7, 7
 OPTIONS = ["--meter-lag", "0.1 s", "--target", "host"]
+#: Each block is tried by the worker that makes it, and the lot's firmware is written here.
+BLOCKS = ["--calibration", "block"]
 NOTHING = dict(recordings=(), identify=IdentifyChoices(), design=DesignChoices(), target="host")
 
 
@@ -81,6 +84,7 @@ def whole_folders(output: Path) -> list[str]:
     return [path.parent.name for path in output.glob("valves/*/manifest.json") if not path.parent.name.startswith(".")]
 
 
+@needs_compiler
 @pytest.mark.skipif(os.name == "nt", reason="SIGKILL is of POSIX")
 def test_a_worker_is_killed_in_mid_run_and_nothing_is_lost(cluster, tmp_path, monkeypatch):
     address, worker, _ = cluster
@@ -98,14 +102,15 @@ def test_a_worker_is_killed_in_mid_run_and_nothing_is_lost(cluster, tmp_path, mo
 
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
-    assert main(["batch", "lot", "-o", "out", "--dask", address, *OPTIONS]) == 1
+    assert main(["batch", "lot", "-o", "out", "--dask", address, *OPTIONS, *BLOCKS]) == 1
     killer.join(30)
     assert 2 <= len(at_the_kill) < COUNT, "the worker was not killed in mid-run"
     with open(tmp_path / "out" / "valves.csv", encoding="utf-8", newline="") as table:
         rows = list(csv.DictReader(table))
     assert [row["name"] for row in rows] == [f"V{number:04d}" for number in range(COUNT)]
     assert {row["name"] for row in rows if row["status"] != "ok"} == set(broken)
-    assert main(["batch", "lot", "-o", "here", "--jobs", "1", *OPTIONS]) == 1
+    assert len(list(Path("out").glob("valves/*/calibration.bin"))) == COUNT - len(broken)
+    assert main(["batch", "lot", "-o", "here", "--jobs", "1", *OPTIONS, *BLOCKS]) == 1
     for path in sorted(Path("here").rglob("*.*")):
         if path.is_file():  # what came over the network is what this machine makes
             assert sha256_of(path.read_bytes()) == sha256_of(("out" / path.relative_to("here")).read_bytes()), path

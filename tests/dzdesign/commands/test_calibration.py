@@ -187,6 +187,8 @@ def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, bloc
         ["compensator.json", "-o", "new.hex", "--target", "f280049c"],
         ["compensator.json", "-o", "new.hex", "--target", "f28334"],
         ["compensator.json", "-o", "nowhere/new.hex"],
+        ["compensator.json", "-o", ""],
+        ["--read", ""],
         ["valve.hex", "-o", "new.hex"],
         ["--read", "valve.hex", "-o", "new.hex"],
         ["--read", "valve.hex", "--serial", "8"],
@@ -236,6 +238,20 @@ def test_only_a_block_is_written_over(written, tmp_path, monkeypatch, capsys, un
     for _ in range(2):
         assert main([*words, "-o", "new.a2l"]) == 0 and main(["calibration", "--read", "new.a2l"]) == 2
     capsys.readouterr()
+
+
+def test_of_an_a2l_nothing_is_said_that_it_does_not_hold(written, tmp_path, capsys, unproven):
+    """It has the layout alone, of any valve: neither octets nor a serial number, a CRC-32 or a compensator."""
+    words = ["calibration", str(written / "compensator.json"), "-o", str(tmp_path / "drive.a2l")]
+    assert main(words) == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.endswith(", at 0x330000 of f28335") and not re.search("octets|CRC|SHA", line)
+    assert main([*words, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    place = {name: said.pop(name) for name in ("schema", "file", "format", "target", "address") if name in said}
+    assert (place["format"], place["address"]) == ("a2l", "0x330000") and set(said.values()) == {None}
+    assert main(["calibration", str(written / "compensator.json"), "-o", str(tmp_path / "valve.hex"), "--json"]) == 0
+    assert None not in json.loads(capsys.readouterr().out).values()
 
 
 def test_address_target_and_ending_can_be_chosen(written, tmp_path, capsys, unproven):

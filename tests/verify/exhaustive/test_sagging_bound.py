@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.beta_table import offset_ceiling
+from dzdesign.design.ceiling.offset_ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
 from dzdesign.identify.options import IdentifyOptions

@@ -152,7 +152,7 @@ def _beta_nodes(form: IntegerForm, side: str) -> tuple[int, ...]:
     if len(law) > NODES:
         raise InputError(
             f"beta of {side} commands has {len(law) - FALLBACKS} nodes, of which a calibration block holds {room} at "
-            f"most; {ALTERNATIVE}, or design it for a converter of fewer codes"
+            f"most; {ALTERNATIVE}, or give pressure sensors of more alike spans"
         )
     pairs = [*zip(law[:-FALLBACKS], zero[:-FALLBACKS], strict=True)]
     pairs += [(0, 0)] * (room - len(pairs)) + [(law[-1], zero[-1])] * FALLBACKS

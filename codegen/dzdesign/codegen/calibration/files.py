@@ -21,8 +21,8 @@ from dzdesign.codegen.calibration.layout import (
     Words,
     entries,
 )
-from dzdesign.codegen.calibration.limits import NAMED, OF_CURRENT, largest_node
-from dzdesign.codegen.core.constants import Define, c_comment, defines
+from dzdesign.codegen.calibration.limits import LARGEST_CODES, NAMED, OF_CURRENT, crc_steps, largest_node
+from dzdesign.codegen.core.constants import LITERALS, Define, Table, c_comment, defines
 from dzdesign.codegen.core.current_files import current_fault_bits
 from dzdesign.codegen.core.drive_constants import drive_status_constants, status_constants
 from dzdesign.codegen.core.files import CoreFile, Values
@@ -150,6 +150,10 @@ def check_file(built: BuiltFor) -> CoreFile:
         _limit("LARGEST_NODE", largest_node(built.beta_step), "uint32", "largest node: times DZ_BETA_STEP below 2^31"),
         *(_limit(*each) for each in named),
     ]
+    equation, of = "four zero bits more of a CRC-32", "polynomial 04C11DB7h, reflected"
+    rows = tuple((step, 0) for step in crc_steps())
+    table = Table(symbol="steps", value=rows, equation=equation, engineering=of, generator=LIMITS_FILE)
+    steps = [LITERALS["uint32"].format(step) for step, _ in table.value]
     values: Values = {
         "misra_lines": misra_lines(),
         "limit_defines": defines(limits),
@@ -158,8 +162,11 @@ def check_file(built: BuiltFor) -> CoreFile:
         "swapped": built.has("SWAPPED"),
         "current": built.has("CURRENT"),
         "supply": built.has("SUPPLY"),
+        "crc_steps": [", ".join(steps[at : at + 4]) for at in range(0, len(steps), 4)],
+        # Of a converter with fewer codes no command is too long for the drive functions.
+        "wide_codes": built.code_max > LARGEST_CODES,
     }
-    return CoreFile(template="dz_calibration.c.jinja", values=values, constants=tuple(limits))
+    return CoreFile(template="dz_calibration.c.jinja", values=values, constants=(*limits, table))
 
 
 def _limit(symbol: str, value: int, literal: str, text: str) -> Define:

@@ -6,7 +6,7 @@ from dzdesign.design.current.loop import LARGEST_ERROR, LARGEST_GAIN
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
 from dzdesign.design.signals import LARGEST_DIFFERENCE, WEIGHT_SHIFT
 
-#: Of the reflected polynomial 04C11DB7h.
+#: 04C11DB7h, reflected.
 CRC_POLYNOMIAL = 0xEDB88320
 #: Pressure drop in codes of sensor A times 4096: one more would be a code too many.
 LARGEST_DROP = ((LARGEST_DIFFERENCE + 1) << WEIGHT_SHIFT) - 1
@@ -29,9 +29,22 @@ def largest_node(beta_step: int) -> int:
     return INT32_MAX // beta_step
 
 
+def crc_steps() -> tuple[int, ...]:
+    """Return what four zero bits more make of the CRC-32 of four bits, for each value of these.
+
+    Examples
+    --------
+    >>> [f"{step:08X}" for step in crc_steps()[:3]]
+    ['00000000', '1DB71064', '3B6E20C8']
+    """
+    found = list(range(16))
+    for _ in range(4):
+        found = [step >> 1 ^ (CRC_POLYNOMIAL if step & 1 else 0) for step in found]
+    return tuple(found)
+
+
 #: Limits that the C names; each its value, its literal and what it is.
 NAMED: tuple[tuple[str, int, str, str], ...] = (
-    ("CRC_POLYNOMIAL", CRC_POLYNOMIAL, "uint32", "polynomial of the CRC-32, 04C11DB7h, reflected"),
     ("LARGEST_WORD", 2**32 - 1, "uint32", "largest number of 32 bits"),
     ("LARGEST_INT32", INT32_MAX, "uint32", "largest number of 32 bits with a sign"),
     ("LARGEST_DROP", LARGEST_DROP, "uint32", "largest pressure drop of valid codes, codes of sensor A times 4096"),

@@ -195,10 +195,11 @@ def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
     # Along the command it is straight but for the ends of zero band and transition.
     corners = {0, c.transition_end, command.span(sign)}
     commands = [command.zero_code + command.direction(sign) * corner for corner in corners]
-    values = [c.drive(code, dp_code, sign) for dp_code in codes for code in commands]
+    different = {(c.law_beta(code, sign), c.beta(code, sign)): code for code in codes}
+    values = [c.counts(code, dp_code, sign) for dp_code in different.values() for code in commands]
     if min(values) < 0:
         raise InputError("the law asks for a negative drive somewhere; check k x_max/u_max and u_min0")
-    return int((max(values) * c.signals.compare_max + Fraction(1, 2)) * divisor)
+    return int((max(values) + Fraction(1, 2)) * divisor)
 
 
 def exact_factors(share: Fraction, largest: int, shifts: range, tried: int = 1) -> Iterator[tuple[int, int]]:

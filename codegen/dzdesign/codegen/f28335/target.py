@@ -19,6 +19,7 @@ from dzdesign.codegen.c2000 import (
     within,
 )
 from dzdesign.codegen.calibration.layout import NO_INTERLOCK
+from dzdesign.codegen.core_costs import CHECK_INSTRUCTIONS
 from dzdesign.codegen.loading.protocol import LOAD_S
 from dzdesign.codegen.target import FlashSector
 from dzdesign.codegen.telemetry.frame import BITS_PER_OCTET, CRC_OCTETS, FRAME_BITS, FRAME_OCTETS, Link, frame_context
@@ -41,6 +42,9 @@ LINE_LOAD_MAX = Fraction(1, 2)
 # Bound of what the main loop spends on one frame: tests/codegen/telemetry/test_frame.py holds it on an AVR, whose
 # 8 bits take several instructions where the C28x takes one.
 FRAME_CYCLES = 6_000
+#: An access to flash at 150 MHz: five wait states, as C2000Ware's InitFlash() sets them; and what an instruction of the
+#: check of a block is given.
+FLASH_CYCLES, CHECK_CYCLES = 6, 8
 #: WDFLAG: crystal periods from a falling XRS to the look at it, and those for which a watchdog reset holds it low.
 WDFLAG_PERIODS, WDRST_PERIODS = 4 * 8192 + 512, 512
 EVENT_PRESCALE = {1: "ET_1ST", 2: "ET_2ND", 3: "ET_3RD"}
@@ -65,6 +69,10 @@ def timing() -> dict[str, str]:
     return {
         **figures,
         "sysclkout_mhz": printed(sysclkout_hz / 10**6),
+        "check_instructions": str(CHECK_INSTRUCTIONS),
+        "check_cycles": str(CHECK_CYCLES),
+        "flash_cycles": str(FLASH_CYCLES),
+        "check_ms": f"{float(1000 * CHECK_INSTRUCTIONS * CHECK_CYCLES / sysclkout_hz):.2f}",
         "wdflag_cycles": str(WDFLAG_PERIODS),
         "wdflag_ms": f"{1e3 * WDFLAG_PERIODS / CRYSTAL_HZ:.2f}",
         "wdrst_us": f"{1e6 * WDRST_PERIODS / CRYSTAL_HZ:.0f}",

@@ -1,6 +1,5 @@
 """That a lot setting over-compensates no valve of its lot: its offset under the bounds of each of them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor
@@ -11,6 +10,7 @@ from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.signals import Signals
+from dzdesign.design.table.linear_programme import between_nodes
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 
 #: Over-compensated valves that a sentence names.
@@ -44,7 +44,8 @@ def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
         law = compensator.side(sign)
         allowance = compensator.allowance(sign)
         low, high = window = allowance.window
-        numerators = _numerators(law.beta, compensator.beta_step_codes, signals.largest_difference(sign))
+        count = signals.largest_difference(sign) + 1
+        numerators = between_nodes(law.beta, count, compensator.beta_step_codes)
         scale = compensator.beta_denominator * compensator.beta_step_codes
         unit_V = law.u_min0_over_u_max * compensator.u_max_V / scale
         for valve in compensator.lot:
@@ -101,14 +102,6 @@ def _nearest(piece: BoundPiece, allowance: Allowance, first: int, drive_V: np.nd
     if piece.curvature == 0 and piece.low_V == piece.high_V:  # a step: the largest drive comes nearest, the first of it
         return np.array([int(drive_V.argmax())])
     return near
-
-
-def _numerators(nodes: Sequence[int], step: int, last: int) -> np.ndarray:
-    """Return the table between its nodes, times their distance: whole numbers at every code from 0 to `last`."""
-    index, past = np.divmod(np.arange(last + 1), step)
-    table = np.array(nodes, dtype=np.int64)  # at most 2^31 times a step: far from 2^63
-    between: np.ndarray = table[index] * (step - past) + table[index + 1] * past
-    return between
 
 
 def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:

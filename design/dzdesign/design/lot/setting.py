@@ -18,14 +18,9 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
-from dzdesign.design.beta_table import (
-    STEP_CODES,
-    OffsetCeiling,
-    OffsetCurve,
-    choose_beta_table,
-    offset_ceiling,
-    pressures_MPa,
-)
+from dzdesign.design.ceiling.exact_row import least_of
+from dzdesign.design.ceiling.offset_ceiling import OffsetCeiling, offset_ceiling
+from dzdesign.design.ceiling.offset_curve import OffsetCurve
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
@@ -39,6 +34,8 @@ from dzdesign.design.option_texts import options_of
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.design.table.beta_table import choose_beta_table
+from dzdesign.design.table.linear_programme import STEP_CODES
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
@@ -207,10 +204,9 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     low, high = _common_interval([curves])
     above_least = _above_the_least(curves, allowance, float(u_max))
     exact = {name: offset_ceiling(curves[name], u_max, allowance) for name in _near(curves, above_least)}
-    limits = zip(*(each.limit for each in exact.values()), strict=True)
     certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
-    ceiling = OffsetCeiling(limit=tuple(map(min, limits)), certified=certified)
-    if min(ceiling.limit[: certified.stop]) <= 0:
+    ceiling = OffsetCeiling(limit=least_of([each.limit for each in exact.values()]), certified=certified)
+    if ceiling.limit[: certified.stop].least() <= 0:
         raise InputError("one of the valves leaves no positive offset for a lot setting")
     tested = floor(signals.dp_code(max(curve.dp_MPa[-1] for curve in curves.values()))) + 1
     return _Side(
@@ -227,7 +223,8 @@ def _above_the_least(curves: Mapping[str, OffsetCurve], allowance: Allowance, u_
     """
     (low, high), signals = allowance.window, allowance.signals
     code_max = signals.largest_difference(allowance.sign)
-    dp_MPa = np.array([float(dp) for dp in pressures_MPa(signals, low, code_max + high)])
+    step = signals.dp_MPa(1)
+    dp_MPa = np.array([float(code * step) for code in range(low, code_max + high + 1)])
     limits = np.array([curve.in_doubles(dp_MPa) / u_max_V for curve in curves.values()])
     limits = np.lib.stride_tricks.sliding_window_view(limits, high - low + 1, axis=1).min(axis=2)
     above: np.ndarray = limits - limits.min(axis=0)

@@ -6,7 +6,7 @@ from fractions import Fraction
 from math import floor
 from typing import NamedTuple
 
-from dzdesign.design.beta_table import OffsetCurve, certified_V
+from dzdesign.design.ceiling.offset_curve import OffsetCurve, certified_V
 from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.machine.budget import Budget, BudgetLine, Component, DIGITS_mV, Origin
 from dzdesign.design.machine.machine import Machine

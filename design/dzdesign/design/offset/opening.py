@@ -3,7 +3,10 @@
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.beta_table import OffsetCeiling, OffsetCurve, pressures_MPa
+from dzdesign.design.ceiling.curve_row import offset_row
+from dzdesign.design.ceiling.exact_row import ExactRow
+from dzdesign.design.ceiling.offset_ceiling import OffsetCeiling
+from dzdesign.design.ceiling.offset_curve import OffsetCurve
 from dzdesign.design.certificate import hold_below
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import Signals
@@ -49,9 +52,20 @@ def opening_ceiling(
     Above the tests it comes down by as much as the certified offset: a transition, and the hysteresis that a play takes
     out of it, stay as they are at the last test. Where the offset is let go, only that height is left of it.
     """
-    pressures = pressures_MPa(signals, 0, signals.largest_difference(sign))
-    limit = [opening.at(dp_MPa) for dp_MPa in pressures]
-    for code in range(tested.stop, len(limit)) if certified.above is not None else ():
-        let_go = released_from is not None and code >= released_from
-        limit[code] -= certified.offset_V[-1] - (0 if let_go else certified.at(pressures[code]))
-    return OffsetCeiling(limit=tuple(value / u_max for value in limit), certified=tested)
+    last = signals.largest_difference(sign)
+    limit = offset_row(opening, signals, 0, last)
+    if certified.above is not None and tested.stop <= last:
+        let_go = last + 1 if released_from is None else min(released_from, last + 1)
+        limit = limit[: tested.stop].followed_by(
+            _less_what_is_lowered(limit[tested.stop :], certified, signals, range(tested.stop, let_go))
+        )
+    return OffsetCeiling(limit=limit.line(1 / u_max), certified=tested)
+
+
+def _less_what_is_lowered(opening: ExactRow, certified: OffsetCurve, signals: Signals, codes: range) -> ExactRow:
+    """Return what is left above the tests of the opening threshold there; behind the codes the offset is let go."""
+    height = opening.line(Fraction(1), certified.offset_V[-1])
+    if not codes:
+        return height
+    lowered = offset_row(certified, signals, codes.start, codes.stop - 1)
+    return height[: len(codes)].plus(lowered).followed_by(height[len(codes) :])

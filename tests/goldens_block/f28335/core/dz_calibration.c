@@ -19,8 +19,6 @@
 #define BETA_STEP_SHIFT 6u
 /* Largest node: times DZ_BETA_STEP below 2^31: 33554431 (exact). */
 #define LARGEST_NODE UINT32_C(33554431)
-/* Polynomial of the CRC-32, 04C11DB7h, reflected: 3988292384 (exact). */
-#define CRC_POLYNOMIAL UINT32_C(3988292384)
 /* Largest number of 32 bits: 4294967295 (exact). */
 #define LARGEST_WORD UINT32_C(4294967295)
 /* Largest number of 32 bits with a sign: 2147483647 (exact). */
@@ -50,6 +48,12 @@ static uint16_t outside(uint64_t value, uint64_t low, uint64_t high)
     return ((value < low) || (value > high)) ? 1u : 0u;
 }
 
+/* 1 if a number is larger than the largest that is allowed, else 0. */
+static uint16_t above(uint64_t value, uint64_t largest)
+{
+    return (value > largest) ? 1u : 0u;
+}
+
 /* 1 if two numbers differ, else 0. */
 static uint16_t differs(uint32_t left, uint32_t right)
 {
@@ -63,15 +67,19 @@ static uint32_t greater(uint32_t left, uint32_t right)
 
 /* ---- CRC ---- */
 
-/* The CRC-32 of one octet more: polynomial 04C11DB7h, reflected. */
+/* The CRC-32 of one octet more, in two steps of four bits: polynomial 04C11DB7h, reflected. */
 static uint32_t crc_with(uint32_t crc, uint32_t octet)
 {
-    uint32_t next = crc ^ octet;
+    static const uint32_t steps[16] = {
+        UINT32_C(0), UINT32_C(498536548), UINT32_C(997073096), UINT32_C(651767980),
+        UINT32_C(1994146192), UINT32_C(1802195444), UINT32_C(1303535960), UINT32_C(1342533948),
+        UINT32_C(3988292384), UINT32_C(4027552580), UINT32_C(3604390888), UINT32_C(3412177804),
+        UINT32_C(2607071920), UINT32_C(2262029012), UINT32_C(2685067896), UINT32_C(3183342108),
+    };
+    const uint32_t low = crc ^ octet;
+    const uint32_t high = (low >> 4) ^ steps[low & 15u];
 
-    for (uint16_t bit = 0u; bit < 8u; bit++) {
-        next = (next >> 1) ^ (CRC_POLYNOMIAL & (0u - (next & 1u)));
-    }
-    return next;
+    return (high >> 4) ^ steps[high & 15u];
 }
 
 /* The CRC-32 of the octets before the block's own, in the order of the file: a char may have 16 bits. */
@@ -110,7 +118,7 @@ static uint16_t firmware_wrong(const struct dz_calibration *block)
 /* 1 if the codes of a signal don't rise from the least valid one over zero to the largest, else 0. */
 static uint16_t codes_wrong(uint16_t low, uint16_t zero, uint16_t high)
 {
-    return (uint16_t)(outside(zero, low, high) | outside(high, 1u, DZ_ADC_CODE_MAX) | outside(low, 0u, high - 1uL));
+    return (uint16_t)(outside(zero, low, high) | outside(high, 1u, DZ_ADC_CODE_MAX) | above(low, high - 1uL));
 }
 
 /* The largest pressure drop of valid codes, A less B, in codes of sensor A times 4096; or of B less A. */
@@ -129,9 +137,9 @@ static uint16_t signals_wrong(const struct dz_calibration *block)
     return (uint16_t)(codes_wrong(block->command_low, block->command_zero, block->command_high) |
                       codes_wrong(block->a_low, block->a_zero, block->a_high) |
                       codes_wrong(block->b_low, block->b_zero, block->b_high) | differs(block->balance, balance) |
-                      outside(block->weight_b, 1u, 65535u) | outside(block->reverse, 0u, LARGEST_DROP) |
-                      outside(largest_drop(block, 0u), 0u, LARGEST_DROP) |
-                      outside(largest_drop(block, 1u), 0u, LARGEST_DROP));
+                      outside(block->weight_b, 1u, 65535u) | above(block->reverse, LARGEST_DROP) |
+                      above(largest_drop(block, 0u), LARGEST_DROP) |
+                      above(largest_drop(block, 1u), LARGEST_DROP));
 }
 
 /* ---- the law of one sign of command ---- */
@@ -146,9 +154,9 @@ static uint16_t nodes_wrong(const struct dz_calibration_side *side)
     for (uint16_t index = 0u; index < DZ_CALIBRATION_NODES; index++) {
         const struct dz_calibration_node *node = &side->nodes[index];
 
-        wrong |= outside(node->law, 0u, LARGEST_NODE) | outside(node->zero, 0u, node->law);
+        wrong |= above(node->law, LARGEST_NODE) | above(node->zero, node->law);
         if ((index < side->node_count) || (index >= DZ_CALIBRATION_NODE_MASK)) {
-            wrong |= outside(fallback->law, 0u, node->law) | outside(greater(fallback->zero, 1u), 0u, node->zero);
+            wrong |= above(fallback->law, node->law) | above(greater(fallback->zero, 1u), node->zero);
         }
     }
     return wrong;
@@ -157,9 +165,9 @@ static uint16_t nodes_wrong(const struct dz_calibration_side *side)
 /* The largest value of beta between the nodes. */
 static uint32_t largest_beta(const struct dz_calibration_side *side)
 {
-    uint32_t largest = 0u;
+    uint32_t largest = side->nodes[0].law;
 
-    for (uint16_t index = 0u; index < DZ_CALIBRATION_NODES; index++) {
+    for (uint16_t index = 1u; index < DZ_CALIBRATION_NODES; index++) {
         largest = greater(largest, side->nodes[index].law);
     }
     return DZ_BETA_STEP * ((largest < LARGEST_NODE) ? largest : LARGEST_NODE);
@@ -187,7 +195,7 @@ static uint16_t sum_wraps(const struct dz_calibration_side *side, uint32_t beta,
     const uint64_t lower = (of_beta & LARGEST_WORD) + (low & LARGEST_WORD) + side->half[0];
     const uint64_t upper = (of_beta >> 32) + (low >> 32) + side->half[1] + (lower >> 32);
 
-    return (uint16_t)(outside(high, 0u, LARGEST_INT32) | outside(high + upper, 0u, LARGEST_INT32));
+    return (uint16_t)(above(high, LARGEST_INT32) | above(high + upper, LARGEST_INT32));
 }
 
 /* The law's sum: no factor leaves 32 bits, the sum never falls below zero or reaches 2^63, and it rises with the
@@ -201,13 +209,13 @@ static uint16_t sum_wrong(const struct dz_calibration *block, const struct dz_ca
     const uint64_t turned = (uint64_t)slope * (uint32_t)command;
     const uint64_t factor = (falls != 0u) ? side->offset : (side->offset + turned);
     const uint64_t linear = ((uint64_t)side->linear[1] << 32) | side->linear[0];
-    uint16_t wrong = (uint16_t)(outside(command, 1u, LARGEST_INT32) | outside(turned, 0u, LARGEST_INT32) |
-                                outside(factor, 0u, LARGEST_INT32) |
-                                outside((uint64_t)side->transition * block->transition_codes, 0u, side->offset));
+    uint16_t wrong = (uint16_t)(above(command, LARGEST_INT32) | above(turned, LARGEST_INT32) |
+                                above(factor, LARGEST_INT32) |
+                                above((uint64_t)side->transition * block->transition_codes, side->offset));
 
     if (wrong == 0u) {
         wrong |= sum_wraps(side, beta, (uint32_t)factor, (uint32_t)command);
-        wrong |= outside((uint64_t)beta * slope * falls, 0u, linear);
+        wrong |= above((uint64_t)beta * slope * falls, linear);
     }
     return wrong;
 }
@@ -218,10 +226,10 @@ static uint16_t division_wrong(const struct dz_calibration *block, const struct 
     const uint64_t counts = ((uint64_t)side->quotient_limit * side->reciprocal) >> 32;
     const uint64_t shown = (uint64_t)largest_beta(side) * side->beta_factor;
 
-    return (uint16_t)(outside(side->quotient_limit, 0u, LARGEST_INT32) | outside(side->reciprocal_shift, 0u, 31u) |
-                      outside(counts >> (side->reciprocal_shift & 31u), 0u, block->compare_limit) |
-                      outside(side->beta_shift, 0u, 63u) | outside(shown >> (side->beta_shift & 63u), 0u, 65535u) |
-                      outside(side->tested_to, 0u, LARGEST_TESTED) | outside(side->beta_unit, 1u, LARGEST_WORD));
+    return (uint16_t)(above(side->quotient_limit, LARGEST_INT32) | above(side->reciprocal_shift, 31u) |
+                      above(counts >> (side->reciprocal_shift & 31u), block->compare_limit) |
+                      above(side->beta_shift, 63u) | above(shown >> (side->beta_shift & 63u), 65535u) |
+                      above(side->tested_to, LARGEST_TESTED) | outside(side->beta_unit, 1u, LARGEST_WORD));
 }
 
 /* `turned` is 1 where the pressure drop is B less A. */
@@ -236,7 +244,7 @@ static uint16_t side_wrong(const struct dz_calibration *block, const struct dz_c
 
 static uint16_t law_wrong(const struct dz_calibration *block)
 {
-    return (uint16_t)(outside(block->compare_limit, 0u, DZ_COMPARE_MAX) |
+    return (uint16_t)(above(block->compare_limit, DZ_COMPARE_MAX) |
                       side_wrong(block, &block->sides[0], 1u, 0u) |
                       side_wrong(block, &block->sides[1], 0u, 1u));
 }
@@ -247,37 +255,30 @@ static uint16_t law_wrong(const struct dz_calibration *block)
 static uint16_t play_wrong(const struct dz_calibration *block, const struct dz_calibration_side *side)
 {
     const uint32_t travel = (uint32_t)block->play_codes * block->transition_codes;
-    uint32_t widest = 0u;
+    uint32_t widest = side->play[0];
 
-    for (uint16_t index = 0u; index < DZ_CALIBRATION_PLAY_NODES; index++) {
+    for (uint16_t index = 1u; index < DZ_CALIBRATION_PLAY_NODES; index++) {
         widest = greater(widest, side->play[index]);
     }
-    return (uint16_t)(outside((uint32_t)side->span >> (block->play_step_shift & 15u), 0u, DZ_CALIBRATION_PLAY_NODES - 2uL) |
-                      outside((uint64_t)widest * travel, 0u, LARGEST_INT32));
-}
-
-/* Codes of the command from zero to the valid one that is farthest from it. */
-static uint32_t longest_command(const struct dz_calibration *block)
-{
-    return greater((uint32_t)block->command_high - block->command_zero, (uint32_t)block->command_zero - block->command_low);
+    return (uint16_t)(above((uint32_t)side->span >> (block->play_step_shift & 15u), DZ_CALIBRATION_PLAY_NODES - 2uL) |
+                      above((uint64_t)widest * travel, LARGEST_INT32));
 }
 
 static uint16_t play_of_both_wrong(const struct dz_calibration *block)
 {
     const uint32_t travel = (uint32_t)block->play_codes * block->transition_codes;
 
-    return (uint16_t)(outside(block->play_codes, 1u, LARGEST_PLAY) | outside(block->play_noise, 0u, LARGEST_NOISE) |
-                      outside(block->play_step_shift, 0u, LARGEST_STEP_SHIFT) | outside(block->play_shift, 0u, 31u) |
+    return (uint16_t)(above(block->play_codes, LARGEST_PLAY) | above(block->play_noise, LARGEST_NOISE) |
+                      above(block->play_step_shift, LARGEST_STEP_SHIFT) | above(block->play_shift, 31u) |
                       differs(UINT32_C(1) << (block->play_shift & 31u), travel) |
-                      outside(longest_command(block), 0u, LARGEST_CODES) | play_wrong(block, &block->sides[0]) |
+                      play_wrong(block, &block->sides[0]) |
                       play_wrong(block, &block->sides[1]));
 }
 
-/* The ramps: a step of every ramp, and commands that they can count. */
+/* The ramps: a step of every ramp. */
 static uint16_t ramps_wrong(const struct dz_calibration *block)
 {
-    return (uint16_t)(outside(longest_command(block), 0u, LARGEST_CODES) |
-                      outside(block->sides[0].ramp_up, 1u, LARGEST_INT32) |
+    return (uint16_t)(outside(block->sides[0].ramp_up, 1u, LARGEST_INT32) |
                       outside(block->sides[0].ramp_down, 1u, LARGEST_INT32) |
                       outside(block->sides[1].ramp_up, 1u, LARGEST_INT32) |
                       outside(block->sides[1].ramp_down, 1u, LARGEST_INT32));
@@ -288,9 +289,9 @@ static uint16_t drive_wrong(const struct dz_calibration *block)
     const uint32_t rest = (block->zero_band != 0u) ? (block->zero_band + 1uL) : 0u;
 
     return (uint16_t)(outside(block->leave_zero, rest, LARGEST_CODES) |
-                      outside(block->fault_samples, 1u, MOST_FAULT_SAMPLES) | outside(block->fault_latch, 0u, 1u) |
-                      ((block->interlock == NO_INTERLOCK) ? 0u : outside(block->interlock, 0u, LARGEST_CODES)) |
-                      outside(block->ramps, 0u, 1u) | ((block->ramps == 0u) ? 0u : ramps_wrong(block)) |
+                      outside(block->fault_samples, 1u, MOST_FAULT_SAMPLES) | above(block->fault_latch, 1u) |
+                      ((block->interlock == NO_INTERLOCK) ? 0u : above(block->interlock, LARGEST_CODES)) |
+                      above(block->ramps, 1u) | ((block->ramps == 0u) ? 0u : ramps_wrong(block)) |
                       outside(block->dither_ticks, 1u, LARGEST_CODES) |
                       ((block->play_codes == 0u) ? 0u : play_of_both_wrong(block)));
 }
@@ -305,9 +306,15 @@ static uint16_t bit_of(uint16_t wrong, uint16_t bit)
 
 uint16_t dz_calibration_check(const struct dz_calibration *block)
 {
-    return (uint16_t)(bit_of(format_wrong(block), DZ_CALIBRATION_FORMAT) |
-                      bit_of(differs(block->crc32, crc_of(block)), DZ_CALIBRATION_CRC) |
-                      bit_of(firmware_wrong(block), DZ_CALIBRATION_FIRMWARE) |
-                      bit_of(signals_wrong(block), DZ_CALIBRATION_SIGNALS) |
-                      bit_of(law_wrong(block), DZ_CALIBRATION_LAW) | bit_of(drive_wrong(block), DZ_CALIBRATION_DRIVE));
+    uint16_t found = (uint16_t)(bit_of(format_wrong(block), DZ_CALIBRATION_FORMAT) |
+                                bit_of(differs(block->crc32, crc_of(block)), DZ_CALIBRATION_CRC) |
+                                bit_of(firmware_wrong(block), DZ_CALIBRATION_FIRMWARE) |
+                                bit_of(signals_wrong(block), DZ_CALIBRATION_SIGNALS));
+
+    /* Law and drive count with the codes: of codes out of order there is nothing to say. */
+    if ((found & DZ_CALIBRATION_SIGNALS) == 0u) {
+        found |= bit_of(law_wrong(block), DZ_CALIBRATION_LAW);
+        found |= bit_of(drive_wrong(block), DZ_CALIBRATION_DRIVE);
+    }
+    return found;
 }

@@ -2,13 +2,20 @@
 
 import re
 import subprocess
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.verify.analysis.longest_path import WORD, Bound, bounds
+from dzdesign.verify.toolchain.bound_block import block_of
+from dzdesign.verify.toolchain.compiled_core import embedded
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, PROGRAMS, Machine
 
 PROGRAM = "core_cost.c"
+#: Sources of law and drive, and of the check of a block.
+FILES = ("dz_comp*.[ch]", "dz_drive.[ch]", "dz_calibration.[ch]")
+CHECK = "dz_calibration.c"
 #: What is called, in the order of the program's numbers.
 CALLS = ("dz_comp", "dz_drive_sample", "dz_drive_tick")
 #: What a machine's program counts.
@@ -17,6 +24,38 @@ UNITS = {CORTEX_M4.name: "instructions", AVR.name: "cycles"}
 IN_FLASH = re.compile(r"\.(?:text|rodata|data)\b")
 IN_RAM = {CORTEX_M4.name: re.compile(r"\.(?:data|bss)\b"), AVR.name: re.compile(r"\.(?:rodata|data|bss)\b")}
 VERSION = re.compile(r"\b\d+\.\d+\.\d+\b")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockCost:
+    """What only block form has: the check, the block itself, and what a call takes of other blocks than this one."""
+
+    check_flash_bytes: int
+    check_ram_bytes: int
+    check_stack_bytes: int
+    #: The most of dz_calibration_check() with the blocks of `hardest`; on the AVR to 256 cycles.
+    check_count: int
+    block_bytes: int
+    #: Of each of `CALLS` the most that was counted with this block, then with every drive function on, then with the
+    #: longest shifts of its divisions too, as far as the firmware's check takes such a block.
+    hardest: tuple[int, int, int]
+    #: The most of any block, over all paths of the machine code; or why there is no bound.
+    bounds: tuple[Bound, Bound, Bound] | str
+
+    def words(self, unit: str) -> str:
+        """The figures as a sentence has them."""
+        hardest = ", ".join(f"{name} {most}" for name, most in zip(CALLS, self.hardest, strict=True))
+        text = (
+            f"the check of a block takes {self.check_flash_bytes} bytes of flash, {self.check_ram_bytes} of RAM, "
+            f"{self.check_stack_bytes} of stack and {self.check_count} {unit}, the block {self.block_bytes} bytes; "
+            f"most {unit} counted with this block and with the drive functions on that it leaves off: {hardest}"
+        )
+        if isinstance(self.bounds, str):
+            return f"{text}; of any block: {self.bounds}"
+        each = ", ".join(f"{name} {bound.instructions}" for name, bound in zip(CALLS, self.bounds, strict=True))
+        stack = max(bound.stack_bytes for bound in self.bounds)
+        text += f"; with any block, over all paths of the machine code: {each}"
+        return f"{text}, {stack} bytes of stack, no recursion"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +74,8 @@ class CoreCost:
     stack_bytes: int
     #: Of each of `CALLS` the fewest and the most, from its first instruction to its return.
     counts: tuple[tuple[int, int], ...]
+    #: Of a core in block form; the counts are those with the firmware's own block.
+    block: BlockCost | None = None
 
     @property
     def words(self) -> str:
@@ -43,27 +84,28 @@ class CoreCost:
             f"{name} {least if least == most else f'{least} to {most}'}"
             for name, (least, most) in zip(CALLS, self.counts, strict=True)
         )
-        return (
+        unit = UNITS[self.machine]
+        text = (
             f"law and drive take {self.flash_bytes} bytes of flash, {self.ram_bytes} of RAM and {self.valve_bytes} a "
-            f"valve, {self.stack_bytes} of stack; {UNITS[self.machine]} a call: {', '.join(calls)} ({self.compiler})"
+            f"valve, {self.stack_bytes} of stack; {unit} a call{' with this block' if self.block else ''}: "
+            f"{', '.join(calls)} ({self.compiler})"
         )
+        return f"{text}; {self.block.words(unit)}" if self.block else text
 
 
 def core_cost(folder: Path, machine: Machine) -> CoreCost:
     """Measure the core of a firmware folder on a machine; what does not compile or run is a `RequirementError`."""
-    files = [path for name in ("dz_comp*.[ch]", "dz_drive.[ch]") for path in sorted((folder / "core").glob(name))]
+    block = block_of(folder)
+    files = [path for name in FILES for path in sorted((folder / "core").glob(name))]
     core = {path.name: path.read_bytes() for path in files}
-    sources = core | {PROGRAM: (PROGRAMS / PROGRAM).read_bytes()} | machine.headers
-    objects = [machine.compile(name, core, machine.core_flags, f"the core {name}") for name in core if name[-1] == "c"]
-    flags = (*machine.check_flags, f"-DBOTH={int('dz_comp_negative.c' in core)}")
-    what = "the measuring program"
-    program = machine.link([*objects, machine.compile(PROGRAM, sources, flags, what)], what)
-    printed = _counting(machine).run(program, [], what)
-    if len(printed) != 1 or len(printed[0]) != 10:
-        raise RequirementError(f"{what} on the {machine.name} reported {printed[:1]}, expected 10 numbers")
-    *numbers, valve_bytes = printed[0]
-    sections = [_sections(machine, each) for each in objects]
-    return CoreCost(
+    objects = {
+        name: machine.compile(name, core, machine.core_flags, f"the core {name}") for name in core if name[-1] == "c"
+    }
+    printed = _counted(machine, core, objects, block)
+    numbers, valve_bytes, more = printed[:9], printed[9], printed[10:]
+    check = [_sections(machine, objects.pop(CHECK))] if block is not None else []
+    sections = [_sections(machine, each) for each in objects.values()]
+    cost = CoreCost(
         machine=machine.name,
         compiler=f"{machine.compiler} {_version(machine)} {machine.core_flags[-1]}",
         flash_bytes=_total(sections, IN_FLASH),
@@ -71,6 +113,56 @@ def core_cost(folder: Path, machine: Machine) -> CoreCost:
         valve_bytes=valve_bytes,
         stack_bytes=max(numbers[2::3]),
         counts=tuple(zip(numbers[0::3], numbers[1::3], strict=True)),
+    )
+    if block is None:
+        return cost
+    refused, count, stack_bytes, *other = more
+    if refused:
+        raise RequirementError(f"the check of the block on the {machine.name} gave {refused}, expected 0: not accepted")
+    comp, sample, tick = (max(pair) for pair in zip(numbers[1::3], other[1::3], strict=True))
+    of_block = BlockCost(
+        check_flash_bytes=_total(check, IN_FLASH),
+        check_ram_bytes=_total(check, IN_RAM[machine.name]),
+        check_stack_bytes=stack_bytes,
+        check_count=count,
+        block_bytes=len(block),
+        hardest=(comp, sample, tick),
+        bounds=_bounds(machine, objects.values(), core),
+    )
+    return replace(cost, block=of_block, stack_bytes=max(numbers[2::3] + other[2::3]))
+
+
+def _counted(machine: Machine, core: dict[str, bytes], objects: dict[str, Path], block: bytes | None) -> list[int]:
+    """Return the numbers that the measuring program prints."""
+    what = "the measuring program"
+    both = any(b"dz_comp_negative" in text for text in core.values())
+    sources = core | {PROGRAM: (PROGRAMS / PROGRAM).read_bytes()} | machine.headers
+    flags = (*machine.check_flags, f"-DBOTH={int(both)}", *(["-DDZ_BLOCK"] if block else []))
+    linked = [*objects.values(), machine.compile(PROGRAM, sources, flags, what)]
+    if block is not None:
+        linked.append(embedded(machine, "block", machine.block_section, block))
+    printed = _counting(machine).run(machine.link(linked, what), [], what)
+    expected = 10 if block is None else 22
+    if len(printed) != 1 or len(printed[0]) != expected:
+        raise RequirementError(f"{what} on the {machine.name} reported {printed[:1]}, expected {expected} numbers")
+    return printed[0]
+
+
+def _bounds(machine: Machine, objects: Iterable[Path], core: dict[str, bytes]) -> tuple[Bound, Bound, Bound] | str:
+    """Return the most of each call over all paths of the machine code, of both signs' laws the greater; or why not."""
+    if machine.small:
+        return "no bound, as a shift takes cycles by its places"
+    program = machine.compiler.replace("gcc", "objdump")
+    text = "".join(_printed(program, "-dr", "--no-show-raw-insn", str(each)) for each in objects)
+    laws = [f"dz_comp{ending}" for ending in ("", "_negative") if f"dz_comp{ending}(".encode() in core["dz_comp.c"]]
+    try:
+        found = bounds(text, [*laws, *CALLS[1:]])
+    except RequirementError as error:
+        return str(error)
+    return (
+        Bound(*(max(getattr(found[name], each) for name in laws) for each in Bound.__slots__)),
+        replace(found[CALLS[1]], stack_bytes=found[CALLS[1]].stack_bytes + WORD),  # its fifth argument
+        found[CALLS[2]],
     )
 
 

@@ -95,9 +95,9 @@ class CompiledCore:
         objects += [machine.compile(name, check, flags, "the check") for name in units]
         arguments = []
         if machine.section:
-            objects.append(_embedded(machine, "prepared", machine.section, prepared))
+            objects.append(embedded(machine, "prepared", machine.section, prepared))
             if self.block is not None:
-                objects.append(_embedded(machine, "block", machine.block_section, self.block))
+                objects.append(embedded(machine, "block", machine.block_section, self.block))
         else:
             blocks = [str(stored(self.block))] if self.block is not None else []
             arguments = [str(stored(prepared)), *(["sample"] if sample else []), *blocks]
@@ -128,7 +128,7 @@ def _defines(held: bool, macros: Sequence[str], names: Sequence[str]) -> tuple[s
     return (*called, *(["-DDZ_HELD"] if held else []))
 
 
-def _embedded(machine: Machine, name: str, section: str, content: bytes) -> Path:
+def embedded(machine: Machine, name: str, section: str, content: bytes) -> Path:
     """Return an object that holds some octets as the symbol dz_<name>."""
     text = f'{section}\n.balign 8\n.global dz_{name}\ndz_{name}:\n.incbin "{name}.bin"\n'
     files = {f"{name}.S": text.encode(), f"{name}.bin": content}
