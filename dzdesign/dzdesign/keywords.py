@@ -89,7 +89,7 @@ def _kind(argument: Argument) -> str:
     """Return what a value may be, in words."""
     if bool in argument.kinds:
         return "bool"
-    words = [argument.result_class] if argument.result_class else []
+    words = argument.result_class.split(" | ") if argument.result_class else []
     words += ["path" if argument.is_path else "str"] if str in argument.kinds else []
     words += [kind.__name__ for kind in (int, float) if kind in argument.kinds]
     words += ["mapping"] if Mapping in argument.kinds else []
@@ -106,7 +106,7 @@ def _checked(argument: Argument, value: Any) -> Any:
     if argument.is_path and value == "":  # which would be the folder '.'
         raise _of_another_kind(name, value, argument)
     fits = bool({int, float} & kinds) or isinstance(value, tuple(kinds - {Mapping, Iterable}))
-    if fits or argument.result_class in (one.__name__ for one in type(value).__mro__):
+    if fits or set(argument.result_class.split(" | ")) & {one.__name__ for one in type(value).__mro__}:
         return value
     if isinstance(value, Mapping) and argument.is_table:
         items = {} if argument.option.by_entry else {f"{name}[{key!r}]": item for key, item in value.items()}

@@ -174,7 +174,7 @@ def test_a_key_that_no_schema_describes_is_seen(example_artefacts):
 def test_the_command_prints_them(capsys):
     assert main(["schema"]) == 0
     listed = capsys.readouterr().out
-    assert re.findall(r"^(\w+)  ", listed, re.MULTILINE) == list(SCHEMAS)
+    assert re.findall(r"^([\w-]+)  ", listed, re.MULTILINE) == list(SCHEMAS)
     assert main(["schema", "--json"]) == 0
     assert [each["name"] for each in json.loads(capsys.readouterr().out)["schemas"]] == list(SCHEMAS)
     for name in SCHEMAS:

@@ -14,7 +14,10 @@ from dzdesign.core.folder_contents import manifest_of
 from dzdesign.core.options import flag_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.design.output_manifest import OutputManifest
 
+#: What a folder holds, by the type of its manifest.
+WORDS = {FirmwareManifest: "firmware", OutputManifest: "output"}
 #: Differences that a message names.
 MOST_NAMED = 4
 #: Keys that another version may write otherwise for the same design, that follow from others, or that have words here.
@@ -32,23 +35,24 @@ def target_in(folder: Path) -> str:
 
 
 def refuse_another_design(folder: Path, compensator: Compensator) -> None:
-    """Refuse a folder with the firmware of another design: its sides and signals would be gone without a word.
+    """Refuse a folder with what was made of another design: its sides and signals would be gone without a word.
 
     A design is the same where valve, options and numbers are, whichever version of dzdesign made it.
     """
     manifest = manifest_of(folder)
-    if manifest is None or family_of(manifest["schema"]) != family_of(schema_of(FirmwareManifest)):
+    kinds = {family_of(schema_of(kind)): word for kind, word in WORDS.items()}
+    if manifest is None or (family := family_of(manifest["schema"])) not in kinds:
         return  # nothing, or nothing of ours, which is refused where it is written
     path = folder / Compensator.FILE_NAME
     try:
-        earlier = read_artefact(read_bytes(path, "compensator of the firmware"), Compensator, str(path))
+        earlier = read_artefact(read_bytes(path, f"compensator of the {kinds[family]}"), Compensator, str(path))
     except InputError as error:
         found = [f"its {Compensator.FILE_NAME} can't be read ({error})"]
     else:
         found = list(_differences(earlier, compensator))
     if found:
         raise InputError(
-            f"'{folder}' holds the firmware of another design: {and_more(found, MOST_NAMED)}; "
+            f"'{folder}' holds the {kinds[family]} of another design: {and_more(found, MOST_NAMED)}; "
             "give `codegen` --replace to write over it, or choose a new folder with -o"
         )
 

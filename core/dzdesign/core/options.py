@@ -74,7 +74,7 @@ class Argument:
     help: str
     #: Types that a value may have, such as str, PathLike, Mapping, Iterable.
     kinds: frozenset[Any]
-    #: Name of the class whose instances may be handed in place of a file; empty if there is none.
+    #: Names of the classes whose instances may be handed in place of a file, "A | B"; empty if there is none.
     result_class: str
     #: Whether Python takes it by position.
     by_position: bool
@@ -140,7 +140,7 @@ def arguments_of(declaration: type) -> tuple[Argument, ...]:
         annotation, option = get_args(field.type)[:2]
         result_class = ""
         if isinstance(annotation, ForwardRef):  # "ValveModel | AnyPath": a class that is imported when it is needed
-            result_class, annotation = annotation.__forward_arg__.partition(" ")[0], AnyPath
+            result_class, annotation = annotation.__forward_arg__.rpartition(" | ")[0], AnyPath
         kinds = get_args(annotation) if get_origin(annotation) not in (Iterable, Mapping) else (annotation,)
         found.append(
             Argument(

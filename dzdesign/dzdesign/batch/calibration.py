@@ -117,7 +117,7 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     from dzdesign.codegen.project import generate
     from dzdesign.stages.design import DesignArguments, design
     from dzdesign.stages.identify import IdentifyArguments, identify
-    from dzdesign.stages.verify import VerifyArguments, verify
+    from dzdesign.stages.verify import VerifyArguments, verify_firmware
 
     out = folder / "out"
     out.mkdir()
@@ -141,7 +141,7 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
         plant = folder / task.plant[0]
         plant.write_bytes(task.plant[1])
     arguments = VerifyArguments(place, ramps=recordings, plant=plant, output=out / "evidence")
-    verification = verify(arguments, identified=valve)
+    verification = verify_firmware(arguments, identified=valve)
     if verification.holds:
         return OK, ""
     check = next(check for check in verification.evidence.all_checks if not check.holds)

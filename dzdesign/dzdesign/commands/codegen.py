@@ -13,6 +13,7 @@ from dzdesign.terminal.progress import say
 EXAMPLES = (
     "dzdesign codegen compensator.json -o firmware",
     "dzdesign codegen valve.json --target host",
+    "dzdesign codegen compensator.json --target iec61131 --dialect twincat -o plc",
     "dzdesign codegen --list-targets",
 )
 
@@ -25,37 +26,43 @@ class Arguments(GenerateArguments):
     """compensator.json; or a valve.json, designed first with the options below."""
     _: KW_ONLY
     list_targets: Annotated[bool, Option()] = False
-    """Print name and description of every target."""
+    """Print name and description of every target, microcontrollers before other outputs."""
 
 
 def run(arguments: Arguments, json: bool) -> int:
-    """Generate a firmware and print its files, or print the targets."""
+    """Generate a firmware or another output and print its files, or print the targets."""
+    from dzdesign.codegen.project import Firmware
     from dzdesign.design.costs import design_warnings
-    from dzdesign.terminal.tables import print_firmware
+    from dzdesign.terminal.tables import print_firmware, print_output
 
     if arguments.list_targets:
         return _list_targets(json)
     if arguments.compensator is None:
         raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
-    firmware = generate(arguments)
-    for line in design_warnings(firmware.compensator):
+    made, folder = generate(arguments), os.fspath(arguments.output or "")
+    for line in design_warnings(made.compensator):
         say(f"warning: {line}")
-    if firmware.note:
-        say(firmware.note)
+    if made.note:
+        say(made.note)
     if json:
-        print_json(firmware.manifest)
+        print_json(made.manifest)
+    elif isinstance(made, Firmware):
+        print_firmware(made, folder=folder)
     else:
-        print_firmware(firmware, folder=os.fspath(arguments.output or ""))
+        print_output(made, folder=folder)
     return 0
 
 
 def _list_targets(json: bool) -> int:
+    from dzdesign.codegen.other_targets import OTHER_TARGETS, OtherTarget
     from dzdesign.codegen.project import targets
+    from dzdesign.codegen.target import Target
 
+    everything: tuple[Target | OtherTarget, ...] = (*targets(), *OTHER_TARGETS.values())
     if json:
-        print_json({"targets": [{"name": target.name, "description": target.description} for target in targets()]})
+        print_json({"targets": [{"name": target.name, "description": target.description} for target in everything]})
         return 0
-    width = max(len(target.name) for target in targets())
-    for target in targets():
+    width = max(len(target.name) for target in everything)
+    for target in everything:
         print(f"{target.name:{width}}  {target.description}")
     return 0

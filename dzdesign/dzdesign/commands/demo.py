@@ -11,7 +11,7 @@ from dzdesign.example import example_folder
 from dzdesign.stages.design import DesignArguments, design
 from dzdesign.stages.generate import GenerateArguments, generate
 from dzdesign.stages.identify import IdentifyArguments, identify
-from dzdesign.stages.verify import VerifyArguments, verify
+from dzdesign.stages.verify import VerifyArguments, verify_firmware
 from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say, stage_progress
 
@@ -55,7 +55,7 @@ def run(arguments: Arguments, json: bool) -> int:
     say("designing the compensator")
     compensator = design(DesignArguments(valve, output=folder / "compensator.json"))
     generate(GenerateArguments(compensator, output=folder / "firmware"))
-    verification = verify(
+    verification = verify_firmware(
         VerifyArguments(folder / "firmware", ramps=ramps, plant=example / "plant.toml", output=folder / "evidence"),
         plant_source="plant.toml of the example",
         identified=valve,

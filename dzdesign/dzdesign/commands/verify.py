@@ -9,6 +9,7 @@ from dzdesign.terminal.page import print_json
 Arguments = VerifyArguments
 EXAMPLES = (
     "dzdesign verify firmware",
+    "dzdesign verify plc -o plc_evidence",
     "dzdesign verify firmware --plant plant.toml --tolerances tolerances.toml",
     'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
     "dzdesign verify firmware --machine-code --mutate --proof",
@@ -16,15 +17,21 @@ EXAMPLES = (
 
 
 def run(arguments: Arguments, json: bool) -> int:
-    """Verify a firmware and print every requirement; 1 if one does not hold."""
+    """Verify a firmware or another output and print every requirement; 1 if one does not hold."""
     from dzdesign.report.valve_report import REPORT_NAME
-    from dzdesign.terminal.verification_tables import print_verification
+    from dzdesign.terminal.verification_tables import print_output_verification, print_verification
+    from dzdesign.verify.output_evidence import OutputEvidence
+    from dzdesign.verify.verification import Verification
 
     verification = verify(arguments)
     if json:
         print_json(verification.evidence)
-    else:
+        return 0 if verification.holds else 1
+    output, to_read = Path(arguments.output or ""), REPORT_NAME
+    if isinstance(verification, Verification):
         print_verification(verification)
-        output = Path(arguments.output or "")
-        print(one_line(f"Evidence: {output}, to be read: {output / REPORT_NAME}"))
+    else:
+        print_output_verification(verification)
+        to_read = OutputEvidence.FILE_NAME
+    print(one_line(f"Evidence: {output}, to be read: {output / to_read}"))
     return 0 if verification.holds else 1

@@ -10,12 +10,15 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import whole_number
 from dzdesign.core.options import AnyPath, Option, Text, flag_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
-from dzdesign.stages.design import TARGETS, design_options
+from dzdesign.stages.design import design_options
 
+#: Where the names of all targets stand, microcontrollers and others.
+ALL_TARGETS = "dzdesign.codegen.other_targets:ALL_TARGET_NAMES"
 #: Forms of the core, the default first.
 FORMS = "dzdesign.design.firmware_manifest:FORMS"
 
 if TYPE_CHECKING:
+    from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
 
@@ -28,63 +31,121 @@ class GenerateArguments(DesignChoices):
     """compensator.json, or a valve.json, which is designed first with the options of `design`."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", command_default="firmware", short="-o")] = None
-    """Folder to write, with the C project."""
-    target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
-    """Microcontroller (default: that of the design; of a VALVE.json f28335)."""
+    """Folder to write, with the C project or the output."""
+    target: Annotated[Text, Option("NAME", choices=ALL_TARGETS)] = None
+    """Microcontroller (default: that of the design; of a VALVE.json f28335), or another output: iec61131, fmu."""
+    dialect: Annotated[Text, Option("NAME")] = None
+    """Of iec61131, dialect of the PLC's tool: codesys (default), twincat."""
+    interface: Annotated[Text, Option("NAME")] = None
+    """Of iec61131, what the function block takes: plc, command in 0.01 % and pressures in 0.1 bar (default), or
+    codes, the converter codes that the compensator was designed for."""
+    plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
+    """Of fmu, file with a plant, like examples/paper_valve/plant.toml: also make an FMU of the plant."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
     """Where the numbers of the valve stand: fixed in the core (default), or in a block of data that it is handed."""
     vectors: Annotated[int | str, Option("N", read=whole_number("a whole number up to 99999", digits=5))] = "0"
     """Number of test vectors in vectors.csv: codes and the exact law's answers at every node, corner and fault, then at
     random codes."""
     replace: Annotated[bool, Option()] = False
-    """Write over the firmware of another design in the folder."""
+    """Write over the firmware or output of another design in the folder."""
 
 
-def generate(arguments: GenerateArguments) -> "Firmware":
-    """Generate the C project of a compensator, whose numbers are derived again first.
+def generate(arguments: GenerateArguments) -> "Firmware | Output":
+    """Generate the C project of a compensator, or another output; its numbers are derived again first.
 
     Raises
     ------
     InputError
         If the file can't be read, a number in it does not follow, the target counts otherwise, the vectors are too few,
-        or the folder holds the firmware of another design.
+        an option is of another target, or the folder holds what was made of another design.
     """
-    from dzdesign.codegen.project import DEFAULT_TARGET, target_named, write_firmware
-    from dzdesign.codegen.project import generate as generate_project
-    from dzdesign.core.artefact_reading import read_artefact
+    from dzdesign.codegen.other_targets import OTHER_TARGETS, check_target_name
+    from dzdesign.codegen.project import DEFAULT_TARGET
     from dzdesign.core.artefact_types import schema_of
+    from dzdesign.design.firmware_manifest import FirmwareManifest
+    from dzdesign.design.output_manifest import OutputManifest
+
+    target = arguments.target or DEFAULT_TARGET
+    check_target_name(target)
+    kind = OutputManifest if target in OTHER_TARGETS else FirmwareManifest
+    if arguments.output is not None:
+        check_folder_may_be_written(Path(arguments.output), schema_of(kind))
+    return _other_output(arguments, target) if target in OTHER_TARGETS else _firmware(arguments, target)
+
+
+def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
+    """Generate the C project, and write it where that is asked for."""
+    from dzdesign.codegen.other_targets import settings_of
+    from dzdesign.codegen.project import generate as generate_project
+    from dzdesign.codegen.project import write_firmware
+    from dzdesign.design.firmware_manifest import form_named
+
+    form = form_named(arguments.calibration)
+    settings_of(target, _of_other_targets(arguments))
+    vectors: int = read_options(arguments, ["vectors"])["vectors"]
+    made, content, designed = _compensator(arguments, target)
+    firmware = generate_project(made, target if designed else arguments.target, content, form, vectors)
+    if arguments.output is None:
+        return firmware
+    return write_firmware(firmware, Path(arguments.output), over_another=arguments.replace)
+
+
+def _other_output(arguments: GenerateArguments, target: str) -> "Output":
+    """Generate an output that is no C firmware, and write it where that is asked for."""
+    from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of, write_output
+    from dzdesign.codegen.project import DEFAULT_TARGET
+
+    given = _of_other_targets(arguments)
+    of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
+    given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
+    settings = settings_of(target, given)
+    made, content, _ = _compensator(arguments, DEFAULT_TARGET)
+    output = generate_output(made, target, settings, content)
+    if arguments.output is None:
+        return output
+    return write_output(output, Path(arguments.output), over_another=arguments.replace)
+
+
+def _of_other_targets(arguments: GenerateArguments) -> "dict[str, str | None]":
+    """Return the options that are of one output that is no C firmware alone, as they were given."""
+    from dzdesign.codegen.other_targets import OTHER_TARGETS
+
+    given = {name: getattr(arguments, name) for other in OTHER_TARGETS.values() for name in other.options}
+    return given | {"plant": None if arguments.plant is None else _plant_text(Path(arguments.plant))}
+
+
+def _plant_text(path: Path) -> str:
+    """Return a plant file's parameters as the setting that stands in a manifest: JSON, those by default included."""
+    import json
+    from dataclasses import asdict
+
+    from dzdesign.terminal.progress import say
+    from dzdesign.verify.closed_loop.plant import read_plant
+
+    return json.dumps({name: float(value) for name, value in asdict(read_plant(path, say)).items()})
+
+
+def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bytes | None, bool]":
+    """Return the compensator whose numbers follow, its file, None without one, and whether it was designed here."""
+    from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.designing import design as design_valve
-    from dzdesign.design.firmware_manifest import FirmwareManifest, form_named
     from dzdesign.design.redesign_check import refuse_without_options
     from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.identify.valve.model import ValveModel
 
-    target, form = arguments.target or DEFAULT_TARGET, form_named(arguments.calibration)
-    target_named(target)
-    if arguments.output is not None:
-        check_folder_may_be_written(Path(arguments.output), schema_of(FirmwareManifest))
     given = arguments.compensator
-    vectors: int = read_options(arguments, ["vectors"])["vectors"]
     if isinstance(given, Compensator):
-        proven = _proven(given, "the compensator", arguments)
-        firmware = generate_project(proven, arguments.target, calibration=form, vectors=vectors)
-    else:
-        source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
-        document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
-        if document["schema"] == VALVE_SCHEMA:
-            valve = read_artefact(content, ValveModel, source)
-            compensator = design_valve(valve, design_options(arguments, target), content)
-            firmware = generate_project(compensator, target, calibration=form, vectors=vectors)
-        else:
-            compensator = read_artefact(content, Compensator, source)
-            refuse_without_options(compensator, source)
-            proven = _proven(compensator, f"'{source}'", arguments)
-            firmware = generate_project(proven, arguments.target, content, form, vectors)
-    if arguments.output is None:
-        return firmware
-    return write_firmware(firmware, Path(arguments.output), over_another=arguments.replace)
+        return _proven(given, "the compensator", arguments), None, False
+    source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
+    document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
+    if document["schema"] == VALVE_SCHEMA:
+        valve = read_artefact(content, ValveModel, source)
+        return design_valve(valve, design_options(arguments, target), content), None, True
+    compensator = read_artefact(content, Compensator, source)
+    refuse_without_options(compensator, source)
+    return _proven(compensator, f"'{source}'", arguments), content, False
 
 
 def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> "Compensator":

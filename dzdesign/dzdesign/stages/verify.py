@@ -1,4 +1,4 @@
-"""`verify`: firmware -> evidence."""
+"""`verify`: firmware, or another output, -> evidence."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,18 +9,24 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, read_bytes, sha256_of, write_folder
 from dzdesign.core.errors import InputError, quoted
-from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Texts, paths_of, texts_of
+from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Texts, flag_of, paths_of, texts_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.stages.recordings import expand
 from dzdesign.terminal.progress import say, stage_progress, with_bar
 
 if TYPE_CHECKING:
+    from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.evidence import MutationScore
+    from dzdesign.verify.outputs.dispatch import OutputVerification
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
 
+#: Options that make no sense for an output that is no C firmware, unless its kind takes one.
+OF_FIRMWARE = (
+    "blocks", "plant", "back_pressure", "tolerances", "include", "c2000ware", "mutate", "machine_code", "proof",
+)  # fmt: skip
 #: No port behind a valve's edge has more.
 LARGEST_BACK_MPA = 100.0
 
@@ -29,7 +35,7 @@ LARGEST_BACK_MPA = 100.0
 class VerifyArguments:
     """Arguments of `verify`."""
 
-    firmware: Annotated["Firmware | AnyPath", Option("DIR")]
+    firmware: Annotated["Firmware | Output | AnyPath", Option("DIR")]
     """Folder made by `dzdesign codegen`."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", command_default="evidence", short="-o")] = None
@@ -56,23 +62,65 @@ class VerifyArguments:
     mutate: Annotated[bool, Option(group=CHECKS)] = False
     """Also make the C wrong in every place, and count what is caught."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
-    """Also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr."""
+    """Also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr; of FMUs every input
+    in Wine and in QEMU."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
     """Also prove by Frama-C that nothing overflows a 16-bit int."""
 
 
-def verify(
-    arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
-) -> "Verification":
+def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
     """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
 
-    What this very run has `identified` from the given ramps is not identified again.
+    Of an output that is no C firmware, such as Structured Text, every input too.
 
     Raises
     ------
     InputError
         If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
     """
+    from dzdesign.verify.outputs.folder import holds_output
+
+    with _firmware_folder(arguments.firmware) as folder:
+        return _verify_output(folder, arguments) if holds_output(folder) else _verify_firmware(folder, arguments)
+
+
+def verify_firmware(
+    arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
+) -> "Verification":
+    """Verify a C firmware; what this very run has `identified` from the given ramps is not identified again."""
+    with _firmware_folder(arguments.firmware) as folder:
+        return _verify_firmware(folder, arguments, plant_source, identified)
+
+
+def _verify_output(folder: Path, arguments: VerifyArguments) -> "OutputVerification":
+    """Verify an output that is no C firmware."""
+    from dzdesign.regeneration import output_regenerated
+    from dzdesign.reidentification import GivenFiles, identified_again
+    from dzdesign.verify.firmware.folder import read_compensator
+    from dzdesign.verify.outputs.dispatch import SCHEMA, output_evidence_files, verify_output
+    from dzdesign.verify.verification import evidence_manifest
+
+    given = [flag_of(name) for name in OF_FIRMWARE if getattr(arguments, name)]
+    if arguments.output is not None:
+        check_folder_may_be_written(Path(arguments.output), SCHEMA)
+    recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
+    with stage_progress() as stage:
+        verification = verify_output(folder, given, stage)
+    added = [output_regenerated(folder)]
+    if recordings:
+        with stage_progress("identifying again"):
+            added.append(identified_again(read_compensator(folder), recordings))
+    verification = replace(verification, evidence=verification.evidence.with_checks(*added))
+    if arguments.output is not None:
+        manifest = evidence_manifest(verification.evidence)
+        write_folder(Path(arguments.output), output_evidence_files(verification), manifest)
+    return verification
+
+
+def _verify_firmware(
+    folder: Path, arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
+) -> "Verification":
+    """Verify a C firmware."""
     from dzdesign.block_checks import blocks_checked, given_blocks
     from dzdesign.regeneration import regenerated
     from dzdesign.reidentification import GivenFiles, identified_again
@@ -96,30 +144,29 @@ def verify(
     include = [Path(place) for place in paths_of(arguments.include)]
     recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
     block_files = expand(arguments.blocks) if paths_of(arguments.blocks) else []
-    with _firmware_folder(arguments.firmware) as folder:
-        blocks = given_blocks(folder, block_files)
-        ware = arguments.c2000ware
-        added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
-        with stage_progress() as stage:
-            verification = verify_folder(
-                folder, plant, plant_source, digest, tolerances=tolerances, backs_MPa=backs_MPa,
-                include=include, say=stage, watch=stage.each,
-            )  # fmt: skip
-        if recordings:
-            with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
-                added.append(identified_again(read_compensator(folder), recordings, identified))
-        if blocks:
-            with stage_progress("comparing every input with each of the calibration blocks"):
-                added += blocks_checked(folder, blocks)
-        more, mutants = _further_checks(arguments, folder, verification)
-        verification = verification.with_checks(regenerated(folder, include), *added, *more)
-        if mutants:
-            verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
-        if arguments.output is not None:
-            output = Path(arguments.output)
-            manifest = evidence_manifest(verification.evidence)
-            files = with_report(evidence_files(verification), folder, output, verification.derived)
-            write_folder(output, files, manifest)
+    blocks = given_blocks(folder, block_files)
+    ware = arguments.c2000ware
+    added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
+    with stage_progress() as stage:
+        verification = verify_folder(
+            folder, plant, plant_source, digest, tolerances=tolerances, backs_MPa=backs_MPa,
+            include=include, say=stage, watch=stage.each,
+        )  # fmt: skip
+    if recordings:
+        with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
+            added.append(identified_again(read_compensator(folder), recordings, identified))
+    if blocks:
+        with stage_progress("comparing every input with each of the calibration blocks"):
+            added += blocks_checked(folder, blocks)
+    more, mutants = _further_checks(arguments, folder, verification)
+    verification = verification.with_checks(regenerated(folder, include), *added, *more)
+    if mutants:
+        verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
+    if arguments.output is not None:
+        output = Path(arguments.output)
+        manifest = evidence_manifest(verification.evidence)
+        files = with_report(evidence_files(verification), folder, output, verification.derived)
+        write_folder(output, files, manifest)
     return verification
 
 
@@ -137,11 +184,12 @@ def _back_pressures_MPa(texts: list[str]) -> list[float] | None:
 
 
 @contextmanager
-def _firmware_folder(firmware: "Firmware | AnyPath") -> Iterator[Path]:
+def _firmware_folder(firmware: "Firmware | Output | AnyPath") -> Iterator[Path]:
     """Give the folder of a firmware; of one that was only generated a temporary one."""
+    from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
 
-    if not isinstance(firmware, Firmware):
+    if not isinstance(firmware, Firmware | Output):
         yield Path(firmware)
         return
     with TemporaryDirectory() as temporary:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 from dzdesign.core.errors import one_line
 from dzdesign.terminal.page import FILE_WIDTH, put_line
 from dzdesign.terminal.plan_tables import print_plan
-from dzdesign.terminal.tables import print_compensator, print_firmware, print_valve
-from dzdesign.terminal.verification_tables import print_verification
+from dzdesign.terminal.tables import print_compensator, print_firmware, print_output, print_valve
+from dzdesign.terminal.verification_tables import print_output_verification, print_verification
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
@@ -41,6 +42,13 @@ def _print_firmware(firmware: "Firmware", console: "Console") -> None:
         put_line(console, firmware.note)
 
 
+def _print_output(output: "Output", console: "Console") -> None:
+    """Print its files, and the note that the command line has on standard error."""
+    print_output(output, console)
+    if output.note:
+        put_line(console, output.note)
+
+
 #: Class of a result -> its heading, and what prints it.
 PAGES: Mapping[str, tuple[Callable[[Any], str], Callable[[Any, "Console"], None]]] = {
     "ValveModel": (_valve_heading, print_valve),
@@ -49,11 +57,16 @@ PAGES: Mapping[str, tuple[Callable[[Any], str], Callable[[Any, "Console"], None]
         lambda made: f"Firmware for {made.manifest.target}, law {made.manifest.law}, {len(made.files)} files",
         _print_firmware,
     ),
+    "Output": (
+        lambda made: f"Output for {made.manifest.target}, law {made.manifest.law}, {len(made.files)} files",
+        _print_output,
+    ),
     "SeriesPlan": (
         lambda plan: f"Test series of {plan.chosen.ramps} ramps, {plan.chosen.duration_min:g} min",
         print_plan,
     ),
     "Verification": (lambda verification: f"Verification: {verification.verdict}", print_verification),
+    "OutputVerification": (lambda verification: f"Verification: {verification.verdict}", print_output_verification),
 }
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.derivation.account.mutation.scoring import AccountMutants
@@ -226,6 +227,16 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
     place = f", in {folder}" if folder else ""
     put_line(console, f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}{place}:")
     for name in firmware.contents:
+        put_line(console, f"  {name}")
+
+
+def print_output(output: "Output", console: "Console | None" = None, folder: str = "") -> None:
+    """Print the files of an output that is no C firmware, and in which folder they are."""
+    console = console or new_console()
+    place = f", in {folder}" if folder else ""
+    settings = output.manifest.settings_in_words
+    put_line(console, f"Output for {output.manifest.target}{settings}, law {output.manifest.law}{place}:")
+    for name in output.contents:
         put_line(console, f"  {name}")
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.evidence import MutationScore
     from dzdesign.verify.loop_results import MonteCarlo, PressureResult, Scatter, ScenarioResult, Spread
+    from dzdesign.verify.outputs.dispatch import OutputVerification
     from dzdesign.verify.verification import Verification
 
 
@@ -40,6 +41,18 @@ def print_verification(verification: "Verification", console: "Console | None" =
     put_line(console, verification.verdict)
     if verification.evidence.mutants:
         print_firmware_mutants(verification.evidence.mutants, console)
+
+
+def print_output_verification(verification: "OutputVerification", console: "Console | None" = None) -> None:
+    """Print every check of an output that is no C firmware, and what was not tried."""
+    from dzdesign.verify.requirements import RAMPS
+
+    console = console or new_console()
+    for check in verification.evidence.checks:
+        put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
+    if not any(check.id == RAMPS.id for check in verification.evidence.checks):
+        put_line(console, f"{NOT_CHECKED}  {RAMPS.title}: {RAMPS.how}".replace("`", ""))
+    put_line(console, verification.verdict)
 
 
 def _put_closed_loop(console: "Console", verification: "Verification", units: "RecordedUnits") -> None:

@@ -20,6 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
+from dzdesign.codegen.other_targets import ALL_TARGET_NAMES
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
 from dzdesign.command_line.invocation import parse
@@ -181,7 +182,7 @@ def bash_script(tmp_path_factory):
         ("ident", {"identify"}),
         ("-q ident", {"identify"}),
         ("identify --meter-", {"--meter-floor", "--meter-lag", "--meter-zero"}),
-        ("codegen --target ", {"avr", "cortex-m4", "f280049c", "f28335", "host"}),
+        ("codegen --target ", set(ALL_TARGET_NAMES)),
         ("design valve.json --guard ", {"closing", "mean", "opening"}),
         ("derive --format h", {"html"}),
         ("completion po", {"powershell"}),

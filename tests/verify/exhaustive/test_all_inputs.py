@@ -314,7 +314,7 @@ def input_check_of(folder):
     prepared = PreparedInputs(exact_law(folder))
     at_zero = np.zeros(prepared.differences.values.size, dtype=int)
     found = Findings(outputs_hash="", object_sha256="", at_zero=at_zero, **dict.fromkeys(COUNTED, 0))
-    return input_check(prepared, CompiledCore(folder), found)
+    return input_check(prepared, CompiledCore(folder).sha256, found)
 
 
 @pytest.mark.slow

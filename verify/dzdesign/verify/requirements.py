@@ -38,6 +38,8 @@ class Requirement:
 
 FILES = Requirement(id="files-as-generated", title="files as generated")
 MANIFEST = Requirement(id="manifest", title="the manifest says what is in the firmware")
+#: Of an output that is no C firmware.
+OUTPUT_MANIFEST = Requirement(id="output-manifest", title="the manifest says what the output was made from")
 COMPILES = Requirement(id="compiles", title="compiles without a warning")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
 MONOTONE = Requirement(id="monotone", title="within range, monotone")
@@ -90,6 +92,13 @@ UNDEFINED_BEHAVIOUR = Requirement(
 )
 MUTATION = Requirement(id="mutation", title="wrong C is caught", how="`verify --mutate`")
 C2000WARE = Requirement(id="c2000ware", title="compiles against C2000Ware", how="`verify --c2000ware`")
+#: Of FMUs.
+FMU_FILES = Requirement(id="fmu-files", title="the FMUs' files are those of their manifests")
+FMU_DESCRIPTION = Requirement(id="fmu-description", title="modelDescription.xml says what the FMU was made from")
+FMU_LIBRARIES = Requirement(id="fmu-libraries", title="the binaries need no library")
+FMU_DRIVE = Requirement(id="fmu-drive", title="Co-Simulation follows the drive's model, a step later")
+FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
+FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="compensator and plant, coupled, run as the closed loop")
 POPULATION = Requirement(
     id="population",
     title="no flow at zero command of any machine drawn from the budget",

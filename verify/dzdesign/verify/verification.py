@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, as_document, schema_of, to_json_bytes
+from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
@@ -220,7 +220,7 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
     )
 
 
-def evidence_manifest(evidence: Evidence) -> Mapping[str, object]:
+def evidence_manifest(evidence: Artefact) -> Mapping[str, object]:
     """Return what the manifest of the evidence folder says beside the hashes of its files."""
     header = as_document(evidence)
     return {key: header[key] for key in ("schema", "tool", "made_from")}

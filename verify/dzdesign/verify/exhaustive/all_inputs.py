@@ -33,11 +33,11 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
     """
     prepared = PreparedInputs(ExactLaw(compensator or read_compensator(folder), sign))
     core = CompiledCore(folder, sign)
-    return input_check(prepared, core, core.check(prepared.everything()))
+    return input_check(prepared, core.sha256, core.check(prepared.everything()))
 
 
-def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -> InputCheck:
-    """Return what was found, with the bound at zero command."""
+def input_check(prepared: PreparedInputs, core_sha256: str, found: Findings) -> InputCheck:
+    """Return what was found of a core, with the bound at zero command."""
     exact, differences = prepared.exact, prepared.differences
     (margin,) = zero_command_margins(exact, differences, found.at_zero, [guarded_bounds(exact.compensator, exact.sign)])
     if margin is None:
@@ -46,7 +46,7 @@ def input_check(prepared: PreparedInputs, core: CompiledCore, found: Findings) -
         sign=1 if exact.sign > 0 else -1,
         over_compensated=margin.exceeded,
         smallest_margin_V=float(margin.margin_V),
-        core_sha256=core.sha256,
+        core_sha256=core_sha256,
         object_sha256=found.object_sha256,
         outputs_hash=found.outputs_hash,
         pressure_pairs=differences.pairs,

@@ -113,6 +113,6 @@ class BlockFirmware:
         prepared = PreparedInputs(ExactLaw(compensator, sign))
         core, inputs = CompiledCore(self._folder, sign, block), prepared.everything()
         try:
-            return input_check(prepared, core, core.check(inputs))
+            return input_check(prepared, core.sha256, core.check(inputs))
         finally:
             discard(inputs, block)

@@ -103,7 +103,7 @@ class CompiledCore:
             arguments = [str(stored(prepared)), *(["sample"] if sample else []), *blocks]
         program = machine.link(objects, f"the core {self.name} ({machine.name})")
         printed = machine.run(program, arguments, f"the core {self.name}")
-        return _findings(printed, sha256_of(core.read_bytes()), f"the core {self.name} on the {machine.name}")
+        return findings_of(printed, sha256_of(core.read_bytes()), f"the core {self.name} on the {machine.name}")
 
     def _adapter(self, machine: Machine, names: Sequence[str], held: bool) -> Path:
         """Return the object that binds the core's functions of a side to a block."""
@@ -142,7 +142,8 @@ def _read(path: Path) -> bytes:
         raise InputError(f"{path}: can't be read: {error.strerror}; make it again with `dzdesign codegen`") from error
 
 
-def _findings(printed: list[list[int]], object_sha256: str, what: str) -> Findings:
+def findings_of(printed: list[list[int]], object_sha256: str, what: str) -> Findings:
+    """Return the findings that a program of the check printed; other numbers are a `RequirementError`."""
     if not printed or len(printed[0]) != 2 + len(COUNTED):
         found = printed[0][:3] if printed else "nothing"
         raise RequirementError(f"{what} reported {found}, expected {2 + len(COUNTED)} numbers")

@@ -26,7 +26,8 @@ from dzdesign.core.errors import InputError, RequirementError
 
 #: What the generated core must bear without a word.
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
-TIMEOUT_S = 120
+#: The first program for another system takes a minute or more: Zig builds its C library.
+TIMEOUT_S = 300
 #: What `zig cc` must be told to be a compiler as others are: not to write debug information (it holds the folder's
 #: name, so that equal sources gave unequal objects), to compile for every processor of the kind and not for this one,
 #: and to build no traps into what is undefined (it does so where it is not told to optimize).

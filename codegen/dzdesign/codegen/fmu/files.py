@@ -1,0 +1,122 @@
+"""FMUs of a compensator, and of a plant where one is given: `output_files` returns them, a file a version of FMI."""
+
+import json
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files as files_of
+
+from dzdesign.codegen.banner import banner_of
+from dzdesign.codegen.fmu.archive import archive
+from dzdesign.codegen.fmu.binaries import binaries_of, ziglang_version
+from dzdesign.codegen.fmu.compensator import compensator_core, compensator_model, compensator_values
+from dzdesign.codegen.fmu.description import SOURCE, Fmi, Model, build_description, model_description
+from dzdesign.codegen.fmu.plant import plant_model, plant_of, plant_values
+from dzdesign.core.artefact_files import TOOL, sha256_of
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.strict_templates import strict_templates
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.firmware_manifest import FirmwareOrigin
+
+PACKAGE = "dzdesign.codegen.fmu"
+VERSIONS: tuple[Fmi, ...] = (2, 3)
+#: Where an FMU keeps what belongs to no tool but this one.
+EXTRA = "extra/dzdesign"
+SCHEMA = "dzdesign.fmu/1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """What an FMU is made of beside its model: printed values, C files of its own, and the file of its data."""
+
+    model: Model
+    template: str
+    values: Mapping[str, object]
+    core: Mapping[str, bytes]
+    extra: Mapping[str, bytes]
+
+
+def output_files(
+    compensator: Compensator, origin: FirmwareOrigin, settings: Mapping[str, str]
+) -> Mapping[str, bytes]:
+    """Return the FMUs, name to bytes: of the compensator, and of the plant in the settings, as JSON, if there is one.
+
+    The same input and the same ziglang give the same bytes. Without ziglang, or for a plant behind a current
+    controller, it is an `InputError`.
+    """
+    ziglang_version()
+    plant = plant_of(settings.get("plant", ""), compensator)
+    document = {Compensator.FILE_NAME: to_json_bytes(compensator)}
+    parts = [
+        Parts(
+            model=compensator_model(compensator),
+            template="compensator.c.jinja",
+            values=compensator_values(compensator),
+            core=compensator_core(compensator),
+            extra=document,
+        )
+    ]
+    if plant is not None:
+        parts.append(
+            Parts(
+                model=plant_model(plant, compensator),
+                template="plant.c.jinja",
+                values=plant_values(compensator),
+                core={},
+                extra={"plant.json": (json.dumps(dict(plant), indent=2) + "\n").encode()},
+            )
+        )
+    return {f"{part.model.identifier}_fmi{fmi}.fmu": _fmu(part, compensator, origin, fmi)
+            for part in parts for fmi in VERSIONS}  # fmt: skip
+
+
+def _fmu(part: Parts, compensator: Compensator, origin: FirmwareOrigin, fmi: Fmi) -> bytes:
+    """Return one FMU."""
+    model, digest = part.model, origin.compensator_json
+    token = _token(part, digest, fmi)
+    values = {
+        **part.values,
+        "banner": banner_of(compensator, digest).lines("dz_fmu.c.jinja"),
+        "title": model.title.replace("dzdesign ", "").capitalize(),
+        "fmi": fmi,
+        "token": token,
+        "variables": model.of(fmi),
+        "indicators": model.indicators,
+        "states": model.states,
+        "rates": [each for each in model.variables if each.derivative_of],
+        "model_template": part.template,
+        "interface_template": f"fmi{fmi}.c.jinja",
+    }
+    template = strict_templates(PACKAGE, autoescape=False).get_template("dz_fmu.c.jinja")
+    sources = {SOURCE: str(template.render(values)).encode(), **part.core, **_headers(fmi)}
+    files = {
+        "modelDescription.xml": model_description(model, fmi, token).encode(),
+        **{f"sources/{name}": content for name, content in sources.items()},
+        **({"sources/buildDescription.xml": build_description(model).encode()} if fmi == 3 else {}),
+        **binaries_of(model.identifier, fmi, sources),
+        **{f"{EXTRA}/{name}": content for name, content in part.extra.items()},
+    }
+    manifest = {
+        "schema": SCHEMA,
+        "tool": TOOL,
+        "compiler": f"ziglang {ziglang_version()}",
+        "compensator_json": digest,
+        "fmi": f"{fmi}.0",
+        "token": token,
+        "files": {path: sha256_of(files[path]) for path in sorted(files)},
+    }
+    files[f"{EXTRA}/manifest.json"] = (json.dumps(manifest, indent=2) + "\n").encode()
+    return archive(files)
+
+
+def _token(part: Parts, digest: str, fmi: Fmi) -> str:
+    """Return what ties a binary to its modelDescription.xml: from the compensator's hash and the variables."""
+    made_from = (digest, fmi, part.model.identifier, part.model.variables, sorted(part.extra.items()), TOOL)
+    return f"{{{uuid.UUID(sha256_of(repr(made_from).encode())[:32])}}}"
+
+
+def _headers(fmi: Fmi) -> dict[str, bytes]:
+    """Return the headers of the standard, which carry their licence."""
+    folder = files_of(PACKAGE) / "headers" / f"fmi{fmi}"
+    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".h"))
+    return {name: (folder / name).read_bytes() for name in names}

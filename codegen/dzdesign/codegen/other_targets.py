@@ -1,0 +1,158 @@
+"""Outputs that are no C firmware: the one list of them, and what writes one.
+
+Each is made by a module that offers ``output_files(compensator, origin, settings) -> Mapping[str, bytes]``: relative
+path to content, without compensator.json and the manifest, which every output has. The same input gives the same bytes.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
+
+from dzdesign.codegen.earlier_firmware import refuse_another_design
+from dzdesign.codegen.project import TARGET_NAMES, target_named
+from dzdesign.core.artefact_files import sha256_of, write_folder
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.folder_contents import manifest_of
+from dzdesign.core.options import flag_of
+from dzdesign.core.result_display import ShownInNotebooks
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.firmware_manifest import FirmwareOrigin
+from dzdesign.design.output_manifest import OutputManifest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OtherTarget:
+    """One kind of output."""
+
+    #: On the command line, after ``--target``.
+    name: str
+    #: One line for ``--list-targets``.
+    description: str
+    #: Where its ``output_files`` stands.
+    module: str
+    #: Option of `codegen` that is of this kind, as a field's name, to the values that it takes, the default first;
+    #: with none listed any text is taken, by default an empty one.
+    options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+#: In the order of ``--list-targets``.
+OTHER_TARGETS: Mapping[str, OtherTarget] = {
+    each.name: each
+    for each in (
+        OtherTarget(
+            name="iec61131",
+            description="Structured Text of IEC 61131-3: a function block for a PLC, and PLCopen XML",
+            module="dzdesign.codegen.structured_text.files",
+            options={"dialect": ("codesys", "twincat"), "interface": ("plc", "codes")},
+        ),
+        OtherTarget(
+            name="fmu",
+            description="FMUs for simulation tools, FMI 2.0 and 3.0: the compensator and, with --plant, the plant",
+            module="dzdesign.codegen.fmu.files",
+            options={"plant": ()},
+        ),
+    )
+}
+#: Options of `codegen` that a firmware alone has.
+OF_FIRMWARE = ("calibration", "vectors")
+#: What ``--target`` of `codegen` takes.
+ALL_TARGET_NAMES = (*TARGET_NAMES, *OTHER_TARGETS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Output(ShownInNotebooks):
+    """The files of an output, path to content, the manifest that names their origin, and what a person should know."""
+
+    files: Mapping[str, bytes]
+    manifest: OutputManifest
+    compensator: Compensator
+    note: str = ""
+
+    @property
+    def contents(self) -> Mapping[str, bytes]:
+        """What is written, path to content, beside the manifest."""
+        return self.files
+
+
+def check_target_name(name: str) -> None:
+    """Refuse a target that is neither a microcontroller nor another output; the message proposes the nearest."""
+    if name not in ALL_TARGET_NAMES:
+        known = ", ".join(ALL_TARGET_NAMES)
+        raise InputError(f"there is no target '{name}'{nearest(name, ALL_TARGET_NAMES)}; known: {known}")
+
+
+def settings_of(target: str, given: Mapping[str, str | None]) -> dict[str, str]:
+    """Return the settings of a target out of the options of all of them; None stands for one that was not given.
+
+    An option of another target, and an unknown value, are an `InputError`.
+    """
+    own = OTHER_TARGETS[target].options if target in OTHER_TARGETS else {}
+    for name in (name for name, value in given.items() if value is not None and name not in own):
+        owners = [each.name for each in OTHER_TARGETS.values() if name in each.options]
+        of = f"of target {' and '.join(owners)}" if owners else "of a C firmware"
+        remedy = "leave it out, or choose another --target"
+        raise InputError(f"{flag_of(name)} is an option {of}, not of {target}; {remedy}")
+    settings = {}
+    for name, values in own.items():
+        value = given.get(name)
+        if value is not None and values and value not in values:
+            raise InputError(f"{flag_of(name)}: '{value[:40]}' is unknown{nearest(value, values)}; "
+                             f"known: {', '.join(values)}")  # fmt: skip
+        settings[name] = (values or ("",))[0] if value is None else value
+    return settings
+
+
+def generate_output(
+    compensator: Compensator,
+    target: str,
+    settings: Mapping[str, str],
+    compensator_bytes: bytes | None = None,
+) -> Output:
+    """Generate an output of a compensator, one of `OTHER_TARGETS`, with settings as `settings_of` gives them.
+
+    `compensator_bytes` is the file that the compensator was read from; without it the document as it would be written.
+    A compensator that this kind of output can't hold is an `InputError`.
+    """
+    if designed_for := compensator.target:
+        target_named(designed_for.name).check_designed_for(designed_for)
+    document = compensator_bytes or to_json_bytes(compensator)
+    digest = sha256_of(document)
+    origin = FirmwareOrigin(
+        compensator_json=digest,
+        valve_json=compensator.valve_json_sha256,
+        ramp_tests=compensator.valve.made_from,
+    )
+    made: Mapping[str, bytes] = import_module(OTHER_TARGETS[target].module).output_files(compensator, origin, settings)
+    files = {**made, Compensator.FILE_NAME: document}
+    manifest = OutputManifest(
+        tool=THIS_TOOL,
+        made_from=(SourceFile(source=Compensator.FILE_NAME, sha256=digest),),
+        target=target,
+        settings=dict(settings),
+        law=compensator.law,
+        origin=origin,
+        files={path: sha256_of(content) for path, content in files.items()},
+    )
+    return Output(files=files, manifest=manifest, compensator=compensator)
+
+
+def write_output(output: Output, folder: Path, *, over_another: bool = False) -> Output:
+    """Write the folder of an output; the result is the same, with a note on another kind that was replaced.
+
+    A place that can't be written, or holds what would be lost, is an `InputError`; so is one with the output of another
+    design, unless it is to be written over.
+    """
+
+    def check() -> None:
+        if not over_another:
+            refuse_another_design(Path(folder), output.compensator)
+
+    check()  # of two at once, the other one may have written since
+    earlier = (manifest_of(Path(folder)) or {}).get("target")
+    write_folder(Path(folder), output.contents, output.manifest, check)
+    if earlier in (None, output.manifest.target):
+        return output
+    note = f"the {earlier} output in '{folder}' was replaced by this {output.manifest.target}"
+    return replace(output, note=f"{note}; to have both, give each its own folder with -o")

@@ -1,0 +1,42 @@
+"""manifest.json of an output that is no C firmware, as a type: Structured Text, an FMU, a MATLAB function.
+
+`codegen` writes it and `verify` compares it with the folder. These share no code, so what both read stands before them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta
+
+from dzdesign.core.artefact_files import MANIFEST_NAME
+from dzdesign.core.artefact_types import Artefact, Sha256
+from dzdesign.design.firmware_manifest import FirmwareOrigin, Text
+
+#: Characters of a setting in a sentence.
+LONGEST_SETTING = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputManifest(Artefact):
+    """Which files an output has, and what they were made from, as `dzdesign codegen` writes it."""
+
+    FILE_NAME: ClassVar[str] = MANIFEST_NAME
+    schema: Annotated[Literal["dzdesign.output/1"], Meta(description="Name and version of this schema.")] = (
+        "dzdesign.output/1"
+    )
+    target: Annotated[Text, Meta(description="Kind of output, as `codegen --list-targets` names it.")]
+    settings: Annotated[
+        Mapping[Text, str],
+        Meta(description="Option of `codegen` that is of this target alone, without hyphens, to its value."),
+    ]
+    law: Annotated[Text, Meta(description="Name of the law, as compensator.json has it.")]
+    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of everything it was made from.")]
+    files: Annotated[Mapping[Text, Sha256], Meta(description="File to the SHA-256 of its bytes, as generated.")]
+
+    @property
+    def settings_in_words(self) -> str:
+        """Return the settings behind commas; of a long one, such as a plant, the name alone."""
+        words = (f"{name} {value}" if len(value) <= LONGEST_SETTING else f"with a {name}"
+                 for name, value in self.settings.items() if value)  # fmt: skip
+        return "".join(f", {word}" for word in words)

@@ -1,0 +1,184 @@
+"""The files of FMUs: the same bytes twice, tokens, units, static symbols, refusals."""
+
+import json
+import subprocess
+from dataclasses import asdict, fields, replace
+from io import BytesIO
+from zipfile import ZipFile
+
+import pytest
+
+from dzdesign.codegen.fmu import binaries, files
+from dzdesign.codegen.fmu.archive import archive
+from dzdesign.codegen.fmu.plant import PARAMETERS
+from dzdesign.codegen.other_targets import generate_output
+from dzdesign.core.errors import InputError
+from dzdesign.stages.generate import GenerateArguments, generate
+from dzdesign.verify.closed_loop.plant import Plant
+from tests.support.golden_firmware import golden_compensator
+from tests.support.host_fmus import PLANT, fmus_of, full_compensator, host_platforms, plant_setting
+
+
+@pytest.fixture
+def one_binary(monkeypatch):
+    """Make FMUs for FMI 3 with this machine's binary alone."""
+    monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
+    monkeypatch.setattr(files, "VERSIONS", (3,))
+
+
+@pytest.fixture
+def no_binary(monkeypatch):
+    """Make FMUs without binaries."""
+    monkeypatch.setattr(files, "binaries_of", lambda *_: {})
+
+
+def opened(content):
+    with ZipFile(BytesIO(content)) as packed:
+        return {name: packed.read(name) for name in packed.namelist()}
+
+
+def test_the_same_input_gives_the_same_bytes(one_binary):
+    first, again = (fmus_of(full_compensator(), None).files for _ in range(2))
+    assert dict(first) == dict(again) and len(first) == 2
+
+
+def test_a_zip_has_no_date_and_one_order():
+    content = archive({"b": b"1", "binaries/x.so": b"2", "modelDescription.xml": b"3"})
+    with ZipFile(BytesIO(content)) as packed:
+        entries = packed.infolist()
+    assert [entry.filename for entry in entries] == ["modelDescription.xml", "b", "binaries/x.so"]
+    assert {entry.date_time for entry in entries} == {(1980, 1, 1, 0, 0, 0)}
+    assert entries[2].external_attr >> 16 & 0o111 and not entries[1].external_attr >> 16 & 0o111
+
+
+def test_every_fmu_has_a_token_of_its_own_and_of_its_compensator(no_binary):
+    def tokens(compensator, plant=PLANT):
+        made = fmus_of(compensator, plant).files
+        return {
+            name: json.loads(opened(content)["extra/dzdesign/manifest.json"])["token"]
+            for name, content in made.items()
+            if name.endswith(".fmu")
+        }
+
+    first = tokens(full_compensator())
+    assert len(set(first.values())) == 4
+    assert tokens(golden_compensator("host"))["dz_compensator_fmi2.fmu"] != first["dz_compensator_fmi2.fmu"]
+    moved = tokens(full_compensator(), replace(PLANT, L_c_H=0.05))
+    changed = {name for name in first if moved[name] != first[name]}
+    assert changed == {"dz_plant_fmi2.fmu", "dz_plant_fmi3.fmu"}
+
+
+def test_the_core_in_an_fmu_is_that_of_the_firmware(no_binary):
+    from dzdesign.codegen.project import generate as generate_project
+
+    compensator = full_compensator()
+    core = {path.removeprefix("core/"): text.encode() for path, text in
+            generate_project(compensator, "host").files.items() if path.startswith("core/")}  # fmt: skip
+    inside = opened(fmus_of(compensator, None).files["dz_compensator_fmi3.fmu"])
+    assert {name: inside[f"sources/{name}"] for name in core} == core
+
+
+def test_nothing_but_the_functions_of_fmi_leaves_the_one_unit(no_binary, tmp_path):
+    from dzdesign.verify.toolchain.host_compiler import host_compiler, words_of
+
+    for name, content in fmus_of(full_compensator()).files.items():
+        if not name.endswith(".fmu"):
+            continue
+        folder = tmp_path / name
+        folder.mkdir()
+        for path, text in opened(content).items():
+            if path.startswith("sources/"):
+                (folder / path.removeprefix("sources/")).write_bytes(text)
+        strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-O2", "-c", "dz_fmu.c")
+        subprocess.run([*words_of(host_compiler()), *strict], cwd=folder, check=True)
+        symbols = subprocess.run(["nm", "-g", "dz_fmu.o"], cwd=folder, check=True, capture_output=True, text=True)
+        shown = [line.split()[-1] for line in symbols.stdout.splitlines() if " U " not in line]
+        assert shown and all(symbol.startswith(("fmi2", "fmi3")) for symbol in shown)
+
+
+def test_units_of_the_recordings_are_display_units(no_binary):
+    from dzdesign.core.recorded_units import PressureUnit, RecordedUnits
+
+    compensator = full_compensator()
+    units = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0))
+    valve = replace(compensator.valve, recorded_units=units)
+    from dzdesign.codegen.fmu.compensator import compensator_model
+    from dzdesign.codegen.fmu.description import model_description
+
+    model = replace(compensator_model(compensator), units=valve.recorded_units)
+    for fmi in (2, 3):
+        text = model_description(model, fmi, "{token}")
+        assert '<DisplayUnit name="bar" factor="10.0"/>' in text and 'displayUnit="bar"' in text
+
+
+def test_the_plants_parameters_are_those_of_its_file():
+    assert list(PARAMETERS) == [field.name for field in fields(Plant)]
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ("no JSON", "[]", "{}", json.dumps({**asdict(PLANT), "K_b": 1}), json.dumps({**asdict(PLANT), "K_a": "x"})),
+)
+def test_what_is_no_plant_is_refused(setting, no_binary):
+    with pytest.raises(InputError, match="plant"):
+        generate_output(full_compensator(), "fmu", {"plant": setting})
+
+
+def test_a_plant_behind_a_current_controller_is_refused(no_binary, monkeypatch):
+    from dzdesign.codegen.fmu.plant import plant_of
+
+    class Current:
+        current_drive = object()
+
+    with pytest.raises(InputError, match="--plant"):
+        plant_of(plant_setting(), Current())
+    assert plant_of("", Current()) is None
+
+
+def test_without_ziglang_it_is_said_how_to_install_it(monkeypatch):
+    monkeypatch.setattr(binaries, "find_spec", lambda name: None)
+    binaries._version.cache_clear()
+    try:
+        with pytest.raises(InputError, match="pip install"):
+            fmus_of(full_compensator(), None)
+    finally:
+        binaries._version.cache_clear()
+
+
+def test_a_ziglang_that_is_too_old_is_refused(monkeypatch):
+    monkeypatch.setattr(binaries, "version", lambda name: "0.13.0")
+    binaries._version.cache_clear()
+    try:
+        with pytest.raises(InputError, match=r"0\.13\.0 .* expected 0\.17"):
+            fmus_of(full_compensator(), None)
+    finally:
+        binaries._version.cache_clear()
+
+
+def test_c_that_does_not_compile_is_named_with_the_platform(monkeypatch):
+    monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
+    with pytest.raises(InputError, match="can't compile"):
+        binaries.binaries_of("dz_wrong", 3, {"dz_fmu.c": b"int x = ;"})
+
+
+def test_a_plant_is_of_the_target_fmu_alone(example_compensator, example_folder, tmp_path):
+    arguments = {"target": "host", "plant": example_folder / "plant.toml", "output": tmp_path / "made"}
+    with pytest.raises(InputError, match="--plant is an option of target fmu"):
+        generate(GenerateArguments(example_compensator, **arguments))
+    with pytest.raises(InputError, match="missing"):
+        generate(GenerateArguments(example_compensator, target="fmu", plant=tmp_path / "missing.toml"))
+    assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.slow
+def test_binaries_of_every_platform_need_no_library(tmp_path):
+    from dzdesign.verify.fmu.descriptions import file_faults, library_faults
+    from dzdesign.verify.fmu.fmu_file import read_fmu
+
+    compensator = golden_compensator("host")
+    output = fmus_of(compensator, None)
+    for name in ("dz_compensator_fmi2.fmu", "dz_compensator_fmi3.fmu"):
+        (tmp_path / name).write_bytes(output.files[name])
+        fmu = read_fmu(tmp_path / name)
+        assert not list(library_faults(fmu))
+        assert not list(file_faults(fmu, compensator, output.manifest.origin.compensator_json))

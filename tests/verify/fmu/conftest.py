@@ -1,0 +1,39 @@
+"""FMUs with this machine's binaries, made once for all tests of the room."""
+
+import pytest
+
+from dzdesign.codegen.fmu import binaries
+from dzdesign.verify.fmu.fmu_file import read_fmu
+from tests.support.host_fmus import fmus_of, full_compensator, host_platforms, written
+
+
+@pytest.fixture(scope="session")
+def compensator():
+    """Return the compensator of all FMUs here."""
+    return full_compensator()
+
+
+@pytest.fixture(scope="session")
+def fmu_folder(tmp_path_factory, compensator):
+    """Return a folder with FMUs of a compensator and of a plant."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(binaries, "PLATFORMS", host_platforms())
+        return written(fmus_of(compensator), tmp_path_factory.mktemp("fmus"))
+
+
+@pytest.fixture(scope="session", params=(2, 3), ids=("fmi2", "fmi3"))
+def fmi(request):
+    """Return a version of FMI."""
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def fmu(fmu_folder, fmi):
+    """Return the compensator's FMU."""
+    return read_fmu(fmu_folder / f"dz_compensator_fmi{fmi}.fmu")
+
+
+@pytest.fixture(scope="session")
+def plant_fmu(fmu_folder, fmi):
+    """Return the plant's FMU."""
+    return read_fmu(fmu_folder / f"dz_plant_fmi{fmi}.fmu")

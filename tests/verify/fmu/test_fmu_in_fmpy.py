@@ -1,0 +1,165 @@
+"""The FMUs in FMPy, a tool of somebody else's: valid, with the delay that each kind is said to have, and sources."""
+
+import shutil
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+from fmpy.validation import validate_fmu
+
+ZERO, FULL_V, STEP_S = 0.0, 10.0, 1 / 2500
+
+
+class Importer:
+    """An instance of an FMU for one kind of interface, through initialization at time 0."""
+
+    def __init__(self, path, fmi, model_exchange=False, events=False):
+        self.description = fmpy.read_model_description(str(path))
+        self.folder = fmpy.extract(str(path))
+        kind = {(2, True): FMU2Model, (2, False): FMU2Slave, (3, True): FMU3Model, (3, False): FMU3Slave}
+        self.fmi, self.references = fmi, {each.name: each.valueReference for each in self.description.modelVariables}
+        self.fmu = kind[fmi, model_exchange](
+            guid=self.description.guid, unzipDirectory=self.folder, instanceName="one",
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+        )  # fmt: skip
+        self.fmu.instantiate(**({"eventModeUsed": True} if events else {}))
+        if fmi == 2:
+            self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def give(self, **values):
+        references = [self.references[name] for name in values]
+        (self.fmu.setReal if self.fmi == 2 else self.fmu.setFloat64)(references, list(values.values()))
+
+    def real(self, name):
+        return (self.fmu.getReal if self.fmi == 2 else self.fmu.getFloat64)([self.references[name]])[0]
+
+    def integer(self, name):
+        return (self.fmu.getInteger if self.fmi == 2 else self.fmu.getInt32)([self.references[name]])[0]
+
+
+@pytest.fixture(scope="module")
+def path(fmu_folder, fmi):
+    return fmu_folder / f"dz_compensator_fmi{fmi}.fmu"
+
+
+@pytest.mark.parametrize("name", ("dz_compensator", "dz_plant"))
+def test_fmpy_finds_no_problem(fmu_folder, fmi, name):
+    assert validate_fmu(str(fmu_folder / f"{name}_fmi{fmi}.fmu")) == []
+
+
+def test_co_simulation_shows_an_input_after_the_step_that_it_was_given_for(path, fmi):
+    with Importer(path, fmi) as one:
+        before = one.integer("compare"), one.real("u_O")
+        one.give(u_i=FULL_V, p_A=3.0, p_B=1.0)
+        assert (one.integer("compare"), one.real("u_O")) == before
+        one.fmu.doStep(0.0, STEP_S)
+        after = one.integer("compare"), one.real("u_O")
+        assert after[0] > before[0] and after[1] > before[1]
+        one.give(u_i=ZERO)
+        one.fmu.doStep(STEP_S, STEP_S)
+        assert one.integer("compare") < after[0]
+
+
+def test_model_exchange_shows_an_input_at_once(path, fmi):
+    with Importer(path, fmi, model_exchange=True) as one:
+        one.give(u_i=ZERO, p_A=3.0, p_B=1.0)
+        before = one.integer("compare"), one.real("u_O")
+        one.give(u_i=FULL_V)
+        assert one.integer("compare") > before[0] and one.real("u_O") > before[1]
+        one.fmu.enterContinuousTimeMode()
+        full = one.integer("compare")
+        one.give(u_i=ZERO)  # between events what is continuous follows, and what is discrete waits
+        assert one.real("u_O") == before[1] and one.integer("compare") == full
+        one.fmu.enterEventMode()
+        assert one.integer("compare") == before[0]
+
+
+@pytest.mark.parametrize("fmi", (3,), indirect=True)
+def test_event_mode_of_fmi_3_takes_the_step_of_delay_away(path, fmi):
+    with Importer(path, fmi, events=True) as one:
+        one.give(u_i=ZERO, p_A=3.0, p_B=1.0)
+        before = one.integer("compare")
+        one.fmu.updateDiscreteStates()
+        one.fmu.enterStepMode()
+        event, *_ = one.fmu.doStep(0.0, STEP_S)
+        assert event  # a PWM period begins here: the drive wants to be asked
+        one.fmu.enterEventMode()
+        one.give(u_i=FULL_V)
+        *_, defined, next_time = one.fmu.updateDiscreteStates()
+        assert one.integer("compare") > before
+        assert defined and next_time == pytest.approx(2 * STEP_S)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    (("m_e_kg", 0.0), ("L_c_H", 1e-9), ("overlap_mm", 3.0), ("K_a", float("nan")), ("preload_N", -1.0)),
+)
+def test_parameters_that_are_no_plant_end_the_initialization(fmu_folder, fmi, name, value):
+    with pytest.raises(Exception, match="ExitInitializationMode"):
+        fmpy.simulate_fmu(str(fmu_folder / f"dz_plant_fmi{fmi}.fmu"), fmi_type="CoSimulation", stop_time=0.001,
+                          output_interval=STEP_S, start_values={name: value})  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ("ModelExchange", "CoSimulation"))
+def test_two_instances_know_nothing_of_each_other(path, fmi, kind):
+    with Importer(path, fmi, kind == "ModelExchange") as one, Importer(path, fmi, kind == "ModelExchange") as other:
+        one.give(u_i=FULL_V, p_A=3.0, p_B=1.0)
+        if kind == "CoSimulation":
+            one.fmu.doStep(0.0, STEP_S)
+            other.fmu.doStep(0.0, STEP_S)
+        assert one.integer("compare") > other.integer("compare")
+
+
+def test_stops_of_the_plant_are_events_of_model_exchange(fmu_folder, fmi):
+    time = np.array([0, 0.05, 0.05, 0.15, 0.15, 0.25])
+    signal = np.array(
+        list(zip(time, [0, 0, 10, 10, 0, 0.0], [3.0] * 6, strict=True)),
+        dtype=[("time", float), ("voltage", float), ("supply", float)],
+    )
+    start = {"stroke_mm": 1.5, "hysteresis_V": 0.0, "supply": 3.0}
+    runs = [
+        fmpy.simulate_fmu(
+            str(fmu_folder / f"dz_plant_fmi{fmi}.fmu"), fmi_type=kind, stop_time=0.25, output_interval=1e-3,
+            relative_tolerance=1e-9, input=signal, start_values=start, output=["Q", "x", "at_stop"],
+        )
+        for kind in ("ModelExchange", "CoSimulation")
+    ]  # fmt: skip
+    exchanged, stepped = runs
+    assert set(exchanged["at_stop"]) == set(stepped["at_stop"]) == {-1, 0, 1}
+    assert stepped["x"].max() == 1.5e-3 and exchanged["x"].max() == pytest.approx(1.5e-3, abs=1e-8)
+    flow = np.interp(stepped["time"], exchanged["time"], exchanged["Q"])
+    assert abs(flow - stepped["Q"]).max() < 1e-5 * stepped["Q"].max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "fmi"), (("dz_compensator", 2), ("dz_plant", 3)), indirect=["fmi"])
+def test_the_sources_compile_again_and_give_the_same(fmu_folder, fmi, name, tmp_path):
+    if shutil.which("cmake") is None:
+        pytest.skip("cmake not found")
+    from fmpy.build import build_platform_binary
+
+    source = fmu_folder / f"{name}_fmi{fmi}.fmu"
+    folder = tmp_path / "unpacked"
+    fmpy.extract(str(source), unzipdir=str(folder))
+    shutil.rmtree(folder / "binaries")
+    (tmp_path / "build").mkdir()
+    build_platform_binary(folder, tmp_path / "build")
+    how = {"stop_time": 0.02, "output_interval": STEP_S, "fmi_type": "CoSimulation"}
+    how["start_values"] = {"u_i": 4.0, "p_A": 3.0, "p_B": 1.0} if name == "dz_compensator" else {"compare": 50000}
+    output = ["u_O", "compare_a"] if name == "dz_compensator" else ["Q", "x"]
+    first, again = (fmpy.simulate_fmu(str(each), output=output, **how) for each in (source, folder))
+    assert len(first) > 40
+    for each in first.dtype.names:
+        assert first[each] == pytest.approx(again[each], rel=1e-9, abs=1e-12)

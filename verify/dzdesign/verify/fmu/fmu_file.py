@@ -1,0 +1,119 @@
+"""An FMU as it lies there: its files, and what modelDescription.xml says; read from the standard."""
+
+import json
+import platform
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Literal, cast
+from xml.etree import ElementTree
+from zipfile import BadZipFile, ZipFile
+
+from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.errors import InputError
+
+Fmi = Literal[2, 3]
+#: Larger than any FMU of ours unpacked.
+LARGEST_OCTETS = 64 * 2**20
+DESCRIPTION = "modelDescription.xml"
+EXTRA = "extra/dzdesign"
+#: Elements of FMI 2 and 3, to what a variable of theirs holds.
+KINDS = {"Real": "real", "Float64": "real", "Integer": "integer", "Int32": "integer", "Boolean": "boolean"}
+#: System and processor of this machine to the folder of its binaries in FMI 2 and 3, and their ending.
+HERE: Mapping[tuple[str, str], tuple[str, str, str]] = {
+    ("linux", "x86_64"): ("linux64", "x86_64-linux", "so"),
+    ("linux", "aarch64"): ("", "aarch64-linux", "so"),
+    ("win32", "amd64"): ("win64", "x86_64-windows", "dll"),
+    ("darwin", "x86_64"): ("darwin64", "x86_64-darwin", "dylib"),
+    ("darwin", "arm64"): ("", "aarch64-darwin", "dylib"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedVariable:
+    """A variable as modelDescription.xml has it."""
+
+    reference: int
+    kind: str
+    causality: str
+    unit: str | None
+    start: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FmuFile:
+    """One FMU."""
+
+    name: str
+    files: Mapping[str, bytes]
+    fmi: Fmi
+    token: str
+    identifier: str
+    variables: Mapping[str, DescribedVariable]
+    #: Name of a unit to its factor to SI.
+    units: Mapping[str, float]
+    #: What the FMU's own manifest says.
+    manifest: Mapping[str, Any]
+
+    def reference(self, name: str) -> int:
+        """Return the value reference of a variable; one that is missing is an `InputError`."""
+        if name not in self.variables:
+            raise InputError(f"{self.name}: {DESCRIPTION} has no variable {name}")
+        return self.variables[name].reference
+
+    def binary(self, folder: str, ending: str) -> bytes | None:
+        """Return the binary for a platform, or None."""
+        return self.files.get(f"binaries/{folder}/{self.identifier}.{ending}")
+
+    def binary_here(self) -> bytes | None:
+        """Return the binary for this machine, or None."""
+        place = HERE.get((sys.platform, platform.machine().lower()))
+        return self.binary(place[self.fmi - 2], place[2]) if place else None
+
+
+def read_fmu(path: Path) -> FmuFile:
+    """Return an FMU; what is none is an `InputError`."""
+    content = read_bytes(path, "FMU")
+    try:
+        with ZipFile(BytesIO(content)) as packed:
+            if sum(entry.file_size for entry in packed.infolist()) > LARGEST_OCTETS:
+                raise InputError(f"'{path}' unpacks to more than {LARGEST_OCTETS // 2**20} MB, as no FMU of dzdesign")
+            files = {entry.filename: packed.read(entry) for entry in packed.infolist()}
+        document = ElementTree.fromstring(files[DESCRIPTION])
+        manifest = json.loads(files[f"{EXTRA}/manifest.json"])
+    except (BadZipFile, KeyError, ValueError, ElementTree.ParseError) as error:
+        raise InputError(f"'{path}' is no FMU of dzdesign: {error}; make it again with `dzdesign codegen`") from error
+    version = document.get("fmiVersion", "")
+    if version not in ("2.0", "3.0") or not isinstance(manifest, dict):
+        raise InputError(f"'{path}' is for FMI '{version[:20]}', expected 2.0 or 3.0")
+    simulation = document.find("CoSimulation")
+    return FmuFile(
+        name=path.name,
+        files=files,
+        fmi=cast(Fmi, int(version[0])),
+        token=document.get("guid" if version == "2.0" else "instantiationToken", ""),
+        identifier=simulation.get("modelIdentifier", "") if simulation is not None else "",
+        variables=_variables(document),
+        units={
+            unit.get("name", ""): float(base.get("factor", "1"))
+            for unit in document.iterfind("UnitDefinitions/Unit")
+            for base in unit.iterfind("BaseUnit")
+        },
+        manifest=manifest,
+    )
+
+
+def _variables(document: ElementTree.Element) -> dict[str, DescribedVariable]:
+    found = {}
+    for element in document.iterfind("ModelVariables/*"):
+        typed = element[0] if element.tag == "ScalarVariable" and len(element) else element
+        found[element.get("name", "")] = DescribedVariable(
+            reference=int(element.get("valueReference", "-1")),
+            kind=KINDS.get(typed.tag, typed.tag),
+            causality=element.get("causality", "local"),
+            unit=typed.get("unit"),
+            start=typed.get("start"),
+        )
+    return found

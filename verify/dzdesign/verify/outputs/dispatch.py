@@ -1,0 +1,118 @@
+"""`verify` of an output: what is checked of each, and which room checks the rest of its kind."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, schema_of, to_json_bytes
+from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.result_display import ShownInNotebooks
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
+from dzdesign.verify.firmware.folder import read_compensator
+from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
+from dzdesign.verify.output_evidence import OutputChecks, OutputEvidence
+from dzdesign.verify.outputs.folder import files_unchanged, manifest_follows, read_output_manifest
+from dzdesign.verify.requirements import Check
+
+SCHEMA = schema_of(OutputEvidence)
+Say = Callable[[str], None]
+#: What a room of one kind offers, as ``checks(folder, manifest, compensator, say)``.
+CheckOutput = Callable[[Path, OutputManifest, Compensator, Say], OutputChecks]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputKind:
+    """One kind of output, and where its checks stand."""
+
+    #: Module with ``checks``, a `CheckOutput`.
+    module: str
+    #: Options of `verify`, as flags such as --machine-code, that make sense for it beside --output and --ramps, to the
+    #: module with the ``checks`` that are made where one is given.
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+#: Target, as the manifest names it, to its checks.
+KINDS: Mapping[str, OutputKind] = {
+    "iec61131": OutputKind(module="dzdesign.verify.structured_text.checks"),
+    "fmu": OutputKind(
+        module="dzdesign.verify.fmu.checks",
+        options={"--machine-code": "dzdesign.verify.fmu.other_machines"},
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class OutputVerification(ShownInNotebooks):
+    """The evidence about one output."""
+
+    #: Every requirement that was tried; stored as evidence.json.
+    evidence: OutputEvidence
+
+    @property
+    def holds(self) -> bool:
+        """True if every requirement that was tried holds."""
+        return self.evidence.holds
+
+    @property
+    def verdict(self) -> str:
+        """In words: what does not hold goes before what could not be checked."""
+        return self.evidence.verdict
+
+
+def kind_of(manifest: OutputManifest, source: str) -> OutputKind:
+    """Return how an output is checked; one of a kind that nobody knows is an `InputError`."""
+    if manifest.target not in KINDS:
+        known = ", ".join(KINDS)
+        raise InputError(f"{source}: target {quoted(manifest.target)} is unknown{nearest(manifest.target, KINDS)}; "
+                         f"known: {known}")  # fmt: skip
+    return KINDS[manifest.target]
+
+
+def verify_output(folder: Path, options: Sequence[str] = (), say: Say = lambda _: None) -> OutputVerification:
+    """Verify the folder of an output, made by `dzdesign codegen`.
+
+    `options` are the flags that were given; one that makes no sense for this kind is an `InputError`, and so is a
+    folder that is no output. `say` is told each stage before it begins.
+    """
+    manifest = read_output_manifest(folder)
+    kind = kind_of(manifest, f"'{folder / MANIFEST_NAME}'")
+    for flag in (flag for flag in options if flag not in kind.options):
+        raise InputError(f"{flag} is for a C firmware, and '{folder}' is an output for {manifest.target}; leave it out")
+    compensator = read_compensator(folder)
+    unchanged = files_unchanged(folder, manifest)
+    modules = (kind.module, *(kind.options[flag] for flag in options))
+    rooms: list[CheckOutput] = [import_module(module).checks for module in modules]
+    found = [check(folder, manifest, compensator, say) for check in rooms]
+    of_all: tuple[Check, ...] = (
+        certificate_follows(compensator),
+        bounds_follow(compensator),
+        law_follows(compensator),
+        valve_follows(folder, compensator),
+    )
+    digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
+    return OutputVerification(
+        evidence=OutputEvidence(
+            tool=THIS_TOOL,
+            made_from=(SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=digest),),
+            target=manifest.target,
+            settings=manifest.settings,
+            origin=manifest.origin,
+            checks=(
+                unchanged,
+                manifest_follows(folder, manifest, compensator),
+                *(check for each in found for check in each.checks),
+                *of_all,
+            ),
+            inputs=tuple(tried for each in found for tried in each.inputs),
+            versions={tool: version for each in found for tool, version in each.versions.items()},
+        )
+    )
+
+
+def output_evidence_files(verification: OutputVerification) -> dict[str, bytes]:
+    """Return the files of the evidence folder."""
+    return {OutputEvidence.FILE_NAME: to_json_bytes(verification.evidence)}
