@@ -118,13 +118,13 @@ def _of_beta(found: Constants, compensator: Compensator, interface: Interface) -
         found.each("FIRST_ROW", starts, "of the tables, of positive and of negative commands")
     shown_sides = found.signs[:1] if alike else found.signs
     told = f"beta of Eq. (7), over {compensator.beta_denominator}, from no pressure drop on"
-    found.table("LAW_BETA", [node for sign in shown_sides for node in law[sign]], told)
+    found.table("LAW_NODES", [node for sign in shown_sides for node in law[sign]], told)
     least = {sign: min(nodes) * step for sign, nodes in law.items()}
-    found.each("LAW_BETA_LEAST", least, "the smallest, for pressures that can't be right")
+    found.each("LAW_LEAST", least, "the smallest, for pressures that can't be right")
     if compensator.transition_codes:
         told = "the same of the certified offset at zero command"
-        found.table("ZERO_BETA", [node for sign in shown_sides for node in zero[sign]], told)
-        found.each("ZERO_BETA_LEAST", {sign: min(nodes) * step for sign, nodes in zero.items()}, "likewise")
+        found.table("ZERO_NODES", [node for sign in shown_sides for node in zero[sign]], told)
+        found.each("ZERO_LEAST", {sign: min(nodes) * step for sign, nodes in zero.items()}, "likewise")
 
 
 def _of_law(found: Constants, compensator: Compensator, interface: Interface, forms: Mapping[int, LawForm]) -> None:
