@@ -43,6 +43,12 @@ def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Map
     return files
 
 
+def note_of(compensator: Compensator) -> str:
+    """Return what of a design a function block has not; empty where it has all of it."""
+    left_out = ", ".join(left_out_of(compensator))
+    return f"the function block leaves out, of this design: {left_out}" if left_out else ""
+
+
 def structured_text(compensator: Compensator, digest: str, interface_name: str) -> str:
     """Return the function block of a compensator whose file has this SHA-256."""
     interface = interface_named(interface_name, compensator)
@@ -50,7 +56,8 @@ def structured_text(compensator: Compensator, digest: str, interface_name: str) 
     values = _values(compensator, interface, forms)
     banner = banner_of(compensator, digest).lines(TEMPLATE)
     template = strict_templates(PACKAGE, autoescape=False, lstrip_blocks=True).get_template(TEMPLATE)
-    return str(template.render(banner=banner, **values))
+    text = str(template.render(banner=banner, **values))
+    return text.replace("²", "^2").encode("ascii", "replace").decode()  # units of recordings stand in comments
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +135,8 @@ def _difference(interface: Interface, constants: Constants) -> str:
     """Return the weighted difference of the pressures."""
 
     def pressure(name: str, zero: int, weight: int) -> str:
-        text = f"(pressure_{name} - {constants.printed[f'PRESSURE_{name.upper()}_ZERO']})" if zero else f"pressure_{name}"
+        at_none = f" - {constants.printed[f'PRESSURE_{name.upper()}_ZERO']}" if zero else ""
+        text = f"(pressure_{name}{at_none})" if zero else f"pressure_{name}"
         return text if interface.weight_unit == 1 else f"{text} * {weight}"
 
     a, b = interface.a, interface.b

@@ -2,8 +2,8 @@
 
 With beta in the table's unit U the law is ``out = (B (slope c + offset) + U linear c) / (D U)``; c is the command.
 Between zero band and transition's end it runs straight, so with the transition's E units, of which r are passed,
-``E out = (E - r) out(at zero) + r out(c, at least at the end)``: two laws with whole weights. Each product of two numbers
-of 32 bits is made of four of 16 bits; the sum, over ``D U E = 2^32 * 2^shift * divisor``, is divided at the end.
+``E out = (E - r) out(at zero) + r out(c, at least at the end)``: two laws with whole weights. Each product of two
+numbers of 32 bits is made of four of 16 bits; the sum, over ``D U E = 2^32 2^shift divisor``, is divided at the end.
 """
 
 from dataclasses import dataclass
@@ -56,7 +56,8 @@ def law_form(compensator: Compensator, interface: Interface, sign: int) -> LawFo
     over = common * unit * weight >> WORD
     shift = min(LIMB, _twos(over) - kept)
     divisor = over >> shift
-    if 3 * 3 * weight * (2**LIMB - 1) >= LIFT << LIMB or (interface.full + interface.full // 8) * divisor > DINT_MAX // 2:
+    largest_output = interface.full + interface.full // 8
+    if 3 * 3 * weight * (2**LIMB - 1) >= LIFT << LIMB or largest_output * divisor > DINT_MAX // 2:
         raise InputError(f"the law's sum needs more than the 32 bits of a PLC's DINT; {PROPOSED}")
     return LawForm(
         slope=slope // scale,

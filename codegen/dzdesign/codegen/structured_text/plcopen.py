@@ -51,7 +51,9 @@ def plcopen_xml(name: str, text: str) -> bytes:
     pou = SubElement(SubElement(types, "pous"), "pou", name=name, pouType="functionBlock")
     interface = SubElement(pou, "interface")
     for element, constant, variables in _sections(declaration):
-        section = SubElement(interface, element, **({"constant": "true"} if constant else {}))
+        section = SubElement(interface, element)
+        if constant:
+            section.set("constant", "true")
         for variable in variables:
             section.append(variable)
     SubElement(SubElement(SubElement(pou, "body"), "ST"), "xhtml", xmlns=XHTML).text = body

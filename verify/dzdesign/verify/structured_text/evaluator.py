@@ -3,7 +3,7 @@
 Every variable is an array with an element for each input; a branch acts on the elements of its condition.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -16,8 +16,8 @@ from dzdesign.verify.structured_text.syntax import (
     If,
     Kind,
     Name,
-    Operation,
     Number,
+    Operation,
     Statement,
 )
 
@@ -88,8 +88,9 @@ class Evaluator:
                 return np.full(self.size, each.value, dtype=np.int64)
             case Name():
                 held = self.values[each.name]
-                row = self._row(each, acts)
-                return held[row, 0 if held.shape[1] == 1 else np.arange(self.size)]
+                column = 0 if held.shape[1] == 1 else np.arange(self.size)
+                read: np.ndarray = held[self._row(each, acts), column]
+                return read
             case Operation():
                 return self._operation(each, [self._of(operand, acts) for operand in each.operands], acts)
 
@@ -116,7 +117,7 @@ class Evaluator:
             case "DINT_TO_UDINT" | "UDINT_TO_DINT":
                 found = x[0]
             case operator:
-                return _logical(operator, x).astype(np.int64)
+                return LOGICAL[operator](*x).astype(np.int64)
         return self._checked(found, *RANGES[kind], acts)
 
     def _product(self, x: list[np.ndarray], kind: Kind, acts: np.ndarray) -> np.ndarray:
@@ -137,22 +138,8 @@ class Evaluator:
         return np.where(x[1] == 0, 0, x[0] - quotient * divisor)
 
 
-def _logical(operator: str, x: list[np.ndarray]) -> np.ndarray:
-    match operator:
-        case "AND":
-            return (x[0] != 0) & (x[1] != 0)
-        case "OR":
-            return (x[0] != 0) | (x[1] != 0)
-        case "NOT":
-            return x[0] == 0
-        case "=":
-            return x[0] == x[1]
-        case "<>":
-            return x[0] != x[1]
-        case "<":
-            return x[0] < x[1]
-        case "<=":
-            return x[0] <= x[1]
-        case ">":
-            return x[0] > x[1]
-    return x[0] >= x[1]
+#: Operators on numbers and conditions whose result is a condition.
+LOGICAL: dict[str, Callable[..., np.ndarray]] = {
+    "AND": np.logical_and, "OR": np.logical_or, "NOT": np.logical_not, "=": np.equal, "<>": np.not_equal,
+    "<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal,
+}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Every input of a function block, tried with its text turned into C, and a sample of them with NumPy's reading of it."""
+"""Every input of a function block, tried with its text turned into C, and a sample of them read by NumPy."""
 
 import ctypes
 import os
@@ -117,10 +117,10 @@ class TriedBlock:
         """Pressures whose differences are tried with every command."""
         return (0, self.exact[0].code_max) if self.of_codes else PLC_PRESSURES
 
-    def every_pair(self) -> list[Tried]:
-        """Try every command at every difference of pressures; one result a side."""
+    def every_pair(self, drops: range | None = None) -> list[Tried]:
+        """Try every command at every difference of pressures, or only at some of them; one result a side."""
         low, high = self.pressures
-        reach = self._reach(low, high)
+        reach = self._reach(low, high) if drops is None else drops
 
         def of_side(place: int) -> Callable[[int, int, _Result], None]:
             return lambda first, end, result: self.library.every_command(
@@ -138,8 +138,8 @@ class TriedBlock:
         largest = max(map(abs, ends)) // self.exact[0].unit + 1
         return range(-largest, largest + 1) if self.of_codes else range(-high, high + 1)
 
-    def every_pressure(self) -> Tried:
-        """Try every pair of pressures, valid or not, at zero command."""
+    def every_pressure(self, of_a: range | None = None) -> Tried:
+        """Try every pair of pressures, valid or not, at zero command; or those of some pressures A."""
         low, high = self.pressures if self.of_codes else PLC_AROUND
 
         def work(first: int, end: int, result: _Result) -> None:
@@ -147,7 +147,7 @@ class TriedBlock:
                 ctypes.byref(self.setup), *map(ctypes.c_int64, (first, end, low, high)), ctypes.byref(result)
             )
 
-        return self._tried(work, range(low, high + 1))
+        return self._tried(work, range(low, high + 1) if of_a is None else of_a)
 
     def extremes(self) -> Tried:
         """Try the ends of the type and the ends of what is valid, in all combinations."""
@@ -173,7 +173,10 @@ class TriedBlock:
 
     def _tried(self, work: Callable[[int, int, _Result], None], reach: range) -> Tried:
         """Do pieces of some work side by side, and add up what they found."""
-        pieces = [(first, min(first + PIECE, reach.stop)) for first in range(reach.start, reach.stop, PIECE)]
+        if reach.step != 1:
+            pieces = [(first, first + 1) for first in reach]
+        else:
+            pieces = [(first, min(first + PIECE, reach.stop)) for first in range(reach.start, reach.stop, PIECE)]
 
         def one(piece: tuple[int, int]) -> _Result:
             result = _Result(hash=piece[0])

@@ -7,6 +7,7 @@ the ends of the pressures that a number of 0.1 bar stands for, one of them eithe
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from math import ceil, floor, lcm
 
 import numpy as np
@@ -104,12 +105,12 @@ class ExactBlock(ExactLaw):
         what each further command adds to both; and their denominator.
         """
         corners, found = self.corners(betas), []
-        for place, ((first, start), (last, end)) in enumerate(zip(corners, corners[1:], strict=False)):
+        for place, ((first, start), (last, end)) in enumerate(pairwise(corners)):
             slope = (end - start) / (last - first) if last > first else Fraction(0)
             start += self.rounding
             common = lcm(start.denominator, slope.denominator)
             if common >= MOST:
-                raise RequirementError("the exact law has denominators of more than 61 bits, so no input can be compared")
+                raise RequirementError("the exact law needs more than 61 bits, so no input can be compared")
             whole, rest = divmod(int(start * common), common)
             step, step_rest = divmod(int(slope * common), common)
             found.append([first if place == 0 else first + 1, last, whole, rest, step, step_rest, common])

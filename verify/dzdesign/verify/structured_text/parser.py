@@ -10,7 +10,8 @@ the same in any case. ::
     initial    = constant | "[" constant {"," constant} "]"
     constant   = ["-"] whole | "TRUE" | "FALSE"
     statement  = variable ":=" expression ";"
-               | "IF" expression "THEN" {statement} {"ELSIF" expression "THEN" {statement}} ["ELSE" {statement}] "END_IF"
+               | "IF" expression "THEN" {statement} {"ELSIF" expression "THEN" {statement}}
+                 ["ELSE" {statement}] "END_IF"
                | "FOR" name ":=" whole "TO" whole "DO" {statement} "END_FOR"
     expression = conjunction {"OR" conjunction}
     conjunction = compared {"AND" compared}
@@ -25,9 +26,8 @@ the same in any case. ::
 ``END_IF`` and ``END_FOR`` may be followed by a semicolon.
 """
 
-import re
 from collections.abc import Callable
-from typing import NamedTuple, NoReturn, cast
+from typing import NoReturn, TypeVar, cast
 
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.verify.structured_text.syntax import (
@@ -44,12 +44,9 @@ from dzdesign.verify.structured_text.syntax import (
     Statement,
     Variable,
 )
+from dzdesign.verify.structured_text.tokens import Token, tokens_of
 
-TOKEN = re.compile(
-    r"(?P<space>\s+|\(\*(?:(?!\(\*).)*?\*\))|(?P<word>[A-Za-z_]\w*)|(?P<whole>\d+)(?![\w#])"
-    r"|(?P<sign>:=|<>|<=|>=|\.\.|[-+*/=<>()\[\],:;])",
-    re.DOTALL,
-)
+Inner = TypeVar("Inner")
 KINDS = ("DINT", "UDINT", "BOOL")
 FUNCTIONS = {"MIN": 2, "MAX": 2, "ABS": 1, "DINT_TO_UDINT": 1, "UDINT_TO_DINT": 1}
 COMPARED = ("=", "<>", "<", "<=", ">", ">=")
@@ -62,14 +59,8 @@ WORDS = frozenset(
 MOST_DIGITS = 10
 #: Elements of an array, and rounds of a loop.
 MOST = 4096
-
-
-class Token(NamedTuple):
-    """A word, whole number or sign; an empty text ends the input."""
-
-    text: str
-    kind: str
-    place: Place
+#: Characters of a text, and brackets and statements inside of each other.
+LONGEST, DEEPEST = 100_000, 40
 
 
 def parse(text: str, source: str) -> FunctionBlock:
@@ -79,24 +70,11 @@ def parse(text: str, source: str) -> FunctionBlock:
 
 class _Parser:
     def __init__(self, text: str, source: str) -> None:
-        self.source, self.at = source, 0
-        self.tokens = self._tokens(text)
+        self.source, self.at, self.depth = source, 0, 0
+        if len(text) > LONGEST:
+            self._refuse(Place(1, 1), f"the text has {len(text)} characters, expected at most {LONGEST}")
+        self.tokens = tokens_of(text, source)
         self.variables: dict[str, Variable] = {}
-
-    def _tokens(self, text: str) -> list[Token]:
-        found, position, line, begin = [], 0, 1, 0
-        while position < len(text):
-            place = Place(line, position - begin + 1)
-            match = TOKEN.match(text, position)
-            if match is None:
-                self._refuse(place, f"{quoted(text[position : position + 10])} is not of the subset that is verified")
-            if match.lastgroup != "space":
-                found.append(Token(match[0], str(match.lastgroup), place))
-            breaks = match[0].count("\n")
-            line += breaks
-            begin = match.start() + match[0].rindex("\n") + 1 if breaks else begin
-            position = match.end()
-        return [*found, Token("", "end", Place(line, position - begin + 1))]
 
     def _refuse(self, place: Place, what: str) -> NoReturn:
         raise InputError(f"{self.source}, {place}: {what}")
@@ -154,14 +132,7 @@ class _Parser:
             names.append(self._name())
         self._must(":")
         if self._may("ARRAY"):
-            self._must("[")
-            first = self._whole()
-            self._must("..")
-            bounds = (first, self._whole())
-            if not 0 <= bounds[1] - first < MOST:
-                self._refuse(self.next.place, f"an array has {first} to {bounds[1]}, expected up to {MOST} elements")
-            self._must("]")
-            self._must("OF")
+            bounds = self._bounds()
         kind = cast(Kind, self._must(*KINDS).text)
         if self._may(":="):
             initial = self._initial(bounds)
@@ -172,6 +143,17 @@ class _Parser:
             self.variables[name.text.lower()] = Variable(
                 place=name.place, name=name.text, section=section, kind=kind, bounds=bounds, initial=initial
             )
+
+    def _bounds(self) -> tuple[int, int]:
+        place = self._must("[").place
+        first = self._whole()
+        self._must("..")
+        last = self._whole()
+        if not 0 <= last - first < MOST:
+            self._refuse(place, f"an array goes from {first} to {last}, expected up to {MOST} elements")
+        self._must("]")
+        self._must("OF")
+        return first, last
 
     def _initial(self, bounds: tuple[int, int] | None) -> tuple[int, ...]:
         if bounds is None:
@@ -196,11 +178,21 @@ class _Parser:
             found.append(self._statement())
         return tuple(found)
 
+    def _inside(self, part: Callable[[], Inner]) -> Inner:
+        """Read what stands inside of something else, up to a depth."""
+        self.depth += 1
+        if self.depth > DEEPEST:
+            self._refuse(self.next.place, f"more than {DEEPEST} brackets or statements stand inside of each other")
+        found = part()
+        self.depth -= 1
+        return found
+
     def _statement(self) -> Statement:
-        if token := self._may("IF"):
-            return self._if(token.place)
-        if token := self._may("FOR"):
-            return self._for(token.place)
+        place = self.next.place
+        if self._may("IF"):
+            return self._inside(lambda: self._if(place))
+        if self._may("FOR"):
+            return self._inside(lambda: self._for(place))
         target = self._variable()
         self._must(":=")
         value = self.expression()
@@ -265,7 +257,7 @@ class _Parser:
     def _operand(self) -> Expression:
         token = self.next
         if self._may("("):
-            found = self.expression()
+            found = self._inside(self.expression)
             self._must(")")
             return found
         if token.kind == "whole":
@@ -274,9 +266,9 @@ class _Parser:
             return Number(place=token.place, value=int(token.text == "TRUE"), kind="BOOL")
         if self._may(*FUNCTIONS):
             self._must("(")
-            operands = [self.expression()]
+            operands = [self._inside(self.expression)]
             while self._may(","):
-                operands.append(self.expression())
+                operands.append(self._inside(self.expression))
             self._must(")")
             if len(operands) != FUNCTIONS[token.text]:
                 self._refuse(token.place, f"{token.text} has {len(operands)} operands")
@@ -286,6 +278,6 @@ class _Parser:
     def _variable(self) -> Name:
         token, index = self._name(), None
         if self._may("["):
-            index = self.expression()
+            index = self._inside(self.expression)
             self._must("]")
         return Name(place=token.place, name=token.text.lower(), index=index)

@@ -1,8 +1,8 @@
 """A function block as C that counts every operation whose result is none of its type: the quick evaluator of its text.
 
 Each number is held in 64 bits, and after each operation its range is looked at. A division rounds towards zero, and MOD
-has the sign of its dividend, as IEC 61131-3 has both. An operation out of range, a division by zero and an index outside
-of its array are faults; the first is kept with its place in the text.
+has the sign of its dividend, as IEC 61131-3 has both. An operation out of range, a division by zero and an index
+outside of its array are faults; the first is kept with its place in the text.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

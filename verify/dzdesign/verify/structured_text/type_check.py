@@ -96,7 +96,8 @@ class _Checker:
 
     def _for(self, each: For, known: set[str]) -> set[str]:
         variable = self._of(each.variable)
-        if variable.kind != "DINT" or variable.section != "VAR_TEMP" or variable.bounds or each.variable.name in self.loops:
+        free = variable.section == "VAR_TEMP" and not variable.bounds and each.variable.name not in self.loops
+        if variable.kind != "DINT" or not free:
             self.refuse(each.place, f"{variable.name} can't be the variable of a loop")
         self.loops.append(each.variable.name)
         after = self.statements(each.body, known | {each.variable.name})
