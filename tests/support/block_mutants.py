@@ -47,14 +47,14 @@ def evenly(found, count):
     return [found[place * len(found) // count] for place in range(count)]
 
 
-def killer(mutant, compensator, interface, drops=None, pressures=None):
+def killer(mutant, tables, drops=None, pressures=None):
     """Return what catches a mutant; empty if nothing does, on some pressure drops and pressures or on all."""
     try:
         block = parse(mutant.text, "mutant")
         kinds = check_types(block, "mutant")
     except InputError:
         return "refused"
-    tried = TriedBlock(block, kinds, compensator, interface)
+    tried = TriedBlock(block, kinds, tables, ["-O1"])
     for name, work in (
         ("extremes", lambda: [tried.extremes()]),
         ("pressures", lambda: [tried.every_pressure(pressures)]),
@@ -62,8 +62,8 @@ def killer(mutant, compensator, interface, drops=None, pressures=None):
     ):
         if any(map(is_wrong, work())):
             return name
-    initial = [variable.initial for variable in block.of_section("VAR")]
-    return "" if initial in ([], [(1,)], [(0,)], [(0,), (1,)]) else "first state"
+    first = {"side": (0,), "at_rest": (1,)}
+    return "" if all(each.initial == first[each.name] for each in block.of_section("VAR")) else "first state"
 
 
 def is_wrong(tried: Tried):

@@ -19,7 +19,7 @@ from dzdesign.verify.requirements import (
     ZERO_COMMAND,
     Check,
 )
-from dzdesign.verify.structured_text.every_pair import Tried, TriedBlock
+from dzdesign.verify.structured_text.every_pair import ExactTables, Tried, TriedBlock
 from dzdesign.verify.structured_text.imported_files import (
     differing_declarations,
     read_xml,
@@ -117,7 +117,7 @@ def _tried(
     block: FunctionBlock, kinds: dict[int, Kind], compensator: Compensator, interface: str
 ) -> tuple[list[Check], tuple[TriedInputs, ...]]:
     """Return what trying every input found."""
-    tried = TriedBlock(block, kinds, compensator, interface)
+    tried = TriedBlock(block, kinds, ExactTables(compensator, interface))
     difference = tried.sample_differs()
     pairs, pressures, extremes = tried.every_pair(), tried.every_pressure(), tried.extremes()
     sets = (*pairs, pressures, extremes)

@@ -77,14 +77,12 @@ class Tried:
     outputs_hash: str
 
 
-class TriedBlock:
-    """A function block that is ready to be tried."""
+class ExactTables:
+    """The exact law of every side over all pressure drops, as what a block is compared with."""
 
-    def __init__(self, block: FunctionBlock, kinds: dict[int, Kind], compensator: Compensator, interface: str) -> None:
-        self.block, self.kinds, self.of_codes = block, kinds, interface == "codes"
+    def __init__(self, compensator: Compensator, interface: str) -> None:
+        self.of_codes = interface == "codes"
         self.exact = [ExactBlock(compensator, sign, interface) for sign in compensator.signals.signs]
-        sources = {HEADER: block_in_c(block, kinds), PROGRAM.name: PROGRAM.read_text(encoding="utf-8")}
-        self.library = load_library(sources, "the function block as C")
         self._held: list[np.ndarray] = []
         self.setup = self._setup()
 
@@ -111,6 +109,18 @@ class TriedBlock:
         a, b = exact.sensors
         ends = (a.high, b.low) if exact.turn > 0 else (a.low, b.high)
         return exact.turn * ((ends[0] - a.zero) * a.weight - (ends[1] - b.zero) * b.weight) // exact.unit
+
+
+class TriedBlock:
+    """A function block that is ready to be tried."""
+
+    def __init__(
+        self, block: FunctionBlock, kinds: dict[int, Kind], tables: ExactTables, options: Sequence[str] = ()
+    ) -> None:
+        self.block, self.kinds, self.of_codes = block, kinds, tables.of_codes
+        self.tables, self.exact, self.setup = tables, tables.exact, tables.setup
+        sources = {HEADER: block_in_c(block, kinds), PROGRAM.name: PROGRAM.read_text(encoding="utf-8")}
+        self.library = load_library(sources, "the function block as C", options)
 
     @property
     def pressures(self) -> tuple[int, int]:

@@ -98,13 +98,13 @@ class ExactBlock(ExactLaw):
         denominator = self._denominator
         return Betas(Fraction(min(self._law_nodes), denominator), Fraction(min(self._zero_nodes), denominator))
 
-    def parts(self, betas: Betas) -> list[list[int]]:
-        """Return the law along the command in straight parts, each in whole numbers.
+    def parts(self, corners: list[tuple[int, Fraction]]) -> list[list[int]]:
+        """Return the law along the command in straight parts between its corners, each in whole numbers.
 
         First and last command, from zero on; the output before it is limited, as a whole and a numerator, at the first;
         what each further command adds to both; and their denominator.
         """
-        corners, found = self.corners(betas), []
+        found: list[list[int]] = []
         for place, ((first, start), (last, end)) in enumerate(pairwise(corners)):
             slope = (end - start) / (last - first) if last > first else Fraction(0)
             start += self.rounding
@@ -121,5 +121,12 @@ class ExactBlock(ExactLaw):
 
     def table(self, drops: range) -> np.ndarray:
         """Return the parts at each pressure drop and, last, where the pressures can't be right: (drops + 1, 3, 7)."""
-        rows = [self.parts(self.betas_at(drop)) for drop in drops]
-        return np.array([*rows, self.parts(self.least_betas())], dtype=np.int64)
+        lines, zeros = self.lines_in_beta(), 2 if self.transition_end else 1
+
+        def row(betas: Betas) -> list[list[int]]:
+            """Take the certified beta up to the zero band's end, and the law's beyond."""
+            values = [none + more * betas.zero for _, none, more in lines[:zeros]]
+            values += [none + more * betas.law for _, none, more in lines[zeros:]]
+            return self.parts([(code, value) for (code, _, _), value in zip(lines, values, strict=True)])
+
+        return np.array([*map(row, map(self.betas_at, drops)), row(self.least_betas())], dtype=np.int64)

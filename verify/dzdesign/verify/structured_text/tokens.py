@@ -8,7 +8,7 @@ from dzdesign.verify.structured_text.syntax import Place
 
 TOKEN = re.compile(
     r"(?P<space>\s+|\(\*(?:(?!\(\*).)*?\*\))|(?P<word>[A-Za-z_]\w*)|(?P<whole>\d+)(?![\w#])"
-    r"|(?P<sign>:=|<>|<=|>=|\.\.|[-+*/=<>()\[\],:;])",
+    r"|(?P<sign>:=|<>|<=|>=|\.\.|\((?!\*)|[-+*/=<>)\[\],:;])",
     re.DOTALL,
 )
 
