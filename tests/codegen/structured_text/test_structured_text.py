@@ -144,7 +144,8 @@ def test_the_command_writes_a_folder_and_refuses_one_of_another_kind(example_com
     assert main(["codegen", source, "--target", "iec61131", "--dialect", "twincat", "-o", str(folder)]) == 0
     assert "dialect twincat, interface plc" in capsys.readouterr().out
     manifest = json.loads((folder / "manifest.json").read_text())
-    assert manifest["schema"] == "dzdesign.output/1" and manifest["settings"] == {"dialect": "twincat", "interface": "plc"}
+    assert manifest["schema"] == "dzdesign.output/1"
+    assert manifest["settings"] == {"dialect": "twincat", "interface": "plc"}
     assert sorted(manifest["files"]) == sorted(each.name for each in folder.iterdir() if each.name != "manifest.json")
     assert main(["codegen", source, "--target", "f28335", "-o", str(folder)]) == 2
     assert "dzdesign.output/1" in capsys.readouterr().err
@@ -154,5 +155,6 @@ def test_the_command_writes_a_folder_and_refuses_one_of_another_kind(example_com
 
 
 def test_settings_are_the_defaults_where_none_were_given():
-    assert settings_of("iec61131", {}) == {name: values[0] for name, values in OTHER_TARGETS["iec61131"].options.items()}
+    known = OTHER_TARGETS["iec61131"].options
+    assert settings_of("iec61131", {}) == {name: values[0] for name, values in known.items()}
     assert settings_of("f28335", {"dialect": None}) == {}

@@ -33,8 +33,13 @@ def tried(text, tables):
     return TriedBlock(block, check_types(block, "B.st"), tables, ["-O1"])
 
 
-@pytest.fixture(scope="module", params=[(GOLDENS, "plc"), (GOLDENS, "codes"), (GOLDENS_FULL, "plc"), (GOLDENS_FULL, "codes")],
-                ids=["one plc", "one codes", "two plc", "two codes"])  # fmt: skip
+CASES = {
+    "one plc": (GOLDENS, "plc"), "one codes": (GOLDENS, "codes"),
+    "two plc": (GOLDENS_FULL, "plc"), "two codes": (GOLDENS_FULL, "codes"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=CASES.values(), ids=CASES)
 def case(request):
     root, interface = request.param
     made = compensator(root)
@@ -81,7 +86,8 @@ def test_rows_made_by_additions_are_the_exact_law(case):
         for drop, parts in zip(drops, exact.table(drops), strict=False):
             corners = exact.corners(exact.betas_at(drop))
             for away in [0, exact.zero_band, exact.transition_end, exact.span, *random.integers(0, exact.span, 20)]:
-                first, last, whole, rest, step, step_rest, common = next(each.tolist() for each in parts if away <= each[1])
+                part = next(each.tolist() for each in parts if away <= each[1])
+                first, last, whole, rest, step, step_rest, common = part
                 value = Fraction(whole) + Fraction(rest, common) + (away - first) * (step + Fraction(step_rest, common))
                 part = next(place for place in range(len(corners) - 1) if away <= corners[place + 1][0])
                 (begin, start), (end, stop) = corners[part : part + 2]
