@@ -6,9 +6,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from dzdesign.codegen.project import target_named
 from dzdesign.codegen.structured_text.files import structured_text
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.structured_text.every_pair import ExactTables, TriedBlock
 from dzdesign.verify.structured_text.exact_block import ExactBlock
@@ -37,6 +41,29 @@ CASES = {
     "one plc": (GOLDENS, "plc"), "one codes": (GOLDENS, "codes"),
     "two plc": (GOLDENS_FULL, "plc"), "two codes": (GOLDENS_FULL, "codes"),
 }  # fmt: skip
+
+
+#: Designs that the goldens are not: without a transition, so that a block remembers no rest.
+DESIGNED = {
+    "one": (GOLDENS, {"transition": "0 %"}),
+    "two": (GOLDENS_FULL, {"transition": "0 %", "command_signal": "-10..10 V x 0.15 + 1.5 V", "polarity": "inverted",
+                           "negative_dp": "swapped"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("interface", ["plc", "codes"])
+@pytest.mark.parametrize("name", DESIGNED)
+def test_a_design_without_transition(name, interface):
+    root, options = DESIGNED[name]
+    valve = read_artefact((root / "valve.json").read_bytes(), ValveModel, "valve.json")
+    made = design(valve, options_of(options, target_named("f28335").inputs()))
+    text = structured_text(made, "0" * 64, interface)
+    assert "at_rest" not in text and "passed" not in text and ("side" in text) == (name == "two")
+    block = tried(text, ExactTables(made, interface))
+    drops, pressures = SOME[interface]
+    for found in (*block.every_pair(drops), block.every_pressure(pressures), block.extremes()):
+        assert found.pairs and not is_wrong(found), found
+    assert block.sample_differs() == ""
 
 
 @pytest.fixture(scope="module", params=CASES.values(), ids=CASES)

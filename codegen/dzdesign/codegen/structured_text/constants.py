@@ -106,7 +106,7 @@ def _of_beta(found: Constants, compensator: Compensator, interface: Interface) -
     shown = compensator.valve.recorded_units.text(code_MPa, ".6g MPa")
     if interface.resolution:
         ratio = (per_unit.numerator, per_unit.denominator)
-        found.pair(("CODES", "UNITS"), ratio, f"so many codes of {shown} are so many units of pressure")
+        found.pair(("CODES", "UNITS"), ratio, f"so many codes of {shown} are so many units")
     found.one("STEP_CODES", step, f"codes of pressure drop, {shown} each, from node to node")
     last = {sign: side.last_code for sign, side in interface.sides.items()}
     found.each("LAST_CODE", last, "largest code that valid pressures make")
