@@ -2,6 +2,7 @@
 
 Each is made by a module that offers ``output_files(compensator, origin, settings) -> Mapping[str, bytes]``: relative
 path to content, without compensator.json and the manifest, which every output has. The same input gives the same bytes.
+A module may also offer ``note_of(compensator) -> str``: what of this design the output leaves out.
 """
 
 from collections.abc import Mapping
@@ -124,7 +125,9 @@ def generate_output(
         valve_json=compensator.valve_json_sha256,
         ramp_tests=compensator.valve.made_from,
     )
-    made: Mapping[str, bytes] = import_module(OTHER_TARGETS[target].module).output_files(compensator, origin, settings)
+    module = import_module(OTHER_TARGETS[target].module)
+    made: Mapping[str, bytes] = module.output_files(compensator, origin, settings)
+    note = module.note_of(compensator) if hasattr(module, "note_of") else ""
     files = {**made, Compensator.FILE_NAME: document}
     manifest = OutputManifest(
         tool=THIS_TOOL,
@@ -135,7 +138,7 @@ def generate_output(
         origin=origin,
         files={path: sha256_of(content) for path, content in files.items()},
     )
-    return Output(files=files, manifest=manifest, compensator=compensator)
+    return Output(files=files, manifest=manifest, compensator=compensator, note=note)
 
 
 def write_output(output: Output, folder: Path, *, over_another: bool = False) -> Output:
@@ -155,4 +158,5 @@ def write_output(output: Output, folder: Path, *, over_another: bool = False) ->
     if earlier in (None, output.manifest.target):
         return output
     note = f"the {earlier} output in '{folder}' was replaced by this {output.manifest.target}"
-    return replace(output, note=f"{note}; to have both, give each its own folder with -o")
+    note += "; to have both, give each its own folder with -o"
+    return replace(output, note="; ".join(filter(None, [output.note, note])))

@@ -40,6 +40,12 @@ FILES = Requirement(id="files-as-generated", title="files as generated")
 MANIFEST = Requirement(id="manifest", title="the manifest says what is in the firmware")
 #: Of an output that is no C firmware.
 OUTPUT_MANIFEST = Requirement(id="output-manifest", title="the manifest says what the output was made from")
+#: Of Structured Text.
+SUBSET = Requirement(id="st-subset", title="the text is of the subset that is verified")
+SAME_TEXT = Requirement(id="st-same-text", title="every file holds the same text")
+TWO_READINGS = Requirement(id="st-two-readings", title="two readings of the text agree")
+OVERFLOW = Requirement(id="st-overflow", title="no operation overflows its 32 bits")
+STATES = Requirement(id="st-states", title="status, side and rest follow their description")
 COMPILES = Requirement(id="compiles", title="compiles without a warning")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
 MONOTONE = Requirement(id="monotone", title="within range, monotone")

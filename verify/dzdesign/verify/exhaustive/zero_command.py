@@ -135,7 +135,13 @@ def zero_command_margins(
     """
     drops = pressure_drops(exact, found, {Fraction(repr(dp)) for each in bounds for dp in each.dp_MPa})
     unit_V = exact.compensator.u_max_V / exact.compare_max
-    at_peak = at_zero + counted_dither(exact.compensator)
+    return margins_of_drives(drops, at_zero + counted_dither(exact.compensator), unit_V, bounds)
+
+
+def margins_of_drives(
+    drops: PressureDrops, at_peak: np.ndarray, unit_V: Fraction, bounds: Sequence[LotSide]
+) -> list[ZeroCommandMargin | None]:
+    """Return what drives at zero command, in units of `unit_V`, leave to each valve's bounds."""
     return [
         _margin(Staircase(each), drops, at_peak, unit_V)
         if each.premise == "monotone" or len(each.dp_MPa) == 1

@@ -1,0 +1,61 @@
+"""Function blocks read by blark, a parser of Beckhoff's language that others wrote: 0 errors, in text and in XML.
+
+Its parser takes every ambiguity in turn, half a minute a block, so this is no test. A block with an error in it must be
+refused. `pip install blark`; it is under the GPL, and nothing of the product imports it.
+"""
+
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+from dzdesign.codegen.other_targets import generate_output
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.design.compensator import Compensator
+
+ROOT = Path(__file__).parents[2]
+NAME = "FB_DeadZone"
+
+
+def texts(root: str, dialect: str, interface: str) -> dict[str, str]:
+    """Return the text of each file of an output that a PLC's tool reads."""
+    source = ROOT / "tests" / root / "compensator.json"
+    compensator = read_artefact(source.read_bytes(), Compensator, source.name)
+    settings = {"dialect": dialect, "interface": interface}
+    files = generate_output(compensator, "iec61131", settings, to_json_bytes(compensator)).files
+    found = {f"{NAME}.st": files[f"{NAME}.st"].decode()}
+    parts = {each.tag.rpartition("}")[2]: each for each in ElementTree.fromstring(files[f"{NAME}.xml"]).iter()}
+    plain, body = ("".join(parts[name].itertext()).strip("\n") for name in ("InterfaceAsPlainText", "body"))
+    found[f"{NAME}.xml"] = f"{plain}\n{body}\nEND_FUNCTION_BLOCK\n"
+    if dialect == "twincat":
+        pou = ElementTree.fromstring(files[f"{NAME}.TcPOU"])[0]
+        declaration, code = pou.findtext("Declaration") or "", pou.findtext("Implementation/ST") or ""
+        found[f"{NAME}.TcPOU"] = f"{declaration}{code}END_FUNCTION_BLOCK\n"
+    return found
+
+
+def errors(text: str) -> int:
+    """Return 1 if blark can't read a text, else 0."""
+    from blark.parse import parse_source_code
+
+    return int(parse_source_code(text).exception is not None)
+
+
+def main() -> int:
+    """Read the blocks of both golden compensators; return how many can't be, or are read with an error in them."""
+    wrong, read = 0, {}
+    for root in ("goldens", "goldens_full"):
+        for dialect in ("codesys", "twincat"):
+            for interface in ("plc", "codes"):
+                for name, text in texts(root, dialect, interface).items():
+                    if text not in read:
+                        read[text] = errors(text)
+                        print(f"{root} {dialect} {interface} {name}: {read[text]} errors", flush=True)
+                    wrong += read[text]
+    broken = next(iter(read)).replace("END_IF", "END_WHILE", 1)
+    print("a block with an error in it:", "refused" if errors(broken) else "read", flush=True)
+    return wrong + (not errors(broken))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,179 @@
+"""What a function block takes and gives: numbers of a PLC, or the converter codes of the design.
+
+A number of a PLC is coarser than a code, so each is taken on the safe side. The output is rounded down. A pressure drop
+of n tenths of a bar stands for all within one of it, for two pressures were rounded: beta is the least of the codes
+about them. Zero band and transition are widened to whole numbers.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, floor
+
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.signals import WEIGHT_UNIT, PressureSignal
+
+#: Units of a PLC: 0.01 % of full command and of full drive, and 0.1 bar.
+FULL = 10_000
+PRESSURE_MPa = Fraction(1, 100)
+DINT_MAX = 2**31 - 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pressure:
+    """One pressure input: first and last valid number, the number of no pressure, and its weight in a difference."""
+
+    low: int
+    high: int
+    zero: int
+    weight: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SideScaling:
+    """What is of one sign of command alone, in units of the inputs."""
+
+    #: Full command, from zero command on.
+    span: int
+    zero_band: int
+    transition: int
+    #: The command must pass this to leave zero command, or to change the side.
+    leave_zero: int
+    #: 1: the pressure drop is A less B.
+    turn: int
+    #: Largest pressure drop that was tested, and the largest code of the tables.
+    tested_to: int
+    last_code: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interface:
+    """Scaling of every input and of the output."""
+
+    #: Value of ``--interface``.
+    name: str
+    command_low: int
+    command_high: int
+    command_zero: int
+    #: 1: positive commands have larger numbers than zero command, -1: smaller ones.
+    command_direction: int
+    a: Pressure
+    b: Pressure
+    #: A difference of weighted pressures over this, rounded down, is the pressure drop.
+    weight_unit: int
+    #: A pressure drop below the negative of this can't be right.
+    reverse: int
+    #: Codes of the design in one unit of the pressure drop.
+    codes_per_unit: Fraction
+    #: A pressure drop that is read stands for all within so many units of it.
+    resolution: int
+    #: Output of full drive, and its limit.
+    full: int
+    limit: int
+    #: Whether the output is rounded to the nearest, a half up; else it is rounded down.
+    rounds: bool
+    sides: Mapping[int, SideScaling]
+
+
+def interface_named(name: str, compensator: Compensator) -> Interface:
+    """Return the scaling of an interface, ``plc`` or ``codes``, for a compensator."""
+    return _of_codes(compensator) if name == "codes" else _of_plc(compensator)
+
+
+def _of_codes(compensator: Compensator) -> Interface:
+    signals, functions = compensator.signals, compensator.drive_functions
+    command, (a, b) = signals.command, (signals.pressure_a, signals.pressure_b)
+    like = signals.like_sensors
+    return Interface(
+        name="codes",
+        command_low=command.valid_codes[0],
+        command_high=command.valid_codes[1],
+        command_zero=command.zero_code,
+        command_direction=command.direction(1),
+        a=Pressure(low=a.valid_codes[0], high=a.valid_codes[1], zero=a.zero_code, weight=1 if like else WEIGHT_UNIT),
+        b=Pressure(low=b.valid_codes[0], high=b.valid_codes[1], zero=b.zero_code,
+                   weight=1 if like else signals.weight_b),
+        weight_unit=1 if like else WEIGHT_UNIT,
+        reverse=compensator.reverse_codes,
+        codes_per_unit=Fraction(1),
+        resolution=0,
+        full=signals.compare_max,
+        limit=functions.compare_limit,
+        rounds=True,
+        sides={
+            sign: SideScaling(
+                span=command.span(sign),
+                zero_band=compensator.zero_band_codes,
+                transition=compensator.transition_codes,
+                leave_zero=functions.leave_zero_codes,
+                turn=_turn(compensator, sign),
+                tested_to=floor(compensator.side(sign).certificate.dp_MPa[1] / a.per_code_MPa),
+                last_code=signals.largest_difference(sign),
+            )
+            for sign in signals.signs
+        },
+    )  # fmt: skip
+
+
+def _of_plc(compensator: Compensator) -> Interface:
+    signals, functions = compensator.signals, compensator.drive_functions
+    per_code = signals.pressure_a.per_code_MPa
+    reverse = floor(compensator.reverse_codes * per_code / PRESSURE_MPa)
+    a, b = (_pressure(signal, reverse) for signal in (signals.pressure_a, signals.pressure_b))
+    return Interface(
+        name="plc",
+        command_low=-FULL,
+        command_high=FULL,
+        command_zero=0,
+        command_direction=1,
+        a=a,
+        b=b,
+        weight_unit=1,
+        reverse=reverse,
+        codes_per_unit=_codes_per_unit(per_code, max(a.high - b.low, b.high - a.low)),
+        resolution=1,
+        full=FULL,
+        limit=FULL * functions.compare_limit // signals.compare_max,
+        rounds=False,
+        sides={
+            sign: SideScaling(
+                span=FULL,
+                zero_band=_units(compensator.zero_band_codes, signals.command.span(sign)),
+                transition=_units(compensator.transition_codes, signals.command.span(sign)),
+                leave_zero=_units(functions.leave_zero_codes, signals.command.span(sign)),
+                turn=_turn(compensator, sign),
+                tested_to=floor(compensator.side(sign).certificate.dp_MPa[1] / PRESSURE_MPa),
+                last_code=signals.largest_difference(sign),
+            )
+            for sign in signals.signs
+        },
+    )
+
+
+def _turn(compensator: Compensator, sign: int) -> int:
+    return -1 if sign < 0 and compensator.signals.swapped else 1
+
+
+def _units(codes: int, span: int) -> int:
+    """Return codes of command in units of a PLC, rounded up."""
+    return ceil(Fraction(codes * FULL, span))
+
+
+def _pressure(signal: PressureSignal, reverse: int) -> Pressure:
+    """Return the valid pressures of a sensor in 0.1 bar.
+
+    A converter that reads zero at no pressure reads it below, too: there a PLC may read as much less as is noise.
+    """
+    low, high = ((code - signal.zero_code) * signal.per_code_MPa / PRESSURE_MPa for code in signal.valid_codes)
+    return Pressure(low=ceil(low) if signal.valid_codes[0] else -reverse, high=floor(high), zero=0, weight=1)
+
+
+def _codes_per_unit(per_code_MPa: Fraction, largest: int) -> Fraction:
+    codes = PRESSURE_MPa / per_code_MPa
+    if (largest + 1) * codes.numerator + codes.denominator > DINT_MAX:
+        raise InputError(
+            f"a pressure of 0.1 bar is {codes} codes of sensor A, which needs more than 32 bits; give --pressure-span "
+            "fewer digits, or take --interface codes"
+        )
+    return codes
