@@ -16,7 +16,7 @@ CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 #: Folders that are no room and hold Python, and where their own modules are looked for besides the rooms.
 OTHERS = ("tests", "benchmarks", "docs")
 #: For comparison in benchmarks, or for what can't be had everywhere: the extras of pyproject.toml that no lock holds.
-EXTRAS = {"atheris", "piecewise_regression", "pwlf"}
+EXTRAS = {"atheris", "blark", "piecewise_regression", "pwlf"}
 
 
 def sources() -> list[Path]:

@@ -146,7 +146,7 @@ def test_what_is_verified_is_the_valves_block_and_no_firmware_stays(made, holds,
         fault = SimpleNamespace(holds=holds, name="drive", text="one code off")
         return SimpleNamespace(holds=holds, evidence=SimpleNamespace(all_checks=[fault]))
 
-    monkeypatch.setattr("dzdesign.stages.verify.verify", look)
+    monkeypatch.setattr("dzdesign.stages.verify.verify_firmware", look)
     assert batch(tmp_path, tmp_path / "out", "--verify") == (0 if holds else 1)
     alone, ((verified, identified),) = valve(tmp_path / "out", "V0001"), given
     block = unpack((alone / "calibration.bin").read_bytes())
