@@ -114,7 +114,7 @@ def test_the_block_of_another_compensator_is_found(firmware):
                 strict=True,
             )
         ),
-        ("found = (uint16_t)(bit_of(format", "found = (uint16_t)(1u | bit_of(format", "refuses calibration.bin (0x0001)"),
+        ("found = (uint16_t)(bit_of(f", "found = (uint16_t)(1u | bit_of(f", "refuses calibration.bin (0x0001)"),
         ("return ~crc;", "return ~crc + 1u;", "refuses calibration.bin (0x0002)"),
     ],
 )  # fmt: skip
