@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from dzdesign.codegen.calibration.layout import NODE_MASK
+from dzdesign.codegen.calibration.layout import NODE_MASK, SUPPLY_MASK
 from dzdesign.codegen.calibration.limits import LARGEST_CODES, LARGEST_DROP
 from dzdesign.design.current.loop import LARGEST_ERROR
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
@@ -30,6 +30,7 @@ def corners(block, built):
     yield from (drops(block, LARGEST_DROP + over, turned) for over in (0, 1) for turned in (False, True))
     yield rebalanced(replace(block, b_low=0, b_zero=0, b_high=1, weight_b=65535))
     yield from (replace(block, fault_samples=samples) for samples in (MOST_FAULT_SAMPLES, MOST_FAULT_SAMPLES + 1))
+    yield from spans(block)
     yield replace(block, leave_zero=block.zero_band)
     yield replace(block, leave_zero=block.zero_band + 1)
     yield replace(block, zero_band=0, leave_zero=0)
@@ -37,6 +38,15 @@ def corners(block, built):
         yield from long_commands(block)
     if built.has("CURRENT"):
         yield from current_corners(block)
+
+
+def spans(block):
+    """Sides as long as the rising command, and a code longer."""
+    for zero in (block.command_zero, block.command_zero + 5):
+        for over in (0, 1):
+            span = min(max(block.command_high - zero, 0) + over, 65535)
+            ends = {"span": span, "room": max(span - block.zero_band, 0), "band_end": zero + block.zero_band}
+            yield with_sides(replace(block, command_zero=zero, play_codes=0), ends)
 
 
 def long_commands(block):
@@ -90,7 +100,8 @@ def current_corners(block):
     yield replace(block, current=replace(ordered, over_sum=65534, short_sum=65535, current_gain=1))
     nodes = tuple(range(16384, 16384 + len(numbers.supply)))
     for shift in (0, 1, 5, 9):
-        for place in (((len(nodes) - 1) << shift) - 1, (len(nodes) - 1) << shift):
+        ends = ((SUPPLY_MASK + 1) << shift, len(nodes) << shift)  # one node too many, and one beyond the table
+        for place in (ends[0] - 1, *ends):
             for top in (place, 65535):
                 measured = {"supply_low": top - place, "supply_high": top, "supply_shift": shift}
                 yield replace(block, current=replace(numbers, supply=nodes, **measured))
@@ -196,7 +207,8 @@ def play_corners(block, built):
         for width in (32767, 32768):
             wide = play(32, 2048)  # which a short command has no room for: the law's bit is set too
             widths = (0,) * place + (width,) + (0,) * (16 - place)
-            yield with_sides(wide, {"play": widths})
+            made = with_sides(wide, {"play": widths})
+            yield from (made, replace(made, sides=(made.sides[0], block.sides[1])))
 
 
 def with_sides(block, change):

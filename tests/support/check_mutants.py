@@ -29,7 +29,7 @@ int main(void)
     return 0;
 }
 """
-SANITIZED = ("-std=c99", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+SANITIZED = ("-std=c99", "-O1", "-fsanitize=address,undefined,bounds-strict", "-fno-sanitize-recover=all")
 
 
 def verdict(block, built) -> int:
