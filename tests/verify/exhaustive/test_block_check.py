@@ -56,7 +56,7 @@ def test_each_block_is_tried_on_every_input_and_the_core_is_compiled_once(lot, m
     assert len({each.inputs[0].outputs_hash for each in found.values()}) == 2
     assert len({each.inputs[0].object_sha256 for each in found.values()}) == 1
     assert len(commands) == first and sum("dz_comp.c" in command for command in commands) <= 1
-    assert set(host_compiler.build_folder().glob("*.bin")) == earlier
+    assert set(host_compiler.build_folder().glob("*.bin")) <= earlier  # others may take theirs away meanwhile
 
 
 def test_the_block_of_another_valve_is_seen(lot):
