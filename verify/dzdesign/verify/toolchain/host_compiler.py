@@ -3,7 +3,6 @@
 Where a machine has no compiler, Zig's serves: a clang with its own headers and linker, in the wheel `ziglang`.
 """
 
-import atexit
 import ctypes
 import importlib.util
 import logging
@@ -12,10 +11,8 @@ import shlex
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from threading import Lock
 
@@ -23,6 +20,7 @@ import platformdirs
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.scratch import process_folder
 
 #: What the generated core must bear without a word.
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
@@ -41,12 +39,9 @@ REDIRECTING = ("CPATH", "C_INCLUDE_PATH", "CCC_OVERRIDE_OPTIONS")
 logger = logging.getLogger(__name__)
 
 
-@cache
 def build_folder() -> Path:
     """Return the folder that everything is built in; it goes when the process ends."""
-    folder = tempfile.mkdtemp(prefix="dzdesign-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Path(folder)
+    return process_folder()
 
 
 def find_compilers() -> tuple[str, ...]:
