@@ -4,6 +4,7 @@ import contextlib
 import logging
 import os
 import shutil
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,6 +39,9 @@ __all__ = [
 TOOL = {"name": "dzdesign", "version": __version__}
 
 logger = logging.getLogger(__name__)
+
+#: The files and folders that this process has written last, but for what goes with it.
+written: deque[Path] = deque(maxlen=5)
 
 
 def check_place_of_files(folder: Path, option: str) -> None:
@@ -112,7 +116,13 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
         with alone_in(place.parent) as alone:
             remove_abandoned(place.parent, alone=alone)
             _replace_file(place, data)
+    _note_written(path)
     logger.debug("wrote '%s', %d bytes", path, len(data))
+
+
+def _note_written(path: Path) -> None:
+    if path not in written and not is_scratch(path):
+        written.append(path)
 
 
 def _replace_file(path: Path, data: bytes) -> None:
@@ -199,7 +209,7 @@ def write_folder(
 
         document = as_document(manifest)
     contents[MANIFEST_NAME] = to_json({**document, "files": listing}).encode()
-    folder = Path(folder)
+    named = folder = Path(folder)
     with _refusing(f"the folder '{folder}'", "-o"):
         folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced
         if not folder.parent.is_dir():
@@ -211,6 +221,7 @@ def write_folder(
             check()
             _check_folder(folder, document.get("schema"))
             kept = _replace_folder(folder, contents, listing, board_of(document))
+    _note_written(named)
     logger.debug("wrote '%s', %d files", folder, len(contents))
     return kept
 

@@ -48,6 +48,12 @@ def is_scratch(path: Path) -> bool:
     return any(folder == place or folder in place.parents for folder in _held)
 
 
+def remove_scratch() -> None:
+    """Remove the folders of this process now, before it ends by a way on which nothing else is done."""
+    for folder in list(_held):
+        _remove(folder)
+
+
 def _made() -> Path:
     _remove_abandoned()
     if os.name != "posix":

@@ -99,7 +99,7 @@ def _compiled(folder: Path, identifier: str, platform: Platform) -> bytes:
         "dylib": (f"-Wl,-install_name,@rpath/{name}",),
     }
     command = [
-        sys.executable, "-m", "ziglang", "cc", "-target", platform.triple, *FLAGS,
+        sys.executable, "-P", "-m", "ziglang", "cc", "-target", platform.triple, *FLAGS,
         *named[platform.ending], "-I.", "-isystem", NO_LIBRARY, SOURCE, "-o", f"{platform.triple}/{name}",
     ]  # fmt: skip
     try:

@@ -57,7 +57,10 @@ def find_compilers() -> tuple[str, ...]:
 def _found(name: str) -> str | None:
     """Return the path of a program, or several words as they are if the first one is a program."""
     path = shutil.which(name)
-    words = [] if path else shlex.split(name, posix=os.name != "nt")
+    try:
+        words = [] if path else shlex.split(name, posix=os.name != "nt")
+    except ValueError as error:
+        raise InputError(f"$CC is {name!r}, which is no compiler's command ({error}); correct or unset it") from error
     return path or (name if len(words) > 1 and shutil.which(words[0]) else None)
 
 
