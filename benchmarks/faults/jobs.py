@@ -13,7 +13,7 @@ def run(*words: str, folder: Path) -> None:
     subprocess.run([PROGRAM, *words], cwd=folder, check=True, capture_output=True)
 
 
-def power_cut_jobs(folder: Path) -> list[Job]:
+def fault_jobs(folder: Path) -> list[Job]:
     """Return the jobs; what they start from is made in `folder`."""
     ramps = folder / "ramps"
     ramps.mkdir()
