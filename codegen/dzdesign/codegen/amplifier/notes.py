@@ -1,0 +1,37 @@
+"""What a user must know of a fixed setting beside its numbers, a sentence each."""
+
+from dzdesign.codegen.amplifier.files import WITHOUT_COMMENTS
+from dzdesign.codegen.amplifier.setting import AmplifierSetting
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.signals import SIDE_NAMES
+
+#: Where the threshold is lower than at any test, by its trend.
+LOWER: dict[str | None, str] = {
+    "decreasing": "above {high}, where the threshold is lower, nothing is certified: flow at zero command is possible",
+    "increasing": "below {low}, where the threshold is lower, nothing is certified: flow at zero command is possible",
+}
+
+
+def notes_of(setting: AmplifierSetting, compensator: Compensator) -> tuple[str, ...]:
+    """Return what the setting does not hold for, what the device's sources leave open, and what is still to be done."""
+    device, units = setting.device, compensator.valve.recorded_units
+    notes = []
+    for sign, offset in setting.offsets.items():
+        low, high = (units.text(float(end), ".2f MPa") for end in offset.dp_MPa)
+        trend = compensator.valve.sides[SIDE_NAMES[sign]].trend
+        outside = LOWER.get(trend, "below {low} and above {high} nothing is certified")
+        side = "" if len(setting.offsets) == 1 else f"{SIDE_NAMES[sign]} side: "
+        notes.append(side + outside.format(low=low, high=high))
+    if compensator.lot:
+        count = len(compensator.lot)
+        notes.append(f"lot setting: under the bounds of each of {count} valves; the table is of one of them")
+    if compensator.current_drive is not None:
+        rated = units.text(compensator.current_drive.circuit.rated_A, ".3g A")
+        notes.append(f"full drive is the rated current of this design, {rated}: set the device's nominal current to it")
+    if compensator.drive_functions.dither_counts:
+        notes.append("the design's dither is left out: the ramp tests must have been recorded with the amplifier's own")
+    notes += [f"not confirmed: {device.unconfirmed}"] if device.unconfirmed else []
+    notes += [device.hint] if device.hint else []
+    if device.format in WITHOUT_COMMENTS:
+        notes.append("the format has no comments, so the file does not say what it was made from; keep this output")
+    return tuple(notes)

@@ -1,0 +1,78 @@
+"""What `dzdesign export` prints: the setting, and the dead zone that it leaves beside that of the law."""
+
+from functools import partial
+from math import isinf
+from typing import TYPE_CHECKING
+
+from dzdesign.terminal.page import new_console, put_line, put_rows
+from dzdesign.terminal.tables import put_units
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rich.console import Console
+
+    from dzdesign.core.recorded_units import RecordedUnits
+    from dzdesign.design.fixed.dead_zones import FixedDeadZone
+    from dzdesign.stages.export import AmplifierExport
+
+BRANCHES = ("opening", "closing")
+
+
+def print_export(made: "AmplifierExport", console: "Console | None" = None) -> None:
+    """Print what a device is told, and for each side what is left at the tested pressure drops."""
+    from dzdesign.design.signals import SIDE_NAMES
+
+    console = console or new_console()
+    setting, units = made.setting, made.compensator.valve.recorded_units
+    words = ", ".join(f"{name} {counts}" for name, counts in setting.parameters.items())
+    if setting.dp_MPa is None:
+        put_line(console, f"{setting.device.title}: {words} ({setting.device.unit})")
+    else:
+        put_line(console, f"{setting.device.title}: law at {units.text(float(setting.dp_MPa), '.2f MPa')}")
+    for sign, offset in setting.offsets.items():
+        side = SIDE_NAMES[sign]
+        of, label = units.of_side(side), "" if len(setting.offsets) == 1 else f"{side} side: "
+        low, high = (float(end) for end in offset.dp_MPa)
+        put_line(
+            console,
+            f"{label}largest fixed offset that is safe {of.span(low, high, '.2f MPa')}: {float(offset.share):.3%} of "
+            f"full drive (the bound is lowest at {of.text(float(offset.lowest_at_MPa), '.2f MPa')}); set: "
+            f"{float(setting.characteristics[sign].offset):.3%}",
+        )
+        rows = [row for row in made.dead_zones if row.side == side]
+        title = "Dead zone that remains, of command (knee): fixed, and by the law, which reads the pressures"
+        put_rows(console, title + (f", {side} side" if label else ""), rows, _columns(made, rows, of, sign))
+    for note in made.notes:
+        put_line(console, f"note: {note}")
+    put_units(console, units, "compensator.json")
+    put_line(console, f"SHA-256 of its compensator.json: {made.compensator_sha256}")
+
+
+def _columns(
+    made: "AmplifierExport", rows: "Sequence[FixedDeadZone]", units: "RecordedUnits", sign: int
+) -> "dict[str, Callable[[FixedDeadZone], str]]":
+    """Return the columns of the table: branches that no test recorded are left out, and so is a missing transition."""
+    columns: dict[str, Callable[[FixedDeadZone], str]] = {
+        f"dP ({units.label('MPa')})": lambda row: units.number(row.dp_MPa, ".2f MPa"),
+    }
+    for whose in ("fixed", "law"):
+        for branch in (each for each in BRANCHES if any(each in row.fixed for row in rows)):
+            columns[f"{whose}: {branch}"] = partial(_share, whose=whose, branch=branch)
+    if any(row.law_end_L_min is not None for row in rows):
+        compensator = made.compensator
+        end = compensator.transition_end / compensator.signals.command.span(sign)
+        for whose in ("fixed", "law"):
+            header = f"{whose}: flow on closing at {end:.2%} of command ({units.label('L/min')})"
+            columns[header] = partial(_flow, whose=whose, units=units)
+    return columns
+
+
+def _share(row: "FixedDeadZone", whose: str, branch: str) -> str:
+    share = (row.fixed if whose == "fixed" else row.law).get(branch)
+    return "-" if share is None else "never" if isinf(share) else f"{share:.2%}"
+
+
+def _flow(row: "FixedDeadZone", whose: str, units: "RecordedUnits") -> str:
+    flow = row.fixed_end_L_min if whose == "fixed" else row.law_end_L_min
+    return "-" if flow is None else units.number(flow, ".2f L/min")
