@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 from dzdesign.core.errors import one_line
 from dzdesign.stages.export import ExportArguments, export
 from dzdesign.terminal.page import print_json
-from dzdesign.terminal.progress import say
 
 if TYPE_CHECKING:
     from dzdesign.stages.export import AmplifierExport
 
 EXAMPLES = (
-    "dzdesign export compensator.json --to west                   # what would it set, what does that leave?",
+    "dzdesign export compensator.json --to west        # what would it set, what does that leave?",
     "dzdesign export compensator.json --to west -o pam199.txt",
-    "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold \"1 %\"",
+    "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold '1 %'",
     'dzdesign export compensator.json --to beckhoff -o table.st --dp "2 MPa"',
 )
 
@@ -27,12 +26,9 @@ class Arguments(ExportArguments):
 
 def run(arguments: Arguments, json: bool) -> int:
     """Write the parameters of a device, and print what they leave beside the law that reads the pressures."""
-    from dzdesign.design.costs import design_warnings
     from dzdesign.terminal.export_tables import print_export
 
     made = export(arguments)
-    for line in design_warnings(made.compensator):
-        say(f"warning: {line}")
     file = None if arguments.output is None else os.fspath(arguments.output)
     if json:
         print_json(_document(made, file))

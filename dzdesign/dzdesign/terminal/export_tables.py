@@ -25,11 +25,12 @@ def print_export(made: "AmplifierExport", console: "Console | None" = None) -> N
 
     console = console or new_console()
     setting, units = made.setting, made.compensator.valve.recorded_units
+    device = setting.device
     words = ", ".join(f"{name} {counts}" for name, counts in setting.parameters.items())
     if setting.dp_MPa is None:
-        put_line(console, f"{setting.device.title}: {words} ({setting.device.unit})")
+        put_line(console, f"{device.title}, {device.description}: {words} (unit {device.unit})")
     else:
-        put_line(console, f"{setting.device.title}: law at {units.text(float(setting.dp_MPa), '.2f MPa')}")
+        put_line(console, f"{device.title}, {device.description}: law at {units.text(float(setting.dp_MPa), '.2f MPa')}")
     for sign, offset in setting.offsets.items():
         side = SIDE_NAMES[sign]
         of, label = units.of_side(side), "" if len(setting.offsets) == 1 else f"{side} side: "

@@ -57,6 +57,7 @@ class Device:
     #: On the command line, after ``--to``.
     name: str
     title: str
+    description: str
     #: Document and section of everything here.
     sources: tuple[str, ...]
     #: What they leave open.
@@ -87,7 +88,7 @@ class Device:
 
     def in_unit(self, counts: int) -> str:
         """Return counts with their unit, volts for a device that counts in millivolts."""
-        return f"{counts / 1000:.3f} V" if self.unit == "mV" else f"{100 * counts / self.counts_of_full:.2f} %"
+        return f"{counts / 1000:g} V" if self.unit == "mV" else f"{100 * counts / self.counts_of_full:.2f} %"
 
 
 @cache

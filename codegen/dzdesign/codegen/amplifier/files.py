@@ -40,7 +40,7 @@ def _about(setting: AmplifierSetting, compensator: Compensator) -> list[str]:
     """Return what a reader of the file should know, a line each."""
     device, (low, high) = setting.device, setting.offsets[1].dp_MPa
     lines = [
-        f"Device: {device.title}.",
+        f"Device: {device.title}, {device.description}.",
         f"At zero command it opens the valve at no pressure drop from {float(low):.4g} to {float(high):.4g} MPa,",
         f"certified of {compensator.certified_of}; above and below nothing is certified.",
     ]
@@ -72,6 +72,7 @@ def _dcf(setting: AmplifierSetting, head: Sequence[str]) -> Iterable[str]:
     yield "; A part of a DCF: these objects alone; the node's number, and all others, are those of the device."
     for section, entries in (
         ("FileInfo", {"FileVersion": "1", "FileRevision": "0", "EDSVersion": "4.0", "Description": "dead band"}),
+        ("DeviceInfo", {"VendorName": "any", "ProductName": "CiA 408", "Granularity": "8", "LSS_Supported": "0"}),
         ("MandatoryObjects", {"SupportedObjects": "0"}),
         ("OptionalObjects", _listed([each.index for each in objects])),
         ("ManufacturerObjects", {"SupportedObjects": "0"}),

@@ -22,6 +22,11 @@ def notes_of(setting: AmplifierSetting, compensator: Compensator) -> tuple[str, 
         outside = LOWER.get(trend, "below {low} and above {high} nothing is certified")
         side = "" if len(setting.offsets) == 1 else f"{SIDE_NAMES[sign]} side: "
         notes.append(side + outside.format(low=low, high=high))
+    if compensator.negative is None and "negative" in compensator.valve.sides:
+        notes.append("the valve's negative side is left out: the design's command has one sign")
+    if compensator.valve.simulated:
+        notes.append("the recordings are simulated: an example, not for a machine")
+    notes += _of_the_machine(compensator)
     if compensator.lot:
         count = len(compensator.lot)
         notes.append(f"lot setting: under the bounds of each of {count} valves; the table is of one of them")
@@ -29,9 +34,19 @@ def notes_of(setting: AmplifierSetting, compensator: Compensator) -> tuple[str, 
         rated = units.text(compensator.current_drive.circuit.rated_A, ".3g A")
         notes.append(f"full drive is the rated current of this design, {rated}: set the device's nominal current to it")
     if compensator.drive_functions.dither_counts:
-        notes.append("the design's dither is left out: the ramp tests must have been recorded with the amplifier's own")
+        notes.append("the offset stays lower by the design's dither: the amplifier's own must be no larger")
     notes += [f"not confirmed: {device.unconfirmed}"] if device.unconfirmed else []
     notes += [device.hint] if device.hint else []
     if device.format in WITHOUT_COMMENTS:
         notes.append("the format has no comments, so the file does not say what it was made from; keep this output")
     return tuple(notes)
+
+
+def _of_the_machine(compensator: Compensator) -> list[str]:
+    """Return what the budget leaves out of an amplifier that controls the current."""
+    if compensator.machine is None:
+        return ["certified of the recording alone: design with --amplifier to count the amplifier's error and the oil"]
+    if compensator.machine.drive != "amplifier":
+        drive = compensator.machine.drive
+        return [f"the budget is that of a drive by {drive}: design with --amplifier for one that controls the current"]
+    return []

@@ -116,6 +116,9 @@ def _table(
     for sign, offset in offsets.items():
         exact = pressure_line(compensator, offset, dp_MPa, max(rest, Fraction(1, unit)))
         nodes = [(_up(command, unit), _down(drive, unit)) for command, drive in exact.nodes]
+        for place in range(len(nodes) - 2, 0, -1):  # drives rise from point to point, where the design limits them too
+            command, drive = nodes[place]
+            nodes[place] = command, min(drive, nodes[place + 1][1] - Fraction(1, unit))
         characteristics[sign] = Characteristic(rest=exact.rest, nodes=tuple(nodes))
     return AmplifierSetting(
         device=device, parameters={}, characteristics=characteristics, offsets=offsets, dp_MPa=dp_MPa
@@ -168,8 +171,8 @@ def _limit(compensator: Compensator) -> Fraction:
 def _check_range(device: Device, parameter: Parameter, name: str, counts: int, remedy: str) -> None:
     if counts > parameter.most:
         raise InputError(
-            f"{device.title} takes at most {device.in_unit(parameter.most)} as {name}, and {device.in_unit(counts)} are "
-            f"needed; {remedy}"
+            f"{device.title} takes at most {device.in_unit(parameter.most)} as {name}, and {device.in_unit(counts)} "
+            f"are needed; {remedy}"
         )
     if counts < parameter.least:
         raise InputError(

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.ceiling.offset_curve import OffsetCurve, certified_V
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.budget import Component
@@ -51,11 +50,12 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
     model = compensator.valve.sides[SIDE_NAMES[sign]]
     # Above the tests the bound goes down: a gauge that read too little there had tests at higher pressure drops.
     above = AboveChoice.on(compensator.machine, "lower", STEP_CODES)
-    guard = compensator.side(sign).certificate.guard
-    curve = guarded_curve(model, guard, compensator.below_dp0, above)
-    error_MPa = allowance.pressures_MPa.get(BENCH_ERROR, Fraction(0))
-    bounds = [(certified_V(curve, at), at) for at in _places(curve, error_MPa)]
-    bounds += _of_the_lot(compensator, sign)
+    curve = guarded_curve(model, compensator.side(sign).certificate.guard, compensator.below_dp0, above)
+    pieces = [*(curve.certified.pieces if curve.certified else ()), *_of_the_lot(compensator, sign)]
+    bounds = [(piece.at(place), place) for piece in pieces for place in _lowest_places(piece)]
+    if error_MPa := allowance.pressures_MPa.get(BENCH_ERROR):
+        highest = curve.dp_MPa[-1] + error_MPa
+        bounds.append((curve.at(highest), highest))  # above the tests it never rises
     least_V, lowest_at = min(bounds)
     kept = sum((share for name, share in allowance.shares.items() if name not in NOT_OF_AN_AMPLIFIER), Fraction(0))
     share = least_V * allowance.factor / compensator.u_max_V - kept
@@ -67,22 +67,8 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
     return FixedOffset(sign=sign, share=share, lowest_at_MPa=lowest_at, dp_MPa=(curve.dp_MPa[0], curve.dp_MPa[-1]))
 
 
-def _places(curve: OffsetCurve, error_MPa: Fraction) -> Iterator[Fraction]:
-    """Yield the pressure drops at one of which the curve is lowest, up to an error above the last test, MPa.
-
-    Between two of them the offset is straight, and the bound straight or with its deepest place at an end.
-    """
-    yield from curve.dp_MPa
-    if curve.hold_below_MPa is not None and curve.dp_MPa[0] <= curve.hold_below_MPa <= curve.dp_MPa[-1]:
-        yield curve.hold_below_MPa
-    for piece in curve.certified.pieces if curve.certified else ():
-        yield from _corners(piece)
-    if error_MPa:
-        yield curve.dp_MPa[-1] + error_MPa  # above the tests the offset never rises
-
-
-def _corners(piece: BoundPiece) -> Iterator[Fraction]:
-    """Yield the ends of a piece of the bound, and where its sag is deepest if that is inside, MPa."""
+def _lowest_places(piece: BoundPiece) -> Iterator[Fraction]:
+    """Yield where a piece of the bound may be lowest, MPa: its ends, and where its sag is deepest if that is inside."""
     yield piece.from_MPa
     yield piece.to_MPa
     if piece.curvature > 0:
@@ -92,11 +78,10 @@ def _corners(piece: BoundPiece) -> Iterator[Fraction]:
             yield deepest
 
 
-def _of_the_lot(compensator: Compensator, sign: int) -> Iterator[tuple[Fraction, Fraction]]:
-    """Yield the bounds of every valve of a lot, V, at the pressure drops where each of them may be lowest, MPa."""
+def _of_the_lot(compensator: Compensator, sign: int) -> Iterator[BoundPiece]:
+    """Yield the bounds of every valve of a lot."""
     for valve in compensator.lot:
         side = valve.side(sign)
         if side is None:
             raise InputError(f"'{valve.name}' of the lot has no bounds of the negative side; run `batch` again")
-        for piece in side.bound().pieces:
-            yield from ((piece.at(place), place) for place in _corners(piece))
+        yield from side.bound().pieces
