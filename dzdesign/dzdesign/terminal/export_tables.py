@@ -30,7 +30,8 @@ def print_export(made: "AmplifierExport", console: "Console | None" = None) -> N
     if setting.dp_MPa is None:
         put_line(console, f"{device.title}, {device.description}: {words} (unit {device.unit})")
     else:
-        put_line(console, f"{device.title}, {device.description}: law at {units.text(float(setting.dp_MPa), '.2f MPa')}")
+        at = units.text(float(setting.dp_MPa), ".2f MPa")
+        put_line(console, f"{device.title}, {device.description}: law at {at}")
     for sign, offset in setting.offsets.items():
         side = SIDE_NAMES[sign]
         of, label = units.of_side(side), "" if len(setting.offsets) == 1 else f"{side} side: "

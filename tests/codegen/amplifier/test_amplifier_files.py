@@ -228,7 +228,7 @@ def test_what_a_device_does_not_hold_is_refused(designs, name, device, options, 
         compensator = replace(compensator, drive_functions=functions)
     if name == "two solenoids":
         compensator = designs[name]
-    with wording.refusal(InputError, f"amplifier: {device}, {name}, {' '.join(options) or 'as it is'}"):
+    with wording.refusal(InputError, f"amplifier files: {device}, {name}, {' '.join(options) or 'as it is'}"):
         amplifier_setting(compensator, device_named(device), **options)
 
 

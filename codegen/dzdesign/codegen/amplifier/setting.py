@@ -36,6 +36,10 @@ def amplifier_setting(
 
     Parameters
     ----------
+    compensator : Compensator
+        Design whose certificate holds.
+    device : Device
+        Whose parameters are wanted.
     dp_MPa : Fraction, optional
         Pressure drop whose whole characteristic is wanted, of a device that takes one; dP0 without it.
     threshold : Fraction, optional

@@ -32,11 +32,8 @@ def pressure_line(
 ) -> Characteristic:
     """Return the characteristic at a pressure drop inside the tests, MPa: continuous, from no drive at zero command.
 
-    Parameters
-    ----------
-    rest : Fraction, optional
-        Command, a share of full, at which the drive has come to the fixed offset; that of the design's zero band
-        without one.
+    At the command `rest`, a share of full, the drive has come to the fixed offset; without one that is the end of the
+    design's zero band.
 
     Raises
     ------
