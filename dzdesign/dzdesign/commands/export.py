@@ -67,5 +67,6 @@ def _document(made: "AmplifierExport", file: str | None) -> dict[str, Any]:
             for row in made.dead_zones
         ],
         "notes": list(made.notes),
+        "checks": [{"id": each.id, "name": each.name, "holds": each.holds, "text": each.text} for each in made.checks],
         "compensator_sha256": made.compensator_sha256,
     }  # fmt: skip

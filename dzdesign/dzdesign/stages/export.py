@@ -1,12 +1,13 @@
 """`export`: Compensator -> the parameters of an amplifier that compensates a fixed dead zone, and what they leave."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, write_file
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.option_readers import percent, quantity
 from dzdesign.core.options import AnyPath, Option, Text, read_options
 from dzdesign.stages.given_compensator import given_compensator, refuse_underived
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from dzdesign.codegen.amplifier.setting import AmplifierSetting
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.fixed.dead_zones import FixedDeadZone
+    from dzdesign.verify.requirements import Check
 
 #: Where the names of the devices stand.
 DEVICES = "dzdesign.codegen.amplifier.device:DEVICE_NAMES"
@@ -55,6 +57,8 @@ class AmplifierExport:
     dead_zones: "tuple[FixedDeadZone, ...]"
     #: What a user must know beside the numbers.
     notes: tuple[str, ...]
+    #: What was found as the file was read back, by code that it was not written with.
+    checks: "tuple[Check, ...]"
 
 
 def export(arguments: ExportArguments) -> AmplifierExport:
@@ -67,6 +71,8 @@ def export(arguments: ExportArguments) -> AmplifierExport:
     InputError
         If the compensator can't be read, a number in it does not follow, the device is unknown or its range does not
         hold the setting, an option is not of it, or the file can't be written or is somebody's own.
+    RequirementError
+        If the file as it is read back is not safe, or leaves other dead zones than stated: a fault of dzdesign.
     """
     from dzdesign.codegen.amplifier.device import device_named
     from dzdesign.codegen.amplifier.files import amplifier_file
@@ -82,21 +88,36 @@ def export(arguments: ExportArguments) -> AmplifierExport:
     compensator, digest, source = given_compensator(arguments.compensator)
     refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
     setting = amplifier_setting(compensator, device, dp_MPa=dp_MPa, threshold=threshold)
+    content = amplifier_file(setting, compensator, digest)
+    zones = {sign: dead_zones(compensator, drives, sign) for sign, drives in setting.characteristics.items()}
     made = AmplifierExport(
         setting=setting,
-        content=amplifier_file(setting, compensator, digest),
+        content=content,
         compensator=compensator,
         compensator_sha256=digest,
-        dead_zones=tuple(
-            row
-            for sign, characteristic in setting.characteristics.items()
-            for row in dead_zones(compensator, characteristic, sign)
-        ),
+        dead_zones=tuple(row for rows in zones.values() for row in rows),
         notes=notes_of(setting, compensator),
+        checks=_read_back(device, content, compensator, zones),
     )
     if output is not None:
         write_file(output, made.content)
     return made
+
+
+def _read_back(
+    device: "Device", content: bytes, compensator: "Compensator", zones: "Mapping[int, Sequence[FixedDeadZone]]"
+) -> "tuple[Check, ...]":
+    """Check a file before anybody has it; refuse one that does not hold."""
+    from dzdesign.verify.amplifier.checks import checks
+
+    stated = {sign: [(row.dp_MPa, row.fixed) for row in rows] for sign, rows in zones.items()}
+    found = checks(device.name, content, compensator, stated)
+    if wrong := [check for check in found if not check.holds]:
+        raise RequirementError(
+            f"the file for {device.name} does not hold as it is read back, so it is not written: {wrong[0].name}: "
+            f"{wrong[0].text}; this is a fault of dzdesign"
+        )
+    return found
 
 
 def _dp_and_threshold(arguments: ExportArguments) -> tuple[Fraction | None, Fraction | None]:

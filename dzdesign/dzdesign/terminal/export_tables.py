@@ -45,6 +45,8 @@ def print_export(made: "AmplifierExport", console: "Console | None" = None) -> N
         rows = [row for row in made.dead_zones if row.side == side]
         title = "Dead zone that remains, of command (knee): fixed, and by the law, which reads the pressures"
         put_rows(console, title + (f", {side} side" if label else ""), rows, _columns(made, rows, of, sign))
+    for check in made.checks:
+        put_line(console, f"HOLDS  {check.name}: {check.text}")
     for note in made.notes:
         put_line(console, f"note: {note}")
     put_units(console, units, "compensator.json")

@@ -23,7 +23,9 @@ def amplifier_file(setting: AmplifierSetting, compensator: Compensator, digest: 
     The same input gives the same bytes.
     """
     device = setting.device
-    head = [*banner_of(compensator, digest).lines(f"{device.name}.toml"), *_about(setting, compensator)]
+    first, _, *of_the_valve = banner_of(compensator, digest).lines(f"{device.name}.toml")
+    made_from = f"Made from compensator.json with the SHA-256 {digest}."
+    head = [first, made_from, *of_the_valve, *_about(setting, compensator)]
     lines = WRITERS[device.format](setting, head)
     return "".join(f"{line}\r\n" for line in lines).encode("ascii")
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from fractions import Fraction
+from itertools import pairwise
 
 from dzdesign.design.fixed.characteristic import Characteristic, Node
 
@@ -16,7 +17,7 @@ def rising_points(characteristics: Mapping[int, Characteristic]) -> tuple[Node, 
 
 
 def with_odd_count(points: tuple[Node, ...], *, least: Node) -> tuple[Node, ...]:
-    """Return points that reach full negative command, an odd number of them: where it is even the last part is halved.
+    """Return points that reach full negative command, an odd number of them: of an even one the largest rise is halved.
 
     `least` stands at full negative command where the points begin at zero.
     """
@@ -24,5 +25,7 @@ def with_odd_count(points: tuple[Node, ...], *, least: Node) -> tuple[Node, ...]
         points = (least, *points)
     if len(points) % 2:
         return points
-    (left, low), (right, high) = points[-2:]
-    return (*points[:-1], ((left + right) / 2, (low + high) / 2), points[-1])
+    rises = [right[1] - left[1] for left, right in pairwise(points)]
+    place = rises.index(max(rises)) + 1  # of a short one half a step of the device would be lost
+    (left, low), (right, high) = points[place - 1 : place + 1]
+    return (*points[:place], ((left + right) / 2, (low + high) / 2), *points[place:])
