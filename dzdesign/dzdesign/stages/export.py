@@ -10,6 +10,7 @@ from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.option_readers import percent, quantity
 from dzdesign.core.options import AnyPath, Option, Text, read_options
+from dzdesign.core.worded import in_units
 from dzdesign.stages.given_compensator import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
@@ -87,7 +88,10 @@ def export(arguments: ExportArguments) -> AmplifierExport:
         _check_output(output, device)
     compensator, digest, source = given_compensator(arguments.compensator)
     refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
-    setting = amplifier_setting(compensator, device, dp_MPa=dp_MPa, threshold=threshold)
+    try:
+        setting = amplifier_setting(compensator, device, dp_MPa=dp_MPa, threshold=threshold)
+    except InputError as error:
+        raise InputError(in_units(error, compensator.valve.recorded_units)) from error
     content = amplifier_file(setting, compensator, digest)
     zones = {sign: dead_zones(compensator, drives, sign) for sign, drives in setting.characteristics.items()}
     made = AmplifierExport(

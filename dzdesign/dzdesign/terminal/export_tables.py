@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.design.fixed.dead_zones import FixedDeadZone
+    from dzdesign.design.fixed.fixed_offset import FixedOffset
     from dzdesign.stages.export import AmplifierExport
 
 BRANCHES = ("opening", "closing")
@@ -34,23 +35,30 @@ def print_export(made: "AmplifierExport", console: "Console | None" = None) -> N
         put_line(console, f"{device.title}, {device.description}: law at {at}")
     for sign, offset in setting.offsets.items():
         side = SIDE_NAMES[sign]
-        of, label = units.of_side(side), "" if len(setting.offsets) == 1 else f"{side} side: "
-        low, high = (float(end) for end in offset.dp_MPa)
-        put_line(
-            console,
-            f"{label}largest fixed offset that is safe {of.span(low, high, '.2f MPa')}: {float(offset.share):.3%} of "
-            f"full drive (the bound is lowest at {of.text(float(offset.lowest_at_MPa), '.2f MPa')}); set: "
-            f"{float(setting.characteristics[sign].offset):.3%}",
-        )
+        label = "" if len(setting.offsets) == 1 else f"{side} side: "
+        put_line(console, label + _offset_line(made, offset, units.of_side(side)))
         rows = [row for row in made.dead_zones if row.side == side]
         title = "Dead zone that remains, of command (knee): fixed, and by the law, which reads the pressures"
-        put_rows(console, title + (f", {side} side" if label else ""), rows, _columns(made, rows, of, sign))
+        title += f", {side} side" if label else ""
+        put_rows(console, title, rows, _columns(made, rows, units.of_side(side), sign))
     for check in made.checks:
         put_line(console, f"HOLDS  {check.name}: {check.text}")
     for note in made.notes:
         put_line(console, f"note: {note}")
     put_units(console, units, "compensator.json")
     put_line(console, f"SHA-256 of its compensator.json: {made.compensator_sha256}")
+
+
+def _offset_line(made: "AmplifierExport", offset: "FixedOffset", units: "RecordedUnits") -> str:
+    """Return what the largest safe offset is, what it lies under, and to what it was rounded."""
+    certificate = made.compensator.side(offset.sign).certificate
+    low, high = (float(end) for end in offset.dp_MPa)
+    set_to = made.setting.characteristics[offset.sign].offset
+    return (
+        f"largest fixed offset under the {100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} "
+        f"threshold {units.span(low, high, '.2f MPa')}: {float(offset.share):.3%} of full drive (lowest at "
+        f"{units.text(float(offset.lowest_at_MPa), '.2f MPa')}); set: {float(set_to):.3%}"
+    )
 
 
 def _columns(

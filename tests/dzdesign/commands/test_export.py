@@ -1,16 +1,23 @@
 """`dzdesign export`: an amplifier's file, the dead zones that are printed, what is refused and what is left alone."""
 
+import io
 import json
 import re
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from rich.console import Console
 
 from dzdesign import api
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES
 from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import PressureUnit, RecordedUnits
+from dzdesign.design.compensator import Compensator
+from dzdesign.terminal.export_tables import print_export
 from tests.support.amplifier_readers import dead_zone, over_compensated, read_file
 from tests.support.paths import GOLDENS
 
@@ -126,6 +133,19 @@ def test_a_larger_threshold_and_another_pressure_change_the_file(compensator, un
     wide = api.export(compensator, to="west", threshold="2 %")
     assert wide.setting.parameters["TRIGGER"] == 200
     assert wide.dead_zones[0].fixed["opening"] > api.export(compensator, to="west").dead_zones[0].fixed["opening"]
+
+
+def test_what_is_said_is_in_the_units_of_the_recordings(compensator, unproven):
+    made = read_artefact(compensator.read_bytes(), Compensator, "compensator.json")
+    units = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0))
+    in_bar = replace(made, valve=replace(made.valve, recorded_units=units))
+    with pytest.raises(InputError, match="is 80 bar, outside the tests from 10 bar to 50 bar"):
+        api.export(in_bar, to="csv", dp="80 bar")
+    found = api.export(in_bar, to="csv")
+    assert "above 50.0 bar" in found.notes[0]
+    console = Console(file=io.StringIO(), width=200)
+    print_export(found, console)
+    assert "from 10.0 to 50.0 bar" in console.file.getvalue() and "dP (bar)" in console.file.getvalue()
 
 
 def test_every_device_stands_in_the_help(capsys):

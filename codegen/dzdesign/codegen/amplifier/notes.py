@@ -10,6 +10,9 @@ LOWER: dict[str | None, str] = {
     "decreasing": "above {high}, where the threshold is lower, nothing is certified: flow at zero command is possible",
     "increasing": "below {low}, where the threshold is lower, nothing is certified: flow at zero command is possible",
 }
+#: Of a threshold without a trend; and of one that was tested at one pressure drop.
+EITHER = "below {low} and above {high} nothing is certified"
+OTHER = "at another pressure drop than {low} nothing is certified"
 
 
 def notes_of(setting: AmplifierSetting, compensator: Compensator) -> tuple[str, ...]:
@@ -19,7 +22,7 @@ def notes_of(setting: AmplifierSetting, compensator: Compensator) -> tuple[str, 
     for sign, offset in setting.offsets.items():
         low, high = (units.text(float(end), ".2f MPa") for end in offset.dp_MPa)
         trend = compensator.valve.sides[SIDE_NAMES[sign]].trend
-        outside = LOWER.get(trend, "below {low} and above {high} nothing is certified")
+        outside = LOWER.get(trend, EITHER if offset.dp_MPa[0] < offset.dp_MPa[1] else OTHER)
         side = "" if len(setting.offsets) == 1 else f"{SIDE_NAMES[sign]} side: "
         notes.append(side + outside.format(low=low, high=high))
     if compensator.negative is None and "negative" in compensator.valve.sides:

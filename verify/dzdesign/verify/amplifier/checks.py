@@ -11,7 +11,7 @@ from dzdesign.verify.requirements import Check, Requirement
 
 READ_BACK = Requirement(id="amplifier-read-back", title="the file is read back", how="`export`")
 SAFE = Requirement(
-    id="amplifier-over-compensation", title="no over-compensation at zero command, at any tested pressure drop",
+    id="amplifier-over-compensation", title="no over-compensation at zero command on the tested interval",
     how="`export`",
 )  # fmt: skip
 DEAD_ZONES = Requirement(
