@@ -41,7 +41,7 @@ def unlimited(compensator):
 
 @pytest.fixture(scope="session")
 def designs():
-    """Three designs, by name."""
+    """The designs, by name."""
     one, two = (
         read_artefact((root / "compensator.json").read_bytes(), Compensator, "compensator.json")
         for root in (GOLDENS, GOLDENS_FULL)
@@ -49,6 +49,7 @@ def designs():
     return {
         "one solenoid": one,
         "two solenoids": unlimited(two),
+        "two, limited": two,
         "a budget": api.design(GOLDENS / "valve.json", bench_pressure_error="0 MPa", **BUDGET),
     }
 
@@ -171,7 +172,7 @@ def test_the_largest_safe_offset_lies_on_the_bound(designs):
 
 
 def test_a_table_is_the_law_beyond_the_transition_and_rises(designs, case):
-    for name, device in (("one solenoid", "beckhoff"), ("two solenoids", "csv")):
+    for name, device in (("one solenoid", "beckhoff"), ("two solenoids", "csv"), ("two, limited", "beckhoff")):
         compensator, (law, _, _) = designs[name], case(name, device)
         commands, drives = zip(*law.points, strict=True)
         assert list(commands) == sorted(set(commands)) and list(drives) == sorted(set(drives))
@@ -182,7 +183,8 @@ def test_a_table_is_the_law_beyond_the_transition_and_rises(designs, case):
             for code in range(compensator.transition_end, command.span(sign), 97):
                 exact = compensator.drive(command.zero_code + command.direction(sign) * code, dp_code, sign)
                 read = sign * law.drive(sign * Fraction(code, command.span(sign)))
-                assert abs(read - exact) < 1e-4
+                limit = Fraction(compensator.drive_functions.compare_limit, compensator.signals.compare_max)
+                assert abs(read - min(exact, limit)) < 1e-4
 
 
 def test_the_same_design_gives_the_same_bytes_with_its_hash_and_is_known_again(designs):
@@ -237,7 +239,9 @@ def test_what_a_device_does_not_hold_is_refused(designs, name, device, options, 
 def test_a_threshold_is_rounded_up_and_an_offset_down(designs):
     setting = amplifier_setting(designs["one solenoid"], device_named("west"), threshold=Fraction(1, 3000))
     assert setting.parameters["TRIGGER"] == 4
-    assert setting.characteristics[1].drive(Fraction(1, 3000)) == 0
+    drives = setting.characteristics[1]
+    assert drives.drive(Fraction(1, 3000)) == drives.drive(Fraction(4, 10_000)) == 0
+    assert drives.drive(Fraction(4, 10_000) + Fraction(1, 10**9)) >= Fraction(setting.parameters["MIN:A"], 10_000)
     offset, counts = setting.offsets[1].share, setting.parameters["MIN:A"]
     assert counts <= offset * 10_000 < counts + 1
 

@@ -126,5 +126,35 @@ def test_a_lot_is_safe_for_its_lowest_valve(designs):
     assert SAFE.id in failed("west", exported(compensator, "west")[0], both, stated)
 
 
+def test_a_bound_that_sags_between_two_tests_counts_where_it_is_deepest(designs):
+    """Of equal bounds at 1 and 5 MPa, with M = 0.1 V/MPa2, it is M h2 / 8 = 0.2 V lower at 3 MPa."""
+    compensator = designs["one"]
+    own = LotSide.of(compensator.valve.sides["positive"], compensator.positive.certificate.guard)
+    sags = replace(own, trend="flat", dp_MPa=(1.0, 5.0), u_lower_V=(4.9, 4.9), curvature_V_MPa2=(0.1,))
+    digests = compensator.valve_json_sha256, "0" * 64
+    lot = tuple(
+        LotValve(name=f"V{n}", valve_sha256=digest, positive=side)
+        for n, (digest, side) in enumerate(zip(digests, (own, sags), strict=True))
+    )
+    both = replace(compensator, lot=lot)
+    found = fixed_offset(both)
+    assert (found.share, found.lowest_at_MPa) == (Fraction(47, 100), Fraction(3))
+    content, stated = exported(both, "cia408")
+    assert failed("cia408", content, both, stated) == set()
+
+
+def test_a_gauge_that_read_too_little_counts_as_a_higher_pressure_drop():
+    valve, budget = GOLDENS / "valve.json", {"amplifier": "1 %"}
+    exact, wrong = (
+        api.design(valve, bench_pressure_error=error, **budget) for error in ("0 MPa", "0.3 MPa")
+    )
+    assert fixed_offset(exact).lowest_at_MPa == 5 and fixed_offset(wrong).lowest_at_MPa == Fraction(53, 10)
+    assert fixed_offset(wrong).share < fixed_offset(exact).share
+    content, stated = exported(wrong, "west")
+    assert failed("west", content, wrong, stated) == set()
+    content, stated = exported(exact, "west")
+    assert failed("west", content, wrong, stated) == {SAFE.id}
+
+
 def test_there_is_a_reader_for_every_device():
     assert {name.partition("-")[0] for name in DEVICE_NAMES} == set(READERS)
