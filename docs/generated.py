@@ -17,8 +17,8 @@ API = (
     (
         "dzdesign.api",
         (
-            "identify", "design", "generate", "calibration", "read_calibration", "verify", "plan", "init", "simulate",
-            "assess", "report", "batch",
+            "identify", "design", "generate", "calibration", "read_calibration", "export", "verify", "plan", "init",
+            "simulate", "assess", "report", "batch",
         ),
     ),
     ("dzdesign.identify.planning.results", ("SeriesPlan", "SeriesRow")),
@@ -36,6 +36,9 @@ API = (
     ("dzdesign.design.compensator", ("Compensator", "SideLaw")),
     ("dzdesign.codegen.project", ("generate", "Firmware")),
     ("dzdesign.stages.calibration", ("CalibrationImage", "ReadCalibration")),
+    ("dzdesign.stages.export", ("AmplifierExport",)),
+    ("dzdesign.codegen.amplifier.setting", ("AmplifierSetting",)),
+    ("dzdesign.design.fixed.dead_zones", ("FixedDeadZone",)),
     ("dzdesign.codegen.calibration.reading", ("CalibrationReading", "SideReading", "NodeReading", "DriveReading")),
     ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),

@@ -3,7 +3,7 @@
 Each takes paths or the result of the stage before it, options in the words of the command line ("1 MPa", "0.1 s"), and
 returns a frozen result, which `print` sums up and a notebook shows as a table. With ``output`` it also writes the file
 or folder that the command of the same stage writes, byte for byte. Nothing is printed. What is heavy is imported when a
-stage is called. `plan`, `init`, `simulate`, `assess`, `report`, `batch` and `calibration` are the
+stage is called. `plan`, `init`, `simulate`, `assess`, `report`, `batch`, `calibration` and `export` are the
 commands of those names, `read_calibration` is `calibration --read`.
 
 >>> from dzdesign import api
@@ -22,6 +22,7 @@ from dzdesign.stages import assess as assess_stage
 from dzdesign.stages import batch as batch_stage
 from dzdesign.stages import calibration as calibration_stage
 from dzdesign.stages import design as design_stage
+from dzdesign.stages import export as export_stage
 from dzdesign.stages import generate as generate_stage
 from dzdesign.stages import identify as identify_stage
 from dzdesign.stages import init as init_stage
@@ -33,8 +34,8 @@ from dzdesign.terminal.notebook import heading_of, html_of, text_of
 
 __all__ = [
     "DzdesignError", "InputError", "RequirementError",
-    "assess", "batch", "calibration", "design", "generate", "identify", "init", "plan", "read_calibration", "report",
-    "simulate", "verify",
+    "assess", "batch", "calibration", "design", "export", "generate", "identify", "init", "plan", "read_calibration",
+    "report", "simulate", "verify",
 ]  # fmt: skip
 
 display_by(heading=heading_of, text=text_of, html=html_of)
@@ -46,6 +47,7 @@ design = with_keywords(design_stage.DesignArguments, design_stage.design)
 generate = with_keywords(generate_stage.GenerateArguments, generate_stage.generate)
 calibration = with_keywords(calibration_stage.CalibrationArguments, calibration_stage.calibration)
 read_calibration = with_keywords(calibration_stage.ReadCalibrationArguments, calibration_stage.read_calibration)
+export = with_keywords(export_stage.ExportArguments, export_stage.export)
 verify = with_keywords(verify_stage.VerifyArguments, verify_stage.verify)
 simulate = with_keywords(simulate_stage.SimulateArguments, simulate_stage.simulate)
 assess = with_keywords(assess_stage.AssessArguments, assess_stage.assess)

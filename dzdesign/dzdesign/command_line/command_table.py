@@ -23,6 +23,7 @@ COMMANDS = {
     "design": Command(PIPELINE, "valve.json in, compensator.json out: the law with exact coefficients, certified"),
     "codegen": Command(PIPELINE, "compensator.json in, a folder of C out"),
     "calibration": Command(PIPELINE, "compensator.json in, one valve's calibration block out; or read one back"),
+    "export": Command(PIPELINE, "compensator.json in, an amplifier's fixed dead-zone parameters out"),
     "verify": Command(PIPELINE, "firmware in, evidence out: every input, and the closed loop"),
     "batch": Command(
         PIPELINE, "many valves: identify, design, codegen for each; one table, one report, the cost of one lot setting"

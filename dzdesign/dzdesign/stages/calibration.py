@@ -1,6 +1,5 @@
 """`calibration`: Compensator -> the calibration block of one valve as a file, and back."""
 
-import os
 from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
@@ -8,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.block_checks import other_numbers
 from dzdesign.block_identity import of_another_valve
-from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, sha256_of, write_file
+from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, write_file
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.stages.design import TARGETS
+from dzdesign.stages.given_compensator import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock
@@ -26,7 +26,6 @@ FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
 READABLE = ("hex", "bin", "txt")
 #: Texts of a block, and the entries of the test record that they are taken from.
 TEXTS = ("serial", "record")
-COMPENSATOR_NAME = "compensator.json"
 
 
 @dataclass(frozen=True)
@@ -112,10 +111,10 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
     for name in TEXTS:
         if getattr(arguments, name) is not None and form not in READABLE:
             raise InputError(f"--{name} is given, but an A2L has the layout of a block alone; leave it out")
-    compensator, digest, source = _given(arguments.compensator)
+    compensator, digest, source = given_compensator(arguments.compensator)
     target = _target_of(compensator, arguments.target)
     place = _place(target, arguments.address, OCTETS)
-    _refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
+    refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
     if fault := of_another_valve(arguments.serial or "", compensator):
         raise InputError(f"--serial: {fault}; leave it out, or give the compensator.json of that valve")
     octets = pack(block_of(compensator, digest, serial=arguments.serial, record=arguments.record))
@@ -157,7 +156,7 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
         return ReadCalibration(
             reading=reading, placed=placed, compared_with="", belongs=None, difference="", units=AS_COMPUTED
         )
-    compensator, digest, source = _given(arguments.compensator)
+    compensator, digest, source = given_compensator(arguments.compensator)
     difference = _difference(block, reading, compensator, digest)
     return ReadCalibration(
         reading=reading,
@@ -216,32 +215,6 @@ def _check_output(output: Path, form: str) -> None:
             f"'{output}' exists and is no calibration block of dzdesign, so it is left alone; choose another name "
             "with -o"
         )
-
-
-def _given(given: "Compensator | AnyPath") -> tuple["Compensator", str, str]:
-    """Return a compensator, the SHA-256 of its file, and how that is called; of a folder the file in it."""
-    from dzdesign.core.artefact_reading import read_artefact
-    from dzdesign.core.artefact_types import to_json_bytes
-    from dzdesign.design.compensator import Compensator
-
-    if isinstance(given, Compensator):
-        return given, sha256_of(to_json_bytes(given)), "the compensator"
-    path = Path(given)
-    path = path / COMPENSATOR_NAME if path.is_dir() else path
-    content = read_bytes(path, "compensator file")
-    return read_artefact(content, Compensator, os.fspath(path)), sha256_of(content), f"'{path}'"
-
-
-def _refuse_underived(compensator: "Compensator", source: str, *, of_file: bool) -> None:
-    """Refuse a compensator whose numbers do not follow from its valve and options."""
-    from dzdesign.design.redesign_check import prove_derived, refuse_without_options
-
-    if of_file:
-        refuse_without_options(compensator, source.strip("'"))
-    try:
-        prove_derived(compensator)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
 
 
 def _target_of(compensator: "Compensator", given: str | None) -> str:

@@ -1,0 +1,185 @@
+"""The fixed compensation of a compensator in the steps of a device: rounded to the safe side, its range checked."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, floor
+
+from dzdesign.codegen.amplifier.device import Device, Parameter
+from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.fixed.characteristic import Characteristic, added, jump
+from dzdesign.design.fixed.fixed_offset import FixedOffset, fixed_offset
+from dzdesign.design.fixed.pressure_line import full_drive, pressure_line, zero_band
+from dzdesign.design.signals import SIDE_NAMES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AmplifierSetting:
+    """What a device is told, in its own counts, and what it makes of a command then."""
+
+    device: Device
+    #: Parameter to counts of the device's unit, in the order in which they are written; empty of a table.
+    parameters: Mapping[str, int]
+    #: Of each sign of command, from the parameters as they are rounded.
+    characteristics: Mapping[int, Characteristic]
+    #: Of each sign, before it was rounded.
+    offsets: Mapping[int, FixedOffset]
+    #: Pressure drop that a table is of, MPa.
+    dp_MPa: Fraction | None = None
+
+
+def amplifier_setting(
+    compensator: Compensator, device: Device, *, dp_MPa: Fraction | None = None, threshold: Fraction | None = None
+) -> AmplifierSetting:
+    """Return the largest setting of a device that opens the valve at no tested pressure drop.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Design whose certificate holds.
+    device : Device
+        Whose parameters are wanted.
+    dp_MPa : Fraction, optional
+        Pressure drop whose whole characteristic is wanted, of a device that takes one; dP0 without it.
+    threshold : Fraction, optional
+        Command up to which the device keeps the valve at rest, a share of full; that of the design's zero band
+        without it.
+
+    Raises
+    ------
+    InputError
+        If the device's range does not hold the setting, it has fewer solenoids, or an option is not of it.
+    """
+    signs = compensator.signals.signs
+    if len(signs) > 1 and not device.takes_both_signs:
+        raise InputError(f"{device.title} drives one solenoid, and the design has two; choose another --to")
+    offsets = {sign: fixed_offset(compensator, sign) for sign in signs}
+    rest = max(zero_band(compensator, sign) for sign in signs) if threshold is None else threshold
+    if device.law == "table":
+        at = Fraction(repr(compensator.valve.sides["positive"].reference.dp_MPa)) if dp_MPa is None else dp_MPa
+        return _table(compensator, device, offsets, at, rest)
+    if dp_MPa is not None:
+        raise InputError(f"--dp is of devices that take a whole characteristic, not of {device.title}; leave it out")
+    if threshold is not None and device.threshold is None:
+        raise InputError(f"{device.title} has no threshold of its dead-zone compensation; leave out --threshold")
+    return _jump(compensator, device, offsets, rest) if device.law == "jump" else _added(compensator, device, offsets)
+
+
+def _down(value: Fraction, unit: int) -> Fraction:
+    return Fraction(floor(value * unit), unit)
+
+
+def _up(value: Fraction, unit: int) -> Fraction:
+    return Fraction(ceil(value * unit), unit)
+
+
+def _jump(
+    compensator: Compensator, device: Device, offsets: Mapping[int, FixedOffset], rest: Fraction
+) -> AmplifierSetting:
+    unit, parameters, characteristics = device.counts_of_full, {}, {}
+    at_rest = ceil(rest * unit) if device.threshold else 0
+    for sign, offset in offsets.items():
+        set_to = _offset_counts(device, offset)
+        full = _full_counts(compensator, device, sign)
+        if full <= set_to:
+            raise InputError(
+                f"the largest drive of the design, {device.in_unit(full)}, is not above the offset of "
+                f"{device.in_unit(set_to)}; design it with a larger --output-max"
+            )
+        parameters[_parameter(device, device.offset).name(sign)] = set_to
+        if device.full is not None:
+            parameters[device.full.name(sign)] = full
+        characteristics[sign] = jump(Fraction(set_to, unit), Fraction(full, unit), Fraction(at_rest, unit))
+    if device.threshold is not None:
+        _check_range(device, device.threshold, device.threshold.positive, at_rest, "choose a smaller --threshold")
+        parameters[device.threshold.positive] = at_rest
+    return AmplifierSetting(
+        device=device, parameters=parameters, characteristics=characteristics, offsets=offsets
+    )
+
+
+def _added(compensator: Compensator, device: Device, offsets: Mapping[int, FixedOffset]) -> AmplifierSetting:
+    """Return the setting of a device with one offset for both signs: the smaller one."""
+    _refuse_a_limit(compensator, device)
+    set_to = min(_offset_counts(device, offset) for offset in offsets.values())
+    characteristic = added(Fraction(set_to, device.counts_of_full))
+    return AmplifierSetting(
+        device=device,
+        parameters={_parameter(device, device.offset).positive: set_to},
+        characteristics=dict.fromkeys(offsets, characteristic),
+        offsets=offsets,
+    )
+
+
+def _table(
+    compensator: Compensator, device: Device, offsets: Mapping[int, FixedOffset], dp_MPa: Fraction, rest: Fraction
+) -> AmplifierSetting:
+    """Return points in whole counts: a command is rounded up, a drive down."""
+    unit, characteristics = device.counts_of_full, {}
+    for sign, offset in offsets.items():
+        exact = pressure_line(compensator, offset, dp_MPa, max(rest, Fraction(1, unit)))
+        nodes = [(_up(command, unit), _down(drive, unit)) for command, drive in exact.nodes]
+        for place in range(len(nodes) - 2, 0, -1):  # drives rise from point to point, where the design limits them too
+            command, drive = nodes[place]
+            nodes[place] = command, min(drive, nodes[place + 1][1] - Fraction(1, unit))
+        characteristics[sign] = Characteristic(rest=exact.rest, nodes=tuple(nodes))
+    return AmplifierSetting(
+        device=device, parameters={}, characteristics=characteristics, offsets=offsets, dp_MPa=dp_MPa
+    )
+
+
+def _parameter(device: Device, parameter: Parameter | None) -> Parameter:
+    if parameter is None:
+        raise InputError(f"the file of device '{device.name}' states no offset, expected a table [offset]")
+    return parameter
+
+
+def _offset_counts(device: Device, offset: FixedOffset) -> int:
+    """Return the offset rounded down to the device's step; one beyond its range is refused."""
+    parameter, counts = _parameter(device, device.offset), floor(offset.share * device.counts_of_full)
+    instead = device.instead or "a design with PLC or drive needs no such parameter (see codegen --list-targets)"
+    _check_range(device, parameter, parameter.name(offset.sign), counts, f"choose another --to: {instead}")
+    return counts
+
+
+def _full_counts(compensator: Compensator, device: Device, sign: int) -> int:
+    """Return the drive at full command: what opens the valve fully at every test, at most the design's limit."""
+    unit = device.counts_of_full
+    if device.full is None:
+        _refuse_a_limit(compensator, device)
+        return unit
+    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    drives = [full_drive(compensator, Fraction(repr(test.dp_MPa)), sign) for test in tests]
+    limit = floor(_limit(compensator) * unit)
+    if limit < device.full.least:
+        raise InputError(
+            f"{device.title} drives at least {device.in_unit(device.full.least)} at full command, and the design "
+            f"allows {device.in_unit(limit)}; design it with a larger --output-max, or choose another --to"
+        )
+    return min(max(floor(max(drives) * unit), device.full.least), limit, device.full.most)
+
+
+def _refuse_a_limit(compensator: Compensator, device: Device) -> None:
+    if (limit := _limit(compensator)) < 1:
+        raise InputError(
+            f"{device.title} has no limit of its drive here, and the design allows {float(limit):.1%} of full drive; "
+            "design it without --output-max, or choose another --to"
+        )
+
+
+def _limit(compensator: Compensator) -> Fraction:
+    return Fraction(compensator.drive_functions.compare_limit, compensator.signals.compare_max)
+
+
+def _check_range(device: Device, parameter: Parameter, name: str, counts: int, remedy: str) -> None:
+    if counts > parameter.most:
+        raise InputError(
+            f"{device.title} takes at most {device.in_unit(parameter.most)} as {name}, and {device.in_unit(counts)} "
+            f"are needed; {remedy}"
+        )
+    if counts < parameter.least:
+        raise InputError(
+            f"{device.title} takes at least {device.in_unit(parameter.least)} as {name}, and "
+            f"{device.in_unit(counts)} are safe; {remedy}"
+        )

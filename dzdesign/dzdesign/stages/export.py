@@ -1,0 +1,150 @@
+"""`export`: Compensator -> the parameters of an amplifier that compensates a fixed dead zone, and what they leave."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, write_file
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.option_readers import percent, quantity
+from dzdesign.core.options import AnyPath, Option, Text, read_options
+from dzdesign.core.worded import in_units
+from dzdesign.stages.given_compensator import given_compensator, refuse_underived
+
+if TYPE_CHECKING:
+    from dzdesign.codegen.amplifier.device import Device
+    from dzdesign.codegen.amplifier.setting import AmplifierSetting
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.design.fixed.dead_zones import FixedDeadZone
+    from dzdesign.verify.requirements import Check
+
+#: Where the names of the devices stand.
+DEVICES = "dzdesign.codegen.amplifier.device:DEVICE_NAMES"
+#: A larger share of command is no threshold of a zero command.
+LARGEST_THRESHOLD = 0.3
+PA_IN_MPA = 10**6
+
+
+@dataclass(frozen=True)
+class ExportArguments:
+    """Arguments of `export`."""
+
+    compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
+    """compensator.json, whose numbers are derived again first, or a folder that holds one."""
+    _: KW_ONLY
+    to: Annotated[Text, Option("DEVICE", choices=DEVICES)] = None
+    """Device: west (W.E.St. PAM-199), west-pam190, west-pos123, cia408 (CANopen), rmc (Delta RMC100), rmc75, beckhoff
+    (TF5810) or csv."""
+    output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
+    """File to write (default: none, only what it would set is shown)."""
+    dp: Annotated[Text, Option("P", example="1 MPa", read=quantity("pressure"))] = None
+    """Of beckhoff and csv, pressure drop whose characteristic is written (default: dP0 of the valve)."""
+    threshold: Annotated[Text, Option("SHARE", example="0.5 %", read=percent("0.5 %"))] = None
+    """Command up to which the valve stays at rest: how far the device's zero command may be off (default: the zero
+    band of the design's command)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AmplifierExport:
+    """What a device is told, the content of its file, and what it leaves of the dead zone."""
+
+    setting: "AmplifierSetting"
+    content: bytes
+    compensator: "Compensator"
+    compensator_sha256: str
+    #: At each tested pressure drop, positive commands first.
+    dead_zones: "tuple[FixedDeadZone, ...]"
+    #: What a user must know beside the numbers.
+    notes: tuple[str, ...]
+    #: What was found as the file was read back, by code that it was not written with.
+    checks: "tuple[Check, ...]"
+
+
+def export(arguments: ExportArguments) -> AmplifierExport:
+    """Return the largest fixed compensation of an amplifier that opens the valve at no tested pressure drop.
+
+    The same input gives the same bytes.
+
+    Raises
+    ------
+    InputError
+        If the compensator can't be read, a number in it does not follow, the device is unknown or its range does not
+        hold the setting, an option is not of it, or the file can't be written or is somebody's own.
+    RequirementError
+        If the file as it is read back is not safe, or leaves other dead zones than stated: a fault of dzdesign.
+    """
+    from dzdesign.codegen.amplifier.device import device_named
+    from dzdesign.codegen.amplifier.files import amplifier_file
+    from dzdesign.codegen.amplifier.notes import notes_of
+    from dzdesign.codegen.amplifier.setting import amplifier_setting
+    from dzdesign.design.fixed.dead_zones import dead_zones
+
+    device = device_named(arguments.to)
+    output = None if arguments.output is None else Path(arguments.output)
+    dp_MPa, threshold = _dp_and_threshold(arguments)
+    if output is not None:
+        _check_output(output, device)
+    compensator, digest, source = given_compensator(arguments.compensator)
+    refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
+    try:
+        setting = amplifier_setting(compensator, device, dp_MPa=dp_MPa, threshold=threshold)
+    except InputError as error:
+        raise InputError(in_units(error, compensator.valve.recorded_units)) from error
+    content = amplifier_file(setting, compensator, digest)
+    zones = {sign: dead_zones(compensator, drives, sign) for sign, drives in setting.characteristics.items()}
+    made = AmplifierExport(
+        setting=setting,
+        content=content,
+        compensator=compensator,
+        compensator_sha256=digest,
+        dead_zones=tuple(row for rows in zones.values() for row in rows),
+        notes=notes_of(setting, compensator),
+        checks=_read_back(device, content, compensator, zones),
+    )
+    if output is not None:
+        write_file(output, made.content)
+    return made
+
+
+def _read_back(
+    device: "Device", content: bytes, compensator: "Compensator", zones: "Mapping[int, Sequence[FixedDeadZone]]"
+) -> "tuple[Check, ...]":
+    """Check a file before anybody has it; refuse one that does not hold."""
+    from dzdesign.verify.amplifier.checks import checks
+
+    stated = {sign: [(row.dp_MPa, row.fixed) for row in rows] for sign, rows in zones.items()}
+    found = checks(device.name, content, compensator, stated)
+    if wrong := [check for check in found if not check.holds]:
+        raise RequirementError(
+            f"the file for {device.name} does not hold as it is read back, so it is not written: {wrong[0].name}: "
+            f"{wrong[0].text}; this is a fault of dzdesign"
+        )
+    return found
+
+
+def _dp_and_threshold(arguments: ExportArguments) -> tuple[Fraction | None, Fraction | None]:
+    """Return the pressure drop, MPa, and the threshold, a share, that were given."""
+    given = [name for name in ("dp", "threshold") if getattr(arguments, name) is not None]
+    found = read_options(arguments, given)
+    threshold = found.get("threshold")
+    if threshold is not None and threshold > LARGEST_THRESHOLD:
+        raise InputError(
+            f"--threshold is '{arguments.threshold}', expected at most {LARGEST_THRESHOLD:.0%}: the valve rests at "
+            "every command up to it"
+        )
+    exact = {name: Fraction(repr(value)) for name, value in found.items()}
+    return exact["dp"] / PA_IN_MPA if "dp" in exact else None, exact.get("threshold")
+
+
+def _check_output(output: Path, device: "Device") -> None:
+    """Refuse to write over what is no file of dzdesign for this device: a recording may end with .csv too."""
+    from dzdesign.codegen.amplifier.files import is_file_of
+
+    check_file_may_be_written(output)
+    if output.exists() and output.stat().st_size and not is_file_of(device, read_bytes(output, "amplifier file")):
+        raise InputError(
+            f"'{output}' exists and is no file of dzdesign for {device.name}, so it is left alone; choose another name "
+            "with -o"
+        )

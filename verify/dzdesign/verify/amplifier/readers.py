@@ -1,0 +1,149 @@
+"""The law that a device makes of its file, from the text alone: units and meaning are stated here once more.
+
+Nothing of `codegen` takes part: a wrong unit, side or rounding there must not be wrong here, too.
+"""
+
+import configparser
+import re
+from bisect import bisect_left
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+
+from dzdesign.core.errors import InputError
+
+ZERO, ONE = Fraction(0), Fraction(1)
+#: Increments of 100 % in CiA 408; steps of 0.01 %; millivolts of a full output of 10 V.
+INCREMENTS, HUNDREDTHS, FULL_MV = 16384, 10_000, 10_000
+#: Points of a TF5810 table.
+TABLE_POINTS = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileLaw:
+    """Drive over command of one direction, both over full: none up to and with `rest`, then through the points."""
+
+    rest: Fraction
+    #: Command and drive, from the rest on, rising.
+    points: tuple[tuple[Fraction, Fraction], ...]
+
+    def just_behind(self, command: Fraction) -> Fraction:
+        """Return the drive that a command is about to make as it rises on from here."""
+        if command < self.rest:
+            return ZERO
+        return self.drive(command) if command > self.rest else self.points[0][1]
+
+    def drive(self, command: Fraction) -> Fraction:
+        """Return the drive at a command."""
+        if command <= self.rest:
+            return ZERO
+        commands = [each for each, _ in self.points]
+        right = min(max(bisect_left(commands, command), 1), len(commands) - 1)
+        (left, low), (end, high) = self.points[right - 1], self.points[right]
+        return low + (high - low) * (command - left) / (end - left)
+
+
+def read_file(device: str, content: bytes) -> Mapping[int, FileLaw]:
+    """Return the law of each sign of command that the file for a device makes.
+
+    Raises
+    ------
+    InputError
+        If the text is none of that device's.
+    """
+    text = content.decode("ascii", "replace")
+    family = device.partition("-")[0]
+    if family not in READERS:
+        raise InputError(f"there is no reader of files for '{device}', expected one of {', '.join(READERS)}")
+    try:
+        return READERS[family](text)
+    except (KeyError, IndexError, ValueError, ZeroDivisionError, configparser.Error) as error:
+        raise InputError(f"the file for {device} can't be read back: {type(error).__name__}, {error}") from error
+
+
+def _jump(rest: int, sides: Mapping[int, tuple[int, int]], steps: int) -> dict[int, FileLaw]:
+    """Return the law that jumps behind its threshold to an offset, and runs straight to the drive at full command."""
+    at = Fraction(rest, steps)
+    return {
+        sign: FileLaw(rest=at, points=((at, Fraction(offset, steps)), (ONE, Fraction(full, steps))))
+        for sign, (offset, full) in sides.items()
+    }
+
+
+def _west(text: str) -> Mapping[int, FileLaw]:
+    found: dict[str, int] = {}
+    for line in text.splitlines():
+        name, value = line.split(" ")
+        found[name] = int(value)
+    names = {1: ":A", -1: ":B"} if "MIN:A" in found else {1: ""}
+    there = {sign: end for sign, end in names.items() if f"MIN{end}" in found}
+    sides = {sign: (found.pop(f"MIN{end}"), found.pop(f"MAX{end}")) for sign, end in there.items()}
+    laws = _jump(found.pop("TRIGGER"), sides, HUNDREDTHS)
+    if found:
+        raise ValueError(f"'{next(iter(found))}' is no command for this")
+    return laws
+
+
+def _cia408(text: str) -> Mapping[int, FileLaw]:
+    entries = configparser.ConfigParser(interpolation=None)
+    entries.read_string(text)
+
+    def value(section: str) -> int:
+        return int(entries[section]["ParameterValue"], 0)
+
+    if value("6342") != 1:
+        raise ValueError("0x6342 is not 1, the function that jumps")
+    sides = {1: (value("6343sub1"), INCREMENTS), -1: (value("6344sub1"), INCREMENTS)}
+    return _jump(value("6345sub1"), sides, INCREMENTS)
+
+
+def _rmc(text: str) -> Mapping[int, FileLaw]:
+    [line] = [line for line in text.splitlines() if line and not line.startswith("#")]
+    name, _, value = line.partition(" = ")
+    number, unit = value.split(" ")
+    if name not in ("Dead Band Eliminator", "Output Deadband"):
+        raise ValueError(f"'{name}' is no parameter for this")
+    offset = Fraction(number) * {"V": 1000, "mV": 1}[unit] / FULL_MV
+    law = FileLaw(rest=ZERO, points=((ZERO, offset), (ONE - offset, ONE), (ONE, ONE)))
+    return {1: law, -1: law}
+
+
+def _beckhoff(text: str) -> Mapping[int, FileLaw]:
+    plain = re.sub(r"\(\*.*?\*\)", "", text, flags=re.DOTALL)
+    listed = plain.partition("OF LREAL := [")[2].partition("]")[0].split(",")
+    *numbers, rest = [item.strip() for item in listed]
+    count = int(plain.partition("TblCount : INT :=")[2].partition(";")[0])
+    if len(numbers) != 2 * count or rest != f"{2 * (TABLE_POINTS - count)}(0.0)" or not count % 2:
+        raise ValueError(f"{len(numbers)} numbers stand in a table of {count} points")
+    return _table([(Fraction(x), Fraction(y)) for x, y in zip(numbers[::2], numbers[1::2], strict=True)])
+
+
+def _csv(text: str) -> Mapping[int, FileLaw]:
+    header, *rows = [line for line in text.splitlines() if line and not line.startswith("#")]
+    if header != "command_percent,drive_percent":
+        raise ValueError(f"the columns are '{header}'")
+    return _table([(Fraction(x) / 100, Fraction(y) / 100) for x, y in (row.split(",") for row in rows)])
+
+
+def _table(points: Sequence[tuple[Fraction, Fraction]]) -> Mapping[int, FileLaw]:
+    """Return the law of points over both directions: a side whose drive is next to none has no solenoid."""
+    if any(left[0] >= right[0] or left[1] >= right[1] for left, right in pairwise(points)):
+        raise ValueError("the points do not rise")
+    if (ZERO, ZERO) not in points or points[-1][0] != 1:
+        raise ValueError("the points do not pass zero and reach full command")
+    laws = {1: FileLaw(rest=ZERO, points=tuple(point for point in points if point[0] >= 0))}
+    negative = tuple((-x, -y) for x, y in reversed(points) if x <= 0)
+    if len(negative) > 2:
+        laws[-1] = FileLaw(rest=ZERO, points=negative)
+    return laws
+
+
+READERS: Mapping[str, Callable[[str], Mapping[int, FileLaw]]] = {
+    "west": _west,
+    "cia408": _cia408,
+    "rmc": _rmc,
+    "rmc75": _rmc,
+    "beckhoff": _beckhoff,
+    "csv": _csv,
+}
