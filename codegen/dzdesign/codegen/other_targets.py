@@ -54,6 +54,11 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
             module="dzdesign.codegen.fmu.files",
             options={"plant": ()},
         ),
+        OtherTarget(
+            name="matlab",
+            description="a function of MATLAB and Octave in integer arithmetic, and C for Simulink's C Caller block",
+            module="dzdesign.codegen.matlab.files",
+        ),
     )
 }
 #: Options of `codegen` that a firmware alone has.

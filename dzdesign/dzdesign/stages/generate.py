@@ -33,7 +33,8 @@ class GenerateArguments(DesignChoices):
     output: Annotated[AnyPath | None, Option("DIR", command_default="firmware", short="-o")] = None
     """Folder to write, with the C project or the output."""
     target: Annotated[Text, Option("NAME", choices=ALL_TARGETS)] = None
-    """Microcontroller (default: that of the design; of a VALVE.json f28335), or another output: iec61131, fmu."""
+    """Microcontroller (default: that of the design; of a VALVE.json f28335), or another output: iec61131, fmu,
+    matlab."""
     dialect: Annotated[Text, Option("NAME")] = None
     """Of iec61131, dialect of the PLC's tool: codesys (default), twincat."""
     interface: Annotated[Text, Option("NAME")] = None

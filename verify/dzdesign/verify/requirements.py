@@ -105,6 +105,12 @@ FMU_LIBRARIES = Requirement(id="fmu-libraries", title="the binaries need no libr
 FMU_DRIVE = Requirement(id="fmu-drive", title="Co-Simulation follows the drive's model, a step later")
 FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
 FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="compensator and plant, coupled, run as the closed loop")
+#: Of a function for MATLAB.
+MATLAB_SUBSET = Requirement(id="matlab-subset", title="the text is of the subset that is verified")
+MATLAB_RANGES = Requirement(id="matlab-ranges", title="no operation leaves the range of its class")
+MATLAB_INPUTS = Requirement(
+    id="matlab-inputs", title="inputs of every class and size are taken or refused as described"
+)
 POPULATION = Requirement(
     id="population",
     title="no flow at zero command of any machine drawn from the budget",

@@ -42,6 +42,7 @@ KINDS: Mapping[str, OutputKind] = {
         module="dzdesign.verify.fmu.checks",
         options={"--machine-code": "dzdesign.verify.fmu.other_machines"},
     ),
+    "matlab": OutputKind(module="dzdesign.verify.matlab.checks"),
 }
 
 

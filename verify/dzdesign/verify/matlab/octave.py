@@ -1,0 +1,84 @@
+"""GNU Octave as a process: where it is, and what runs in it, in a folder of its own and with nothing of the user's."""
+
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+
+from dzdesign.core.errors import RequirementError
+
+PROGRAMS = Path(str(files("dzdesign.verify.matlab"))) / "programs"
+#: The one without a window first.
+NAMES = ("octave-cli", "octave")
+#: No file of the user's or the site's is run, and nothing of the run is kept.
+FLAGS = ("--norc", "--no-init-file", "--no-site-file", "--no-history", "--no-window-system", "--quiet")
+MISSING = "GNU Octave not found; install it (Debian: apt install octave) to have the function itself run"
+#: A run that takes longer hangs, s.
+TIMEOUT_S = 600.0
+#: Characters of what Octave says that a sentence has.
+LONGEST = 300
+
+
+def find_octave() -> str | None:
+    """Return the path of Octave, or None."""
+    return next((path for name in NAMES if (path := shutil.which(name))), None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Octave:
+    """Octave on this machine: its path, and as what its version stands in the evidence; or why it can't be run."""
+
+    path: str = ""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    missing: str = ""
+
+
+def available_octave() -> Octave:
+    """Return Octave where it runs."""
+    path = find_octave()
+    if path is None:
+        return Octave(missing=MISSING)
+    try:
+        done = subprocess.run(
+            [path, "--version"], capture_output=True, text=True, errors="replace", timeout=60.0, check=False,
+            stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return Octave(missing=f"'{path}' does not run: {error}")
+    found = re.search(r"GNU Octave, version (\S+)", done.stdout)
+    if found is None:
+        return Octave(missing=f"'{path} --version' does not say that it is GNU Octave; install it anew")
+    return Octave(path=path, versions={"octave": f"GNU Octave {found.group(1)}"})
+
+
+def run_octave(path: str, program: str, arguments: Sequence[str], folder: Path, functions: int = 1) -> str:
+    """Run a program of this room in a folder and return what it prints; if it fails or hangs, `RequirementError`.
+
+    It has the time of so many functions.
+    """
+    try:
+        done = subprocess.run(
+            [path, *FLAGS, str(PROGRAMS / program), *arguments], cwd=folder, env=_environment(folder),
+            capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False,
+            timeout=TIMEOUT_S * functions,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired as error:
+        raise RequirementError(f"Octave did not end within {error.timeout:g} s") from error
+    except OSError as error:
+        raise RequirementError(f"Octave did not start: {error}") from error
+    if done.returncode:
+        said = " ".join((done.stderr or done.stdout).split())[:LONGEST]
+        raise RequirementError(f"Octave ended with exit status {done.returncode}: {said}")
+    return done.stdout
+
+
+def _environment(folder: Path) -> Mapping[str, str]:
+    """Return an environment in which Octave finds no settings and no other functions of the user's."""
+    own = {name for name in os.environ if name.startswith("OCTAVE_")} - {"OCTAVE_HOME"}
+    kept = {name: value for name, value in os.environ.items() if name not in own}
+    # It does little linear algebra, and a thread of a library for each core would only wait.
+    return {**kept, "HOME": str(folder), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
