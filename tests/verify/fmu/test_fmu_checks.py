@@ -130,7 +130,7 @@ def test_a_wrong_plant_is_found(one, one_plant, compensator, old, new):
 
 
 def test_a_coil_that_is_fast_beside_a_step_is_exact_too(one, one_plant, compensator):
-    fast = with_binary(one_plant, edited(one_plant, "dz_fmu.c", "BEFORE_START, 0.04}", "BEFORE_START, 0.0004}"))
+    fast = with_binary(one_plant, edited(one_plant, "dz_fmu.c", "BEFORE_START, 0.04,", "BEFORE_START, 0.0004,"))
     assert closed_loop_check(one, fast, {**asdict(PLANT), "L_c_H": 0.0004}, compensator).holds is True
 
 
