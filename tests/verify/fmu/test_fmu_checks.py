@@ -74,6 +74,49 @@ def test_a_binary_of_another_token_is_refused_and_found(one, prepared, compensat
     assert drive_check(one, takes_any, compensator).holds is False
 
 
+PRINTS = """
+#include <stdio.h>
+#include <stdlib.h>
+#define TALK {0}
+#include "fmi2Functions.h"
+"""
+LINES = r'do { printf("1 2 3 0 0 0 0 0 0 0 0 0 0 0 0 0 0\\n0 0\\nend\\n"); fflush(stdout); } while (0)'
+
+
+@pytest.mark.parametrize("ends", (False, True))
+def test_a_binary_that_prints_or_ends_the_program_says_nothing_by_it(one, prepared, compensator, ends):
+    """What it prints is neither taken for results nor disturbs them; of a program that it ends there are none."""
+    talk = LINES.replace("while (0)", "while (exit(0), 0)") if ends else LINES
+    with_talk = PRINTS.replace("{0}", talk)
+    source = one.files["sources/dz_fmu.c"].decode().replace('#include "fmi2Functions.h"\n', with_talk, 1)
+    source = source.replace("refresh(one);   ", "TALK; refresh(one);", 1)
+    source = source.replace("refusal = take_step(", "TALK; refusal = take_step(")
+    made = edited(with_files(one, {"sources/dz_fmu.c": source.encode()}), "dz_fmu.c", "TALK", "TALK")
+    if not ends:
+        assert FmuCore(one, 1, made).check(prepared[1], sample=True).faults == 0
+        assert drive_check(one, made, compensator).holds is True
+        return
+    with pytest.raises(RequirementError, match="before its results were whole"):
+        FmuCore(one, 1, made).check(prepared[1], sample=True)
+    found = drive_check(one, made, compensator)
+    assert found.holds is False and "whole" in found.text
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    (
+        ("if (!(size > 0.0)) {", "if (size < 0.0) {"),
+        ("(late >= -SAME_TIME_S)", "(late <= 1.0 || late > 0.0)"),
+        ("if (!((late >=", "if (0 && !((late >="),
+        ("value >= described[reference].least", "value >= -1e999"),
+        ("value <= described[reference].largest", "value <= 1e999"),
+    ),
+)
+def test_a_binary_that_takes_what_is_no_step_or_number_is_found(one, compensator, old, new):
+    found = drive_check(one, edited(one, "dz_fmu.c", old, new), compensator)
+    assert found.holds is False and "the binary takes" in found.text
+
+
 def test_the_drive_and_the_delay_of_a_step_are_those_of_the_model(fmu, compensator):
     assert drive_check(fmu, fmu.binary_here(), compensator).holds is True
 

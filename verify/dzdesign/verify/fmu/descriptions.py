@@ -6,7 +6,7 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, as_document, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.fmu.fmu_file import DESCRIPTION, EXTRA, FmuFile
-from dzdesign.verify.fmu.needed_libraries import needed_libraries
+from dzdesign.verify.fmu.needed_libraries import machine_of, needed_libraries
 
 MANIFEST = f"{EXTRA}/manifest.json"
 #: What a platform's binary may ask for: every process of these systems has it.
@@ -18,6 +18,12 @@ PLATFORMS: Mapping[int, Mapping[str, str]] = {
         "x86_64-linux": "so", "aarch64-linux": "so", "x86_64-windows": "dll", "x86_64-darwin": "dylib",
         "aarch64-darwin": "dylib",
     },
+}  # fmt: skip
+#: Folder of a binary to the machine that it is for, as `machine_of` names them.
+MACHINES: Mapping[str, str] = {
+    "linux64": "x86_64 ELF", "x86_64-linux": "x86_64 ELF", "aarch64-linux": "aarch64 ELF", "win64": "x86_64 PE",
+    "x86_64-windows": "x86_64 PE", "darwin64": "x86_64 Mach-O", "x86_64-darwin": "x86_64 Mach-O",
+    "aarch64-darwin": "aarch64 Mach-O",
 }  # fmt: skip
 #: Units that stand for something, and their factors to SI.
 FACTORS = {"V": 1.0, "MPa": 1e6, "L/min": 1e-3 / 60, "A": 1.0, "m": 1.0, "m/s": 1.0}
@@ -43,9 +49,28 @@ def file_faults(fmu: FmuFile, compensator: Compensator, digest: str) -> Iterator
     document = fmu.files.get(f"{EXTRA}/{Compensator.FILE_NAME}")
     if document is not None and document != to_json_bytes(compensator):
         yield f"its {Compensator.FILE_NAME} is another"
-    for folder, ending in PLATFORMS[fmu.fmi].items():
-        if fmu.binary(folder, ending) is None:
-            yield f"binaries/{folder} is missing"
+    if fmu.identifier != fmu.name.partition("_fmi")[0]:
+        yield f"{DESCRIPTION}: the model is {fmu.identifier!r}, another than the file's"
+    expected_files = _expected_files(fmu, compensator)
+    for path in sorted(expected_files - fmu.files.keys()):
+        yield f"{path} is missing"
+    for path in sorted(fmu.files.keys() - expected_files):
+        yield f"{path} is no file of such an FMU"
+
+
+def _expected_files(fmu: FmuFile, compensator: Compensator) -> set[str]:
+    """Return the paths that an FMU has: what else a tool finds in it, it would load or compile too."""
+    types = {2: "fmi2TypesPlatform.h", 3: "fmi3PlatformTypes.h"}[fmu.fmi]
+    sources = {"dz_fmu.c", f"fmi{fmu.fmi}Functions.h", f"fmi{fmu.fmi}FunctionTypes.h", types}
+    sources |= {"buildDescription.xml"} if fmu.fmi == 3 else set()
+    if fmu.name.startswith("dz_compensator"):
+        sources |= {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h"}
+        sources |= {"dz_comp_negative.c"} if len(compensator.signals.signs) == 2 else set()
+        data = Compensator.FILE_NAME
+    else:
+        data = "plant.json"
+    binaries = (f"binaries/{folder}/{fmu.identifier}.{ending}" for folder, ending in PLATFORMS[fmu.fmi].items())
+    return {DESCRIPTION, MANIFEST, f"{EXTRA}/{data}", *(f"sources/{name}" for name in sources), *binaries}
 
 
 def library_faults(fmu: FmuFile) -> Iterator[str]:
@@ -53,10 +78,12 @@ def library_faults(fmu: FmuFile) -> Iterator[str]:
     for path in sorted(path for path in fmu.files if path.startswith("binaries/")):
         ending = path.rpartition(".")[2]
         try:
-            needed = needed_libraries(fmu.files[path])
+            machine, needed = machine_of(fmu.files[path]), needed_libraries(fmu.files[path])
         except ValueError as error:
             yield f"{path}: {error}"
             continue
+        if machine != MACHINES.get(path.split("/")[1]):
+            yield f"{path} is for {machine}"
         known = ALWAYS_THERE.get(ending, set())
         if others := [name for name in needed if name not in known and name.lower() not in known]:
             yield f"{path} needs {', '.join(others)}"

@@ -2,21 +2,23 @@
 
 import json
 import platform
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal, cast
 from xml.etree import ElementTree
-from zipfile import BadZipFile, ZipFile
 
 from dzdesign.core.artefact_files import read_bytes
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, quoted
+from dzdesign.verify.fmu.fmu_archive import unpacked
 
 Fmi = Literal[2, 3]
-#: Larger than any FMU of ours unpacked.
-LARGEST_OCTETS = 64 * 2**20
+#: What ties a binary to the description: plain enough to stand in a program's text.
+TOKEN = re.compile(r"\{[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}\}")
+#: How the description begins.
+BEGIN = b'<?xml version="1.0" encoding="UTF-8"?>\n'
 DESCRIPTION = "modelDescription.xml"
 EXTRA = "extra/dzdesign"
 #: Elements of FMI 2 and 3, to what a variable of theirs holds.
@@ -76,24 +78,24 @@ class FmuFile:
 def read_fmu(path: Path) -> FmuFile:
     """Return an FMU; what is none is an `InputError`."""
     content = read_bytes(path, "FMU")
+    files = unpacked(content, f"'{path}'")
     try:
-        with ZipFile(BytesIO(content)) as packed:
-            if sum(entry.file_size for entry in packed.infolist()) > LARGEST_OCTETS:
-                raise InputError(f"'{path}' unpacks to more than {LARGEST_OCTETS // 2**20} MB, as no FMU of dzdesign")
-            files = {entry.filename: packed.read(entry) for entry in packed.infolist()}
-        document = ElementTree.fromstring(files[DESCRIPTION])
+        document = _document(files[DESCRIPTION])
         manifest = json.loads(files[f"{EXTRA}/manifest.json"])
-    except (BadZipFile, KeyError, ValueError, ElementTree.ParseError) as error:
+    except (KeyError, ValueError, RecursionError, ElementTree.ParseError) as error:
         raise InputError(f"'{path}' is no FMU of dzdesign: {error}; make it again with `dzdesign codegen`") from error
     version = document.get("fmiVersion", "")
     if version not in ("2.0", "3.0") or not isinstance(manifest, dict):
         raise InputError(f"'{path}' is for FMI '{version[:20]}', expected 2.0 or 3.0")
+    token = document.get("guid" if version == "2.0" else "instantiationToken", "")
+    if not TOKEN.fullmatch(token):
+        raise InputError(f"'{path}' has the token {quoted(token)}, expected a UUID in braces; make it again")
     simulation = document.find("CoSimulation")
     return FmuFile(
         name=path.name,
         files=files,
         fmi=cast(Fmi, int(version[0])),
-        token=document.get("guid" if version == "2.0" else "instantiationToken", ""),
+        token=token,
         identifier=simulation.get("modelIdentifier", "") if simulation is not None else "",
         variables=_variables(document),
         units={
@@ -103,6 +105,14 @@ def read_fmu(path: Path) -> FmuFile:
         },
         manifest=manifest,
     )
+
+
+def _document(content: bytes) -> ElementTree.Element:
+    """Return modelDescription.xml; an encoding or a declaration that tools could read otherwise is a `ValueError`."""
+    inside = content.removeprefix(BEGIN)
+    if inside == content or b"<!" in inside or b"<?" in inside or b"\0" in inside:
+        raise ValueError(f"{DESCRIPTION} is not in UTF-8, or has declarations or comments")
+    return ElementTree.fromstring(content)
 
 
 def _variables(document: ElementTree.Element) -> dict[str, DescribedVariable]:
