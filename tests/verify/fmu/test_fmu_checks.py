@@ -14,7 +14,7 @@ from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.fmu.binary_core import FmuCore
 from dzdesign.verify.fmu.checks import drive_check, physical_check, plant_of
 from dzdesign.verify.fmu.closed_loop import closed_loop_check
-from dzdesign.verify.fmu.descriptions import compensator_faults, file_faults, library_faults, plant_faults
+from dzdesign.verify.fmu.descriptions import file_faults, library_faults
 from dzdesign.verify.fmu.fmu_file import read_fmu
 from tests.support.golden_firmware import golden_compensator
 from tests.support.host_fmus import PLANT, edited, with_binary, with_files
@@ -199,26 +199,6 @@ def test_an_added_file_another_compensator_and_a_missing_platform_are_found(fmu,
         assert any(key in fault for fault in faults_of(wrong, compensator))
     missing = list(file_faults(fmu, compensator, sha256_of(to_json_bytes(compensator))))
     assert any("windows" in fault or "win64" in fault for fault in missing)
-
-
-def test_the_description_says_what_the_compensator_has(fmu, compensator):
-    assert not list(compensator_faults(fmu, compensator))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
-    (("u_i", {"unit": "mV"}), ("p_A", {"unit": None}), ("u_i_code", {"start": "1"}),
-     ("compare", {"causality": "local"}), ("codes", {"causality": "input"}), ("u_O_negative", {"kind": "integer"})),
-)  # fmt: skip
-def test_a_wrong_description_is_found(fmu, compensator, name, change):
-    variables = {**fmu.variables, name: replace(fmu.variables[name], **change)}
-    assert any(name in fault for fault in compensator_faults(replace(fmu, variables=variables), compensator))
-
-
-def test_a_wrong_unit_factor_and_a_wrong_plant_are_found(fmu, plant_fmu, compensator):
-    assert list(compensator_faults(replace(fmu, units={**fmu.units, "MPa": 1e5}), compensator))
-    assert not list(plant_faults(plant_fmu, asdict(PLANT)))
-    assert list(plant_faults(plant_fmu, {**asdict(PLANT), "L_c_H": 0.03}))
 
 
 def test_no_library_is_needed_and_one_that_is_needed_is_found(fmu, plant_fmu):

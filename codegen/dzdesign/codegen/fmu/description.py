@@ -218,16 +218,25 @@ def _structure(model: Model, fmi: Fmi) -> str:
             key, references = {"index": _index(model, fmi, each.name)}, [_index(model, fmi, name) for name in names]
         return _element(tag, {**key, "dependencies": " ".join(map(str, sorted(references)))})
 
+    def initial(tag: str, each: Variable) -> str:
+        """Return an unknown of initialization, when parameters are known as inputs are: it may follow them all."""
+        key = {"valueReference": each.reference} if fmi == 3 else {"index": _index(model, fmi, each.name)}
+        return _element(tag, key)
+
     if fmi == 3:
         entries = [
             *(entry("Output", each) for each in outputs),
             *(entry("ContinuousStateDerivative", each) for each in rates),
-            *(entry("InitialUnknown", each) for each in unknown),
+            *(initial("InitialUnknown", each) for each in unknown),
             *(entry("EventIndicator", each) for each in signs),
         ]
         return _element("ModelStructure", {}, entries)
-    groups = {"Outputs": outputs, "Derivatives": rates, "InitialUnknowns": unknown}
-    entries = [_element(tag, {}, [entry("Unknown", each) for each in group]) for tag, group in groups.items() if group]
+    groups = {
+        "Outputs": [entry("Unknown", each) for each in outputs],
+        "Derivatives": [entry("Unknown", each) for each in rates],
+        "InitialUnknowns": [initial("Unknown", each) for each in unknown],
+    }
+    entries = [_element(tag, {}, group) for tag, group in groups.items() if group]
     return _element("ModelStructure", {}, entries)
 
 

@@ -22,7 +22,8 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.fmu.binary_core import ENDINGS, FmuCore
 from dzdesign.verify.fmu.closed_loop import closed_loop_check
-from dzdesign.verify.fmu.descriptions import compensator_faults, file_faults, library_faults, plant_faults
+from dzdesign.verify.fmu.described_model import compensator_faults, plant_faults
+from dzdesign.verify.fmu.descriptions import file_faults, library_faults
 from dzdesign.verify.fmu.fmu_file import FmuFile, read_fmu
 from dzdesign.verify.fmu.stepping import stepped
 from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
@@ -115,7 +116,9 @@ def _read_checks(
         f"{fmu.name}: {fault}"
         for fmu in fmus
         for fault in (
-            plant_faults(fmu, plant) if fmu.name.startswith("dz_plant") else compensator_faults(fmu, compensator)
+            plant_faults(fmu, plant, compensator)
+            if fmu.name.startswith("dz_plant")
+            else compensator_faults(fmu, compensator)
         )
     ]
     variables = sum(len(fmu.variables) for fmu in fmus)
