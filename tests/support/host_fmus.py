@@ -5,6 +5,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from dzdesign.codegen.fmu import binaries
 from dzdesign.codegen.other_targets import Output, generate_output
@@ -62,6 +63,6 @@ def with_binary(fmu: FmuFile, content: bytes) -> FmuFile:
     return with_files(fmu, {path: content for path in fmu.files if path.startswith("binaries/")})
 
 
-def with_files(fmu: FmuFile, files: Mapping[str, bytes]) -> FmuFile:
-    """Return an FMU with other files."""
-    return replace(fmu, files={**fmu.files, **files})
+def with_files(fmu: FmuFile, files: Mapping[str, bytes], manifest: Mapping[str, Any] | None = None) -> FmuFile:
+    """Return an FMU with other files, and where one is given another manifest of them."""
+    return replace(fmu, files={**fmu.files, **files}, manifest=manifest or fmu.manifest)

@@ -16,6 +16,10 @@ class InputError(DzdesignError):
     """Input or usage is bad: a file, a column, a unit, a name, an option."""
 
 
+class MissingToolError(InputError):
+    """A program or package of others that is needed is not here, is too old, or fails on this machine."""
+
+
 class RequirementError(DzdesignError):
     """A requirement does not hold (a proof failed, an input is wrong): exit status 1, not a usage error."""
 

@@ -111,6 +111,58 @@ def test_units_of_the_recordings_are_display_units(no_binary):
         assert '<DisplayUnit name="bar" factor="10.0"/>' in text and 'displayUnit="bar"' in text
 
 
+def displayed(model, name):
+    """Return unit and display unit of a variable, and factor and offset of that, in both versions."""
+    from xml.etree import ElementTree
+
+    from dzdesign.codegen.fmu.description import model_description
+
+    found = []
+    for fmi in (2, 3):
+        document = ElementTree.fromstring(model_description(model, fmi, "{token}"))
+        variable = next(each for each in document.find("ModelVariables") if each.get("name") == name)
+        variable = variable[0] if fmi == 2 else variable
+        unit, shown = variable.get("unit"), variable.get("displayUnit")
+        entries = document.iterfind(f"UnitDefinitions/Unit[@name='{unit}']/DisplayUnit")
+        units = {each.get("name"): each for each in entries}
+        found.append((unit, shown) + ((float(units[shown].get("factor")), float(units[shown].get("offset", "0")))
+                                      if shown else ()))  # fmt: skip
+    assert found[0] == found[1]
+    return found[0]
+
+
+def test_the_display_unit_of_a_command_is_that_of_its_side_and_of_no_other_voltage():
+    """A reading of 12 mA at zero command falls on the negative side, whose outputs count from zero outwards."""
+    from dzdesign.codegen.fmu.compensator import compensator_model
+    from dzdesign.codegen.fmu.plant import plant_model
+    from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
+
+    def of(command):
+        made = full_compensator()
+        return replace(made, valve=replace(made.valve, recorded_units=RecordedUnits(command=command)))
+
+    centred = of(CommandUnit(unit="mA", at_zero=12.0, factor=0.8))
+    model = compensator_model(centred)
+    assert displayed(model, "u_i") == displayed(model, "u_O") == ("V", "mA", 0.8, 12.0)
+    assert displayed(model, "u_O_negative") == ("V", None)
+    assert displayed(compensator_model(of(CommandUnit(unit="%", factor=10.0))), "u_O_negative") == ("V", "%", 10.0, 0.0)
+    plant = plant_model(asdict(PLANT), centred)
+    for name in ("voltage", "u_max_V", "hysteresis_V"):
+        assert displayed(plant, name) == ("V", None)
+
+
+def test_the_output_of_a_current_controller_is_a_current(no_binary):
+    from dzdesign.codegen.fmu.compensator import compensator_model, compensator_values
+    from dzdesign.codegen.project import target_named
+    from tests.support.example_coil import SENSORS, with_current
+
+    made = with_current(golden_compensator("f28335"), target_named("f28335"), SENSORS["supply unknown"])
+    rated_A = made.current_drive.circuit.rated_A
+    assert displayed(compensator_model(made), "u_O") == ("A", None)
+    assert displayed(compensator_model(made), "u_i")[0] == "V"
+    assert compensator_values(made)["full_output"] == repr(float(rated_A)) != compensator_values(made)["u_max"]
+
+
 def test_the_plants_parameters_are_those_of_its_file():
     assert list(PARAMETERS) == [field.name for field in fields(Plant)]
 

@@ -16,7 +16,8 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.structured_text.parser import parse
+from dzdesign.verify.structured_text.parser import WORDS, parse
+from dzdesign.verify.structured_text.reserved_words import RESERVED, is_reserved
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 
 ROOTS = {"one solenoid": GOLDENS, "two solenoids": GOLDENS_FULL}
@@ -52,6 +53,14 @@ def test_names_are_others_whatever_the_case(text):
     assert len(variables) > 50 and set(variables) == {each.name.lower() for each in variables.values()}
     with pytest.raises(InputError, match="twice"):
         parse(text.replace("LAW_NODES", "LAW_BETA"), "B.st")
+
+
+def test_no_name_is_a_word_of_the_standard_or_of_a_tool(text):
+    """Of any of its languages: TRANSITION is a keyword of charts, and tools keep one list for all."""
+    assert {"TRANSITION", "STEP", "INDEXOF", "S1", "LIMIT", "DINT"} <= RESERVED and len(RESERVED) > 300
+    code = re.sub(r"\(\*.*?\*\)", "", text, flags=re.DOTALL)
+    names = set(re.findall(r"\b[A-Za-z_]\w*\b", code)) - WORDS
+    assert not [name for name in names if is_reserved(name)] and len(names) > 50
 
 
 def output(root, dialect, interface):

@@ -14,7 +14,7 @@ from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.fmu.binary_core import FmuCore
 from dzdesign.verify.fmu.checks import drive_check, physical_check, plant_of
 from dzdesign.verify.fmu.closed_loop import closed_loop_check
-from dzdesign.verify.fmu.descriptions import compensator_faults, file_faults, library_faults, plant_faults
+from dzdesign.verify.fmu.descriptions import file_faults, library_faults
 from dzdesign.verify.fmu.fmu_file import read_fmu
 from tests.support.golden_firmware import golden_compensator
 from tests.support.host_fmus import PLANT, edited, with_binary, with_files
@@ -74,6 +74,49 @@ def test_a_binary_of_another_token_is_refused_and_found(one, prepared, compensat
     assert drive_check(one, takes_any, compensator).holds is False
 
 
+PRINTS = """
+#include <stdio.h>
+#include <stdlib.h>
+#define TALK {0}
+#include "fmi2Functions.h"
+"""
+LINES = r'do { printf("1 2 3 0 0 0 0 0 0 0 0 0 0 0 0 0 0\\n0 0\\nend\\n"); fflush(stdout); } while (0)'
+
+
+@pytest.mark.parametrize("ends", (False, True))
+def test_a_binary_that_prints_or_ends_the_program_says_nothing_by_it(one, prepared, compensator, ends):
+    """What it prints is neither taken for results nor disturbs them; of a program that it ends there are none."""
+    talk = LINES.replace("while (0)", "while (exit(0), 0)") if ends else LINES
+    with_talk = PRINTS.replace("{0}", talk)
+    source = one.files["sources/dz_fmu.c"].decode().replace('#include "fmi2Functions.h"\n', with_talk, 1)
+    source = source.replace("refresh(one);   ", "TALK; refresh(one);", 1)
+    source = source.replace("refusal = take_step(", "TALK; refusal = take_step(")
+    made = edited(with_files(one, {"sources/dz_fmu.c": source.encode()}), "dz_fmu.c", "TALK", "TALK")
+    if not ends:
+        assert FmuCore(one, 1, made).check(prepared[1], sample=True).faults == 0
+        assert drive_check(one, made, compensator).holds is True
+        return
+    with pytest.raises(RequirementError, match="before its results were whole"):
+        FmuCore(one, 1, made).check(prepared[1], sample=True)
+    found = drive_check(one, made, compensator)
+    assert found.holds is False and "whole" in found.text
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    (
+        ("if (!(size > 0.0)) {", "if (size < 0.0) {"),
+        ("(late >= -SAME_TIME_S)", "(late <= 1.0 || late > 0.0)"),
+        ("if (!((late >=", "if (0 && !((late >="),
+        ("value >= described[reference].least", "value >= -1e999"),
+        ("value <= described[reference].largest", "value <= 1e999"),
+    ),
+)
+def test_a_binary_that_takes_what_is_no_step_or_number_is_found(one, compensator, old, new):
+    found = drive_check(one, edited(one, "dz_fmu.c", old, new), compensator)
+    assert found.holds is False and "the binary takes" in found.text
+
+
 def test_the_drive_and_the_delay_of_a_step_are_those_of_the_model(fmu, compensator):
     assert drive_check(fmu, fmu.binary_here(), compensator).holds is True
 
@@ -130,7 +173,7 @@ def test_a_wrong_plant_is_found(one, one_plant, compensator, old, new):
 
 
 def test_a_coil_that_is_fast_beside_a_step_is_exact_too(one, one_plant, compensator):
-    fast = with_binary(one_plant, edited(one_plant, "dz_fmu.c", "BEFORE_START, 0.04}", "BEFORE_START, 0.0004}"))
+    fast = with_binary(one_plant, edited(one_plant, "dz_fmu.c", "BEFORE_START, 0.04,", "BEFORE_START, 0.0004,"))
     assert closed_loop_check(one, fast, {**asdict(PLANT), "L_c_H": 0.0004}, compensator).holds is True
 
 
@@ -156,26 +199,6 @@ def test_an_added_file_another_compensator_and_a_missing_platform_are_found(fmu,
         assert any(key in fault for fault in faults_of(wrong, compensator))
     missing = list(file_faults(fmu, compensator, sha256_of(to_json_bytes(compensator))))
     assert any("windows" in fault or "win64" in fault for fault in missing)
-
-
-def test_the_description_says_what_the_compensator_has(fmu, compensator):
-    assert not list(compensator_faults(fmu, compensator))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
-    (("u_i", {"unit": "mV"}), ("p_A", {"unit": None}), ("u_i_code", {"start": "1"}),
-     ("compare", {"causality": "local"}), ("codes", {"causality": "input"}), ("u_O_negative", {"kind": "integer"})),
-)  # fmt: skip
-def test_a_wrong_description_is_found(fmu, compensator, name, change):
-    variables = {**fmu.variables, name: replace(fmu.variables[name], **change)}
-    assert any(name in fault for fault in compensator_faults(replace(fmu, variables=variables), compensator))
-
-
-def test_a_wrong_unit_factor_and_a_wrong_plant_are_found(fmu, plant_fmu, compensator):
-    assert list(compensator_faults(replace(fmu, units={**fmu.units, "MPa": 1e5}), compensator))
-    assert not list(plant_faults(plant_fmu, asdict(PLANT)))
-    assert list(plant_faults(plant_fmu, {**asdict(PLANT), "L_c_H": 0.03}))
 
 
 def test_no_library_is_needed_and_one_that_is_needed_is_found(fmu, plant_fmu):

@@ -17,6 +17,7 @@ from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.outputs.folder import files_unchanged, manifest_follows, read_output_manifest
 from dzdesign.verify.structured_text import checks as checks_module
 from dzdesign.verify.structured_text.every_pair import ExactTables, TriedBlock
+from dzdesign.verify.structured_text.parser import parse
 from tests.support.paths import GOLDENS
 from tests.support.synthetic import needs_compiler
 
@@ -107,7 +108,10 @@ def test_another_typed_declaration_is_seen(folder, few):
         ("command : DINT", "asked : DINT"),
         ("output_a : DINT", "output : DINT"),
         ("at_rest : BOOL := TRUE", "at_rest : BOOL := FALSE"),
-        ("s0 := 0; s1", "s1"),
+        ("w0 := 0; w1", "w1"),
+        ("FB_DeadZone\n", "FB_LiveZone\n"),
+        ("status : DINT", "status : UDINT"),
+        ("OUTPUT_LIMIT", "TRANSITION"),
     ],
 )
 def test_a_text_that_is_not_of_the_subset_does_not_hold(folder, old, new):
@@ -156,8 +160,68 @@ def test_the_command_writes_the_evidence(example_compensator, monkeypatch, tmp_p
     assert any(check["id"] == "regenerated" and check["holds"] for check in document["checks"])
 
 
+BODY = "<body><ST><xhtml xmlns='http://www.w3.org/1999/xhtml'>x</xhtml></ST></body>"
+ACTION = f"<actions><action name='A'>{BODY}</action></actions>"
+METHOD = "<data name='http://www.3s-software.com/plcopenxml/method' handleUnknown='implementation'><Method /></data>"
+GLOBAL = "<configuration name='c'><globalVars><variable name='g' /></globalVars></configuration>"
+INSIDE = "<Declaration/><Implementation><ST/></Implementation>"
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("xml", "</pou>", "</pou><pou name='FB_Other' pouType='functionBlock'/>"),
+        ("xml", "<pou name=", "<pou name='FB_Other' pouType='functionBlock'/><pou name="),
+        ("xml", "</body>", f"</body>{BODY}"),
+        ("xml", "<body>", f"{ACTION}<body>"),
+        ("xml", "</addData>", f"{METHOD}</addData>"),
+        ("xml", "<dataTypes />", "<dataTypes><dataType name='DINT'><baseType><INT/></baseType></dataType></dataTypes>"),
+        ("xml", "<configurations />", f"<configurations>{GLOBAL}</configurations>"),
+        ("xml", 'name="FB_DeadZone" pouType="functionBlock"', 'name="FB_DeadZone" pouType="program"'),
+        ("xml", "status := 0;", "status := <b xmlns=''>1</b>;"),
+        ("xml", "status := 0;", "status := <?x 1?>0;"),
+        ("xml", "status := 0;", "status := <![CDATA[0]]>;"),
+        ("xml", "status := 0;", "status := <!-- 1 -->0;"),
+        ("xml", '<tempVars>', '<tempVars retain="true">'),
+        ("xml", "</ST>", "x</ST>"),
+        ("TcPOU", "</POU>", f"<Method Name='M' Id='{{0}}'>{INSIDE}</Method></POU>"),
+        ("TcPOU", "</POU>", "<Action Name='A' Id='{0}'><Implementation><ST>x</ST></Implementation></Action></POU>"),
+        ("TcPOU", "</Implementation>", "</Implementation><Implementation><ST>x</ST></Implementation>"),
+        ("TcPOU", "</POU>", "</POU><POU Name='FB_Other' Id='{0}' SpecialFunc='None'/>"),
+        ("TcPOU", 'Name="FB_DeadZone"', 'Name="FB_Other"'),
+        ("TcPOU", "encoding='utf-8'", "encoding='utf-7'"),
+    ],
+)  # fmt: skip
+def test_what_stands_beside_the_block_in_a_tools_file_is_seen(folder, name, old, new):
+    edited(folder, f"FB_DeadZone.{name}", old, new, told=True)
+    assert same_text_of(folder).holds is False
+
+
+def same_text_of(folder):
+    text = (folder / "FB_DeadZone.st").read_text()
+    return checks_module._same_text(folder, text, parse(text, "FB_DeadZone.st"), "twincat")
+
+
+def test_the_cut_between_declaration_and_body_is_that_of_the_tools(folder):
+    assert same_text_of(folder).holds
+    path = folder / "FB_DeadZone.TcPOU"
+    declaration, body = (path.read_text().partition("</Declaration>")[0], path.read_text().partition("<ST>")[2])
+    moved = body[: body.index("\n") + 1]
+    path.write_text(f"{declaration}{moved}</Declaration><Implementation><ST>{body.removeprefix(moved)}")
+    assert same_text_of(folder).holds is False
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
+def test_a_document_type_of_its_own_is_refused_in_any_encoding(folder, encoding):
+    path = folder / "FB_DeadZone.xml"
+    text = path.read_text().replace("utf-8", encoding.removesuffix("-sig"))
+    path.write_bytes(text.replace("<project", "<!DOCTYPE x [<!ENTITY a 'b'>]><project", 1).encode(encoding))
+    with pytest.raises(InputError, match="begins otherwise"):
+        checks_module.read_xml(path)
+
+
 def test_a_document_type_of_its_own_is_refused(folder):
     path = folder / "FB_DeadZone.xml"
-    path.write_bytes(b"<!DOCTYPE x [<!ENTITY a 'b'>]>" + path.read_bytes())
+    path.write_text(path.read_text().replace("<project", "<!DOCTYPE x [<!ENTITY a 'b'>]><project", 1))
     with pytest.raises(InputError, match="document type"):
         checks_module.read_xml(path)

@@ -171,6 +171,25 @@ def test_a_seeded_fault_is_counted(one_plc, old, new, count):
         assert {each.first_fault.line for each in found if each.first_fault} == {line}
 
 
+@pytest.mark.parametrize(
+    ("before", "change"),
+    [
+        ("IF valid THEN towards", "IF side > 0 THEN side := 0; END_IF"),
+        ("IF valid THEN towards", "IF side < 0 THEN side := 0; END_IF"),
+        ("drive := MIN(drive, O", "IF last > 0 AND command > 5000 THEN drive := 0; END_IF"),
+        ("drive := MIN(drive, O", "IF last < 0 AND command > 5000 THEN drive := 0; END_IF"),
+    ],
+)
+def test_a_block_that_remembers_a_side_wrongly_is_caught(before, change):
+    """Each state is one that calls begin from: a change seen from one of them alone counts."""
+    made = compensator(GOLDENS_FULL)
+    text = structured_text(made, "0" * 64, "plc")
+    text = text.replace("w0, w1,", "last, w0, w1,").replace("status := 0;", "status := 0; last := side;", 1)
+    assert text.count(before) == 1
+    block = tried(text.replace(before, f"{change} {before}"), ExactTables(made, "plc"))
+    assert any(map(is_wrong, block.every_pair(range(500, 540, 20))))
+
+
 def test_a_lower_bound_that_is_exceeded_is_seen(one_plc):
     _, text, tables = one_plc
     nodes = text[text.index("ZERO_NODES") : text.index("ZERO_LEAST")]

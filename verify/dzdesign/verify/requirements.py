@@ -104,6 +104,8 @@ FMU_DESCRIPTION = Requirement(id="fmu-description", title="modelDescription.xml 
 FMU_LIBRARIES = Requirement(id="fmu-libraries", title="the binaries need no library")
 FMU_DRIVE = Requirement(id="fmu-drive", title="Co-Simulation follows the drive's model, a step later")
 FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
+FMU_STARTS = Requirement(id="fmu-starts", title="variables begin as they are described")
+FMU_EXCHANGE = Requirement(id="fmu-exchange", title="Model Exchange follows the exact models, without delay")
 FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="compensator and plant, coupled, run as the closed loop")
 #: Of a function for MATLAB.
 MATLAB_SUBSET = Requirement(id="matlab-subset", title="the text is of the subset that is verified")

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from dzdesign.codegen.fmu.description import SOURCE, Fmi
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import MissingToolError
 from dzdesign.core.scratch import scratch_folder
 
 #: As in the checked core: no contraction to fused products, so that every processor gives the same digits.
@@ -53,19 +53,19 @@ PLATFORMS = (
 
 
 def ziglang_version() -> str:
-    """Return the version of ziglang; without it the `InputError` says how to install it."""
+    """Return the version of ziglang; without it the `MissingToolError` says how to install it."""
     return _version()
 
 
 @cache
 def _version() -> str:
     if find_spec("ziglang") is None:
-        raise InputError(
+        raise MissingToolError(
             'binaries of an FMU are compiled by ziglang, which is not installed; run `pip install "dzdesign[fmu]"`'
         )
     found = version("ziglang")
     if tuple(int(part) for part in re.findall(r"\d+", found)[:2]) < OLDEST:
-        raise InputError(
+        raise MissingToolError(
             f"ziglang {found} can't link the FMUs' binaries without a library, expected {OLDEST[0]}.{OLDEST[1]} or "
             'later; run `pip install --upgrade "dzdesign[fmu]"`'
         )
@@ -108,8 +108,8 @@ def _compiled(folder: Path, identifier: str, platform: Platform) -> bytes:
             env={name: value for name, value in os.environ.items() if name not in REDIRECTING},
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise InputError(f"ziglang can't compile the FMU for {platform.triple}: {error}") from error
+        raise MissingToolError(f"ziglang can't compile the FMU for {platform.triple}: {error}") from error
     if done.returncode:
         said = " ".join(done.stderr.split())[:400]
-        raise InputError(f"ziglang can't compile the FMU for {platform.triple}: {said}")
+        raise MissingToolError(f"ziglang can't compile the FMU for {platform.triple}: {said}")
     return (made / name).read_bytes()

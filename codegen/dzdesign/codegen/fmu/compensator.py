@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dzdesign.codegen.core.constants import Define
 from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, core_files
 from dzdesign.codegen.fmu.description import Model
-from dzdesign.codegen.fmu.variables import compensator_variables
+from dzdesign.codegen.fmu.variables import compensator_variables, full_output
 from dzdesign.codegen.project import generate
 from dzdesign.design.compensator import Compensator
 
@@ -64,6 +64,7 @@ def compensator_values(compensator: Compensator) -> Mapping[str, object]:
         "code_max": signals.code_max,
         "compare_max": signals.compare_max,
         "u_max": repr(float(compensator.u_max_V)),
+        "full_output": repr(full_output(compensator)[1]),
         "command_zero": command.zero_code,
         "positive_codes": codes(1),
         "negative_codes": codes(-1) if len(signals.signs) == 2 else "",

@@ -126,24 +126,31 @@ def _interfaces(model: Model, fmi: Fmi) -> list[str]:
     ]  # fmt: skip
 
 
-def _displayed(model: Model, unit: str) -> tuple[str, float, float] | None:
-    """Return name, factor and offset of the unit in which the valve was recorded, where that is another."""
-    if unit not in ("V", "MPa", "L/min"):
+def _displayed(model: Model, unit: str, command: bool) -> tuple[str, float, float] | None:
+    """Return name, factor and offset of the unit in which the valve was recorded, where that is another.
+
+    That of the command is no unit of other voltages.
+    """
+    if unit not in ("V", "MPa", "L/min", "A") or (unit == "V" and not command):
         return ("mm", 1e3, 0.0) if unit == "m" else None
     label = model.units.label(unit)
     if label == unit:
         return None
-    zero, one = (float(model.units.convert(value, unit)) for value in (0.0, 1.0))
-    return label, one - zero, zero
+    units = model.units
+    if unit == "V":
+        return label, units.command.factor, units.command.at_zero
+    current = units.current.factor if units.current else 1.0
+    return label, {"MPa": units.pressure.factor, "L/min": units.flow.factor, "A": current}[unit], 0.0
 
 
 def _units(model: Model, fmi: Fmi) -> str:
     found = []
+    commands = any(each.command for each in model.of(fmi))
     for name in dict.fromkeys(each.unit for each in model.of(fmi) if each.unit):
         factor, exponents = UNITS[name]
         scaled = {} if factor == 1.0 else {"factor": repr(factor)}
         inner = [_element("BaseUnit", {**exponents, **scaled})]
-        if displayed := _displayed(model, name):
+        if displayed := _displayed(model, name, commands):
             label, per_unit, offset = displayed
             moved = {"offset": repr(offset)} if offset else {}
             inner.append(_element("DisplayUnit", {"name": label, "factor": repr(per_unit), **moved}))
@@ -173,7 +180,7 @@ def _variable(model: Model, variable: Variable, fmi: Fmi) -> str:
     of_kind: dict[str, object] = {}
     if variable.unit:
         of_kind["unit"] = variable.unit
-        if displayed := _displayed(model, variable.unit):
+        if displayed := _displayed(model, variable.unit, variable.command):
             of_kind["displayUnit"] = displayed[0]
     if variable.range is not None:
         of_kind |= dict(zip(("min", "max"), map(int, variable.range), strict=True))
@@ -211,16 +218,25 @@ def _structure(model: Model, fmi: Fmi) -> str:
             key, references = {"index": _index(model, fmi, each.name)}, [_index(model, fmi, name) for name in names]
         return _element(tag, {**key, "dependencies": " ".join(map(str, sorted(references)))})
 
+    def initial(tag: str, each: Variable) -> str:
+        """Return an unknown of initialization, when parameters are known as inputs are: it may follow them all."""
+        key = {"valueReference": each.reference} if fmi == 3 else {"index": _index(model, fmi, each.name)}
+        return _element(tag, key)
+
     if fmi == 3:
         entries = [
             *(entry("Output", each) for each in outputs),
             *(entry("ContinuousStateDerivative", each) for each in rates),
-            *(entry("InitialUnknown", each) for each in unknown),
+            *(initial("InitialUnknown", each) for each in unknown),
             *(entry("EventIndicator", each) for each in signs),
         ]
         return _element("ModelStructure", {}, entries)
-    groups = {"Outputs": outputs, "Derivatives": rates, "InitialUnknowns": unknown}
-    entries = [_element(tag, {}, [entry("Unknown", each) for each in group]) for tag, group in groups.items() if group]
+    groups = {
+        "Outputs": [entry("Unknown", each) for each in outputs],
+        "Derivatives": [entry("Unknown", each) for each in rates],
+        "InitialUnknowns": [initial("Unknown", each) for each in unknown],
+    }
+    entries = [_element(tag, {}, group) for tag, group in groups.items() if group]
     return _element("ModelStructure", {}, entries)
 
 

@@ -5,6 +5,9 @@ import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files as files_of
+from io import BytesIO
+from zipfile import BadZipFile, ZipFile
+from zlib import error as ZlibError
 
 from dzdesign.codegen.banner import banner_of
 from dzdesign.codegen.fmu.archive import archive
@@ -14,6 +17,7 @@ from dzdesign.codegen.fmu.description import SOURCE, Fmi, Model, build_descripti
 from dzdesign.codegen.fmu.plant import plant_model, plant_of, plant_values
 from dzdesign.core.artefact_files import TOOL, sha256_of
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.errors import quoted
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
@@ -68,6 +72,20 @@ def output_files(
         )
     return {f"{part.model.identifier}_fmi{fmi}.fmu": _fmu(part, compensator, origin, fmi)
             for part in parts for fmi in VERSIONS}  # fmt: skip
+
+
+def made_by_another_compiler(files: Mapping[str, bytes]) -> str:
+    """Return why binaries are others than this machine's compiler makes; empty if it is the one that made them."""
+    this = f"ziglang {ziglang_version()}"
+    for name in sorted(name for name in files if name.endswith(".fmu")):
+        try:
+            with ZipFile(BytesIO(files[name])) as packed:
+                found = json.loads(packed.read(f"{EXTRA}/manifest.json"))["compiler"]
+        except (BadZipFile, KeyError, TypeError, ValueError, RuntimeError, NotImplementedError, ZlibError):
+            continue  # no FMU: then it is another file than is generated
+        if found != this:
+            return f"{name} was compiled by {quoted(found)}, and here is {this}"
+    return ""
 
 
 def _fmu(part: Parts, compensator: Compensator, origin: FirmwareOrigin, fmi: Fmi) -> bytes:

@@ -39,6 +39,8 @@ class Variable:
     nominal: float | None = None
     #: Least and largest value.
     range: tuple[float, float] | None = None
+    #: A command as it was recorded, which has a unit and a zero of its own; any other voltage is one.
+    command: bool = False
 
     @property
     def symbol(self) -> str:
@@ -55,6 +57,14 @@ class Variable:
     def c_start(self) -> str:
         """Return its first value in C."""
         return repr(float(self.start or 0.0))
+
+    @property
+    def c_ends(self) -> str:
+        """Return the least and the largest number that it may be set to, in C."""
+        if self.kind == "real":
+            return "-LARGEST_REAL, LARGEST_REAL"
+        least, largest = self.range or ((-(2.0**31), 2.0**31 - 1) if self.kind == "integer" else (0.0, 1.0))
+        return f"{least!r}, {largest!r}"
 
     @property
     def variability(self) -> str:
@@ -80,7 +90,7 @@ def compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
             Variable(name=name, reference=1 + len(found), description=description, causality=causality, **how)  # type: ignore[arg-type]
         )
 
-    add("u_i", f"Command, {-u_max if two else 0.0:g} to {u_max:g} V.", "input", unit="V", start=0.0)
+    add("u_i", f"Command, {-u_max if two else 0.0:g} to {u_max:g} V.", "input", unit="V", start=0.0, command=True)
     add("p_A", "Pressure ahead of the metering edge, for positive command.", "input", unit="MPa", start=0.0)
     add("p_B", "Pressure behind it.", "input", unit="MPa", start=0.0)
     for name, what, zero in (
@@ -94,8 +104,12 @@ def compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
         "parameter", kind="boolean", start=0.0)  # fmt: skip
     for sign in signals.signs:
         end, side = ("", "") if sign > 0 else ("_negative", ", for negative commands")
-        add(f"u_O{end}", f"What the law drives the valve with{side}: compare{end} in V.", "output", unit="V",
-            follows=inputs)  # fmt: skip
+        unit, full = full_output(compensator)
+        what = "Set point of the current" if unit == "A" else "What the law drives the valve with"
+        # The negative side counts from zero outwards: a reading that is not zero at zero command falls there.
+        recorded = unit == "V" and (sign > 0 or c.valve.recorded_units.command.at_zero == 0)
+        add(f"u_O{end}", f"{what}{side}: compare{end} in {unit}, {full:g} {unit} at {signals.compare_max}.", "output",
+            unit=unit, follows=inputs, command=recorded)  # fmt: skip
         add(f"beta{end}", f"Beta that the law uses{side}.", "output", follows=inputs[1:3] + inputs[4:])
         add(f"compare{end}", f"PWM compare value of the law{side}, of {signals.compare_max}; changes at events.",
             "output", kind="integer", follows=inputs)  # fmt: skip
@@ -107,6 +121,13 @@ def compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
     add("drive_status", "What the drive says of its inputs, DZ_STATUS_... of dz_drive.h; 0: all valid, and used.",
         "output", kind="integer")  # fmt: skip
     return tuple(found)
+
+
+def full_output(compensator: Compensator) -> tuple[str, float]:
+    """Return unit and size of the law's output at full drive: the command, or the current that is controlled."""
+    if (drive := compensator.current_drive) is not None:
+        return "A", float(drive.circuit.rated_A)
+    return "V", float(compensator.u_max_V)
 
 
 def named(variables: Sequence[Variable]) -> dict[str, Variable]:

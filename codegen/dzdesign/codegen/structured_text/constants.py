@@ -20,7 +20,7 @@ class Constants:
     #: Whether beta has a scale beside its step.
     scales: bool = False
     lines: list[str] = field(default_factory=list)
-    #: Constant to what the body has for it: where the sides differ, an element by the variable ``n``.
+    #: Constant to what the body has for it: where the sides differ, an element by the variable ``k``.
     printed: dict[str, str] = field(default_factory=dict)
 
     def each(self, name: str, values: Mapping[int, int], comment: str, kind: str = "DINT") -> None:
@@ -30,7 +30,7 @@ class Constants:
         if len(set(numbers)) == 1:
             self._line(f"{name} : {kind} := {numbers[0]};", comment)
             return
-        self.printed[name] = f"{name}[n]"
+        self.printed[name] = f"{name}[k]"
         self._line(f"{name} : ARRAY[0..1] OF {kind} := [{', '.join(map(str, numbers))}];", comment)
 
     def pair(self, names: tuple[str, str], values: tuple[int, int], comment: str) -> None:
@@ -44,7 +44,7 @@ class Constants:
 
     def of_sign(self, name: str, sign: int) -> str:
         """Return the constant of one side, whichever is driven."""
-        return self.printed[name].replace("[n]", f"[{self.signs.index(sign)}]")
+        return self.printed[name].replace("[k]", f"[{self.signs.index(sign)}]")
 
     def table(self, name: str, nodes: Sequence[int], comment: str) -> None:
         """Add a table."""
@@ -80,7 +80,7 @@ def _of_command(found: Constants, compensator: Compensator, interface: Interface
         zero_band = {sign: side.zero_band for sign, side in sides.items()}
         found.each("ZERO_BAND", zero_band, "a command up to this counts as zero")
         transition = {sign: side.transition for sign, side in sides.items()}
-        found.each("TRANSITION", transition, "beyond it, from the closing to the opening threshold")
+        found.each("TRANS_SPAN", transition, "beyond it, from the closing to the opening threshold")
 
 
 def _of_pressures(found: Constants, compensator: Compensator, interface: Interface) -> None:

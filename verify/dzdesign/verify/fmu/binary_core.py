@@ -8,11 +8,13 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.verify.fmu.fmu_file import FmuFile
+from dzdesign.verify.fmu.results import results_of
 from dzdesign.verify.toolchain.compiled_core import CHECK, Findings, findings_of
 from dzdesign.verify.toolchain.host_compiler import find_zig
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
-#: Folder of this room's C.
+#: This room's C: headers, and their folder.
+OWN_HEADERS = ("fmi_calls.h", "results.h")
 OWN_PROGRAMS = Path(str(files("dzdesign.verify.fmu"))) / "programs"
 ENDINGS = {1: "", -1: "_negative"}
 #: Loads a binary by itself: of Windows without flags.
@@ -87,7 +89,7 @@ def reference_flags(fmu: FmuFile, names: Mapping[str, str]) -> tuple[str, ...]:
 
 def fmu_program(name: str, flags: Sequence[str], machine: Machine, what: str) -> Path:
     """Return a program of this room, compiled with the macros given."""
-    sources = {each: (OWN_PROGRAMS / each).read_bytes() for each in (name, "fmi_calls.h")}
+    sources = {each: (OWN_PROGRAMS / each).read_bytes() for each in (name, *OWN_HEADERS)}
     return machine.link([machine.compile(name, sources, (*machine.check_flags, *flags), what)], what)
 
 
@@ -108,18 +110,19 @@ class FmuCore:
         called = {"DZ_CORE": "comp", "DZ_STATUS": "status", "DZ_BETA": "beta"}
         names = tuple(f"-D{macro}=dz_{name}{ending}" for macro, name in called.items())
         flags = (*machine.check_flags, *names)
-        own = {each: (OWN_PROGRAMS / each).read_bytes() for each in ("core_of_fmu.c", "fmi_calls.h")}
+        own = {each: (OWN_PROGRAMS / each).read_bytes() for each in ("core_of_fmu.c", *OWN_HEADERS)}
+        own["every_input.h"] = (PROGRAMS / "every_input.h").read_bytes()
         references = {
             "U_I_CODE": "u_i_code", "P_A_CODE": "p_A_code", "P_B_CODE": "p_B_code", "CODES": "codes",
             "COMPARE": f"compare{ending}", "STATUS": f"status{ending}", "BETA": f"beta{ending}",
         }  # fmt: skip
         of_fmu = (*fmu_flags(self._fmu, self._binary, self._drive), *reference_flags(self._fmu, references))
-        check = {name: (PROGRAMS / name).read_bytes() for name in (*CHECK, machine.main)} | machine.headers
+        check = {name: (PROGRAMS / name).read_bytes() for name in CHECK}
         objects = [machine.compile("core_of_fmu.c", own, (*flags, *of_fmu), f"the check of {what}")]
         objects += [
             machine.compile(name, check, flags, f"the check of {what}") for name in check if name.endswith(".c")
         ]
         program = machine.link(objects, f"the check of {what}")
         arguments = [f"{self._drive}{stored(prepared)}", *(["sample"] if sample else [])]
-        printed = machine.run(program, arguments, what)
-        return findings_of(printed, self.sha256, f"{what} on the {machine.name}")
+        found = results_of(machine, program, arguments, what, self._drive)
+        return findings_of(found, self.sha256, f"{what} on the {machine.name}")

@@ -22,7 +22,9 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.fmu.binary_core import ENDINGS, FmuCore
 from dzdesign.verify.fmu.closed_loop import closed_loop_check
-from dzdesign.verify.fmu.descriptions import compensator_faults, file_faults, library_faults, plant_faults
+from dzdesign.verify.fmu.described_model import compensator_faults, plant_faults
+from dzdesign.verify.fmu.descriptions import file_faults, library_faults
+from dzdesign.verify.fmu.exchange import compensator_exchange_check, plant_exchange_check, starts_check
 from dzdesign.verify.fmu.fmu_file import FmuFile, read_fmu
 from dzdesign.verify.fmu.stepping import stepped
 from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
@@ -66,10 +68,19 @@ def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say
             found += [named(check, name) for check in input_checks(inputs, units, both_signs=two)]
             tried.append(_tried(name, inputs))
         found += [drive_check(fmu, binary, compensator), physical_check(fmu, binary, compensator)]
+        found += [starts_check(fmu, binary), compensator_exchange_check(fmu, binary, compensator)]
         if plant:
+            found += _of_plant(fmus["dz_plant", fmi], plant, compensator)
             say(f"running {fmu.name} with the plant's FMU")
             found.append(closed_loop_check(fmu, fmus["dz_plant", fmi], plant, compensator))
     return OutputChecks(checks=tuple(found), inputs=tuple(tried))
+
+
+def _of_plant(fmu: FmuFile, plant: Mapping[str, float], compensator: Compensator) -> list[Check]:
+    """Return the checks of a plant by itself; without a binary for this machine the closed loop says so."""
+    if (binary := fmu.binary_here()) is None:
+        return []
+    return [starts_check(fmu, binary), plant_exchange_check(fmu, binary, plant, compensator)]
 
 
 def plant_of(manifest: OutputManifest) -> dict[str, float]:
@@ -115,7 +126,9 @@ def _read_checks(
         f"{fmu.name}: {fault}"
         for fmu in fmus
         for fault in (
-            plant_faults(fmu, plant) if fmu.name.startswith("dz_plant") else compensator_faults(fmu, compensator)
+            plant_faults(fmu, plant, compensator)
+            if fmu.name.startswith("dz_plant")
+            else compensator_faults(fmu, compensator)
         )
     ]
     variables = sum(len(fmu.variables) for fmu in fmus)

@@ -1,6 +1,7 @@
 """Which libraries a binary asks the system for: of ELF, PE and Mach-O, read from their headers."""
 
 import struct
+from collections.abc import Mapping
 
 #: ELF: types of a dynamic entry, and of a program header that holds these.
 DT_NULL, DT_NEEDED, DT_STRTAB, PT_LOAD, PT_DYNAMIC = 0, 1, 5, 1, 2
@@ -8,6 +9,26 @@ DT_NULL, DT_NEEDED, DT_STRTAB, PT_LOAD, PT_DYNAMIC = 0, 1, 5, 1, 2
 MACH_O, LOADS = 0xFEEDFACF, frozenset({0xC, 0x80000018, 0x8000001F, 0x20})
 #: PE: where the directory of imports stands in the optional header of 64 bits, and octets of an entry of it.
 PE_DIRECTORIES, IMPORT_SIZE, SECTION_SIZE = 112, 20, 40
+
+
+def machine_of(content: bytes) -> str:
+    """Return processor and form of a binary of 64 bits; one of another form is a `ValueError`."""
+    try:
+        if content[:6] == b"\x7fELF\x02\x01":
+            return _named(struct.unpack_from("<H", content, 18)[0], {62: "x86_64", 183: "aarch64"}, "ELF")
+        if content[:2] == b"MZ":
+            (header,) = struct.unpack_from("<I", content, 60)
+            return _named(struct.unpack_from("<H", content, header + 4)[0], {0x8664: "x86_64", 0xAA64: "aarch64"}, "PE")
+        if len(content) > 8 and struct.unpack_from("<I", content)[0] == MACH_O:
+            processor = struct.unpack_from("<I", content, 4)[0]
+            return _named(processor, {0x1000007: "x86_64", 0x100000C: "aarch64"}, "Mach-O")
+    except struct.error as error:
+        raise ValueError(f"it ends within its headers ({error})") from error
+    raise ValueError("it is neither ELF nor PE nor Mach-O, of 64 bits and little-endian")
+
+
+def _named(number: int, names: Mapping[int, str], form: str) -> str:
+    return f"{names.get(number, f'processor {number}')} {form}"
 
 
 def needed_libraries(content: bytes) -> list[str]:

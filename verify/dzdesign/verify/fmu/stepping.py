@@ -8,6 +8,7 @@ import numpy as np
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.fmu.binary_core import FMU_HOST, fmu_flags, fmu_program, reference_flags, text_flag
 from dzdesign.verify.fmu.fmu_file import FmuFile
+from dzdesign.verify.fmu.results import results_of
 from dzdesign.verify.toolchain.machines import stored
 
 #: Places for value references of outputs, as programs/steps.c has them.
@@ -28,9 +29,10 @@ def stepped(
     targets = [fmu.reference(name) for name in outputs] + [0] * (MOST_OUTPUTS - len(outputs))
     head = struct.pack(f"<{8 + MOST_OUTPUTS}I", 3 if codes else 0, len(outputs), len(rows), 0, *references, *targets)
     given = head + struct.pack("<d", step_s) + np.ascontiguousarray(rows, dtype="<f8").tobytes()
-    flags = (*fmu_flags(fmu, binary), *reference_flags(fmu, {"CODES": "codes"}))
+    of_fmu = {"CODES": "codes", "U_I": "u_i", "U_I_CODE": "u_i_code"}
+    flags = (*fmu_flags(fmu, binary), *reference_flags(fmu, of_fmu))
     program = fmu_program("steps.c", flags, FMU_HOST, f"the steps of {fmu.name}")
-    found = np.array(FMU_HOST.run(program, [str(stored(given))], fmu.name), dtype=np.int64)
+    found = np.array(results_of(FMU_HOST, program, [str(stored(given))], fmu.name), dtype=np.int64)
     if found.shape != (len(rows), len(outputs)):
         raise RequirementError(f"{fmu.name} gave outputs of shape {found.shape}, expected {(len(rows), len(outputs))}")
     return found
@@ -66,7 +68,7 @@ def coupled(
     what = f"{compensator.name} with {plant.name}"
     program = fmu_program("couple.c", flags, FMU_HOST, what)
     given = struct.pack("<4d", step_s, drop_MPa, back_MPa, len(command_V)) + command_V.astype("<f8").tobytes()
-    found = FMU_HOST.run(program, [str(stored(given))], what)
+    found = results_of(FMU_HOST, program, [str(stored(given))], what)
     if len(found) != len(command_V):
         raise RequirementError(f"{what} made {len(found)} steps, expected {len(command_V)}")
     flow = np.array([row[0] for row in found], dtype=np.uint64).view(np.float64)

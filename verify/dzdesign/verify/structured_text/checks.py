@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dzdesign.core.artefact_files import read_bytes
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
@@ -20,12 +20,7 @@ from dzdesign.verify.requirements import (
     Check,
 )
 from dzdesign.verify.structured_text.every_pair import ExactTables, Tried, TriedBlock
-from dzdesign.verify.structured_text.imported_files import (
-    differing_declarations,
-    read_xml,
-    text_of_plcopen,
-    text_of_tcpou,
-)
+from dzdesign.verify.structured_text.imported_files import plcopen_faults, read_xml, tcpou_faults
 from dzdesign.verify.structured_text.parser import parse
 from dzdesign.verify.structured_text.syntax import FunctionBlock, Kind
 from dzdesign.verify.structured_text.type_check import check_types
@@ -82,6 +77,8 @@ def _text(path: Path) -> str:
 
 def _check_ends(block: FunctionBlock, compensator: Compensator) -> None:
     """Refuse a block with other inputs, outputs or states than are asked for: nothing of it could be compared."""
+    if block.name != NAME:
+        raise InputError(f"{NAME}.st has the function block {block.name}, expected {NAME}")
     both = len(compensator.signals.signs) == 2
     states = [*(["side"] if both else []), *(["at_rest"] if compensator.zero_band_codes else [])]
     outputs = [name for name in OUTPUTS if both or name != "output_b"]
@@ -89,6 +86,9 @@ def _check_ends(block: FunctionBlock, compensator: Compensator) -> None:
         names = [variable.name for variable in block.of_section(section)]
         if names != expected:
             raise InputError(f"{section} of {NAME}.st has {', '.join(names)}, expected {', '.join(expected)}")
+        for variable in block.of_section(section):
+            if variable.kind != ("BOOL" if variable.name == "at_rest" else "DINT"):
+                raise InputError(f"{NAME}.st, {variable.place}: {variable.name} is a {variable.kind}")
     for variable in block.of_section("VAR"):
         if variable.initial != (0 if variable.name == "side" else 1,):
             raise InputError(f"{NAME}.st, {variable.place}: {variable.name} does not start at rest")
@@ -96,21 +96,15 @@ def _check_ends(block: FunctionBlock, compensator: Compensator) -> None:
 
 def _same_text(folder: Path, text: str, block: FunctionBlock, dialect: str) -> Check:
     """Tell whether each file that a tool imports holds the text that is verified."""
-    try:
-        document = read_xml(folder / f"{NAME}.xml")
-        texts = {f"{NAME}.xml": text_of_plcopen(document)}
-        if dialect == "twincat":
-            texts[f"{NAME}.TcPOU"] = text_of_tcpou(read_xml(folder / f"{NAME}.TcPOU"))
-        others = [name for name, found in texts.items() if found != text]
-        if others:
-            return SAME_TEXT.check(holds=False, text=f"{', '.join(others)}: another text than {NAME}.st")
-        if differing := differing_declarations(document, block):
-            what = f"{NAME}.xml declares {', '.join(differing[:5])} otherwise than {NAME}.st"
-            return SAME_TEXT.check(holds=False, text=what)
-    except (InputError, ValueError) as error:
-        return SAME_TEXT.check(holds=False, text=str(error))
-    words = f"{' and '.join(texts)} read back: the text of {NAME}.st, and {len(block.variables)} typed variables"
-    return SAME_TEXT.check(holds=True, text=words)
+    readers = {f"{NAME}.xml": plcopen_faults} | ({f"{NAME}.TcPOU": tcpou_faults} if dialect == "twincat" else {})
+    faults: list[str] = []
+    for name, reader in readers.items():
+        try:
+            faults += [f"{name}: {fault}" for fault in reader(read_xml(folder / name), block, text)]
+        except InputError as error:
+            faults.append(str(error))
+    words = f"{' and '.join(readers)} read back: the text of {NAME}.st, and {len(block.variables)} typed variables"
+    return SAME_TEXT.check(holds=not faults, text=and_more(faults, 2) if faults else words)
 
 
 def _tried(

@@ -133,9 +133,8 @@ class Evaluator:
         divisor = np.where(x[1] == 0, 1, x[1])
         size = np.abs(x[0]) // np.abs(divisor)
         quotient = np.where((x[0] < 0) != (divisor < 0), -size, size)
-        if operator == "/":
-            return np.where(x[1] == 0, 0, self._checked(quotient, *RANGES[kind], acts))
-        return np.where(x[1] == 0, 0, x[0] - quotient * divisor)
+        within = self._checked(quotient, *RANGES[kind], acts)  # of a rest too: processors stop at one of 2^31
+        return np.where(x[1] == 0, 0, within if operator == "/" else x[0] - quotient * divisor)
 
 
 #: Operators on numbers and conditions whose result is a condition.

@@ -1,7 +1,7 @@
 """Structured Text in, a tree out. Exactly this subset is read; anything else is refused with its line and column.
 
 Comments stand between ``(*`` and ``*)`` and nest in none. Words of the language are written in capitals, and names are
-the same in any case. ::
+the same in any case; what a PLC's tool reserves is no name. A loop's limits are numbers: nothing in it moves them. ::
 
     block      = "FUNCTION_BLOCK" name {section} {statement} "END_FUNCTION_BLOCK"
     section    = ("VAR_INPUT" | "VAR_OUTPUT" | "VAR" ["CONSTANT"] | "VAR_TEMP") {declared} "END_VAR"
@@ -30,7 +30,9 @@ from collections.abc import Callable
 from typing import NoReturn, TypeVar, cast
 
 from dzdesign.core.errors import InputError, quoted
+from dzdesign.verify.structured_text.reserved_words import is_reserved
 from dzdesign.verify.structured_text.syntax import (
+    RANGES,
     Assignment,
     Expression,
     For,
@@ -57,7 +59,7 @@ WORDS = frozenset(
 )
 #: A whole number with more digits is none of 32 bits.
 MOST_DIGITS = 10
-#: Elements of an array, and rounds of a loop.
+#: Elements of an array, and rounds of a loop with those around it.
 MOST = 4096
 #: Characters of a text, and brackets and statements inside of each other.
 LONGEST, DEEPEST = 100_000, 40
@@ -70,7 +72,7 @@ def parse(text: str, source: str) -> FunctionBlock:
 
 class _Parser:
     def __init__(self, text: str, source: str) -> None:
-        self.source, self.at, self.depth = source, 0, 0
+        self.source, self.at, self.depth, self.rounds = source, 0, 0, 1
         if len(text) > LONGEST:
             self._refuse(Place(1, 1), f"the text has {len(text)} characters, expected at most {LONGEST}")
         self.tokens = tokens_of(text, source)
@@ -103,6 +105,8 @@ class _Parser:
         token = self._take()
         if token.kind != "word" or token.text.upper() in WORDS:
             self._refuse(token.place, f"{quoted(token.text)} stands where a name is expected")
+        if is_reserved(token.text):
+            self._refuse(token.place, f"{quoted(token.text)} is a word that PLC tools reserve")
         return token
 
     def _whole(self) -> int:
@@ -219,10 +223,15 @@ class _Parser:
         first = self._whole()
         self._must("TO")
         last = self._whole()
-        if last - first >= MOST:
-            self._refuse(place, f"a loop has more than {MOST} rounds")
+        rounds = max(last - first + 1, 1) * self.rounds
+        if rounds > MOST:
+            self._refuse(place, f"a loop, with those around it, has more than {MOST} rounds")
+        if max(first, last) >= RANGES["DINT"][1]:
+            self._refuse(place, f"a loop to {max(first, last)} never ends: its variable can't be one more")
         self._must("DO")
+        outside, self.rounds = self.rounds, rounds
         body = self._statements("END_FOR")
+        self.rounds = outside
         self._must("END_FOR")
         self._may(";")
         variable = Name(place=name.place, name=name.text.lower())

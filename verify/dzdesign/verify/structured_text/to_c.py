@@ -66,7 +66,8 @@ static inline int64_t quotient(int64_t x, int64_t y, int64_t low, int64_t high, 
 
 static inline int64_t rest(int64_t x, int64_t y, struct faults *faults, int64_t place)
 {
-    return y == 0 ? fault(faults, place) : x % y;
+    /* What is left of the least number over -1 has a quotient that is none, at which processors stop. */
+    return (y == 0 || (y == -1 && x == INT32_MIN)) ? fault(faults, place) : x % y;
 }
 
 static inline int64_t least(int64_t x, int64_t y)

@@ -7,7 +7,7 @@ from dzdesign.core.errors import InputError, quoted
 from dzdesign.verify.structured_text.syntax import Place
 
 TOKEN = re.compile(
-    r"(?P<space>\s+|\(\*(?:(?!\(\*).)*?\*\))|(?P<word>[A-Za-z_]\w*)|(?P<whole>\d+)(?![\w#])"
+    r"(?P<space>[ \t\r\n]+|\(\*(?!\))(?:(?!\(\*).)*?\*\))|(?P<word>[A-Za-z_]\w*)|(?P<whole>\d+)(?![\w#])"
     r"|(?P<sign>:=|<>|<=|>=|\.\.|\((?!\*)|[-+*/=<>)\[\],:;])",
     re.DOTALL,
 )

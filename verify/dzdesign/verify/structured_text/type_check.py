@@ -1,7 +1,9 @@
 """Whether a function block keeps the rules of its types: then each operation has one type, which no PLC can doubt.
 
-A whole number takes the type of what it meets. DINT and UDINT meet nowhere but in a conversion that is written. What is
-constant is never assigned, an input neither, and no variable of VAR_TEMP is read before it was assigned.
+A whole number takes the type of what it meets, and it meets no other number: of ``30000 * 2`` each tool makes its own,
+as a number by itself has the least type that holds it. DINT and UDINT meet nowhere but in a conversion that is written.
+What is constant is never assigned, an input neither. No variable of VAR_TEMP is read before it was assigned, and every
+output is assigned in every call: one that is not would keep its last value.
 """
 
 from collections.abc import Sequence
@@ -34,7 +36,10 @@ def check_types(block: FunctionBlock, source: str) -> dict[int, Kind]:
     checker = _Checker(block, source)
     for variable in block.variables.values():
         checker.declared(variable)
-    checker.statements(block.body, set())
+    known = checker.statements(block.body, set())
+    for output in block.of_section("VAR_OUTPUT"):
+        if output.name.lower() not in known:
+            checker.refuse(output.place, f"{output.name} is not assigned in every call")
     return checker.kinds
 
 
@@ -154,6 +159,8 @@ class _Checker:
             for operand in operands:
                 self.expect(operand, "BOOL", known)
             return "BOOL"
+        if all(map(_is_number, operands)) and not (operator == "NEG" and isinstance(operands[0], Number)):
+            self.refuse(each.place, f"{operator} of whole numbers alone: tools differ in its type; write its result")
         if operator in ("NEG", "ABS"):
             self.expect(operands[0], "DINT", known)
             return "DINT"
@@ -164,16 +171,15 @@ class _Checker:
         return "BOOL" if compares else kind
 
     def _common(self, operands: Sequence[Expression], wanted: Kind | None, known: set[str]) -> Kind:
-        """Return the type of operands: that of the first that is more than whole numbers."""
-        typed = [operand for operand in operands if not _is_number(operand)]
-        kind = self.kind_of(typed[0], wanted, known) if typed else wanted or "DINT"
+        """Return the type of operands, of which one is more than a whole number: that of the first such."""
+        kind = self.kind_of(next(each for each in operands if not _is_number(each)), wanted, known)
         for operand in operands:
             self.expect(operand, kind, known)
         return kind
 
 
 def _is_number(each: Expression) -> bool:
-    """Tell whether an expression is made of whole numbers alone."""
+    """Tell whether an expression is a whole number, or one negated."""
     if isinstance(each, Operation):
-        return each.operator not in CONVERTED and all(map(_is_number, each.operands))
+        return each.operator == "NEG" and _is_number(each.operands[0])
     return isinstance(each, Number) and each.kind is None

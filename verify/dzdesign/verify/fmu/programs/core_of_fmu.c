@@ -1,4 +1,8 @@
-/* The core's functions as the check of every input calls them, by the getters of an FMU: Model Exchange, in Event Mode. */
+/* The core's functions as the check of every input calls them, by the getters of an FMU: Model Exchange, in Event Mode.
+ * What was prepared comes from the file named first; with `sample` behind it the sample is tried, else all. */
+#include <string.h>
+
+#include "every_input.h"
 #include "fmi_calls.h"
 
 uint16_t DZ_CORE(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
@@ -57,4 +61,34 @@ uint16_t DZ_BETA(uint16_t p_a_adc, uint16_t p_b_adc)
         fail("beta is no multiple of 2^-15");
     }
     return (uint16_t)beta;
+}
+
+int main(int count, char **arguments)
+{
+    struct dz_findings findings;
+    const struct dz_plan *plan;
+    void *prepared;
+
+    begin_results(count, arguments);
+    prepared = read_whole(arguments[1]);
+    plan = prepared;
+    if (count > 3 && strcmp(arguments[2], "sample") == 0) {
+        dz_check_sample(prepared, &findings);
+        dz_put_findings(&findings, put);
+    } else {
+        uint16_t *work = calloc((size_t)plan->codes * 3u, sizeof *work);
+        uint16_t *at_zero = calloc((size_t)plan->rows, sizeof *at_zero);
+
+        if (work == NULL || at_zero == NULL) {
+            fail("no memory");
+        }
+        dz_check_everything(prepared, work, at_zero, &findings);
+        dz_put_findings(&findings, put);
+        fputs("\n", results);
+        for (int32_t row = 0; row < plan->rows; row++) {
+            put(at_zero[row]);
+        }
+    }
+    fputs("\n", results);
+    return end_results();
 }

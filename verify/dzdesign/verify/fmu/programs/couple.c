@@ -13,27 +13,25 @@ int main(int count, char **arguments)
     const uint32_t drive = REF_DRIVE, compare = REF_PLANT_COMPARE, flow = REF_Q;
     struct fmu compensator = {0};
     struct fmu plant = {0};
-    FILE *file = (count > 1) ? fopen(arguments[1], "rb") : NULL;
-    double head[4];
+    const double *head, *commands;
     int32_t written = 0;
 
-    if (file == NULL || fread(head, sizeof *head, 4u, file) != 4u) {
-        fail("nothing to do");
-    }
+    begin_results(count, arguments);
+    head = read_whole(arguments[1]);
+    commands = &head[4];
+    double pressure[2] = {head[1], head[2]};
+
     if (!fmu_instantiate(&compensator, FMU_PATH, FMU_VERSION, FMU_TOKEN, 1) ||
         !fmu_instantiate(&plant, PLANT_PATH, FMU_VERSION, PLANT_TOKEN, 1)) {
         fail("a binary refuses the token of its modelDescription.xml");
     }
-    set_reals(&plant, supplies, 2u, &head[1]);
+    set_reals(&plant, supplies, 2u, pressure);
     fmu_initialize(&compensator);
     fmu_initialize(&plant);
     for (int64_t row = 0; row < (int64_t)head[3]; row++) {
-        double given[3], q;
+        double given[3] = {commands[row], 0.0, 0.0}, q;
         uint64_t bits;
 
-        if (fread(given, sizeof *given, 1u, file) != 1u) {
-            fail("a command is missing");
-        }
         get_reals(&plant, pressures, 2u, &given[1]);
         set_ints(&plant, &compare, 1u, &written);
         set_reals(&compensator, inputs, 3u, given);
@@ -42,8 +40,8 @@ int main(int count, char **arguments)
         get_ints(&compensator, &drive, 1u, &written);
         get_reals(&plant, &flow, 1u, &q);
         memcpy(&bits, &q, sizeof bits);
-        printf("%llu %ld\n", (unsigned long long)bits, (long)written);
+        fprintf(results, "%llu %ld\n", (unsigned long long)bits, (long)written);
     }
-    fclose(file);
-    return 0;
+    refuses(&plant, head[0] * head[3], head[0], REF_SUPPLY);
+    return end_results();
 }

@@ -1,12 +1,12 @@
 /* An FMU's binary, loaded, and what of FMI 2 and 3 the checks call: written from the standard. A call that fails ends the
- * program. */
+ * program, but for those that ask whether it does. */
 #ifndef FMI_CALLS_H
 #define FMI_CALLS_H
 
+#include <math.h>
 #include <stdbool.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
+
+#include "results.h"
 
 #ifdef _WIN32
 #include <windows.h>
@@ -42,19 +42,6 @@ struct fmu {
     int (*step_3)(void *instance, double time, double step, bool no_return, bool *event, bool *terminate, bool *early,
                   double *last);
 };
-
-static void fail(const char *what)
-{
-    fprintf(stderr, "%s\n", what);
-    exit(3);
-}
-
-static void need(int status, const char *what)
-{
-    if (status != 0) {
-        fail(what);
-    }
-}
 
 /* A function of the binary, as a pointer of another type of function. */
 static void (*found(const struct fmu *fmu, const char *name))(void)
@@ -181,11 +168,15 @@ static void get_ints(struct fmu *fmu, const uint32_t *references, size_t count, 
          "integers can't be got");
 }
 
+static inline int try_reals(struct fmu *fmu, const uint32_t *references, size_t count, double *values)
+{
+    return fmu->version == 2 ? fmu->set_real_2(fmu->instance, references, count, values)
+                             : fmu->set_real_3(fmu->instance, references, count, values, count);
+}
+
 static inline void set_reals(struct fmu *fmu, const uint32_t *references, size_t count, double *values)
 {
-    need(fmu->version == 2 ? fmu->set_real_2(fmu->instance, references, count, values)
-                           : fmu->set_real_3(fmu->instance, references, count, values, count),
-         "reals can't be set");
+    need(try_reals(fmu, references, count, values), "reals can't be set");
 }
 
 static inline void get_reals(struct fmu *fmu, const uint32_t *references, size_t count, double *values)
@@ -195,14 +186,38 @@ static inline void get_reals(struct fmu *fmu, const uint32_t *references, size_t
          "reals can't be got");
 }
 
-static inline void step(struct fmu *fmu, double time, double size)
+static inline int try_step(struct fmu *fmu, double time, double size)
 {
     bool event, terminate, early;
     double last;
 
-    need(fmu->version == 2 ? fmu->step_2(fmu->instance, time, size, 1)
-                           : fmu->step_3(fmu->instance, time, size, true, &event, &terminate, &early, &last),
-         "a step fails");
+    return fmu->version == 2 ? fmu->step_2(fmu->instance, time, size, 1)
+                             : fmu->step_3(fmu->instance, time, size, true, &event, &terminate, &early, &last);
+}
+
+static inline void step(struct fmu *fmu, double time, double size)
+{
+    need(try_step(fmu, time, size), "a step fails");
+}
+
+/* Steps, at the time that an instance has come to, and inputs, none of which may be taken: no sizes, no times, no numbers. */
+static inline void refuses(struct fmu *fmu, double time, double size, uint32_t real)
+{
+    const double infinity = HUGE_VAL, nothing = HUGE_VAL - HUGE_VAL;
+    const double steps[][2] = {{time, 0.0}, {time, -size}, {time, nothing}, {time, infinity}, {nothing, size},
+                               {infinity, size}, {time - 2.0 * size, size}, {time + 2.0 * size, size}};
+    double values[] = {infinity, -infinity, nothing};
+
+    for (size_t place = 0; place < sizeof steps / sizeof *steps; place++) {
+        if (try_step(fmu, steps[place][0], steps[place][1]) == 0) {
+            fail("the binary takes a step of no size or length, or that does not begin where the last one ended");
+        }
+    }
+    for (size_t place = 0; place < sizeof values / sizeof *values; place++) {
+        if (try_reals(fmu, &real, 1u, &values[place]) == 0) {
+            fail("the binary takes an input that is no number");
+        }
+    }
 }
 
 #endif

@@ -5,33 +5,13 @@
 
 #define MOST 8
 
-static void *read_whole(const char *name)
-{
-    FILE *file = fopen(name, "rb");
-    long size = 0;
-    char *content = NULL;
-
-    if (file != NULL && fseek(file, 0L, SEEK_END) == 0) {
-        size = ftell(file);
-        rewind(file);
-        content = malloc((size_t)size);
-        if (content != NULL && fread(content, 1u, (size_t)size, file) != (size_t)size) {
-            content = NULL;
-        }
-        fclose(file);
-    }
-    if (content == NULL) {
-        fail("nothing to do");
-    }
-    return content;
-}
-
 int main(int count, char **arguments)
 {
     struct fmu fmu = {0};
-    const char *content = (count > 1) ? read_whole(arguments[1]) : NULL;
-    const uint32_t *head = (const uint32_t *)content;
+    const uint32_t *head;
 
+    begin_results(count, arguments);
+    head = read_whole(arguments[1]);
     if (!fmu_instantiate(&fmu, FMU_PATH, FMU_VERSION, FMU_TOKEN, 1)) {
         fail("the binary refuses the token of its modelDescription.xml");
     }
@@ -41,9 +21,6 @@ int main(int count, char **arguments)
         if (fmu_instantiate(&other, FMU_PATH, FMU_VERSION, FMU_TOKEN "x", 1)) {
             fail("the binary takes another token than that of its modelDescription.xml");
         }
-    }
-    if (head == NULL) {
-        return 2;
     }
     const uint32_t integers = head[0];
     const uint32_t outputs = head[1];
@@ -68,9 +45,10 @@ int main(int count, char **arguments)
         step(&fmu, size * (double)row, size);
         get_ints(&fmu, to, outputs, found_);
         for (uint32_t output = 0; output < outputs; output++) {
-            printf("%ld ", (long)found_[output]);
+            fprintf(results, "%ld ", (long)found_[output]);
         }
-        puts("");
+        fputs("\n", results);
     }
-    return 0;
+    refuses(&fmu, size * (double)rows, size, from[0] == REF_U_I_CODE ? REF_U_I : from[0]);
+    return end_results();
 }

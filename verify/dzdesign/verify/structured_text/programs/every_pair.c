@@ -3,7 +3,8 @@
  *
  * The law comes as straight parts along the command, in whole numbers, for each side and pressure drop; its outputs are
  * made by additions alone. What the block remembers, the driven side and whether the command counts as zero, is followed
- * here from its description. A block is tried from every state near zero command, elsewhere from the first and the last.
+ * here from its description. A block is tried from every state near zero command, elsewhere from the first and from one of
+ * the others in turn.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -198,10 +199,11 @@ static void compare(const struct setup *setup, const struct memory *from, int64_
 static int states_of(const struct setup *setup, struct memory *states)
 {
     const int both = setup->sides == 2, rests = (int)setup->side[0].has_rest;
+    static const int64_t sides[3] = {0, 1, -1};
     int count = 0;
-    for (int64_t side = both ? 0 : 1; side >= (both ? -1 : 1); side--) {
+    for (int place = both ? 0 : 1; place < (both ? 3 : 2); place++) {
         for (int64_t at_rest = rests; at_rest >= 0; at_rest--) {
-            states[count].side = both && side == 0 ? 0 : side;
+            states[count].side = sides[place];
             states[count].at_rest = at_rest;
             count++;
         }
@@ -256,8 +258,9 @@ int every_command(const struct setup *setup, int64_t which, int64_t first, int64
                 continue;
             }
             result->pairs++;
+            const int other = count > 1 ? 1 + (int)(result->pairs % (count - 1)) : 0;
             for (int each = 0; each < count; each++) {
-                if (each == 0 || each == count - 1 || towards <= side->leave_zero + 1) {
+                if (each == 0 || each == other || towards <= side->leave_zero + 1) {
                     compare(setup, &states[each], command, a[place], b[place], side, row, known, result);
                 }
             }

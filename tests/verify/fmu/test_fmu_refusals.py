@@ -1,0 +1,135 @@
+"""What an FMU refuses: calls at the wrong time, steps that are none, and what is no number."""
+
+from math import inf, nan
+
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from tests.support.fmu_importer import Importer
+
+STEP_S = 1 / 2500
+REFUSED = (FMICallException,)
+
+
+@pytest.fixture(scope="module", params=("dz_compensator", "dz_plant"))
+def kind(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def path(fmu_folder, fmi, kind):
+    return fmu_folder / f"{kind}_fmi{fmi}.fmu"
+
+
+@pytest.mark.parametrize(
+    ("point", "size"),
+    ((0.0, 0.0), (0.0, -STEP_S), (0.0, nan), (0.0, inf), (0.0, 1e300), (nan, STEP_S), (-inf, STEP_S), (inf, STEP_S),
+     (-STEP_S, STEP_S), (STEP_S, STEP_S), (1.0, STEP_S)),
+)  # fmt: skip
+def test_a_step_that_is_none_is_refused_and_changes_nothing(path, fmi, point, size):
+    with Importer(path, fmi) as one:
+        with pytest.raises(REFUSED):
+            one.fmu.doStep(point, size)
+        one.fmu.doStep(0.0, STEP_S)
+        with pytest.raises(REFUSED):
+            one.fmu.doStep(0.0, STEP_S)
+        one.fmu.doStep(STEP_S * (1 + 1e-9), STEP_S)  # times are rounded
+
+
+def test_no_step_goes_past_the_stop_time(path, fmi):
+    with Importer(path, fmi, startTime=1.0, stopTime=1.0 + STEP_S) as one:
+        with pytest.raises(REFUSED):
+            one.fmu.doStep(1.0, 2 * STEP_S)
+        one.fmu.doStep(1.0, STEP_S)
+
+
+@pytest.mark.parametrize(
+    "times",
+    (
+        {"startTime": nan},
+        {"startTime": -inf},
+        {"startTime": 1e30},
+        {"startTime": 1.0, "stopTime": 0.0},
+        {"startTime": 0.0, "stopTime": nan},
+    ),
+)
+def test_times_that_are_none_are_refused(path, fmi, times):
+    with Importer(path, fmi, begin=False) as one, pytest.raises(REFUSED):
+        one.begin(**times)
+
+
+@pytest.mark.parametrize("value", (nan, inf, -inf))
+def test_what_is_no_number_is_no_input(path, fmi, kind, value):
+    name, output = ("p_A", "u_O") if kind == "dz_compensator" else ("supply", "Q")
+    with Importer(path, fmi) as one:
+        one.fmu.doStep(0.0, STEP_S)
+        before = one.real(output)
+        with pytest.raises(REFUSED):
+            one.give(**{name: value})
+        one.fmu.doStep(STEP_S, STEP_S)
+        assert one.real(output) == before
+
+
+@pytest.mark.parametrize("value", (-1, 65536))
+def test_an_integer_outside_of_its_range_is_no_input(path, fmi, kind, value):
+    with Importer(path, fmi) as one, pytest.raises(REFUSED):
+        one.give_integers(**{"u_i_code" if kind == "dz_compensator" else "compare": value})
+
+
+def test_a_step_that_ends_in_no_number_is_refused(fmu_folder, fmi):
+    with Importer(fmu_folder / f"dz_plant_fmi{fmi}.fmu", fmi) as one:
+        one.give(voltage=1.7e308)
+        with pytest.raises(REFUSED):
+            one.fmu.doStep(0.0, STEP_S)
+
+
+@pytest.mark.parametrize("model_exchange", (False, True))
+def test_before_initialization_nothing_is_computed(path, fmi, kind, model_exchange):
+    output, start = ("u_O", "u_i") if kind == "dz_compensator" else ("Q", "supply")
+    with Importer(path, fmi, model_exchange, begin=False) as one:
+        assert one.real(start) == (0.0 if kind == "dz_compensator" else 1.0)
+        with pytest.raises(REFUSED):
+            one.real(output)
+        with pytest.raises(REFUSED):
+            one.fmu.enterContinuousTimeMode() if model_exchange else one.fmu.doStep(0.0, STEP_S)
+        one.begin()
+        one.real(output)
+
+
+@pytest.mark.parametrize("model_exchange", (False, True))
+def test_after_the_end_nothing_is_set(path, fmi, kind, model_exchange):
+    with Importer(path, fmi, model_exchange) as one:
+        one.fmu.terminate()
+        with pytest.raises(REFUSED):
+            one.give(**{"u_i" if kind == "dz_compensator" else "supply": 1.0})
+        if not model_exchange:
+            with pytest.raises(REFUSED):
+                one.fmu.doStep(0.0, STEP_S)
+
+
+def test_a_parameter_is_set_before_the_start_alone(fmu_folder, fmi):
+    with Importer(fmu_folder / f"dz_plant_fmi{fmi}.fmu", fmi) as one, pytest.raises(REFUSED):
+        one.give(K_a=1.0)
+
+
+def test_between_events_what_is_discrete_stays(path, fmi, kind):
+    name = "u_i_code" if kind == "dz_compensator" else "compare"
+    with Importer(path, fmi, model_exchange=True) as one:
+        one.give_integers(**{name: 1000})
+        one.fmu.enterContinuousTimeMode()
+        with pytest.raises(REFUSED):
+            one.give_integers(**{name: 2000})
+
+
+@pytest.mark.parametrize("time", (nan, inf, -1e30))
+def test_a_time_that_is_none_is_refused(path, fmi, time):
+    with Importer(path, fmi, model_exchange=True) as one:
+        one.fmu.enterContinuousTimeMode()
+        with pytest.raises(REFUSED):
+            one.fmu.setTime(time)
+
+
+def test_event_mode_of_co_simulation_is_for_those_who_asked_for_it(path):
+    if path.stem.endswith("3"):
+        with Importer(path, 3) as one, pytest.raises(REFUSED):
+            one.fmu.enterEventMode()

@@ -1,0 +1,49 @@
+"""Programs around an FMU's binary, and what they found: read from a file of theirs, never from what is printed."""
+
+import logging
+import re
+import shlex
+import subprocess
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.verify.toolchain.machines import Machine
+
+logger = logging.getLogger(__name__)
+
+#: Last line of results that are whole, and how the line of a refusal begins.
+END, REFUSED = "end", "refused "
+NUMBERS = re.compile(r"[\d ]*")
+
+
+def results_of(
+    machine: Machine, program: Path, arguments: Sequence[str], what: str, drive: str = ""
+) -> list[list[int]]:
+    """Run a program of this room and return its lines of numbers.
+
+    One that fails, hangs, or whose binary ends it before its results are whole, is a `RequirementError`. What is
+    printed goes nowhere. A binary that sets out to forge results can: it runs in the same process.
+    """
+    with TemporaryDirectory(prefix="dzdesign-fmu-") as place:
+        file = Path(place) / "results"
+        command = [*machine.runner, str(program), *arguments, f"{drive}{file}"]
+        begin = time.perf_counter()
+        try:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=place,
+                timeout=machine.run_timeout_s, check=False,
+            )  # fmt: skip
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise RequirementError(f"{what} on the {machine.name} did not end: {error}") from error
+        logger.debug("%s (%.3f s)", shlex.join(command), time.perf_counter() - begin)
+        lines = file.read_bytes().decode("ascii", "replace").splitlines() if file.is_file() else []
+    refusal = next((line.removeprefix(REFUSED)[:200] for line in lines if line.startswith(REFUSED)), "")
+    if done.returncode:
+        reason = f"signal {-done.returncode}" if done.returncode < 0 else f"exit status {done.returncode}"
+        raise RequirementError(f"{what} on the {machine.name} ended with {reason}{': ' * bool(refusal)}{refusal}")
+    if not lines or lines[-1] != END or not all(NUMBERS.fullmatch(line) for line in lines[:-1]):
+        raise RequirementError(f"{what} on the {machine.name} ended before its results were whole")
+    return [list(map(int, line.split())) for line in lines[:-1] if line.strip()]
