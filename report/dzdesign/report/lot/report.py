@@ -81,8 +81,10 @@ def _verdict(lot: Lot) -> Headline:
         text = f"{words}, each block tried on every input; the firmware itself is NOT VERIFIED"
         return Headline(kind="open", text=text)
     if not lot.summary.verified:
-        return Headline(kind="open", text=f"{words}; their firmware is NOT VERIFIED")
-    return Headline(kind="good", text=f"{words}, and the firmware of each is verified")
+        what = "firmware and outputs are" if lot.summary.outputs else "firmware is"
+        return Headline(kind="open", text=f"{words}; their {what} NOT VERIFIED")
+    outputs = f" and the outputs {', '.join(lot.summary.outputs)}" if lot.summary.outputs else ""
+    return Headline(kind="good", text=f"{words}, and the firmware{outputs} of each {'are' if outputs else 'is'} verified")
 
 
 def _not_calibrated(lot: Lot) -> tuple[str, ...]:

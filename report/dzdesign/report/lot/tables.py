@@ -7,6 +7,7 @@ from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.lot.folder import Lot
+from dzdesign.report.lot.outputs import output_columns
 from dzdesign.report.lot.reasons import ReasonGroup
 from dzdesign.report.lot.spread import EXTRA, QUANTITIES, Quantity, Spread
 from dzdesign.report.lot.summary import LotSettingSummary, Quantiles
@@ -200,6 +201,7 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
             for side in lot.sides
             for quantity in QUANTITIES.values()
         ),
+        *output_columns(lot),
         ("warnings", lambda row: " ".join(row.warnings) or "–"),
         csv=lot.table if embedded else "",
         name="valves",
