@@ -105,7 +105,7 @@ def make_output(wanted: WantedOutput, of: ForOutputs) -> tuple[ValveOutput, bool
         verdict = NOT_VERIFIED
         return (_verified(wanted, of) if of.verify else _found(wanted, verdict)), False
     except DzdesignError as error:
-        return _found(wanted, verdict, str(error)), False
+        return _found(wanted, verdict, str(error)), verdict == NOT_VERIFIED  # it could not be tried, for want of a tool
     except Exception as error:  # as of a firmware: a fault of ours must not stop the batch
         return _found(wanted, verdict, f"unexpected {type(error).__name__}: {error}"), True
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.errors import and_more
 from dzdesign.design.output_manifest import setting_words
 from dzdesign.report.lot.folder import Lot
@@ -61,8 +60,7 @@ def output_columns(lot: Lot) -> Iterator[tuple[str, Callable[[TableRow], Cell]]]
 
 
 def output_lines(summary: LotSummary) -> list[str]:
-    """Return one sentence for each output, for the terminal.
-    """
+    """Return one sentence for each output, for the terminal."""
     lines = []
     for target, output in summary.outputs.items():
         words = [f"made of {output.made} of {summary.valves} valves"]

@@ -83,8 +83,8 @@ def _verdict(lot: Lot) -> Headline:
     if not lot.summary.verified:
         what = "firmware and outputs are" if lot.summary.outputs else "firmware is"
         return Headline(kind="open", text=f"{words}; their {what} NOT VERIFIED")
-    outputs = f" and the outputs {', '.join(lot.summary.outputs)}" if lot.summary.outputs else ""
-    return Headline(kind="good", text=f"{words}, and the firmware{outputs} of each {'are' if outputs else 'is'} verified")
+    what = "firmware and the outputs of each are" if lot.summary.outputs else "firmware of each is"
+    return Headline(kind="good", text=f"{words}, and the {what} verified")
 
 
 def _not_calibrated(lot: Lot) -> tuple[str, ...]:
