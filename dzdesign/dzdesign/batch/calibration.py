@@ -9,13 +9,13 @@ from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple
 
-from dzdesign.batch.outputs import ForOutputs, WantedOutput, make_output, reason_of_outputs
+from dzdesign.batch.outputs import ForOutputs, WantedOutput, make_output, may_end_otherwise, reason_of_outputs
 from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import DzdesignError, one_line
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.firmware_manifest import Calibration
-from dzdesign.report.lot.output_types import NOT_MADE, NOT_VERIFIED, ValveOutput
+from dzdesign.report.lot.output_types import NOT_MADE, ValveOutput
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
 from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
 from dzdesign.stages.identify import IdentifyChoices
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
 
+#: Folder of a valve's evidence.
+EVIDENCE = "evidence"
 #: A worker may run several threads; NumPy and the solvers of one process would only get in each other's way.
 SOLVER_LOCK = Lock()
 
@@ -160,11 +162,20 @@ def _run(task: Task, folder: Path) -> Result:
     of = ForOutputs(
         compensator=compensator, document=document, valve=valve, recordings=recordings, place=out, verify=task.verify
     )
-    made = [make_output(each, of) for each in task.outputs]
-    outputs = tuple(each for each, _ in made)
-    unwanted = {each.verdict for each in outputs if each.reason}
-    status = FAILED if unwanted & {NOT_MADE, NOT_VERIFIED} else DOES_NOT_HOLD if unwanted else OK
-    return Result(status, reason_of_outputs(outputs), outputs, any(again for _, again in made))
+    outputs = tuple(make_output(each, of) for each in task.outputs)
+    if outputs and task.verify:
+        _report_with_outputs(out)
+    again = any(map(may_end_otherwise, outputs))
+    status = DOES_NOT_HOLD if any(each.verdict == DOES_NOT_HOLD for each in outputs) else FAILED if again else OK
+    return Result(status, reason_of_outputs(outputs), outputs, again)
+
+
+def _report_with_outputs(out: Path) -> None:
+    """Write the valve's report as `dzdesign report` does: if that changed a file, the next run would make all again."""
+    from dzdesign.report.valve_report import REPORT_NAME
+    from dzdesign.stages.report import ReportArguments, report
+
+    report(ReportArguments(out, output=out / EVIDENCE / REPORT_NAME))
 
 
 def _unmade(wanted: WantedOutput, reason: str) -> ValveOutput:
@@ -194,7 +205,7 @@ def _firmware(
     if task.plant:
         plant = folder / task.plant[0]
         plant.write_bytes(task.plant[1])
-    arguments = VerifyArguments(place, ramps=recordings, plant=plant, output=out / "evidence")
+    arguments = VerifyArguments(place, ramps=recordings, plant=plant, output=out / EVIDENCE)
     verification = verify_firmware(arguments, identified=valve)
     if verification.holds:
         return OK, ""

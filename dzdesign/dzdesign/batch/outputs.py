@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
 
 #: Behind the name of an output's folder: that of its evidence.
-EVIDENCE = "_evidence"
+OF_EVIDENCE = "_evidence"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,11 +90,10 @@ def _names(text: str | None) -> list[str]:
     return names
 
 
-def make_output(wanted: WantedOutput, of: ForOutputs) -> tuple[ValveOutput, bool]:
+def make_output(wanted: WantedOutput, of: ForOutputs) -> ValveOutput:
     """Write an output of a valve into its folder, and verify it if asked for; return what came of it.
 
-    No failure is an exception: its reason stands in the result. The second part of it says whether the next run should
-    try again, as after a fault of dzdesign's own.
+    No failure is an exception: its reason stands in the result.
     """
     from dzdesign.codegen.other_targets import generate_output
 
@@ -103,25 +102,32 @@ def make_output(wanted: WantedOutput, of: ForOutputs) -> tuple[ValveOutput, bool
         output = generate_output(of.compensator, wanted.target, wanted.settings, of.document)
         write_folder(of.place / wanted.folder, output.contents, output.manifest)
         verdict = NOT_VERIFIED
-        return (_verified(wanted, of) if of.verify else _found(wanted, verdict)), False
+        return _verified(wanted, of) if of.verify else _found(wanted, verdict)
     except DzdesignError as error:
-        return _found(wanted, verdict, str(error)), verdict == NOT_VERIFIED  # it could not be tried, for want of a tool
+        return _found(wanted, verdict, str(error))
     except Exception as error:  # as of a firmware: a fault of ours must not stop the batch
-        return _found(wanted, verdict, f"unexpected {type(error).__name__}: {error}"), True
+        return _found(wanted, verdict, f"unexpected {type(error).__name__}: {error}")
+
+
+def may_end_otherwise(output: ValveOutput) -> bool:
+    """Tell whether the next run should try an output again: a tool may be there then that was not, or a disk have room.
+    """
+    return bool(output.reason) and output.verdict in (NOT_MADE, NOT_VERIFIED)
 
 
 def _verified(wanted: WantedOutput, of: ForOutputs) -> ValveOutput:
     from dzdesign.stages.verify import VerifyArguments, verify_output_folder
 
     folder = of.place / wanted.folder
-    arguments = VerifyArguments(folder, ramps=of.recordings, output=of.place / (wanted.folder + EVIDENCE))
+    arguments = VerifyArguments(folder, ramps=of.recordings, output=of.place / (wanted.folder + OF_EVIDENCE))
     evidence = verify_output_folder(folder, arguments, of.valve).evidence
     inputs = sum(tried.inputs for tried in evidence.inputs)
     missed = [check for check in evidence.checks if not check.holds]
     if not missed:
         return _found(wanted, HOLDS, inputs=inputs)
     first = min(missed, key=lambda check: check.holds is None)  # what does not hold, before what was not checked
-    return _found(wanted, DOES_NOT_HOLD, f"{first.name}: {first.text}", inputs)
+    verdict: OutputVerdict = NOT_VERIFIED if first.holds is None else DOES_NOT_HOLD
+    return _found(wanted, verdict, f"{first.name}: {first.text}", inputs)
 
 
 def _found(wanted: WantedOutput, verdict: OutputVerdict, reason: str = "", inputs: int = 0) -> ValveOutput:

@@ -63,10 +63,10 @@ def output_lines(summary: LotSummary) -> list[str]:
     """Return one sentence for each output, for the terminal."""
     lines = []
     for target, output in summary.outputs.items():
-        words = [f"made of {output.made} of {summary.valves} valves"]
-        words += [f"verified and holds of {len(output.holds)}"] if summary.verified else ["not verified"]
-        words += [f"does not hold of {and_more(output.does_not_hold, NAMED)}"] if output.does_not_hold else []
-        words += [f"not made of {and_more(output.not_made, NAMED)}"] if output.not_made else []
+        words = [f"made for {output.made} of {summary.valves} valves"]
+        words += [f"verified, and holds for {len(output.holds)}"] if summary.verified else ["not verified"]
+        words += [f"does not hold for {and_more(output.does_not_hold, NAMED)}"] if output.does_not_hold else []
+        words += [f"not made for {and_more(output.not_made, NAMED)}"] if output.not_made else []
         settings = "".join(f", {word}" for word in setting_words(output.settings))
         lines.append(f"output {target}{settings}: {'; '.join(words)}; in {VALVES}/NAME/{output.folder}")
     return lines
