@@ -1,26 +1,19 @@
 """What the report of a lot says of the outputs of its valves beside the C firmware."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 from dzdesign.core.errors import and_more
 from dzdesign.design.output_manifest import setting_words
 from dzdesign.report.lot.folder import Lot
-from dzdesign.report.lot.output_types import DOES_NOT_HOLD, HOLDS, NOT_MADE, NOT_VERIFIED, LotOutput
+from dzdesign.report.lot.output_types import LotOutput
 from dzdesign.report.lot.summary import LotSummary
-from dzdesign.report.lot.table import TableRow
+from dzdesign.report.lot.table import OUTPUT_HASH, TableRow
 from dzdesign.report.lot.valve_folder import VALVES
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, in_number_font, table_of, whole
 
 #: Valves that a cell names.
 NAMED = 20
-#: Verdict on an output of a valve -> its cell.
-CELLS = {
-    HOLDS: Cell(text="✓ holds", kind="good"),
-    DOES_NOT_HOLD: Cell(text="✗ does not hold", kind="bad"),
-    NOT_VERIFIED: Cell(text="? not verified", kind="open"),
-    NOT_MADE: Cell(text="✗ not made", kind="bad"),
-}
 
 
 def outputs_section(lot: Lot) -> dict[str, Section]:
@@ -49,14 +42,9 @@ def _outputs_table(summary: LotSummary) -> Table:
     )
 
 
-def output_columns(lot: Lot) -> Iterator[tuple[str, Callable[[TableRow], Cell]]]:
-    """Yield heading and cell of a column for each output, for the table of the valves."""
-
-    def verdict_on(target: str) -> Callable[[TableRow], Cell]:
-        return lambda row: CELLS.get(row.outputs.get(target, ""), Cell(text="–"))
-
-    for target in lot.summary.outputs if lot.summary else ():
-        yield target, verdict_on(target)
+def output_verdicts(row: TableRow) -> str:
+    """Return the verdict on each output of a valve, for its row; empty of one without outputs."""
+    return ", ".join(f"{name} {cell}" for name, cell in row.outputs.items() if not name.endswith(OUTPUT_HASH))
 
 
 def output_lines(summary: LotSummary) -> list[str]:
