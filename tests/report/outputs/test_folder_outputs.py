@@ -15,6 +15,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
+from dzdesign.report.chain import Chain
 from dzdesign.report.outputs.folder_outputs import outputs_of_folder
 from dzdesign.report.outputs.made_output import MadeOutput, MadeOutputs
 from dzdesign.report.outputs.section import with_outputs
@@ -233,7 +234,23 @@ WRONG = MadeOutput(kind="fmu", settings="", place="fmu/", sha256="0" * 64, holds
 @pytest.mark.parametrize("kind", ["good", "open", "bad"])
 def test_a_wrong_output_takes_the_verdict_and_is_named(kind):
     said = Headline(kind=kind, text="as it was", reasons=("one",))
-    assert with_outputs(said, MadeOutputs(listed=(replace(WRONG, holds=True), replace(WRONG, holds=None)))) == said
-    found = with_outputs(said, MadeOutputs(listed=(WRONG,)))
+    chain = Chain(evidence=evidence_with())
+    right = MadeOutputs(listed=(replace(WRONG, holds=True), replace(WRONG, holds=None)))
+    assert with_outputs(said, right, chain) == said
+    found = with_outputs(said, MadeOutputs(listed=(WRONG,)), chain)
     assert found.kind == "bad" and found.reasons == ("one", "DOES NOT HOLD: fmu/ (fmu): inputs: 3 wrong")
     assert ("fmu/" in found.text) == (kind != "bad") and found.text.endswith("as it was")
+
+
+def test_without_a_firmware_the_verdict_is_of_the_outputs():
+    said = Headline(kind="open", text="NOT VERIFIED: there is no evidence here", cautions=("SIMULATED",))
+    good, open_ = replace(WRONG, place="plc/", holds=True, fault=""), replace(WRONG, holds=None, fault="")
+    found = with_outputs(said, MadeOutputs(listed=(good,)), Chain())
+    assert (found.kind, found.text, found.cautions) == (
+        "good", "Every requirement holds of plc/; no C firmware is here", ("SIMULATED",),
+    )  # fmt: skip
+    found = with_outputs(said, MadeOutputs(listed=(good, open_)), Chain())
+    assert (found.kind, found.text) == ("open", "NOT VERIFIED: fmu/; every requirement holds of plc/")
+    assert with_outputs(said, MadeOutputs(), Chain()) == said
+    faulty = Chain(faults=("one",))
+    assert with_outputs(said, MadeOutputs(listed=(good,)), faulty) == said

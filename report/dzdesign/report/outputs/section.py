@@ -40,13 +40,27 @@ def _check(output: MadeOutput) -> Cell:
     return replace(verdict(output.holds), more=more)
 
 
-def with_outputs(headline: Headline, made: MadeOutputs) -> Headline:
-    """Return the verdict of a report of the firmware, not good if another output is wrong; each is named."""
+def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headline:
+    """Return the verdict of a report, which speaks of a C firmware, with what is to be said of the outputs.
+
+    It is not good if one of them is wrong; each that is wrong is named. Where there is no C firmware and no evidence of
+    one, the verdict is of the outputs.
+    """
     wrong = [each for each in made.listed if each.is_wrong]
     if not wrong:
-        return headline
+        only_these = made.listed and not (chain.faults or chain.firmware or chain.evidence)
+        return _of_outputs_alone(headline, made) if only_these else headline
     reasons = tuple(f"{each.verdict}: {each.place} ({each.kind}): {each.changed or each.fault}" for each in wrong)
     text, names = headline.text, ", ".join(each.place for each in wrong)
     if headline.kind != "bad":
         text = f"{counted(len(wrong), 'output')} NOT to be used: {names}. {text}"
     return replace(headline, kind="bad", text=text, reasons=(*headline.reasons, *reasons))
+
+
+def _of_outputs_alone(headline: Headline, made: MadeOutputs) -> Headline:
+    held = ", ".join(each.place for each in made.listed if each.holds)
+    untried = ", ".join(each.place for each in made.listed if each.holds is None)
+    if untried:
+        text = f"NOT VERIFIED: {untried}" + (f"; every requirement holds of {held}" if held else "")
+        return replace(headline, kind="open", text=text)
+    return replace(headline, kind="good", text=f"Every requirement holds of {held}; no C firmware is here")
