@@ -36,6 +36,8 @@ class OtherTarget:
     #: Option of `codegen` that is of this kind, as a field's name, to the values that it takes, the default first;
     #: with none listed any text is taken, by default an empty one.
     options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    #: Folder that it is written into where no other is named; without one that of its name.
+    folder: str = ""
 
 
 #: In the order of ``--list-targets``.
@@ -47,6 +49,7 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
             description="Structured Text of IEC 61131-3: a function block for a PLC, and PLCopen XML",
             module="dzdesign.codegen.structured_text.files",
             options={"dialect": ("codesys", "twincat"), "interface": ("plc", "codes")},
+            folder="plc",
         ),
         OtherTarget(
             name="fmu",
@@ -61,6 +64,8 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         ),
     )
 }
+#: Folder that a C firmware is written into where no other is named.
+FIRMWARE_FOLDER = "firmware"
 #: Options of `codegen` that a firmware alone has.
 OF_FIRMWARE = ("calibration", "vectors")
 #: What ``--target`` of `codegen` takes.
@@ -87,6 +92,17 @@ def check_target_name(name: str) -> None:
     if name not in ALL_TARGET_NAMES:
         known = ", ".join(ALL_TARGET_NAMES)
         raise InputError(f"there is no target '{name}'{nearest(name, ALL_TARGET_NAMES)}; known: {known}")
+
+
+def folder_of(target: str) -> str:
+    """Return the folder that a target is written into where no other is named: firmware, plc, fmu.
+
+    Examples
+    --------
+    >>> folder_of("f28335"), folder_of("iec61131"), folder_of("fmu")
+    ('firmware', 'plc', 'fmu')
+    """
+    return (OTHER_TARGETS[target].folder or target) if target in OTHER_TARGETS else FIRMWARE_FOLDER
 
 
 def settings_of(target: str, given: Mapping[str, str | None]) -> dict[str, str]:

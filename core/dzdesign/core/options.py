@@ -33,8 +33,8 @@ Table = str | Mapping[str, str] | None
 #: Headings of the help, in their order; an option without one stands above them.
 EXPECTED, RECORDINGS, METER, FIT, LAW = "expected valve", "recordings", "flow meter", "fit", "law"
 CONNECTIONS, DRIVE, CHECKS = "connections of the firmware", "drive functions", "further checks"
-MACHINE = "machine"
-GROUPS = (EXPECTED, RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, MACHINE, CHECKS)
+MACHINE, OUTPUTS = "machine", "outputs other than a C firmware"
+GROUPS = (EXPECTED, RECORDINGS, METER, FIT, LAW, CONNECTIONS, DRIVE, MACHINE, OUTPUTS, CHECKS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,16 @@ class OutputManifest(Artefact):
     @property
     def settings_in_words(self) -> str:
         """Return the settings behind commas; of a long one, such as a plant, the name alone."""
-        words = (f"{name} {value}" if len(value) <= LONGEST_SETTING else f"with a {name}"
-                 for name, value in self.settings.items() if value)  # fmt: skip
-        return "".join(f", {word}" for word in words)
+        return "".join(f", {word}" for word in setting_words(self.settings))
+
+
+def setting_words(settings: Mapping[str, str]) -> list[str]:
+    """Return each setting that is not empty; of a long one, such as a plant, the name alone.
+
+    Examples
+    --------
+    >>> setting_words({"dialect": "codesys", "plant": ""}), setting_words({"plant": "{" + 20 * " " + "}"})
+    (['dialect codesys'], ['with a plant'])
+    """
+    return [f"{name} {value}" if len(value) <= LONGEST_SETTING else f"with a {name}"
+            for name, value in settings.items() if value]  # fmt: skip

@@ -7,13 +7,13 @@ from dzdesign.core.option_readers import whole_number
 from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.design import TARGETS
-from dzdesign.stages.generate import FORMS
+from dzdesign.stages.generate import FORMS, OutputChoices
 from dzdesign.stages.identify import IdentifyChoices
 
 
 @dataclass(frozen=True)
-class BatchArguments(DesignChoices, IdentifyChoices):
-    """Arguments of `batch`: beside its own, the options of `identify` and `design` for every valve."""
+class BatchArguments(OutputChoices, DesignChoices, IdentifyChoices):
+    """Arguments of `batch`: beside its own, the options of `identify`, `design` and outputs for every valve."""
 
     source: Annotated[AnyPath, Option("FOLDER")]
     """Folder with a subfolder of recordings for each valve; or a CSV file with a row for each: name, files (patterns, ;
@@ -30,9 +30,11 @@ class BatchArguments(DesignChoices, IdentifyChoices):
     pattern: Annotated[Text, Option("P")] = None
     """Pattern of the recordings in a subfolder, such as "*.csv" (default: by suffix)."""
     verify: Annotated[bool, Option()] = False
-    """Also verify each valve's firmware, as the command does."""
+    """Also verify each valve's firmware and outputs, as the command does."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
-    """File with the plant of the closed loop, for the verification."""
+    """File with the plant of the closed loop, for the verification; of the output fmu also make an FMU of it."""
+    outputs: Annotated[Text, Option("NAMES")] = None
+    """Outputs that each valve is to have beside its firmware, with commas between them: iec61131, fmu."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
     """Where the numbers of a valve stand: fixed in a firmware of its own (default), or in a calibration block for one
     firmware of the lot; each block is tried on every input."""

@@ -3,20 +3,29 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from threading import Lock
+from typing import TYPE_CHECKING, NamedTuple
 
+from dzdesign.batch.outputs import ForOutputs, WantedOutput, make_output, may_end_otherwise, reason_of_outputs
 from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import DzdesignError, one_line
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.firmware_manifest import Calibration
+from dzdesign.report.lot.output_types import NOT_MADE, ValveOutput
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
 from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
 from dzdesign.stages.identify import IdentifyChoices
 
+if TYPE_CHECKING:
+    from dzdesign.design.compensator import Compensator
+    from dzdesign.identify.valve.model import ValveModel
+
+#: Folder of a valve's evidence.
+EVIDENCE = "evidence"
 #: A worker may run several threads; NumPy and the solvers of one process would only get in each other's way.
 SOLVER_LOCK = Lock()
 
@@ -38,6 +47,7 @@ class Task:
     calibration: Calibration = "fixed"
     verify: bool = False
     plant: tuple[str, bytes] | None = None
+    outputs: tuple[WantedOutput, ...] = ()
     refused: str = ""
 
     @property
@@ -53,12 +63,19 @@ class Task:
             "calibration": self.calibration,
             "verify": self.verify,
             "plant": self.plant and (self.plant[0], sha256_of(self.plant[1])),
+            "outputs": [asdict(each) for each in self.outputs],
             "refused": self.refused,
         }
         return sha256_of(json.dumps(inputs, sort_keys=True).encode())
 
     def outcome(
-        self, status: Status, reason: str = "", files: Mapping[str, bytes] | None = None, *, again: bool = False
+        self,
+        status: Status,
+        reason: str = "",
+        files: Mapping[str, bytes] | None = None,
+        *,
+        again: bool = False,
+        outputs: tuple[ValveOutput, ...] = (),
     ) -> "Outcome":
         """Return what came of it; `files` by their path in the valve's folder.
 
@@ -71,6 +88,7 @@ class Task:
             status=status,
             reason=one_line(reason),
             inputs_sha256=None if again else self.digest,
+            outputs=outputs,
             files={},
         )
         return Outcome(manifest=manifest, files=files or {})
@@ -89,35 +107,45 @@ class Outcome:
         return self.manifest.name
 
 
+class Result(NamedTuple):
+    """What came of the stages; the next run tries it `again` where that may end otherwise."""
+
+    status: Status
+    reason: str = ""
+    outputs: tuple[ValveOutput, ...] = ()
+    again: bool = False
+
+
 def calibrate(task: Task) -> Outcome:
     """Identify, design, generate and, if asked for, verify one valve; a failure is an outcome, never an exception."""
     if task.refused:
         return task.outcome(FAILED, task.refused)
     with SOLVER_LOCK, scratch_folder() as folder:
-        again = False
-        status: Status
         try:
-            status, reason = _run(task, folder)
+            result = _run(task, folder)
         except DzdesignError as error:
-            status, reason = FAILED, str(error)
+            result = Result(FAILED, str(error))
         except Exception as error:  # a fault of ours must not stop the batch either
-            status, reason, again = FAILED, f"unexpected {type(error).__name__}: {error}", True
-        # The worker's own folder is no place that the user knows.
-        for place in (folder / "recordings", folder):
-            reason = reason.replace(f"{place}{os.sep}", "")
+            result = Result(FAILED, f"unexpected {type(error).__name__}: {error}", again=True)
         out = folder / "out"
         paths = sorted(path for path in out.rglob("*") if path.is_file())  # none where nothing came to be written
         files = {path.relative_to(out).as_posix(): path.read_bytes() for path in paths}
-        return task.outcome(status, reason, files, again=again)
+        outputs = tuple(replace(each, reason=_of_the_user(each.reason, folder)) for each in result.outputs)
+        reason = _of_the_user(result.reason, folder)
+        return task.outcome(result.status, reason, files, again=result.again, outputs=outputs)
 
 
-def _run(task: Task, folder: Path) -> tuple[Status, str]:
-    """Run the stages into ``folder/out`` and return status and reason."""
-    from dzdesign.batch.blocks import write_block
-    from dzdesign.codegen.project import generate
+def _of_the_user(reason: str, folder: Path) -> str:
+    """Return a reason without the worker's own folder, which is no place that the user knows."""
+    for place in (folder / "recordings", folder / "out", folder):
+        reason = reason.replace(f"{place}{os.sep}", "")
+    return reason
+
+
+def _run(task: Task, folder: Path) -> Result:
+    """Run the stages into ``folder/out``."""
     from dzdesign.stages.design import DesignArguments, design
     from dzdesign.stages.identify import IdentifyArguments, identify
-    from dzdesign.stages.verify import VerifyArguments, verify_firmware
 
     out = folder / "out"
     out.mkdir()
@@ -126,6 +154,42 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     compensator = design(
         DesignArguments(valve, target=task.target, **vars(task.design), output=out / "compensator.json")
     )
+    status, reason = _firmware(task, folder, valve, compensator, recordings)
+    if status != OK:
+        return Result(status, reason, tuple(_unmade(each, "the firmware does not hold") for each in task.outputs))
+    document = (out / compensator.FILE_NAME).read_bytes()
+    of = ForOutputs(
+        compensator=compensator, document=document, valve=valve, recordings=recordings, place=out, verify=task.verify
+    )
+    outputs = tuple(make_output(each, of) for each in task.outputs)
+    if outputs and task.verify:
+        _report_with_outputs(out)
+    again = any(map(may_end_otherwise, outputs))
+    status = DOES_NOT_HOLD if any(each.verdict == DOES_NOT_HOLD for each in outputs) else FAILED if again else OK
+    return Result(status, reason_of_outputs(outputs), outputs, again)
+
+
+def _report_with_outputs(out: Path) -> None:
+    """Write the valve's report as `dzdesign report` does: if that changed a file, the next run would make all again."""
+    from dzdesign.report.valve_report import REPORT_NAME
+    from dzdesign.stages.report import ReportArguments, report
+
+    report(ReportArguments(out, output=out / EVIDENCE / REPORT_NAME))
+
+
+def _unmade(wanted: WantedOutput, reason: str) -> ValveOutput:
+    return ValveOutput(target=wanted.target, folder=wanted.folder, verdict=NOT_MADE, reason=reason)
+
+
+def _firmware(
+    task: Task, folder: Path, valve: "ValveModel", compensator: "Compensator", recordings: list[Path]
+) -> tuple[Status, str]:
+    """Write a valve's firmware or block into ``folder/out``, and verify it if asked for; return status and reason."""
+    from dzdesign.batch.blocks import write_block
+    from dzdesign.codegen.project import generate
+    from dzdesign.stages.verify import VerifyArguments, verify_firmware
+
+    out = folder / "out"
     place = out / FIRMWARE
     if task.calibration == "block":
         status, reason = write_block(compensator, task.target, out)
@@ -140,7 +204,7 @@ def _run(task: Task, folder: Path) -> tuple[Status, str]:
     if task.plant:
         plant = folder / task.plant[0]
         plant.write_bytes(task.plant[1])
-    arguments = VerifyArguments(place, ramps=recordings, plant=plant, output=out / "evidence")
+    arguments = VerifyArguments(place, ramps=recordings, plant=plant, output=out / EVIDENCE)
     verification = verify_firmware(arguments, identified=valve)
     if verification.holds:
         return OK, ""

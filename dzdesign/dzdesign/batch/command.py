@@ -12,6 +12,7 @@ from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
 from dzdesign.batch.lot_firmware import firmware_left, needing_another, write_lot_firmware
 from dzdesign.batch.odd_blocks import foreign_block
+from dzdesign.batch.outputs import WantedOutput, lot_outputs, wanted_outputs
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import (
@@ -60,17 +61,17 @@ def calibrate_lot(args: BatchArguments) -> LotSummary:
     if source.is_dir() and output.resolve().is_relative_to(source.resolve()):
         raise InputError(f"'{output}' lies in '{source}', whose subfolders are the valves; choose another with -o")
     valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
-    plant = _plant(args)
+    plant, wanted = _plant(args), wanted_outputs(args)
     results = Results(output)
     with _taken(output):
         results.begin([valve.name for valve in valves])
-        digests = {valve.name: _task(valve, args, plant).digest for valve in with_bar(valves, "reading")}
+        digests = {valve.name: _task(valve, args, plant, wanted).digest for valve in with_bar(valves, "reading")}
         waiting = [valve for valve in valves if not results.is_done(valve.name, digests[valve.name])]
         say(f"{len(valves)} valves, {len(valves) - len(waiting)} of them done before")
-        tasks = (_task(valve, args, plant) for valve in waiting)
+        tasks = (_task(valve, args, plant, wanted) for valve in waiting)
         outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
         unwritten = _write_all(results, outcomes, len(waiting))
-        summary = _finished(args, valves, results, unwritten)
+        summary = _finished(args, valves, results, unwritten, wanted)
         _write_report(output)
     return summary
 
@@ -105,7 +106,11 @@ def _is_full(error: InputError) -> bool:
 
 
 def _finished(
-    args: BatchArguments, valves: Sequence[Valve], results: Results, unwritten: Mapping[str, str]
+    args: BatchArguments,
+    valves: Sequence[Valve],
+    results: Results,
+    unwritten: Mapping[str, str],
+    wanted: Sequence[WantedOutput],
 ) -> LotSummary:
     """Write table, lot setting and batch.json, from the valves' folders alone; return the last."""
     output = results.folder
@@ -138,6 +143,7 @@ def _finished(
         ],
         budget=lot_budget(designed),
         firmware=firmware,
+        outputs=lot_outputs(wanted, found),
         units=units_of_lot(designed),
     )
     if setting is None:
@@ -189,15 +195,17 @@ def _plant(args: BatchArguments) -> tuple[str, bytes] | None:
     """Return name and content of the plant's file, which must be one."""
     if args.plant is None:
         return None
-    if not args.verify:
-        raise InputError("--plant is of the verification; give --verify too, or leave it out")
+    if not args.verify:  # of an output it is another setting
+        return None
     from dzdesign.verify.closed_loop.plant import read_plant
 
     read_plant(Path(args.plant))
     return Path(args.plant).name, read_bytes(Path(args.plant), "plant")
 
 
-def _task(valve: Valve, args: BatchArguments, plant: tuple[str, bytes] | None) -> Task:
+def _task(
+    valve: Valve, args: BatchArguments, plant: tuple[str, bytes] | None, wanted: tuple[WantedOutput, ...]
+) -> Task:
     """Read a valve's recordings; where they can't be read the task says why."""
     options = {**vars(args), **valve.overrides, "record": _record(valve, args)}
     recordings, refused = [], ""
@@ -214,6 +222,7 @@ def _task(valve: Valve, args: BatchArguments, plant: tuple[str, bytes] | None) -
         calibration=form_named(args.calibration),
         verify=args.verify,
         plant=plant,
+        outputs=wanted,
         refused=refused,
     )
 

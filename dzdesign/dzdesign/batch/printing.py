@@ -6,6 +6,7 @@ from pathlib import Path
 from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.lot.budget import lot_budget_lines
+from dzdesign.report.lot.outputs import output_lines
 from dzdesign.report.lot.setting_text import checked_line, cost_lines, span, untested_lines
 from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware, LotSummary
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
@@ -25,6 +26,8 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
         table.add_row(_in_words(column, summary.recorded_units), *_numbers(column, values, summary.recorded_units))
     put_table(console, table)
     for line in (*lot_budget_lines(summary.budget), *_setting_lines(summary)):
+        put_line(console, line)
+    for line in output_lines(summary):
         put_line(console, line)
     if summary.firmware:
         put_line(console, _firmware_line(summary.firmware, folder))

@@ -74,7 +74,7 @@ class Results:
         The next run tries it again.
         """
         folder = self.of(name)
-        manifest = replace(read_manifest(folder), status=FAILED, reason=reason, inputs_sha256=None)
+        manifest = replace(read_manifest(folder), status=FAILED, reason=reason, inputs_sha256=None, outputs=())
         kept = [file for file in manifest.files if file in (ValveModel.FILE_NAME, Compensator.FILE_NAME)]
         self.write(Outcome(manifest=manifest, files={file: (folder / file).read_bytes() for file in kept}))
 

@@ -11,6 +11,7 @@ from dzdesign.core.worded import in_units
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.compensator_sides import SIGNS
 from dzdesign.report.lot.budget import LotBudget
+from dzdesign.report.lot.output_types import LotOutput
 from dzdesign.report.lot.spread import quantiles, spreads_of
 from dzdesign.report.lot.summary import (
     FailedValve,
@@ -57,6 +58,7 @@ def summary_of(
     anomalies: Sequence[str] = (),
     budget: LotBudget | None = None,
     firmware: LotFirmware | None = None,
+    outputs: Mapping[str, LotOutput] | None = None,
     units: RecordedUnits = AS_COMPUTED,
 ) -> LotSummary:
     """Return what batch.json says of a finished lot.
@@ -87,6 +89,7 @@ def summary_of(
         why_no_lot_setting=why_no_setting,
         budget=budget,
         firmware=firmware,
+        outputs=outputs or {},
         recorded_units=units,
     )
 

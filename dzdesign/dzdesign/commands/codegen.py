@@ -1,7 +1,7 @@
 """`dzdesign codegen COMPENSATOR.json`, or VALVE.json."""
 
 import os
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Annotated
 
 from dzdesign.core.errors import InputError
@@ -31,7 +31,8 @@ class Arguments(GenerateArguments):
 
 def run(arguments: Arguments, json: bool) -> int:
     """Generate a firmware or another output and print its files, or print the targets."""
-    from dzdesign.codegen.project import Firmware
+    from dzdesign.codegen.other_targets import folder_of
+    from dzdesign.codegen.project import DEFAULT_TARGET, Firmware
     from dzdesign.design.costs import design_warnings
     from dzdesign.terminal.tables import print_firmware, print_output
 
@@ -39,7 +40,8 @@ def run(arguments: Arguments, json: bool) -> int:
         return _list_targets(json)
     if arguments.compensator is None:
         raise InputError("codegen needs a COMPENSATOR.json or a VALVE.json; see `dzdesign codegen --help`")
-    made, folder = generate(arguments), os.fspath(arguments.output or "")
+    folder = os.fspath(arguments.output or folder_of(arguments.target or DEFAULT_TARGET))
+    made = generate(replace(arguments, output=folder))
     for line in design_warnings(made.compensator):
         say(f"warning: {line}")
     if made.note:

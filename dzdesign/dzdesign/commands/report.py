@@ -1,10 +1,11 @@
 """`dzdesign report DIR`."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from dzdesign.core.errors import InputError
 from dzdesign.stages.report import ReportArguments, report
+from dzdesign.terminal.output_tables import print_outputs
 from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say
 
@@ -22,21 +23,27 @@ def run(arguments: Arguments, json: bool) -> int:
         say(f"does not fit: {line}")
     if json:
         verdict = {"holds": made.holds, "verdict": made.verdict}
-        print_json({"report": str(output), **verdict, "faults": made.faults, "missing": made.missing})
+        outputs = {"outputs": [asdict(each) for each in made.outputs.listed], "other_outputs": made.outputs.others}
+        print_json({"report": str(output), **verdict, "faults": made.faults, "missing": made.missing, **outputs})
     else:
         print(made.verdict)
+        print_outputs(made.outputs)
         print(f"Written: {output}")
     return 0 if made.kind == "good" else 1
 
 
 def _beside_evidence(folder: Path) -> Path:
-    """Return where `verify` leaves its report, or a place in the folder where there is no evidence."""
+    """Return where `verify` leaves its report, or a place in the folder where there is no evidence.
+
+    Of an output it is a place beside it: a file that its manifest does not name would be taken for a change of it.
+    """
     from dzdesign.report.artefact_folder import VERIFICATION_NAME
     from dzdesign.report.valve_report import REPORT_NAME
+    from dzdesign.verify.outputs.folder import holds_output
 
     if not folder.is_dir():
         raise InputError(f"'{folder}' is no folder, expected one with artefacts of dzdesign; check the name")
     for place in (folder, folder / "evidence"):
         if (place / VERIFICATION_NAME).is_file():
             return place / REPORT_NAME
-    return folder / REPORT_NAME
+    return (folder.resolve().parent if holds_output(folder) else folder) / REPORT_NAME

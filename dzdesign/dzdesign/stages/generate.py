@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_folder_may_be_written, parse_document, read_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.option_readers import whole_number
-from dzdesign.core.options import AnyPath, Option, Text, flag_of, read_options
+from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, flag_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.stages.design import design_options
 
@@ -23,25 +23,31 @@ if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
 
 
+@dataclass(frozen=True, kw_only=True)
+class OutputChoices:
+    """What can be chosen of an output that is no C firmware: the same in `codegen` and in `batch`."""
+
+    dialect: Annotated[Text, Option("NAME", OUTPUTS)] = None
+    """Of iec61131, dialect of the PLC's tool: codesys (default), twincat."""
+    interface: Annotated[Text, Option("NAME", OUTPUTS)] = None
+    """Of iec61131, what the function block takes: plc, command in 0.01 % and pressures in 0.1 bar (default), or
+    codes, the converter codes that the compensator was designed for."""
+    plant: Annotated[AnyPath | None, Option("PLANT.toml", OUTPUTS)] = None
+    """Of fmu, file with a plant, like examples/paper_valve/plant.toml: also make an FMU of the plant."""
+
+
 @dataclass(frozen=True)
-class GenerateArguments(DesignChoices):
+class GenerateArguments(OutputChoices, DesignChoices):
     """Arguments of `codegen`, in Python `generate`."""
 
     compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
     """compensator.json, or a valve.json, which is designed first with the options of `design`."""
     _: KW_ONLY
-    output: Annotated[AnyPath | None, Option("DIR", command_default="firmware", short="-o")] = None
-    """Folder to write, with the C project or the output."""
+    output: Annotated[AnyPath | None, Option("DIR", short="-o")] = None
+    """Folder to write (default of the command: firmware, or plc, fmu, matlab of such an output)."""
     target: Annotated[Text, Option("NAME", choices=ALL_TARGETS)] = None
     """Microcontroller (default: that of the design; of a VALVE.json f28335), or another output: iec61131, fmu,
     matlab."""
-    dialect: Annotated[Text, Option("NAME")] = None
-    """Of iec61131, dialect of the PLC's tool: codesys (default), twincat."""
-    interface: Annotated[Text, Option("NAME")] = None
-    """Of iec61131, what the function block takes: plc, command in 0.01 % and pressures in 0.1 bar (default), or
-    codes, the converter codes that the compensator was designed for."""
-    plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
-    """Of fmu, file with a plant, like examples/paper_valve/plant.toml: also make an FMU of the plant."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
     """Where the numbers of the valve stand: fixed in the core (default), or in a block of data that it is handed."""
     vectors: Annotated[int | str, Option("N", read=whole_number("a whole number up to 99999", digits=5))] = "0"
@@ -82,7 +88,7 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
     from dzdesign.design.firmware_manifest import form_named
 
     form = form_named(arguments.calibration)
-    settings_of(target, _of_other_targets(arguments))
+    settings_of(target, chosen_of_outputs(arguments))
     vectors: int = read_options(arguments, ["vectors"])["vectors"]
     made, content, designed = _compensator(arguments, target)
     firmware = generate_project(made, target if designed else arguments.target, content, form, vectors)
@@ -96,7 +102,7 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
     from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of, write_output
     from dzdesign.codegen.project import DEFAULT_TARGET
 
-    given = _of_other_targets(arguments)
+    given = chosen_of_outputs(arguments)
     of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
     given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
     settings = settings_of(target, given)
@@ -107,8 +113,8 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
     return write_output(output, Path(arguments.output), over_another=arguments.replace)
 
 
-def _of_other_targets(arguments: GenerateArguments) -> "dict[str, str | None]":
-    """Return the options that are of one output that is no C firmware alone, as they were given."""
+def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
+    """Return the options that are of one output that is no C firmware alone, as they were given; a plant is read."""
     from dzdesign.codegen.other_targets import OTHER_TARGETS
 
     given = {name: getattr(arguments, name) for other in OTHER_TARGETS.values() for name in other.options}

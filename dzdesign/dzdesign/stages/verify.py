@@ -81,7 +81,9 @@ def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
     from dzdesign.verify.outputs.folder import holds_output
 
     with _firmware_folder(arguments.firmware) as folder:
-        return _verify_output(folder, arguments) if holds_output(folder) else _verify_firmware(folder, arguments)
+        if holds_output(folder):
+            return verify_output_folder(folder, arguments)
+        return _verify_firmware(folder, arguments)
 
 
 def verify_firmware(
@@ -92,8 +94,10 @@ def verify_firmware(
         return _verify_firmware(folder, arguments, plant_source, identified)
 
 
-def _verify_output(folder: Path, arguments: VerifyArguments) -> "OutputVerification":
-    """Verify an output that is no C firmware."""
+def verify_output_folder(
+    folder: Path, arguments: VerifyArguments, identified: "ValveModel | None" = None
+) -> "OutputVerification":
+    """Verify an output that is no C firmware; `identified` is as in `verify_firmware`."""
     from dzdesign.regeneration import output_regenerated
     from dzdesign.reidentification import GivenFiles, identified_again
     from dzdesign.verify.firmware.folder import read_compensator
@@ -108,8 +112,8 @@ def _verify_output(folder: Path, arguments: VerifyArguments) -> "OutputVerificat
         verification = verify_output(folder, given, stage)
     added = [output_regenerated(folder)]
     if recordings:
-        with stage_progress("identifying again"):
-            added.append(identified_again(read_compensator(folder), recordings))
+        with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
+            added.append(identified_again(read_compensator(folder), recordings, identified))
     verification = replace(verification, evidence=verification.evidence.with_checks(*added))
     if arguments.output is not None:
         manifest = evidence_manifest(verification.evidence)

@@ -227,12 +227,16 @@ class _Search:
         return min((name for name, digest in self.hashes.items() if digest == stated), key=preferred, default=None)
 
     def _first(self, role: str) -> str | None:
-        """Return the first file of a kind; a manifest, which has the schema of what it lists, is of firmware only."""
-        for name, content in self.files.items():
-            is_manifest = name.rpartition("/")[2] == MANIFEST_NAME
-            if is_of(content, KINDS[role].schema) and (role == "firmware" or not is_manifest):
-                return name
-        return None
+        """Return the first file of a kind, in the folder asked for before the others.
+
+        A manifest, which has the schema of what it lists, is of firmware only.
+        """
+        found = [
+            name
+            for name, content in self.files.items()
+            if is_of(content, KINDS[role].schema) and (role == "firmware" or name.rpartition("/")[2] != MANIFEST_NAME)
+        ]
+        return min(found, key=lambda name: not name.startswith(self.asked), default=None)
 
     def _other(self, role: str, named: str) -> str | None:
         """Return a file of a kind that is not the one: that of its name, which was replaced, before a stranger."""

@@ -29,8 +29,7 @@ def read_artefact_folder(folder: Path) -> dict[str, bytes]:
     if not folder.is_dir():
         raise InputError(f"'{folder}' is no folder, expected one with artefacts of dzdesign; check the name")
     try:
-        folder = folder.resolve()
-        root = folder.parent if _is_one_stage(folder) else folder
+        folder, root = folder.resolve(), artefact_root(folder)
         within = sorted(place for place in root.iterdir() if place.is_dir() and not place.name.startswith("."))
         named = _files_in(folder, root)
     except OSError as error:
@@ -50,6 +49,12 @@ def read_artefact_folder(folder: Path) -> dict[str, bytes]:
             "valve.json; give the folder that `dzdesign demo`, `verify` or `codegen` wrote"
         )
     return files
+
+
+def artefact_root(folder: Path) -> Path:
+    """Return the folder that a report looks into: that around an evidence, firmware or output folder."""
+    folder = Path(folder).resolve()
+    return folder.parent if _is_one_stage(folder) else folder
 
 
 def asked_prefixes(folder: Path) -> tuple[str, ...]:

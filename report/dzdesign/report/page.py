@@ -13,6 +13,7 @@ from dzdesign.core.artefact_files import TOOL
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.presentation.writer import anchor
 from dzdesign.report.figures.figure import PALETTE, ReportFigure, data_uri
+from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
 from dzdesign.report.sections.cells import Table
 
 if TYPE_CHECKING:
@@ -126,6 +127,8 @@ class Report:
         In words.
     faults, missing : tuple of str
         What does not fit, and what is not there.
+    outputs : MadeOutputs
+        Of a valve's report: the outputs that were made of its compensator.
     """
 
     html: str
@@ -134,6 +137,7 @@ class Report:
     verdict: str
     faults: tuple[str, ...]
     missing: tuple[str, ...]
+    outputs: MadeOutputs = NO_OUTPUTS
 
 
 def report_of(page: Page, faults: tuple[str, ...]) -> Report:

@@ -13,6 +13,9 @@ from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
 from dzdesign.report.chain import Chain
 from dzdesign.report.figures.figure import figure_style
+from dzdesign.report.outputs.folder_outputs import outputs_of_folder
+from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
+from dzdesign.report.outputs.section import outputs_sections, with_outputs
 from dzdesign.report.page import Page, Report, Section, report_of
 from dzdesign.report.sections.acceptance import acceptance_section
 from dzdesign.report.sections.budget import budget_section
@@ -32,7 +35,9 @@ OF_A_VALVE = ("data", "thresholds", "beta", "budget", "loop")
 def report_of_folder(folder: Path) -> Report:
     """Make the report of an artefact folder: of demo, evidence or firmware, or with valve.json or compensator.json.
     """
-    return make_report(chain_of(read_artefact_folder(folder), asked=asked_prefixes(folder)))
+    chain = chain_of(read_artefact_folder(folder), asked=asked_prefixes(folder))
+    made_of = chain.places.get("compensator")
+    return make_report(chain, outputs_of_folder(folder, made_of.sha256) if made_of else NO_OUTPUTS)
 
 
 def with_report(
@@ -64,17 +69,17 @@ def with_report(
     return {**files, REPORT_NAME: make_report(chain).html}
 
 
-def make_report(chain: Chain) -> Report:
-    """Make the report of a chain of artefacts."""
+def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS) -> Report:
+    """Make the report of a chain of artefacts, and of the outputs that were made of its compensator."""
     compensator = chain.compensator
     lot, figures = lot_figures(chain), key_figures(chain)
     if lot and chain.evidence:  # the last of them, the inputs, is of the C and not of a valve
         lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
-        sections = _sections(chain)
+        sections = {**_sections(chain), **outputs_sections(chain, outputs)}
     page = Page(
         title=_title(chain),
-        verdict=headline(chain),
+        verdict=with_outputs(headline(chain), outputs, chain),
         record=tuple(chain.valve.record.items()) if chain.valve else (),
         figures=figures,
         lot=lot,
@@ -85,7 +90,7 @@ def make_report(chain: Chain) -> Report:
         not_counted=not_counted(compensator),
         law=account_of(compensator.law) if compensator else None,
     )
-    return report_of(page, chain.faults)
+    return replace(report_of(page, chain.faults), outputs=outputs)
 
 
 def _sections(chain: Chain) -> dict[str, Section]:

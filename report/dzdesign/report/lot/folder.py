@@ -5,7 +5,7 @@ artefacts. A file whose hash is another is named, and not used. Of a lot whose b
 then the valves' folders themselves are read.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from dzdesign.core.input_files import MOST_DOCUMENT
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.summary import AGAIN, OK, SUMMARY_NAME, LotSummary, UnfinishedLot
-from dzdesign.report.lot.table import HASHED, TABLE, TableRow, read_table
+from dzdesign.report.lot.table import HASHED, OUTPUT_HASH, TABLE, TableRow, read_table
 from dzdesign.report.lot.table_rows import table_rows
 from dzdesign.report.lot.valve_folder import VALVES, ValveManifest, read_manifest, read_valve_folder
 from dzdesign.report.lot.valve_names import NAME
@@ -188,7 +188,7 @@ class _LotFiles:
             if not NAME.fullmatch(row.name):
                 other.append(row.name)
                 continue
-            for file, stated in ((file, row.hashes.get(column)) for column, file in HASHED.items()):
+            for file, stated in self._stated(row):
                 path = self.folder / VALVES / row.name / file
                 content = path.read_bytes() if stated and path.is_file() else b""
                 if stated and sha256_of(content) != stated:
@@ -201,6 +201,12 @@ class _LotFiles:
                 f"files of valves are not those that the table was made from ({len(other)}): {and_more(other, NAMED)}"
             )
         return texts
+
+    def _stated(self, row: TableRow) -> Iterator[tuple[str, str | None]]:
+        """Yield each file of a valve whose hash the table may state, with that hash."""
+        yield from ((file, row.hashes.get(column)) for column, file in HASHED.items())
+        for target, output in self.summary.outputs.items():
+            yield f"{output.folder}/{MANIFEST_NAME}", row.outputs.get(target + OUTPUT_HASH)
 
 
 def _unfinished(folder: Path, found: UnfinishedLot, own_hash: tuple[str, str]) -> Lot:

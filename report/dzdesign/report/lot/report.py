@@ -81,8 +81,10 @@ def _verdict(lot: Lot) -> Headline:
         text = f"{words}, each block tried on every input; the firmware itself is NOT VERIFIED"
         return Headline(kind="open", text=text)
     if not lot.summary.verified:
-        return Headline(kind="open", text=f"{words}; their firmware is NOT VERIFIED")
-    return Headline(kind="good", text=f"{words}, and the firmware of each is verified")
+        what = "firmware and outputs are" if lot.summary.outputs else "firmware is"
+        return Headline(kind="open", text=f"{words}; their {what} NOT VERIFIED")
+    what = "firmware and the outputs of each are" if lot.summary.outputs else "firmware of each is"
+    return Headline(kind="good", text=f"{words}, and the {what} verified")
 
 
 def _not_calibrated(lot: Lot) -> tuple[str, ...]:

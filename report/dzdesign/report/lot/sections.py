@@ -8,6 +8,7 @@ from dzdesign.report.figures.figure import ReportFigure, figure_style
 from dzdesign.report.lot.budget import lot_budget_table
 from dzdesign.report.lot.figures import spread_figure
 from dzdesign.report.lot.folder import Lot
+from dzdesign.report.lot.outputs import outputs_section
 from dzdesign.report.lot.reasons import reason_groups
 from dzdesign.report.lot.setting_text import checked_line, cost_lines, cost_text, span, untested_lines
 from dzdesign.report.lot.spread import EXTRA, FAR, FEWEST, Spread
@@ -63,6 +64,7 @@ def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
             "left": _left_section(lot, spreads),
             "setting": _setting_section(lot, spreads),
             "valves": _valves_section(lot, spreads),
+            **outputs_section(lot),
             "recordings": _recordings_section(lot),
             "warnings": Section(),
             "provenance": _provenance_section(lot),

@@ -9,6 +9,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import Artefact, RuleError, quantity
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.report.lot.budget import LotBudget
+from dzdesign.report.lot.output_types import LotOutput
 
 #: File of either type below.
 SUMMARY_NAME = "batch.json"
@@ -192,6 +193,10 @@ class LotSummary(Artefact):
         LotFirmware | None,
         Meta(description="The one firmware, of valves with calibration blocks; null where each has a firmware."),
     ] = None
+    outputs: Annotated[
+        Mapping[str, LotOutput],
+        Meta(description="Outputs of each valve beside its firmware, by target as `codegen --list-targets` names it."),
+    ] = field(default_factory=dict)
     recorded_units: Annotated[
         RecordedUnits, Meta(description="Units of the valves' recordings; the numbers here are in V and MPa.")
     ] = AS_COMPUTED

@@ -14,6 +14,8 @@ from dzdesign.report.lot.summary import AGAIN, LARGEST, OK, Status
 TABLE = "valves.csv"
 #: A column that is an entry of each valve's record: record.serial.
 RECORD = "record."
+#: Columns of an output of the valves, such as output.fmu: its verdict, and the SHA-256 of its manifest.
+OUTPUT, OUTPUT_HASH = "output.", ".manifest_sha256"
 #: A spreadsheet takes a cell that begins so for a formula, but for the '; one more ' before it makes it text.
 FORMULA = re.compile(r"'*[=+\-@]")
 SAFE = re.compile(f"'{FORMULA.pattern}")
@@ -61,7 +63,7 @@ class TableRow:
     """One valve of the lot: what its folder's manifest says, and its figures by side ("" where the lot has one).
 
     `hashes` has SHA-256 by column, ``inputs_sha256`` and those of `HASHED`; `record` who and what, as the engineer
-    says.
+    says; `outputs` the cells about its outputs, by column without `OUTPUT`.
     """
 
     name: str
@@ -71,6 +73,7 @@ class TableRow:
     warnings: tuple[str, ...] = ()
     hashes: Mapping[str, str] = field(default_factory=dict)
     record: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def calibrated(self) -> bool:
@@ -120,8 +123,16 @@ def table_files(rows: Sequence[TableRow]) -> dict[str, bytes]:
     """Return valves.csv and valves.parquet, the same rows in both, but for `safe_cell` in the former."""
     import polars
 
+    outputs = dict.fromkeys(name for row in rows for name in row.outputs)
     names = dict.fromkeys(name for row in rows for name in row.record)
-    cells = [{**row.cells(), **{RECORD + name: row.record.get(name) for name in names}} for row in rows]
+    cells = [
+        {
+            **row.cells(),
+            **{OUTPUT + name: row.outputs.get(name) for name in outputs},
+            **{RECORD + name: row.record.get(name) for name in names},
+        }
+        for row in rows
+    ]
     frame = polars.DataFrame(
         cells, schema={column: polars.String if _is_text(column) else polars.Float64 for column in cells[0]}
     )
@@ -132,7 +143,7 @@ def table_files(rows: Sequence[TableRow]) -> dict[str, bytes]:
 
 
 def _is_text(column: str) -> bool:
-    return column in (*FIRST, *LAST) or column.endswith("trend") or column.startswith(RECORD)
+    return column in (*FIRST, *LAST) or column.endswith("trend") or column.startswith((OUTPUT, RECORD))
 
 
 def read_table(content: bytes, source: str) -> list[TableRow]:
@@ -171,6 +182,7 @@ def _row(heading: Sequence[str], line: Sequence[str], sides: Sequence[str], wher
         warnings=tuple(words["warnings"].split()),
         hashes={column: words[column] for column in LAST[1:] if words[column]},
         record={name.removeprefix(RECORD): cell for name, cell in words.items() if name.startswith(RECORD) and cell},
+        outputs={name.removeprefix(OUTPUT): cell for name, cell in words.items() if name.startswith(OUTPUT) and cell},
     )
 
 

@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.test_record import checked_record
 from dzdesign.report.compensator_sides import SIGNS
-from dzdesign.report.lot.table import HASHED, SideFigures, TableRow
+from dzdesign.report.lot.table import HASHED, OUTPUT_HASH, SideFigures, TableRow
 from dzdesign.report.lot.valve_folder import ValveFolder
 from dzdesign.report.lot.valve_names import by_name
 
@@ -37,6 +38,7 @@ def table_rows(
             warnings=tuple(dict.fromkeys(w.code for w in each.compensator.valve.warnings)) if each.compensator else (),
             hashes=_hashes(each),
             record=_record(each, (records or {}).get(each.name, {})),
+            outputs=_outputs(each),
         )
         for each in sorted(valves, key=lambda valve: by_name(valve.name))
     ]
@@ -45,6 +47,15 @@ def table_rows(
 def _hashes(valve: ValveFolder) -> dict[str, str]:
     files = {column: valve.manifest.files.get(file) for column, file in HASHED.items()}
     return {name: value for name, value in {"inputs_sha256": valve.manifest.inputs_sha256, **files}.items() if value}
+
+
+def _outputs(valve: ValveFolder) -> dict[str, str]:
+    """Return the cells about the outputs of a valve: verdict and hash of the manifest."""
+    cells: dict[str, str] = {}
+    for each in valve.manifest.outputs:
+        cells[each.target] = each.verdict
+        cells[each.target + OUTPUT_HASH] = valve.manifest.files.get(f"{each.folder}/{MANIFEST_NAME}", "")
+    return cells
 
 
 def _record(valve: ValveFolder, given: Mapping[str, str]) -> Mapping[str, str]:

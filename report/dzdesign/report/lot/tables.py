@@ -7,6 +7,7 @@ from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.lot.folder import Lot
+from dzdesign.report.lot.outputs import output_verdicts
 from dzdesign.report.lot.reasons import ReasonGroup
 from dzdesign.report.lot.spread import EXTRA, QUANTITIES, Quantity, Spread
 from dzdesign.report.lot.summary import LotSettingSummary, Quantiles
@@ -192,7 +193,7 @@ def valves_table(lot: Lot, far: Collection[str]) -> Table | None:
     return table_of(
         caption,
         rows,
-        ("valve", lambda row: row.name),
+        ("valve", lambda row: Cell(text=row.name, more=output_verdicts(row))),
         *((("serial", lambda row: _serial(row) or "–"),) if any(map(_serial, lot.rows)) else ()),
         ("status", lambda row: Cell(text="✓ ok", kind="good") if row.calibrated else _failed(row.status)),
         *(

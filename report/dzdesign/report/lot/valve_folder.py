@@ -12,6 +12,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import Artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
+from dzdesign.report.lot.output_types import ValveOutput
 from dzdesign.report.lot.summary import AGAIN, OK, Sha256, Status
 
 #: Folder of a lot in which each valve has its own.
@@ -36,6 +37,9 @@ class ValveManifest(Artefact):
         Meta(description="SHA-256 of recordings, options and version; null where the next run tries it again."),
     ] = None
     board: Annotated[tuple[str, ...], Meta(description="Files of its firmware that are the user's to fill in.")] = ()
+    outputs: Annotated[
+        tuple[ValveOutput, ...], Meta(description="What came of its outputs beside the C firmware; empty of none.")
+    ] = ()
     files: Annotated[Mapping[str, Sha256], Meta(description="SHA-256 of each file beside this one.")]
 
 
