@@ -94,7 +94,8 @@ class Page:
     `template` has the heading of every section, and what no report proves; `sections` by anchor what this one found;
     `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
     `not_counted` is what of a machine no certificate here counts. Of a lot setting `lot` stands before all other
-    figures, and `carrier` is the one valve that `record` and `figures` are of.
+    figures, and `carrier` is the one valve that `record` and `figures` are of. `subtitle` says what the report is of,
+    where the title names the valve; `lead` is the figure of the first page.
     """
 
     title: str
@@ -108,6 +109,8 @@ class Page:
     lot: Sequence[Figure] = ()
     carrier: str = ""
     not_counted: Sequence[str] = ()
+    subtitle: str = ""
+    lead: ReportFigure | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

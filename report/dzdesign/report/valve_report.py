@@ -12,6 +12,8 @@ from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
 from dzdesign.report.chain import Chain
+from dzdesign.report.characteristic.curves import characteristic_curves
+from dzdesign.report.figures.characteristic import characteristic_figure
 from dzdesign.report.figures.figure import figure_style
 from dzdesign.report.page import Page, Report, Section, report_of
 from dzdesign.report.sections.acceptance import acceptance_section
@@ -23,6 +25,7 @@ from dzdesign.report.sections.lot_setting import carrier_of, lot_figures, lot_se
 from dzdesign.report.sections.provenance import provenance_section, warnings_section
 from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import headline, key_figures
+from dzdesign.report.valve_name import valve_name
 
 REPORT_NAME = "report.html"
 #: Of a lot setting, these are of the one valve that its file holds.
@@ -72,8 +75,14 @@ def make_report(chain: Chain) -> Report:
         lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
         sections = _sections(chain)
+        lead = characteristic_figure(
+            characteristic_curves(chain.valve, chain.assessment, chain.curves), chain.recorded_units
+        )
+    name = valve_name(chain.valve.record) if chain.valve else ""
     page = Page(
-        title=_title(chain),
+        title=name or _title(chain),
+        subtitle=_title(chain) if name else "",
+        lead=lead,
         verdict=headline(chain),
         record=tuple(chain.valve.record.items()) if chain.valve else (),
         figures=figures,
