@@ -78,7 +78,7 @@ def change_evidence(folder: Path, change) -> None:
 def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo):
     evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
     loops = evidence["closed_loop"]["pressures"]
-    head = html[: html.index('<section id="acceptance">')]
+    head = html[: html.index('<section id="characteristic">')]
     tried = f"all {len(evidence['checks'])} that were tried"
     assert f"Every requirement holds, {tried}; the certificate is of the recording; {AS_STATED}<" in head
     assert "no machine was declared" in head and "Certificate of the recording<" in head
@@ -92,8 +92,8 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     assert re.findall(r'<section id="(\w+)">', html) == [
-        "acceptance", "loop", "thresholds", "beta", "checks", "warnings", "data", "budget", "law", "integers", "inputs",
-        "provenance",
+        "characteristic", "conditions", "acceptance", "loop", "thresholds", "beta", "checks", "warnings", "data",
+        "budget", "law", "integers", "inputs", "provenance",
     ]  # fmt: skip
     figures = ("dead-zone", "loop", "thresholds", "beta", "fit", "budget", "law", "map", "zero")
     of_sections = [f"figure-{name}-positive" for name in figures]

@@ -16,6 +16,7 @@ from dzdesign.report.figures.figure import (
     new_figure,
     to_report_figure,
 )
+from dzdesign.report.language import word
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,13 +30,8 @@ ORIGIN_WORDS = {"recorded": "recorded", "simulated": "simulated closed loop"}
 HEIGHT, LABEL_ROOM, LABEL_HEIGHT = 3.75, 0.62, 0.055
 
 
-def characteristic_figure(
-    curves: Sequence[CharacteristicCurve], units: RecordedUnits, of: str = ""
-) -> ReportFigure | None:
-    """Draw flow over command at every pressure drop; None without any curve.
-
-    `of` is the one valve that it is of, where the report is of a lot.
-    """
+def characteristic_figure(curves: Sequence[CharacteristicCurve], units: RecordedUnits) -> ReportFigure | None:
+    """Draw flow over command at every pressure drop; None without any curve."""
     curves = [curve for curve in curves if curve.branches]
     if not curves:
         return None
@@ -46,7 +42,7 @@ def characteristic_figure(
     for curve in curves:
         _draw(axes, curve, hues[id(curve)], units)
     axes.set(
-        xlabel="command (% of full)", ylabel=f"flow Q ({units.label('L/min')})",
+        xlabel=word("command (% of full)"), ylabel=f"{word('flow')} Q ({units.label('L/min')})",
         xlim=(-100 if low else 0, 100 if high else 0),
         xticks=range(-100 if low else 0, 101 if high else 1, 20),
     )  # fmt: skip
@@ -58,7 +54,7 @@ def characteristic_figure(
     _label_ends(axes, curves, hues, units)
     _legend(figure, axes, curves)
     return to_report_figure(
-        figure, "characteristic", _caption(curves, of), _description(curves, units), _csv(curves)
+        figure, "characteristic", _caption(curves), _description(curves, units), _csv(curves)
     )
 
 
@@ -117,22 +113,22 @@ def _legend(figure: "object", axes: "Axes", curves: Sequence[CharacteristicCurve
         if of_set:
             dash, width = DASHES[name]
             origin = ORIGIN_WORDS[of_set[0].origin]
-            label = f"{WITH_WORDS[name]} ({origin})"
+            label = f"{word(WITH_WORDS[name])} ({word(origin)})"
             handles += axes.plot([], [], linestyle=dash, lw=width, color=LIGHT["soft"], label=label)
     if any(curve.samples for curve in curves):
-        handles += axes.plot([], [], color=LIGHT["soft"], label="samples", **SAMPLE)
+        handles += axes.plot([], [], color=LIGHT["soft"], label=word("samples"), **SAMPLE)
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), columnspacing=1.4, borderpad=0.1,  # type: ignore[attr-defined]
                   borderaxespad=0.1)  # fmt: skip
 
 
-def _caption(curves: Sequence[CharacteristicCurve], of: str) -> str:
+def _caption(curves: Sequence[CharacteristicCurve]) -> str:
     sides = {curve.side for curve in curves}
-    lines = [f"Flow over command{f' of {of}' if of else ''}, opening and closing, at every pressure drop."]
+    lines = [word("Flow over command, opening and closing, at every pressure drop.")]
     if len(sides) == 1:
-        other = "negative" if "positive" in sides else "positive"
-        lines.append(f"No {other} commands were tested.")
+        none = "negative" if "positive" in sides else "positive"
+        lines.append(word(f"No {none} commands were tested."))
     if any(curve.samples for curve in curves):
-        lines.append("Of the samples a few of each branch are drawn, at equal steps of the command.")
+        lines.append(word("Of the samples a few of each branch are drawn, at equal steps of the command."))
     return " ".join(lines)
 
 
