@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.identify.plots.style import CYCLE
 from dzdesign.report.characteristic.curves import CharacteristicCurve, same_pressure
 from dzdesign.report.figures.figure import (
-    CYCLE,
     LIGHT,
     ReportFigure,
     apart,
