@@ -5,7 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.identify.plots.frame import METADATA, STYLE
+from dzdesign.identify.plots.frame import METADATA
+from dzdesign.identify.plots.style import STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

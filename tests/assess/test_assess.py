@@ -12,11 +12,13 @@ import pytest
 from dzdesign.assess.assessing import assess
 from dzdesign.assess.assessment import Assessment
 from dzdesign.assess.limits import LIMITED, parse_limits
+from dzdesign.assess.measured_curves import MOST_POINTS, MOST_SAMPLES
 from dzdesign.assess.options import AssessOptions
 from dzdesign.assess.quantities import QUANTITIES, observed
 from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import RuleError, to_json_bytes
+from dzdesign.core.artefact_types import RuleError, as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import read_ramp_file
@@ -656,3 +658,22 @@ def test_a_simulated_recording_with_the_compensator_needs_a_firmware(tmp_path, m
     assert main(["simulate", "--firmware", "nowhere", "-o", "after"]) == 2
     assert "compensator of the firmware 'nowhere" in capsys.readouterr().err
     assert not (tmp_path / "after").exists()
+
+
+def test_the_curves_of_both_sets_are_kept_with_samples_and_how_they_were_recorded():
+    sets = {"before": (BEFORE, record(BEFORE, seed=1)), "after": (AFTER, record(AFTER, seed=2))}
+    (item,) = assess([sets["before"][1]], [sets["after"][1]], OPTIONS).pressures
+    for name, (valve, ramp) in sets.items():
+        curve = getattr(item, name).curve
+        for branch, threshold in ((curve.rising, valve.opening), (curve.falling, valve.closing)):
+            at = (threshold + 2.0) * PERCENT
+            flow = np.interp(at, branch.command_percent, branch.q_L_min)
+            assert flow == pytest.approx(2.0 * valve.gain, rel=0.05)  # on the straight line of the valve
+            assert len(branch.command_percent) <= MOST_POINTS
+            assert MOST_SAMPLES / 2 < len(branch.sample_q_L_min) == len(branch.sample_command_percent) <= MOST_SAMPLES
+        assert curve.conditions.sampling_Hz == pytest.approx(1 / np.median(np.diff(ramp.time)), rel=1e-3)
+        assert len(to_json_bytes_of(curve)) < 6000
+
+
+def to_json_bytes_of(curve) -> bytes:
+    return to_json(as_document(curve)).encode()

@@ -145,7 +145,8 @@ def test_every_other_target_prints_names_by_the_same_banner():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
 def test_a_name_in_a_plot(name):
-    from dzdesign.identify.plots.frame import finish, new_figure, plot_style, saved
+    from dzdesign.identify.plots.frame import finish, new_figure, saved
+    from dzdesign.identify.plots.style import plot_style
 
     with plot_style():
         figure = new_figure(2.0, f"1 MPa: {one_line(name)}", name)

@@ -18,8 +18,8 @@ from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
 GOLDENS = GOLDENS_FULL
 #: End of a key's name -> unit of its value.
-UNITS = {"_V": "V", "_MPa": "MPa", "_L_min": "L/min", "_L_min_V": "L/min/V", "_V_mm": "V/mm", "_Hz": "Hz", "_s": "s",
-         "_N_MPa": "N/MPa", "_N_mm_MPa": "N/(mm MPa)"}  # fmt: skip
+UNITS = {"_V": "V", "_MPa": "MPa", "_L_min": "L/min", "_L_min_V": "L/min/V", "_V_mm": "V/mm", "_V_s": "V/s",
+         "_Hz": "Hz", "_s": "s", "_N_MPa": "N/MPa", "_N_mm_MPa": "N/(mm MPa)"}  # fmt: skip
 
 
 def identified(tests, **options):

@@ -13,7 +13,7 @@ from corpus_units import BOTH_WAYS, bench, ramp
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.identify.identification import identify_sides
-from dzdesign.identify.plots.frame import plot_style
+from dzdesign.identify.plots.style import plot_style
 from dzdesign.identify.plots.valve_plots import draw_figures
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.units_of_columns import units_of
@@ -204,10 +204,10 @@ def test_plots_are_drawn_in_the_units_of_the_recordings(folder, ramps):
     with plot_style():
         figures = dict(draw_figures(found))
     flow, thresholds = figures["flow_1_MPa"], figures["thresholds"]
-    edge = next(axes for axes in flow.axes if axes.get_title() == "the edge, enlarged")
+    edge = next(axes for axes in flow.axes if axes.get_title("left") == "the edge, enlarged")
     assert (edge.get_xlabel(), edge.get_ylabel()[-5:]) == ("command u (mA)", "(gpm)")
     assert edge.get_xlim()[0] < CLOSES < OPENS < edge.get_xlim()[1]
-    whole = next(axes for axes in flow.axes if axes.get_title() == "whole range")
+    whole = next(axes for axes in flow.axes if axes.get_title("left") == "whole range")
     assert whole.get_xlim() == pytest.approx((4, 20), abs=0.05) and 3 < whole.get_ylim()[1] < 6
     axes = thresholds.axes[0]
     assert (axes.get_ylabel(), axes.get_xlabel()) == ("command u (mA)", "pressure drop dP (bar)")

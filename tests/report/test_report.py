@@ -78,7 +78,7 @@ def change_evidence(folder: Path, change) -> None:
 def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo):
     evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
     loops = evidence["closed_loop"]["pressures"]
-    head = html[: html.index('<section id="data">')]
+    head = html[: html.index('<section id="characteristic">')]
     tried = f"all {len(evidence['checks'])} that were tried"
     assert f"Every requirement holds, {tried}; the certificate is of the recording; {AS_STATED}<" in head
     assert "no machine was declared" in head and "Certificate of the recording<" in head
@@ -92,11 +92,12 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     assert re.findall(r'<section id="(\w+)">', html) == [
-        "data", "thresholds", "beta", "budget", "law", "integers", "inputs", "loop", "acceptance", "checks", "warnings",
-        "provenance",
+        "characteristic", "conditions", "acceptance", "loop", "thresholds", "beta", "checks", "warnings", "data",
+        "budget", "law", "integers", "inputs", "provenance",
     ]  # fmt: skip
-    figures = ("fit", "thresholds", "beta", "budget", "law", "map", "zero", "dead-zone", "loop")
-    assert [f"figure-{name}-positive" for name in figures] == [name for name in ids if name.startswith("figure-")]
+    figures = ("dead-zone", "loop", "thresholds", "beta", "fit", "budget", "law", "map", "zero")
+    of_sections = [f"figure-{name}-positive" for name in figures]
+    assert ["figure-characteristic", *of_sections] == [name for name in ids if name.startswith("figure-")]
     links = [each["href"] for each in page.of("a")]
     assert {link[1:] for link in links if link.startswith("#")} <= set(ids)
     manifest_symbols = re.findall(r"<code>(\w+)</code><small>core/dz_comp.c", html)
@@ -119,7 +120,7 @@ def test_the_page_needs_nothing_from_outside_and_runs_nothing(html):
 
 def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
     links = {each["download"]: each["href"] for each in Page(html).of("a") if "download" in each}
-    assert len(links) == 11  # nine figures, the constants, and the budget's components
+    assert len(links) == 12  # ten figures, the constants, and the budget's components
     tables = {name: unquote(link.removeprefix("data:text/csv;charset=utf-8,")) for name, link in links.items()}
     evidence = reported_demo / "evidence"
     assert tables["loop-positive.csv"] == (evidence / "closed_loop_positive.csv").read_text()
@@ -133,7 +134,7 @@ def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
 
 def test_figures_take_their_colours_from_the_page(html):
     drawings = re.findall(r'<svg class="drawing".*?</svg>', html, re.DOTALL)
-    assert len(drawings) == 9
+    assert len(drawings) == 10
     light = {shade for shade, _ in PALETTE.values()}
     for drawing in drawings:
         assert not {shade for shade in light if shade in drawing}
@@ -448,10 +449,10 @@ def test_a_valve_alone_is_reported_and_what_is_missing_said(copied, tmp_path):
     report = report_of_folder(folder)
     assert report.kind == "open" and "only an identified valve" in report.verdict
     assert [line.partition(":")[0] for line in report.missing] == ["evidence", "firmware", "compensator"]
-    assert report.html.count("<figure") == 3
+    assert report.html.count("<figure") == 4
     shutil.copy(copied / "compensator.json", folder)
     report = report_of_folder(folder)
-    assert report.html.count("<figure") == 5 and "only a design" in report.verdict
+    assert report.html.count("<figure") == 6 and "only a design" in report.verdict
     assert main(["report", str(folder)]) == 1
     assert (folder / REPORT_NAME).read_text(encoding="utf-8") == report.html
 
@@ -470,7 +471,7 @@ def test_evidence_of_an_earlier_version_without_curves(copied):
     for path in (copied / "evidence").glob("*.csv"):
         path.unlink()
     html = report_of_folder(copied).html
-    assert "closed_loop_positive.csv is missing" in html and html.count("<figure") == 6
+    assert "closed_loop_positive.csv is missing" in html and html.count("<figure") == 7
 
 
 def test_a_neighbour_that_can_not_be_read_does_not_hinder_the_rest(copied):

@@ -54,6 +54,8 @@ LOST_LINKS = """() => [...document.querySelectorAll('a[href^="#"]')].map(a => a.
   .filter(href => !document.getElementById(decodeURIComponent(href.slice(1))))"""
 DOWNLOADS = """async () => Promise.all([...document.querySelectorAll('a[download]')].map(async a =>
   [a.download, await (await fetch(a.href)).text()]))"""
+#: The appendices are folded; what is in them is looked at too.
+UNFOLD = "document.querySelectorAll('details.appendix').forEach(each => { each.open = true; })"
 #: What reaches beyond the page's right edge without a box that scrolls around it.
 BEYOND = """() => [...document.querySelectorAll('main *, nav *')].filter(e =>
     e.getBoundingClientRect().right > document.documentElement.clientWidth + 1 &&
@@ -141,6 +143,7 @@ def opened(browser, path: Path, width: int = 1280, scheme: str = "light"):
     page.on("requestfailed", lambda request: heard.append(f"failed: {request.url[:80]}"))
     page.on("request", lambda request: request.url.startswith(("file:", "data:")) or heard.append(request.url))
     page.goto(path.as_uri())
+    page.evaluate(UNFOLD)
     try:
         yield page, heard
     finally:
@@ -154,7 +157,7 @@ def test_a_page_is_quiet_whole_and_readable(browser, pages, name, width, scheme)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate(BEYOND) == [] and page.evaluate(SPLIT) == []
         sizes = page.evaluate(SIZES)
-        assert len(sizes) == {"demo": 9, "failing": 9, "valve alone": 3, "lot": 3}[name]
+        assert len(sizes) == {"demo": 10, "failing": 10, "valve alone": 4, "lot": 3}[name]
         assert all(wide > 300 and high > 100 for wide, high in sizes)
         poor = [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST]
         assert poor == []
@@ -162,6 +165,28 @@ def test_a_page_is_quiet_whole_and_readable(browser, pages, name, width, scheme)
         dark = page.evaluate("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
         assert dark == (scheme == "dark")
         assert heard == []
+
+
+@pytest.mark.parametrize("name", ["demo", "valve alone"])
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_characteristic_is_seen_without_scrolling(browser, pages, name, width):
+    with opened(browser, pages[name], width) as (page, _):
+        bottom = "document.querySelector('#figure-characteristic svg').getBoundingClientRect().bottom"
+        assert page.evaluate(bottom) < 900
+
+
+def test_the_appendices_are_folded_on_a_screen_and_open_on_paper_and_for_a_link(browser, pages):
+    seen = "document.querySelector('#provenance table').checkVisibility({contentVisibilityAuto: true})"
+    height = "document.querySelector('#provenance').getBoundingClientRect().height"
+    with opened(browser, pages["demo"]) as (page, _):
+        page.reload()
+        assert page.evaluate("[...document.querySelectorAll('details.appendix')].every(each => !each.open)")
+        assert not page.evaluate(seen)
+        page.emulate_media(media="print")
+        assert page.evaluate(height) > 300
+        page.emulate_media(media="screen")
+        page.click('header a[href="#provenance"]')
+        assert page.evaluate(seen)
 
 
 #: By how much each box's content is wider than the box.
@@ -185,7 +210,7 @@ def test_the_raster_decodes_and_the_numbers_can_be_fetched(browser, pages):
         widths = page.evaluate(IMAGES)
         assert widths and all(widths)
         tables = dict(page.evaluate(DOWNLOADS))
-        assert len(tables) == 11
+        assert len(tables) == 12
         assert tables.keys() >= {"budget-positive.csv", "budget-components-positive.csv"}
         evidence = pages["demo"].parent
         assert tables["zero-positive.csv"] == (evidence / "zero_command_positive.csv").read_text()

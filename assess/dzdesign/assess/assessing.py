@@ -14,6 +14,7 @@ from dzdesign.assess.assessment import (
 from dzdesign.assess.curve_pairs import Comparison, CurvePair, compare_curves, relative_distance
 from dzdesign.assess.flow_curves import PressureCurves
 from dzdesign.assess.limits import check_limits
+from dzdesign.assess.measured_curves import measured_curve
 from dzdesign.assess.notes import find_notes
 from dzdesign.assess.options import BOTH_SIDES, SETS, AssessOptions, Set
 from dzdesign.assess.quantities import LOSS, LOSS_OF_FLOW, QUANTITIES, Reading, change, symmetry
@@ -47,7 +48,10 @@ def assess_curves(comparison: Comparison) -> Assessment:
     flows = [_reading_flow(pair, options) for pair in comparison.pairs]
     readings = [_read(pair, flow, comparison) for pair, flow in zip(comparison.pairs, flows, strict=True)]
     _add_symmetry(comparison.pairs, readings)
-    pressures = tuple(map(_pressure, comparison.pairs, flows, readings))
+    pressures = tuple(
+        _pressure(pair, flow, found, options)
+        for pair, flow, found in zip(comparison.pairs, flows, readings, strict=True)
+    )
     return Assessment(
         tool=THIS_TOOL,
         made_from=tuple(
@@ -116,7 +120,9 @@ def _add_symmetry(pairs: Sequence[CurvePair], readings: Sequence[Readings]) -> N
                 found[name]["symmetry"] = symmetry(*(gains.get(side) for side in BOTH_SIDES))
 
 
-def _pressure(pair: CurvePair, reading_flow: float, readings: Readings) -> PressureAssessment:
+def _pressure(
+    pair: CurvePair, reading_flow: float, readings: Readings, options: AssessOptions
+) -> PressureAssessment:
     old, new = (readings.get(name, {}) for name in SETS)
     keys = next(iter(readings.values()))
     return PressureAssessment(
@@ -124,8 +130,8 @@ def _pressure(pair: CurvePair, reading_flow: float, readings: Readings) -> Press
         dp_MPa=_in_MPa(pair.first.dp),
         reading_flow_L_min=reading_flow / L_MIN,
         rated_flow_L_min=pair.first.y_max / L_MIN,
-        before=_ramp_set(pair.before),
-        after=_ramp_set(pair.after),
+        before=_ramp_set(pair.before, options.of_set("before").u_max),
+        after=_ramp_set(pair.after, options.of_set("after").u_max),
         quantities={
             key: BeforeAfter(before=old.get(key), after=new.get(key), change=change(old.get(key), new.get(key)))
             for key in keys
@@ -133,8 +139,12 @@ def _pressure(pair: CurvePair, reading_flow: float, readings: Readings) -> Press
     )
 
 
-def _ramp_set(curves: PressureCurves | None) -> RampSet | None:
-    return None if curves is None else RampSet(source=curves.source, ramps=curves.ramps, dp_MPa=_in_MPa(curves.dp))
+def _ramp_set(curves: PressureCurves | None, u_max: float) -> RampSet | None:
+    if curves is None:
+        return None
+    return RampSet(
+        source=curves.source, ramps=curves.ramps, dp_MPa=_in_MPa(curves.dp), curve=measured_curve(curves, u_max)
+    )
 
 
 def _in_MPa(dp: float | None) -> float | None:

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.assess.limits import LimitResult
+from dzdesign.assess.measured_curves import MeasuredCurve
 from dzdesign.assess.options import Set, Side
 from dzdesign.assess.quantities import Change, Quantity, Reading
 from dzdesign.core.artefact_types import Artefact, RuleError, SourceFile, quantity
@@ -70,6 +71,9 @@ class RampSet:
     source: Annotated[str, Meta(description="Names of the files.")]
     ramps: Annotated[tuple[str, ...], Meta(description="File and number of each ramp.", min_length=1)]
     dp_MPa: Annotated[PressureDrop | None, Meta(description="Pressure drop at no flow.")]
+    curve: Annotated[
+        MeasuredCurve | UnsetType, Meta(description="Flow over command, thinned. Left out where nobody kept it.")
+    ] = UNSET
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

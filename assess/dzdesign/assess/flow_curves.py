@@ -23,6 +23,7 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.pooling import PooledTest, group_by_pressure, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, nominal_dp
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.ramp_conditions import RampConditions, conditions_of
 
 #: Width over u_max of the cells in which a curve is averaged: a mean over some tens of samples.
 CELL = 0.01
@@ -74,6 +75,8 @@ class PressureCurves:
     u_top: float
     #: Flow in the later half of the holds at zero command after closing, m³/s; empty where there is no such hold.
     at_zero: np.ndarray
+    #: How the ramps were recorded.
+    conditions: RampConditions
 
     @property
     def curves(self) -> tuple[FlowCurve, ...]:
@@ -211,6 +214,7 @@ def _at_pressure(
         q_max=largest_flow(item.branches, options.u_max),
         u_top=max(float(branch.u.max()) for branch in item.branches if branch),
         at_zero=np.concatenate([_hold_after_closing(ramp, options.u_max) for ramp in group]),
+        conditions=conditions_of([branch.rate for branch in item.branches if branch], item.test.time),
     )
 
 

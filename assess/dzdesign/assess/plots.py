@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.curve_pairs import Comparison, CurvePair
 from dzdesign.identify.constants import L_MIN
-from dzdesign.identify.plots.frame import HUES, finish, new_figure, plot_style, pressure_names, saved
+from dzdesign.identify.plots.frame import finish, new_figure, pressure_names, saved
+from dzdesign.identify.plots.style import HUES, plot_style
 from dzdesign.identify.plots.valve_curves import BRANCHES
 
 if TYPE_CHECKING:

@@ -29,6 +29,7 @@ from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.results import SideIdentification
 from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard
 from dzdesign.identify.valve.low_flow import LowFlow
+from dzdesign.identify.valve.ramp_conditions import conditions_of
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
@@ -232,6 +233,7 @@ def _test_result(
         recorded=recorded_curve(item, group.leak[row], noise_level, u_max, at_zero),
         ramps=item.ramps,
         left_out=item.left_out,
+        conditions=conditions_of([shape.prepared.branch.rate for shape in item.branches], item.test.time),
     )
 
 

@@ -13,6 +13,7 @@ from dzdesign.core.artefact_files import TOOL
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.presentation.writer import anchor
 from dzdesign.report.figures.figure import PALETTE, ReportFigure, data_uri
+from dzdesign.report.language import current_language, word
 from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
 from dzdesign.report.sections.cells import Table
 
@@ -95,7 +96,9 @@ class Page:
     `template` has the heading of every section, and what no report proves; `sections` by anchor what this one found;
     `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
     `not_counted` is what of a machine no certificate here counts. Of a lot setting `lot` stands before all other
-    figures, and `carrier` is the one valve that `record` and `figures` are of.
+    figures, and `carrier` is the one valve that `record` and `figures` are of. `subtitle` says what the report is of,
+    where the title names the valve; `lead` is the figure of the first page, `logo` a
+    data: address.
     """
 
     title: str
@@ -109,6 +112,9 @@ class Page:
     lot: Sequence[Figure] = ()
     carrier: str = ""
     not_counted: Sequence[str] = ()
+    subtitle: str = ""
+    lead: ReportFigure | None = None
+    logo: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,10 +158,24 @@ def report_of(page: Page, faults: tuple[str, ...]) -> Report:
 def render(page: Page) -> str:
     """Return a page as HTML."""
     environment = strict_templates("dzdesign.report", lstrip_blocks=True, autoescape=True)
-    environment.filters.update(data_uri=data_uri, anchor=anchor, words=_words, cell=_cell)
+    environment.filters.update(
+        data_uri=data_uri, anchor=anchor, words=_words, cell=_cell, translated=word, css_text=_css_text
+    )
     content = {each.name: getattr(page, each.name) for each in fields(page)}
-    html: str = environment.get_template(page.template).render(tool=TOOL, palette=PALETTE, **content)
+    html: str = environment.get_template(page.template).render(
+        tool=TOOL, palette=PALETTE, language=current_language(), **content
+    )
     return html
+
+
+def _css_text(text: str) -> "markupsafe.Markup":
+    """Return a text as a string of a style sheet, in which no sign of it has a meaning."""
+    from markupsafe import Markup
+
+    plain = " ".join(text.split())
+    return Markup('"{}"').format(
+        Markup("").join(sign if sign.isascii() and sign.isalnum() else Markup(f"\\{ord(sign):x} ") for sign in plain)
+    )
 
 
 def _words(text: str) -> "markupsafe.Markup":

@@ -5,12 +5,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
+from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED, verdict_words
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
+from dzdesign.report.measured_figures import measured_figures
 from dzdesign.report.page import Figure, Headline, misfit
 from dzdesign.report.sections.cells import counted, whole
 from dzdesign.verify.contradictions import contradictions
@@ -46,6 +47,12 @@ def _verdict(chain: Chain) -> Headline:
     if chain.faults:
         return misfit(chain.faults)
     if evidence is None:
+        if missed := [check for check in _limits(chain) if check.holds is not True]:
+            count = len(_limits(chain))
+            text = f"NOT VERIFIED, and {len(missed)} of {count} limits of the recordings are missed or not checked"
+            reasons = tuple(f"{verdict_words(check.holds)}: {check.name}: {check.text}" for check in missed)
+            return Headline(kind="bad" if any(check.holds is False for check in missed) else "open", text=text,
+                            reasons=reasons)  # fmt: skip
         what = "a design" if chain.compensator else "an identified valve"
         return Headline(kind="open", text=f"NOT VERIFIED: there is no evidence here, only {what}")
     if others := contradictions(evidence, chain.compensator):
@@ -91,16 +98,29 @@ def key_figures(chain: Chain) -> tuple[Figure, ...]:
     evidence, units = chain.evidence, chain.recorded_units
     inputs = evidence.inputs if evidence else ()
     loops = evidence.closed_loop.pressures if evidence else ()
-    figures: list[Figure] = []
-    if loops:
+    figures: list[Figure] = list(measured_figures(chain.assessment))
+    if loops and figures:
+        figures += [_simulated(loops, units)]
+    elif loops:
         figures += [_dead_zone(loops, "opening", units), _dead_zone(loops, "closing", units), _at_zero(loops, units)]
-    elif chain.valve:
+    elif chain.valve and not figures:
         figures.append(_threshold(chain.valve))
     if chain.compensator:
         figures.append(_certificate(chain.compensator, inputs))
     if evidence:
         figures.append(_inputs(evidence))
     return tuple(figures)
+
+
+def _simulated(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
+    """Return in one card what the simulated loop shows, where measured figures lead."""
+    each = [_dead_zone(loops, branch, units) for branch in ("opening", "closing")]
+    return Figure(
+        label="Simulated closed loop",
+        value=" · ".join(figure.value for figure in each),
+        note=f"dead zone on opening and on closing at the onset of flow, without → with, {worst_of(loops, units)}; "
+        f"flow at zero command: {_at_zero(loops, units).value}",
+    )
 
 
 def _dead_zone(loops: Sequence[PressureResult], branch: str, units: RecordedUnits) -> Figure:

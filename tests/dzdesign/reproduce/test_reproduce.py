@@ -19,7 +19,8 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.derivation.account.published import RAMP_S, SIMULATION, VALVES
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.identify.plots.frame import plot_style, saved
+from dzdesign.identify.plots.frame import saved
+from dzdesign.identify.plots.style import plot_style
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
 from dzdesign.reproduce import chain, paper_figures, paper_numbers, recovered_valves, reproduction, rows

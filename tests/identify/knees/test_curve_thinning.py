@@ -8,9 +8,9 @@ import pytest
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import curve_thinning
-from dzdesign.identify.knees.curve_thinning import TOLERANCE
+from dzdesign.identify.knees.curve_thinning import TOLERANCE, evenly_spaced
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.valve.recorded_curve import MOST_POINTS, RecordedBranch, RecordedCurve
+from dzdesign.identify.valve.recorded_curve import MOST_POINTS, MOST_SAMPLES, RecordedBranch, RecordedCurve
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 
@@ -57,13 +57,13 @@ def test_the_truth_is_nearer_to_the_curve_than_the_noise():
 def test_points_stand_closer_only_about_a_flow_that_is_allowed_at_zero(zero_flow, monkeypatch):
     """Noise below zero is no such flow: without a declared one the tolerance is the same everywhere."""
     asked = []
-    points = curve_thinning._points
+    points = curve_thinning.fewest_points
 
     def noted(u, q, tolerance):
         asked.append((q / L_MIN, tolerance / L_MIN))
         return points(u, q, tolerance)
 
-    monkeypatch.setattr(curve_thinning, "_points", noted)
+    monkeypatch.setattr(curve_thinning, "fewest_points", noted)
     ramp, _ = bent_ramp(2.0)
     (test,) = identify([ramp], IdentifyOptions(zero_flow=zero_flow and zero_flow * L_MIN)).positive.tests
     assert len(asked) == 2 and any(np.any(q < 0) for q, _ in asked)
@@ -103,6 +103,35 @@ def test_one_branch_stands_for_both():
     (test,) = identify([synthetic_ramp(1.0, Truth(), falling=False)]).positive.tests
     assert test.recorded.falling is None
     assert test.recorded.closing is test.recorded.opening is test.recorded.rising
+
+
+def test_samples_are_readings_of_the_recording_spread_over_the_whole_branch():
+    ramp, _ = bent_ramp(2.0)
+    (test,) = identify([ramp]).positive.tests
+    read = set(np.round(ramp.q / L_MIN, 3).tolist())
+    for branch in test.recorded.branches:
+        u, q = np.array(branch.samples.u_V), np.array(branch.samples.q_L_min)
+        assert MOST_SAMPLES / 2 < u.size <= MOST_SAMPLES and np.all(np.diff(u) > 0)
+        assert np.diff(u).max() < 2 * np.ptp(u) / MOST_SAMPLES  # none of the branch is left out
+        assert all(min(abs(value - each) for each in read) < 0.01 for value in q)  # read, and not averaged
+        assert np.std(q - branch.flow_at(u)) > 0.05  # they scatter as the meter does
+
+
+def test_pace_and_sampling_are_those_of_the_recording():
+    ramp, _ = bent_ramp(2.0)
+    (test,) = identify([ramp]).positive.tests
+    step = np.median(np.diff(ramp.time))
+    assert test.conditions.sampling_Hz == pytest.approx(1 / step, rel=1e-3)
+    pace = np.ptp(ramp.u) / (np.ptp(ramp.time) / 2)
+    assert test.conditions.rate_V_s == pytest.approx(pace, rel=0.03)
+    assert test.conditions.samples <= ramp.u.size
+
+
+@pytest.mark.parametrize("commands", [[3.0], [1.0, 2.0], [2.0, 1.0, 1.0, 5.0], list(range(100))])
+def test_evenly_spaced_samples_rise_and_reach_both_ends(commands):
+    u = np.array(commands, dtype=float)
+    kept = u[evenly_spaced(u)]
+    assert kept[0] == u.min() and kept[-1] == u.max() and np.all(np.diff(kept) >= 0)
 
 
 def branch(u=(0.0, 5.0, 10.0), q=(0.0, 0.0, 20.0)):

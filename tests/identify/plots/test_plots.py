@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from dzdesign.command_line.cli import main
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.plots.frame import plot_style, pressure_names
+from dzdesign.identify.plots.frame import pressure_names
+from dzdesign.identify.plots.style import plot_style
 from dzdesign.identify.plots.valve_curves import BOUND_NAMES, draw_thresholds
 from dzdesign.identify.plots.valve_plots import MOST_POINTS, RESIDUAL_EDGE, draw_figures, plot_files
 from tests.support.repeatable_valves import identify_sides
@@ -56,7 +57,7 @@ def labelled(axes, label):
 
 
 def panel(figure, title):
-    return next(axes for axes in figure.axes if axes.get_title().startswith(title))
+    return next(axes for axes in figure.axes if axes.get_title("left").startswith(title))
 
 
 def shown_text(figure):
@@ -349,3 +350,20 @@ class TestBadFolder:
         assert main(["identify", "a.csv", "-o", "valve.json", "--plots", "plots"]) == 2
         wording.of_test(capsys.readouterr().err)
         assert (bench / "plots" / "thresholds.svg").is_dir()
+
+
+def test_plots_of_identify_assess_and_the_report_share_one_style():
+    """Only what a page needs differs: no background, text as text, and sizes for a narrower figure."""
+    import matplotlib as mpl
+
+    from dzdesign.identify.plots.style import STYLE, plot_style
+    from dzdesign.report.figures.figure import figure_style
+
+    with plot_style():
+        in_files = dict(mpl.rcParams)
+    with mpl.rc_context({"lines.linewidth": 7}), figure_style():  # a matplotlibrc of the user's changes nothing
+        on_the_page = dict(mpl.rcParams)
+    differing = {name for name, value in in_files.items() if on_the_page[name] != value}
+    assert differing == {"axes.facecolor", "axes.titlesize", "xtick.labelsize", "ytick.labelsize", "legend.fontsize",
+                         "svg.fonttype"}  # fmt: skip
+    assert all(in_files[name] == value for name, value in STYLE.items() if name != "font.family")

@@ -1,7 +1,7 @@
 """A recorded branch as few points: straight lines through its averaged flow, halved where they depart from it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,14 @@ from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import smooth_profile
 from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.medians import median
-from dzdesign.identify.valve.recorded_curve import MOST_POINTS, SAG_STEPS, RecordedBranch, RecordedCurve
+from dzdesign.identify.valve.recorded_curve import (
+    MOST_POINTS,
+    MOST_SAMPLES,
+    SAG_STEPS,
+    RecordedBranch,
+    RecordedCurve,
+    RecordedSamples,
+)
 
 #: A line between two points is halved where the flow, averaged over so many bins (0.5 % of full command), departs from
 #: it by more than this share of the test's largest flow, and by more than its own noise explains, standard errors.
@@ -39,14 +46,19 @@ def recorded_curve(
     profiles = [_profile(shape, supply, leak, u_max) if shape else None for shape in item.shapes]
     tolerance = TOLERANCE * max(float(profile[1].max()) for profile in profiles if profile)
     rising, falling = (
-        profile and _thinned(*profile, leak=leak, level=noise_level, tolerance=tolerance, at_zero=at_zero or 0.0)
-        for profile in profiles
+        None
+        if shape is None or profile is None
+        else replace(
+            _thinned(*profile, leak=leak, level=noise_level, tolerance=tolerance, at_zero=at_zero or 0.0),
+            samples=_samples(shape.prepared.branch, leak),
+        )
+        for shape, profile in zip(item.shapes, profiles, strict=True)
     )
     curve = RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=None)
     if supply is None:
         return curve
     dp = supply.at(np.linspace(0, curve.q_max_L_min * L_MIN, SAG_STEPS + 1)) / MPA
-    nodes = tuple(round(value, _decimals(dp.max())) for value in dp.tolist())
+    nodes = tuple(round(value, decimals_of(dp.max())) for value in dp.tolist())
     return RecordedCurve(rising=rising, falling=falling, dp_at_flow_MPa=nodes)
 
 
@@ -110,7 +122,7 @@ def _thinned(
     of_bins = np.full(q.size, tolerance)
     if at_zero > 0:
         of_bins[q < ABOUT_ZERO * at_zero] = min(OF_ZERO_FLOW * at_zero, tolerance)
-    at, q_at = _points(u, q, of_bins)
+    at, q_at = fewest_points(u, q, of_bins)
     u_seen = _first_seen(u[at], q_at, leak + level)
     lowest, seen = float(u[0]), u[at] > u_seen
     points = [(u_seen, leak + level), *zip(u[at][seen].tolist(), np.maximum(q_at[seen], 0.0).tolist(), strict=True)]
@@ -119,7 +131,7 @@ def _thinned(
         points = [(lowest, leak), (min(max(onset, lowest), u_seen), leak), *points]
     else:
         points = list(zip(u[at].tolist(), np.maximum(q_at, 0.0).tolist(), strict=True))
-    fine_V, fine_L_min = _decimals(float(u[-1])), _decimals(float(q_at.max()) / L_MIN)
+    fine_V, fine_L_min = decimals_of(float(u[-1])), decimals_of(float(q_at.max()) / L_MIN)
     # Of two points at one command, as of an onset at the first flow seen, the later one stands for both.
     kept = {round(command, fine_V): round(flow / L_MIN, fine_L_min) for command, flow in points}
     commands, flows = np.array(list(kept)), np.array(list(kept.values()))
@@ -132,12 +144,34 @@ def _thinned(
     )
 
 
-def _decimals(largest: float) -> int:
+def _samples(branch: Branch, leak: float) -> RecordedSamples:
+    """Return a few samples of a branch, as recorded; the leak (m³/s) is in them."""
+    kept = evenly_spaced(branch.u)
+    u, q = branch.u[kept], (branch.q[kept] + leak) / L_MIN
+    fine_V, fine_L_min = (decimals_of(float(np.abs(values).max())) for values in (u, q))
+    return RecordedSamples(
+        u_V=tuple(round(value, fine_V) for value in u.tolist()),
+        q_L_min=tuple(round(value, fine_L_min) + 0.0 for value in q.tolist()),
+    )
+
+
+def evenly_spaced(u: np.ndarray, count: int = MOST_SAMPLES) -> np.ndarray:
+    """Return which samples (N,) of a command stand nearest to equal steps over its range, rising; each once."""
+    order = np.argsort(u, kind="stable")
+    rising = u[order]
+    steps = np.linspace(rising[0], rising[-1], min(count, u.size))
+    after = np.clip(np.searchsorted(rising, steps), 1, max(u.size - 1, 1)) if u.size > 1 else np.zeros(1, dtype=int)
+    nearest = after - (steps - rising[after - 1] < rising[np.minimum(after, u.size - 1)] - steps)
+    chosen: np.ndarray = order[np.unique(np.clip(nearest, 0, u.size - 1))]
+    return chosen
+
+
+def decimals_of(largest: float) -> int:
     """Return the decimals that leave a quantity so many digits as a recording tells, and a few more."""
     return min(max(DIGITS - math.ceil(math.log10(largest)), 0), DECIMALS)
 
 
-def _points(u: np.ndarray, q: np.ndarray, tolerance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def fewest_points(u: np.ndarray, q: np.ndarray, tolerance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return at which bins the points stand, and the flow there: least squares, halved until the lines fit.
 
     `tolerance` is that of each bin.

@@ -1,10 +1,8 @@
-"""What all plots share: style, title above, one legend below, and bytes that depend on nothing but what is drawn."""
+"""What plots in files share: title above, one legend below, and bytes that depend on nothing but what is drawn."""
 
 import io
 import textwrap
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import one_line
@@ -13,49 +11,11 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-#: No text below 8 pt, on a page as wide as the figure.
-STYLE = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.labelsize": 9,
-    "axes.titlesize": 9,
-    "figure.titlesize": 10,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "legend.fontsize": 8,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "dzdesign",  # ids in the file follow from its content: same input, same bytes
-}
-#: Hues of Okabe and Ito, darker or lighter where a label's contrast (4.5 to 1) asks for it; `sky` fills areas only.
-HUES = {
-    "ink": "#1b2128",
-    "soft": "#5a6570",
-    "grid": "#d9dee4",
-    "face": "#fefefe",
-    "blue": "#0072b2",
-    "vermilion": "#c44e00",
-    "green": "#008060",
-    "purple": "#a0467a",
-    "orange": "#8f6200",
-    "sky": "#3b8fc4",
-}
 #: Of a figure, inches; of a line of its title, characters.
 WIDTH, TITLE_WIDTH = 9, 105
 DPI = 150
 #: Neither the day nor the version of a library: the same valve gives the same bytes.
 METADATA = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
-
-
-@contextmanager
-def plot_style() -> Iterator[None]:
-    """Draw alike on every machine, whatever its matplotlibrc says."""
-    from matplotlib import style
-
-    with style.context(["default", STYLE]), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # of a file's name
-        yield
 
 
 def new_figure(height: float, *title: str) -> "Figure":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.identify.plots.frame import HUES
+from dzdesign.identify.plots.style import HUES
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
 from dzdesign.identify.valve.side_model import SideModel
 

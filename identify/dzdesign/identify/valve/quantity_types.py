@@ -11,6 +11,8 @@ Voltage = Annotated[float, quantity("V", ge=-1e4, le=1e4)]
 VoltageError = Annotated[float, quantity("V", ge=0, le=1e4)]
 PressureDrop = Annotated[float, quantity("MPa", ge=1e-6, le=1e3)]
 Flow = Annotated[float, quantity("L/min", ge=0, le=1e6)]
+#: A reading: noise may take it below zero.
+SignedFlow = Annotated[float, quantity("L/min", ge=-1e6, le=1e6)]
 FlowGain = Annotated[float, quantity("L/min/V", ge=0, le=1e6)]
 #: Largest beta(dP): a table of it has room for that, and dP0 can be chosen so that none is larger.
 LARGEST_BETA = 2

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.quantity_types import Flow, FlowGain, PressureDrop, Ratio, Voltage, VoltageError
+from dzdesign.identify.valve.ramp_conditions import RampConditions
 from dzdesign.identify.valve.recorded_curve import RecordedCurve
 
 #: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has next to none.
@@ -124,6 +125,9 @@ class TestResult:
     left_out: Annotated[
         tuple[LeftOut, ...], Meta(description="What of the recordings was left out: in these ramps, and before them.")
     ] = ()
+    conditions: Annotated[
+        RampConditions | UnsetType, Meta(description="How it was recorded. Left out where nobody wrote it down.")
+    ] = UNSET
 
     def __post_init__(self) -> None:
         for branch in BRANCHES:

@@ -11,15 +11,41 @@ from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.core.artefact_types import RuleError, quantity
-from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, Voltage
+from dzdesign.identify.valve.quantity_types import Flow, PressureDrop, SignedFlow, Voltage
 
 #: Most points of a branch: beyond, the flow between two points may be off by more than `error_L_min` promises to be.
 MOST_POINTS = 100
+#: Most single samples of a branch that are kept beside its points.
+MOST_SAMPLES = 24
 #: Equal steps of the flow, from none to the largest, at whose ends the pressure drop is given.
 SAG_STEPS = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedSamples:
+    """Single samples of a branch, for a plot that shows how they scatter: none of them is an average."""
+
+    u_V: Annotated[
+        tuple[Voltage, ...],
+        Meta(
+            description="Commands of the samples, rising: of equal steps over the branch the sample nearest to each, "
+            "whichever ramp it is of.",
+            min_length=1,
+            max_length=MOST_SAMPLES,
+            extra_json_schema={"unit": "V"},
+        ),
+    ]
+    q_L_min: Annotated[
+        tuple[SignedFlow, ...],
+        quantity("L/min", "Flow of each as read, the meter's lag and its error at rest taken out; a leak is in it."),
+    ]
+
+    def __post_init__(self) -> None:
+        if len(self.u_V) != len(self.q_L_min):
+            raise RuleError(f"{len(self.u_V)} commands of samples stand beside {len(self.q_L_min)} flows")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +79,10 @@ class RecordedBranch:
             "where it is seen."
         ),
     ]
+    samples: Annotated[
+        RecordedSamples | UnsetType,
+        Meta(description="A few of its samples, not averaged. Left out where nobody kept any."),
+    ] = UNSET
 
     def __post_init__(self) -> None:
         if len(self.u_V) != len(self.q_L_min):

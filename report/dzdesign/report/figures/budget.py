@@ -7,8 +7,8 @@ import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.machine.budget import Budget, BudgetLine
+from dzdesign.identify.plots.style import CYCLE
 from dzdesign.report.figures.figure import (
-    CYCLE,
     LIGHT,
     ReportFigure,
     csv_text,

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.identify.plots.style import CYCLE
 from dzdesign.report.figures.figure import (
-    CYCLE,
     LIGHT,
     Curves,
     ReportFigure,

@@ -8,7 +8,6 @@ never in colour alone.
 import csv
 import io
 import re
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.identify.plots.frame import HUES
+from dzdesign.identify.plots.style import HUES, plot_style
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,43 +39,11 @@ DARK = {
 }
 #: Name of a variable of the page -> (light, dark).
 PALETTE = {name: (light, DARK[name]) for name, light in LIGHT.items()}
-#: For a series over the pressure drop: hues in turn.
-CYCLE = ("blue", "vermilion", "green", "purple", "orange", "ink")
 WIDTH = 7.4
 #: Left margin, and the width of numbers on the axis for which it has room: of ``5.150``.
 LEFT, TICKS_IN_MARGIN = 0.6, 0.345
 #: Of the numbers on axes, points.
 TICK_SIZE = 8.5
-#: Of Matplotlib, while a figure is drawn.
-STYLE = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.labelsize": 9,
-    "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
-    "xtick.labelsize": TICK_SIZE,
-    "ytick.labelsize": TICK_SIZE,
-    "legend.fontsize": 8.5,
-    "legend.frameon": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": LIGHT["grid"],
-    "grid.linewidth": 0.7,
-    "axes.edgecolor": LIGHT["soft"],
-    "axes.labelcolor": LIGHT["ink"],
-    "text.color": LIGHT["ink"],
-    "xtick.color": LIGHT["soft"],
-    "ytick.color": LIGHT["soft"],
-    "xtick.labelcolor": LIGHT["ink"],
-    "ytick.labelcolor": LIGHT["ink"],
-    "axes.facecolor": "none",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "hatch.linewidth": 0.8,
-    "text.parse_math": False,
-    "svg.fonttype": "none",  # text stays text: to be searched, read out, and set in the page's own font
-    "svg.hashsalt": "dzdesign",  # ids follow from the content: same input, same bytes
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,11 +91,15 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """Draw in the report's style; a name may have letters that the font for measuring lacks, the page's has them."""
-    from matplotlib import rc_context
-
-    with rc_context(STYLE), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+    """Draw in the style of all plots, for a page: no background, and text that stays text."""
+    with plot_style(
+        axes__facecolor="none",
+        axes__titlesize=9.5,
+        xtick__labelsize=TICK_SIZE,
+        ytick__labelsize=TICK_SIZE,
+        legend__fontsize=8.5,
+        svg__fonttype="none",  # to be searched, read out, and set in the page's own font
+    ):
         yield
 
 

@@ -4,11 +4,11 @@ import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
+from dzdesign.identify.plots.style import CYCLE
 from dzdesign.identify.plots.valve_curves import BOUND_NAMES, BRANCHES, draw_beta, draw_thresholds
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import (
-    CYCLE,
     LIGHT,
     ReportFigure,
     csv_text,
