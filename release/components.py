@@ -94,7 +94,7 @@ def licence_of(installed: Distribution) -> str:
         return metadata["License-Expression"]
     classifiers = [line.split(" :: ")[-1] for line in metadata.get_all("Classifier") or () if "License ::" in line]
     words = [word for word in classifiers if word != "OSI Approved"]
-    text = " AND ".join(words) or (metadata["License"] if "License" in metadata else "").strip().partition("\n")[0]
+    text = " AND ".join(words) or "".join(metadata.get_all("License") or ()).strip().partition("\n")[0]
     if not text:
         raise PackageNotFoundError(f"{installed.name}, or rather its licence: its metadata states none")
     return SPDX.get(text, text)
