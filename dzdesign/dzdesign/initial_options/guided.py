@@ -48,6 +48,7 @@ def init_by_questions(arguments: InitArguments) -> "Proposal":
     if declared != Declared(dp=dp):
         proposal = look(answered, declared)
     if arguments.output is not None:
+        check_output(arguments)  # once more: the answers took their time
         write_file(Path(arguments.output), proposal.text)
     return proposal
 

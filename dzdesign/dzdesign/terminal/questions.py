@@ -37,6 +37,9 @@ def ask(question: str, default: str = "", check: Callable[[str], object] | None 
                 "the input ended before the last question; nothing was written. With --quiet init asks nothing and "
                 "leaves open what it does not know"
             ) from error
+        except UnicodeError:  # letters of another encoding
+            print("  the answer has letters that the terminal's encoding does not know; type it again")
+            continue
         if not answer:
             return default
         try:

@@ -14,6 +14,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.commands import init as command
+from dzdesign.terminal.questions import ask
 from tests.dzdesign.commands.test_init import columns_of, write
 
 pty = pytest.importorskip("pty", reason="this system has no pseudo-terminals")
@@ -153,6 +154,29 @@ def test_pressure_drops_of_files_and_a_smaller_command(here, answering):
     answering(r1="10 bar", r2=["low", "20 bar"], Full=["5 V", "10 V"])
     assert main(["init", "r1.csv", "r2.csv"]) in (0, 1)
     assert table()["dp"] == {"r1.csv": "10 bar", "r2.csv": "20 bar"} and table()["u-max"] == "10 V"
+
+
+def test_a_file_that_came_while_it_asked_stays(here, monkeypatch, capsys):
+    recorded("t_s,u_V,Q_Lmin,dP_bar")
+    monkeypatch.setattr(command, "may_ask", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda prompt: Path("dzdesign.toml").write_text("mine") and ENTER)
+    assert main(["init", "ramp.csv"]) == 2
+    assert "init never writes over a file" in capsys.readouterr().err
+    assert Path("dzdesign.toml").read_text() == "mine"
+
+
+def test_an_answer_in_another_encoding_is_asked_again(monkeypatch, capsys):
+    replies = iter([UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"), " 10 bar\x07 "])
+
+    def answer(prompt):
+        reply = next(replies)
+        if isinstance(reply, Exception):
+            raise reply
+        return reply
+
+    monkeypatch.setattr("builtins.input", answer)
+    assert ask("Pressure drop") == "10 bar"
+    assert "type it again" in capsys.readouterr().out
 
 
 # --- with a terminal, and without -----------------------------------------------------------------------------------
