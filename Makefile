@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-c2000ware bench-faults bench-identify bench-isr bench-loading bench-paper bench-verify
+.PHONY: demo test quick coverage lint docs dist goldens lock clean fuzz bench bench-batch bench-c2000ware bench-faults bench-identify bench-isr bench-loading bench-paper bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -91,6 +91,10 @@ docs: $(STAMP)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -E -W --keep-going -b html docs $(SITE)
 	@echo "docs: $(SITE)/index.html"
 
+# A release in dist/: wheel, source package, list of components, pages and checksums; the same bytes from the same sources.
+dist: docs
+	$(BIN)/python -m release.distribution --pages $(SITE)
+
 $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit("dzdesign needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Try: make PYTHON=python3.12") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv $(VENV)
@@ -104,4 +108,4 @@ lock:
 	    --generate-hashes --no-annotate --no-header --quiet --upgrade -o requirements.lock
 
 clean:
-	rm -rf $(VENV) $(DOCS) docs/_build docs/_made build *.egg-info .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(DOCS) docs/_build docs/_made build dist *.egg-info .pytest_cache .ruff_cache

@@ -38,6 +38,12 @@ __all__ = [
     "report", "simulate", "verify",
 ]  # fmt: skip
 
+
+def __dir__() -> list[str]:
+    """Return the names of the API alone, for an editor or a notebook that completes them."""
+    return sorted(__all__)
+
+
 display_by(heading=heading_of, text=text_of, html=html_of)
 
 init = with_keywords(init_stage.InitArguments, init_stage.init)

@@ -1,6 +1,7 @@
 """Signals as engineers write them, the codes they become, and the drive functions as integers."""
 
 import random
+import re
 from fractions import Fraction
 
 import pytest
@@ -90,6 +91,16 @@ def test_a_command_that_cannot_be(text, wording):
     with pytest.raises(InputError) as caught:
         command(text)
     wording(f"a signal: {text}", str(caught.value))
+
+
+@pytest.mark.parametrize("text", ["0..10 V", "-10..10V", "-7..7 V", "0..7 V", "-12..12 V"])
+def test_the_attenuator_that_is_proposed_is_one_that_serves(text):
+    with pytest.raises(InputError) as caught:
+        command(text)
+    proposed = re.search(r"such as '([^']+)'", str(caught.value))[1]
+    assert proposed.startswith(text)
+    found = command(proposed)
+    assert abs(found.full_code - found.zero_code) > (0.98 if text.startswith("0") else 0.49) * ADC.code_max
 
 
 def test_a_pressure_signal_may_not_start_below_zero(wording):

@@ -228,6 +228,15 @@ def test_the_pages_name_no_file_that_is_not_there():
     assert tried > 40
 
 
+def test_every_page_shows_the_version(site, pages):
+    for path in pages:
+        assert f"dzdesign {__version__}" in path.read_text(encoding="utf-8"), path
+    named = re.findall(r"dzdesign-(\d+\.\d+\.\d+)", "".join(
+        (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/index.md")
+    ))  # fmt: skip
+    assert len(named) >= 3 and {*named} == {__version__}
+
+
 def test_the_citation_is_of_the_format_and_of_this_version():
     """The keys that Citation File Format 1.2.0 requires, and the paper by its DOI."""
     import tomllib
@@ -236,7 +245,9 @@ def test_the_citation_is_of_the_format_and_of_this_version():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["cff-version"] == "1.2.0" and {"message", "title", "authors"} <= set(citation)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert (citation["version"], citation["license"]) == (__version__, project["license"])
+    # A list of licences would say "one of them" there; of what is cited it is the first.
+    assert (citation["version"], citation["license"]) == (__version__, project["license"].partition(" AND ")[0])
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", str(citation["date-released"]))
     (paper,) = citation["references"]
     assert paper["doi"] == "10.11916/j.issn.1005-9113.20063" and (paper["start"], paper["end"]) == (45, 56)
     assert [author["family-names"] for author in paper["authors"]] == ["Wu", "Ji", "Wang", "Hao", "Huang"]

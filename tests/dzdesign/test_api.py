@@ -46,6 +46,11 @@ def ramps(example_folder):
     return sorted((example_folder / "ramps").glob("*.csv.gz"))[:2]
 
 
+def test_a_notebook_completes_the_api_and_nothing_else():
+    assert dir(api) == sorted(api.__all__)
+    assert all(callable(getattr(api, name)) for name in dir(api))
+
+
 def test_the_api_writes_the_bytes_of_the_commands(ramps, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     options = ["--meter-lag", "0.1 s", "--x-max", "1.8 mm", "--confidence", "0.95"]

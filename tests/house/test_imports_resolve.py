@@ -14,7 +14,7 @@ from tests.support.paths import ROOMS, ROOT
 
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 #: Folders that are no room and hold Python, and where their own modules are looked for besides the rooms.
-OTHERS = ("tests", "benchmarks", "docs")
+OTHERS = ("tests", "benchmarks", "docs", "release")
 #: For comparison in benchmarks, or for what can't be had everywhere: the extras of pyproject.toml that no lock holds.
 EXTRAS = {"atheris", "blark", "piecewise_regression", "pwlf"}
 

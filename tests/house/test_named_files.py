@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.paths import ROOMS, ROOT
 
-FOLDERS = (*ROOMS, "benchmarks", "docs", "examples", "tests")
+FOLDERS = (*ROOMS, "benchmarks", "docs", "examples", "release", "tests")
 #: A path from the clone's root, to a file; C and JSON under such names stand in a firmware's folder.
 NAMED = re.compile(
     rf"(?<![\w./<{{*-])(?:{'|'.join(FOLDERS)})/(?:[\w.-]+/)*[\w.-]+\.(?:py|md|toml|jinja|txt|ipynb|svg|gz|csv)\b"
@@ -20,7 +20,7 @@ RECIPES = {ROOT / "docs" / "howto" / f"add-{what}.md" for what in ("file-format"
 def texts() -> list[Path]:
     """Return the files that are read by people."""
     found = [ROOT / "Makefile", *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
-    for folder in (*ROOMS, "benchmarks", "tests"):
+    for folder in (*ROOMS, "benchmarks", "release", "tests"):
         found += [path for kind in ("*.py", "*.jinja", "*.toml") for path in (ROOT / folder).rglob(kind)]
     return sorted({*found} - RECIPES - {Path(__file__)})
 

@@ -45,8 +45,18 @@ class PinSignal:
             if not 0 <= self.volts(end) <= converter.full_V:
                 raise InputError(
                     f"the signal '{self.text}' reaches {float(self.volts(end)):g} V at the converter's pin, expected 0 "
-                    f"to {float(converter.full_V):g} V; give the attenuator, shunt or offset, such as {EXAMPLE}"
+                    f"to {float(converter.full_V):g} V; give the attenuator, shunt or offset, such as "
+                    f"{self._attenuated(converter) or EXAMPLE}"
                 )
+
+    def _attenuated(self, converter: Converter) -> str:
+        """Return the signal with what brings a voltage into the converter's range; empty where it has a gain, or so."""
+        if self.unit != "V" or self.volts_per_unit != 1 or self.offset_V or self.meaning or not self.low <= 0:
+            return ""
+        # Rounded down: an end would lie above the range.
+        gain = 10_000 * converter.full_V / (self.high - self.low) // 1 / 10_000
+        offset = f" + {float(-self.low * gain):g} V" if self.low else ""
+        return f"'{self.text} x {float(gain):g}{offset}'"
 
     def sound_codes(self, converter: Converter) -> tuple[int, int]:
         """Return the first and last code of a sound signal: a broken wire reads below a live zero.

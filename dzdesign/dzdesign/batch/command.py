@@ -40,7 +40,7 @@ from dzdesign.report.lot.valve_folder import ValveFolder
 from dzdesign.report.valve_report import REPORT_NAME
 from dzdesign.stages.design import design_options
 from dzdesign.stages.identify import IdentifyChoices, identify_options, record_of
-from dzdesign.terminal.progress import say, with_bar
+from dzdesign.terminal.progress import is_watched, say, with_bar
 
 #: Of a disk, and of what a user may take of it; Windows knows no such limit.
 FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
@@ -234,7 +234,9 @@ def _record(valve: Valve, args: BatchArguments) -> dict[str, str]:
 def _write_all(results: Results, outcomes: Iterator[Outcome], count: int) -> dict[str, str]:
     """Write each valve's folder as it comes; return the reasons of those that could not be written."""
     unwritten: dict[str, str] = {}
-    for _, outcome in zip(with_bar(range(count), "valves"), outcomes, strict=True):
+    for number, outcome in zip(with_bar(range(1, count + 1), "valves"), outcomes, strict=True):
+        if not is_watched():  # in a pipe there is no bar
+            say(f"valve {number} of {count}: {outcome.name}: {outcome.manifest.reason or 'calibrated'}")
         try:
             results.write(outcome)
         except InputError as error:

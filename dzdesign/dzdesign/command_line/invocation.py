@@ -1,5 +1,7 @@
 """What the user asked for: the command line, with an options file behind it, as a command's arguments."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +32,7 @@ def parse(argv: list[str]) -> Invocation:
     if word and word not in COMMANDS:
         raise InputError(f"there is no command '{word}'{nearest(word, COMMANDS)}; see `dzdesign --help`")
     parser, commands = build_parser(only=word or "")
-    namespace, unknown = parser.parse_known_args(argv)
+    namespace, unknown = parser.parse_known_args(_with_signed_values(argv))
     given = vars(namespace)
     name = given.pop("command")
     if unknown:
@@ -56,6 +58,17 @@ def parse(argv: list[str]) -> Invocation:
         command=name, arguments=command_module(name).Arguments(**given), json=json, quiet=quiet, verbose=verbose,
         options_file=options_file, from_file=from_file,
     )  # fmt: skip
+
+
+def _with_signed_values(argv: Sequence[str]) -> list[str]:
+    """Return the words with a value such as ``-10..10V`` tied to its option, which argparse takes for an option."""
+    words: list[str] = []
+    for word in argv:
+        if words and re.fullmatch(r"--[a-z][^=]*", words[-1]) and re.match(r"-\.?\d", word):
+            words[-1] += f"={word}"
+        else:
+            words.append(word)
+    return words
 
 
 def _refuse_empty(argument: Argument, value: Value | None, options_file: str) -> None:

@@ -89,6 +89,7 @@ class FrontParser(Parser):
         page.end_section()
         for text in (_lines("examples", EXAMPLES), EXIT_STATUS, "`dzdesign COMMAND --help` explains each command."):
             page.add_text(text)
+        page.add_text(f"Documentation: index.html in dzdesign-{__version__}-docs.zip, beside the wheel.")
         return page.format_help()
 
 

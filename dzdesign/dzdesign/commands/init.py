@@ -3,8 +3,10 @@
 import os
 
 from dzdesign.core.options import paths_of
+from dzdesign.initial_options.guided import init_by_questions
 from dzdesign.stages.init import InitArguments, init
 from dzdesign.terminal.page import print_json
+from dzdesign.terminal.questions import may_ask
 
 Arguments = InitArguments
 EXAMPLES = ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml")
@@ -14,7 +16,8 @@ MOST_NAMES = 3
 
 def run(arguments: Arguments, json: bool) -> int:
     """Write the options file; 1 if it leaves something open without which `identify` can't run."""
-    proposal = init(arguments)
+    asked = not json and may_ask()
+    proposal = init_by_questions(arguments) if asked else init(arguments)
     output = os.fspath(arguments.output or "")
     if json:
         keys = ("labels", "columns", "dp", "u_max_V", "u_seen_V", "valve")
@@ -25,7 +28,7 @@ def run(arguments: Arguments, json: bool) -> int:
             "open": proposal.opens,
         })  # fmt: skip
         return 1 if proposal.opens else 0
-    for line in (*proposal.seen, *(f"open: {line}" for line in proposal.opens)):
+    for line in (*(() if asked else proposal.seen), *(f"open: {line}" for line in proposal.opens)):
         print(line)
     ramps = [os.fspath(path) for path in paths_of(arguments.ramps)]
     names = " ".join(map(_word, ramps)) if 0 < len(ramps) <= MOST_NAMES else "RAMP..."

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 #: Decimals in the unit of a quantity.
 DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
+#: Quantities of the overview.
+OVERVIEW = ("dead_zone_opening", "dead_zone_closing", "hysteresis", "largest_flow")
 
 
 def print_assessment(assessment: "Assessment") -> None:
@@ -20,7 +22,10 @@ def print_assessment(assessment: "Assessment") -> None:
     from dzdesign.identify.valve.model import lag_in_words
 
     page, units, meter = new_console(), assessment.recorded_units, assessment.meter
-    for item in _shown_pressures(assessment):
+    shown = _shown_pressures(assessment)
+    if len(shown) > 1:
+        put_table(page, _overview_of(shown, units))
+    for item in shown:
         put_table(page, _table_of(item, units))
     lines = [
         *_not_observable(assessment),
@@ -34,6 +39,30 @@ def print_assessment(assessment: "Assessment") -> None:
     for line in lines:
         put_line(page, line)
     put_units(page, units, "assessment.json")
+
+
+def _overview_of(shown: list["PressureAssessment"], units: "RecordedUnits") -> Table:
+    """Return a row for each pressure drop and side: what most readers look for, before and after."""
+    from dzdesign.assess.quantities import QUANTITIES
+
+    headers = [
+        f"{QUANTITIES[key].name} ({_unit(QUANTITIES[key].unit, units)}): {name}"
+        for key in OVERVIEW
+        for name in ("before", "after")
+    ]
+    title = "Overview, without (before) and with the compensator (after); a table for each row follows"
+    table = Table(title, f"dP ({units.label('MPa')})", "commands", *headers, words=(0, 1))
+    for item in shown:
+        table.add_row(
+            "unknown" if item.dp_MPa is None else units.number(item.dp_MPa, ".2f MPa"),
+            item.side,
+            *(
+                _shown(reading, QUANTITIES[key].unit, units)
+                for key in OVERVIEW
+                for reading in (item.quantities[key].before, item.quantities[key].after)
+            ),
+        )
+    return table
 
 
 def _table_of(item: "PressureAssessment", units: "RecordedUnits") -> Table:

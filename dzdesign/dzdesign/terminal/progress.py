@@ -69,6 +69,11 @@ def say(text: str) -> None:
         print(f"dzdesign: {since}{clear_line(text)}", file=sys.stderr, flush=True)
 
 
+def is_quiet() -> bool:
+    """Tell whether the running command is to print results and errors only."""
+    return _Verbosity.quiet
+
+
 def is_watched() -> bool:
     """Tell whether a person sees stderr and wants to: a bar is drawn over itself, which a dumb terminal can't."""
     return sys.stderr.isatty() and not _Verbosity.quiet and not _Verbosity.verbose and os.environ.get("TERM") != "dumb"

@@ -209,6 +209,12 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     }
     console, title = new_console(), "Simulated example valve, 0-10 V ramps in closed loop with the generated C"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
+    reference = valve.positive.reference.dp_MPa
+    put_line(
+        console,
+        "beta: how the threshold moves with the pressure drop; the firmware moves its offset by it. Without beta the "
+        f"offset stays that of {reference:g} MPa, and where the threshold is lower flow (Q) passes at zero command.",
+    )
     _put_readings(console, verification, {"dP (MPa)": columns["dP (MPa)"]}, AS_COMPUTED)
     checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))
     put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")

@@ -5,6 +5,7 @@ import errno
 import io
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -200,6 +201,10 @@ def test_a_killed_run_leaves_whole_folders_and_is_taken_up_by_more_jobs(lot, mad
     said = capsys.readouterr()
     assert f"9 of {COUNT} valves calibrated, 3 not" in said.out
     assert f"{len(found)} of them done before" in said.err
+    waiting = COUNT - len(found)  # in a pipe a line for each of them
+    lines = re.findall(r"valve (\d+) of (\d+): (V\d+|\S+): \S", said.err)
+    assert [(int(number), int(count)) for number, count, _ in lines] == [(n, waiting) for n in range(1, waiting + 1)]
+    assert len({name for *_, name in lines} - set(found)) == waiting
     assert "does not hold: 3 of 12 valves are not calibrated" in said.err
 
 

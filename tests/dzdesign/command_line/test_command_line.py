@@ -490,3 +490,12 @@ def test_help_of_a_command_imports_no_other_and_nothing_heavy():
 def test_a_ramp_test_keeps_its_samples_under_another_name():
     test = synthetic_ramp(1.0, Truth(), ramp_s=2)
     assert replace(test, source="b/x.csv").u is test.u
+
+
+@pytest.mark.parametrize("value", ["-10..10V x 0.15 + 1.5 V", "-10..10V", "-.5..0.5V", "-10..10 V"])
+def test_a_value_that_begins_with_a_minus_sign_is_one(value):
+    for words in (["--command-signal", value], [f"--command-signal={value}"]):
+        assert parse(["design", "v.json", *words, "--guard", "mean"]).arguments.command_signal == value
+    assert parse(["verify", "f", "--back-pressure", "-1MPa"]).arguments.back_pressure == ["-1MPa"]
+    with pytest.raises(InputError, match="--command-signal"):
+        parse(["design", "v.json", "--command-signal", "--guard", "mean"])

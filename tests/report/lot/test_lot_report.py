@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from dataclasses import astuple, replace
+from types import SimpleNamespace
 from urllib.parse import unquote
 
 import numpy as np
@@ -23,8 +24,8 @@ from dzdesign.core.recorded_units import AS_COMPUTED, CommandUnit, PressureUnit,
 from dzdesign.report.lot.folder import read_lot
 from dzdesign.report.lot.reasons import reason_groups
 from dzdesign.report.lot.report import report_of_lot
-from dzdesign.report.lot.setting_text import untested_lines
-from dzdesign.report.lot.spread import FAR, LEVELS, quantiles, spread_of
+from dzdesign.report.lot.setting_text import cost_lines, untested_lines
+from dzdesign.report.lot.spread import EXTRA, FAR, LEVELS, quantiles, spread_of
 from dzdesign.report.lot.summary import LotSettingSummary, SmallestMargin, UntestedPressures
 from dzdesign.report.lot.table import SideFigures
 from tests.support.html_pages import HOSTILE, Page
@@ -584,3 +585,10 @@ def test_the_units_of_a_lot_are_those_that_all_its_valves_have(example_compensat
     assert units_of_lot({"a": other, "b": other}) == bar
     assert units_of_lot({"a": other, "b": example_compensator}).pressure.unit == "MPa"
     assert units_of_lot({}) == AS_COMPUTED
+
+
+@pytest.mark.parametrize("least", [-0.3, 0.0])
+def test_a_negative_cost_of_the_lot_setting_is_explained(least):
+    summary = SimpleNamespace(quantiles={EXTRA: quantiles([least, 0.5, 1.0])}, calibrated=3)
+    lines = cost_lines(summary)
+    assert any("negative cost" in line for line in lines) == (least < 0) and len(lines) == 1 + (least < 0)

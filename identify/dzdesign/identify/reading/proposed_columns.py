@@ -57,6 +57,8 @@ class ProposedColumns:
         Quantity -> why it could not be told.
     bare_pressures : tuple of str
         Labels that look like a pressure and have no unit, where no pressure drop is known.
+    pressures : dict
+        Columns that may make the pressure drop, for a person to say which is which: label -> unit, "" if it has none.
     command_range : str
         Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct.
     """
@@ -66,6 +68,7 @@ class ProposedColumns:
     proposed: dict[str, Column]
     unclear: dict[str, str]
     bare_pressures: tuple[str, ...]
+    pressures: dict[str, str]
     command_range: str = ""
 
     @property
@@ -113,15 +116,33 @@ def propose_columns(
             elif why := _why_none(table, quantity, candidates):
                 unclear[quantity] = why
         command_range = _command_range(table, known, taken) if "u" in unclear else ""
+        pressures = {} if edge.quantities else _pressures(table, known, taken - {_label_of(proposed.get("dP"))})
     if command_range:
         unclear["u"] += f"; or say what its numbers mean, for example --columns \"u={command_range}\""
     has_pressure = bool(edge.quantities) or "dP" in proposed
-    bare = (label for label in table.labels if label not in taken and not table.units.get(label))
+    bare = (label for label, unit in pressures.items() if not unit and label not in taken)
     return ProposedColumns(
         labels=table.labels, known=known, proposed=proposed, unclear=unclear,
-        bare_pressures=() if has_pressure else tuple(label for label in bare if PRESSURE_LIKE.fullmatch(label)),
-        command_range=command_range,
+        bare_pressures=() if has_pressure else tuple(bare),
+        pressures=pressures, command_range=command_range,
     )  # fmt: skip
+
+
+def _label_of(column: Column | None) -> str:
+    return column.label if column else ""
+
+
+def _pressures(table: Table, known: Mapping[str, Column], taken: set[str]) -> dict[str, str]:
+    """Return the columns that may be a pressure: of ports, in a unit of pressure, or named like one."""
+    found = {column.label: column.unit for name, column in known.items() if name in PORTS}
+    for label in table.labels:
+        if label in taken:
+            continue
+        if fits(_unit_of(table, label), "dP"):
+            found.setdefault(label, _unit_of(table, label))
+        elif not table.units.get(label) and PRESSURE_LIKE.fullmatch(label):
+            found.setdefault(label, "")
+    return found
 
 
 def _command_range(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:

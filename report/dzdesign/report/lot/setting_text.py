@@ -56,14 +56,22 @@ def _coarse_lines(inside: Sequence[UntestedPressures], units: RecordedUnits) -> 
     return lines
 
 
+#: Said where the lot setting leaves some valve less dead zone than its own.
+NEGATIVE_COST = (
+    "a negative cost: with the lot setting that valve has less dead zone than with its own, at each of its tests; it "
+    "is certified all the same, for the lot's offset lies below the valve's bound too"
+)
+
+
 def cost_lines(summary: LotSummary) -> list[str]:
     """Say of each side what one setting for all costs."""
-    return [
+    costs = {column: at for column, at in summary.quantiles.items() if column.endswith(EXTRA)}
+    lines = [
         (f"{column.removesuffix(EXTRA).rstrip('_')} side: " if column != EXTRA else "")
         + f"it leaves more dead zone than each valve's own setting: {cost_text(at, summary.calibrated)}"
-        for column, at in summary.quantiles.items()
-        if column.endswith(EXTRA)
+        for column, at in costs.items()
     ]
+    return [*lines, NEGATIVE_COST] if any(at.least < 0 for at in costs.values()) else lines
 
 
 def cost_text(at: Quantiles, count: int) -> str:
