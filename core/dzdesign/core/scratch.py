@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 #: How the folders are called, in the system's folder for temporary files. A folder is hidden until its lock is held.
-PREFIX, HIDDEN = "dzdesign-", ".dzdesign-"
+PREFIX, HIDDEN = "dzdesign-run-", ".dzdesign-run-"
 #: A hidden folder of this age was left by a process that was killed before it held the lock.
 ABANDONED_S = 60.0
 #: Windows locks no folder, but deletes none with an open file: this one.
