@@ -5,12 +5,12 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from threading import Lock
 
 from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import DzdesignError, one_line
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.firmware_manifest import Calibration
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
@@ -93,8 +93,8 @@ def calibrate(task: Task) -> Outcome:
     """Identify, design, generate and, if asked for, verify one valve; a failure is an outcome, never an exception."""
     if task.refused:
         return task.outcome(FAILED, task.refused)
-    with SOLVER_LOCK, TemporaryDirectory() as temporary:
-        folder, again = Path(temporary), False
+    with SOLVER_LOCK, scratch_folder() as folder:
+        again = False
         status: Status
         try:
             status, reason = _run(task, folder)
