@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-c2000ware bench-identify bench-isr bench-loading bench-paper bench-verify
+.PHONY: demo test quick coverage lint docs goldens lock clean fuzz bench bench-batch bench-c2000ware bench-faults bench-identify bench-isr bench-loading bench-paper bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -60,6 +60,10 @@ bench-loading: $(STAMP)
 # 1000 valves: a quarter of an hour of two cores; `make bench-batch BENCH=--quick` tries 60.
 bench-batch: $(STAMP)
 	$(BIN)/python benchmarks/batch/run.py $(BENCH)
+
+# Power cuts in every command that writes a folder: half an hour, and only for root on Linux (loop devices).
+bench-faults: $(STAMP)
+	$(BIN)/python benchmarks/faults/run.py $(BENCH)
 
 # Every wrong statement about the paper, and its reproduction twice: minutes. CI tries a drawn part.
 bench-paper: $(STAMP)

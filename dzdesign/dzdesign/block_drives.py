@@ -8,10 +8,10 @@ import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple, fields
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from dzdesign.core.errors import and_more
+from dzdesign.core.scratch import scratch_folder
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock
@@ -44,11 +44,11 @@ def drives_checked(folder: Path, blocks: Iterable[Tried]) -> Iterator["Check"]:
     for each in blocks:
         settings.setdefault(_settings(each[1]), []).append(each)
     for (path, block, compensator), *others in settings.values():
-        with TemporaryDirectory() as temporary:
-            shutil.copytree(folder / "core", Path(temporary) / "core")
-            (Path(temporary) / BLOCK_FILE).write_bytes(pack(block))
-            found = [drive_follows(Path(temporary), compensator)]
-            found += current_checks(Path(temporary), compensator, lambda _: None).checks
+        with scratch_folder() as temporary:
+            shutil.copytree(folder / "core", temporary / "core")
+            (temporary / BLOCK_FILE).write_bytes(pack(block))
+            found = [drive_follows(temporary, compensator)]
+            found += current_checks(temporary, compensator, lambda _: None).checks
         faults = [f"{check.name}: {check.text}" for check in found if not check.holds]
         text = "; ".join(faults) or "; ".join(check.text for check in found)
         alike = and_more([str(other) for other, _, _ in others], NAMED)

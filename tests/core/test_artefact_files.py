@@ -53,7 +53,7 @@ def folder(tmp_path):
     return folder
 
 
-@pytest.mark.parametrize("step", ["fsync", "replace", "chmod"])
+@pytest.mark.parametrize("step", ["fsync", "replace"])
 @pytest.mark.parametrize(
     ("error", "becomes"),
     [(OSError(28, "No space left on device"), InputError), (KeyboardInterrupt(), KeyboardInterrupt)],
@@ -67,12 +67,24 @@ def test_a_file_that_fails_half_way_leaves_the_old_one_and_nothing_else(tmp_path
     assert tree(tmp_path) == {"valve.json": b"old"}
 
 
-def test_a_file_is_written_in_utf_8_and_may_be_read_by_others(tmp_path):
-    path = tmp_path / "valve.json"
-    write_file(path, "Δp\n")
-    assert path.read_bytes() == "Δp\n".encode()
-    if sys.platform != "win32":
-        assert stat.S_IMODE(path.stat().st_mode) == 0o644
+def test_a_file_is_written_in_utf_8(tmp_path):
+    write_file(tmp_path / "valve.json", "Δp\n")
+    assert (tmp_path / "valve.json").read_bytes() == "Δp\n".encode()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no modes")
+@pytest.mark.parametrize(("umask", "file", "inside"), [(0o022, 0o644, 0o755), (0o027, 0o640, 0o750), (0, 0o666, 0o777)])
+def test_modes_follow_the_umask_for_files_and_folders_alike(tmp_path, umask, file, inside):
+    before = os.umask(umask)
+    try:
+        write_file(tmp_path / "valve.json", "{}")
+        write_folder(tmp_path / "firmware", FILES, FIRMWARE)
+        write_folder(tmp_path / "firmware", FILES, FIRMWARE)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "valve.json").stat().st_mode) == file
+    for path in [tmp_path / "firmware", *(tmp_path / "firmware").rglob("*")]:
+        assert stat.S_IMODE(path.stat().st_mode) == (inside if path.is_dir() else file), path
 
 
 @pytest.mark.parametrize("name", ["", "missing/valve.json", "file/valve.json", "x" * 300, "a\0b"])

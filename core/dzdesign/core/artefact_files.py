@@ -4,10 +4,12 @@ import contextlib
 import logging
 import os
 import shutil
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dzdesign.core.disk_sync import sync_file, sync_folder, sync_tree
 from dzdesign.core.documents import family_of, parse_document, sha256_of, sha256_of_file, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_contents import (
@@ -18,9 +20,11 @@ from dzdesign.core.folder_contents import (
     check_inside,
     keep_filled_in,
     manifest_of,
+    refuse_to_replace_unknown,
 )
-from dzdesign.core.folder_swap import alone_in, beside, bring_back, put_in_place
+from dzdesign.core.folder_swap import alone_in, beside, bring_back, put_in_place, remove_abandoned
 from dzdesign.core.input_files import json_object, open_bytes, read_bytes, reason_of
+from dzdesign.core.scratch import is_scratch
 from dzdesign.core.version import __version__
 
 if TYPE_CHECKING:
@@ -35,6 +39,9 @@ __all__ = [
 TOOL = {"name": "dzdesign", "version": __version__}
 
 logger = logging.getLogger(__name__)
+
+#: The files and folders that this process has written last, but for what goes with it.
+written: deque[Path] = deque(maxlen=5)
 
 
 def check_place_of_files(folder: Path, option: str) -> None:
@@ -102,19 +109,32 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
 
     With the `schema` of a JSON artefact, an existing file of another kind is left alone.
     """
-    path = Path(path)
     data = content.encode() if isinstance(content, str) else content
     check_file_may_be_written(path, schema, option)
+    with _refusing(f"'{path}'", option):
+        place = Path(os.path.realpath(path))  # a link stays, the file that it leads to is replaced
+        with alone_in(place.parent) as alone:
+            remove_abandoned(place.parent, alone=alone)
+            _replace_file(place, data)
+    _note_written(path)
+    logger.debug("wrote '%s', %d bytes", path, len(data))
+
+
+def _note_written(path: Path) -> None:
+    if path not in written and not is_scratch(path):
+        written.append(path)
+
+
+def _replace_file(path: Path, data: bytes) -> None:
     temporary = beside(path)
     try:
-        with _refusing(f"'{path}'", option):
-            with open(temporary, "xb") as handle:
-                handle.write(data)
-                handle.flush()
-                os.fsync(handle.fileno())
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, path)
-            logger.debug("wrote '%s', %d bytes", path, len(data))
+        with open(temporary, "xb") as handle:
+            handle.write(data)
+        if durable := not is_scratch(path):
+            sync_file(temporary)
+        os.replace(temporary, path)
+        if durable:
+            sync_folder(path.parent)
     finally:  # an interrupt, too, leaves no half-written file behind
         with contextlib.suppress(OSError, ValueError):
             temporary.unlink(missing_ok=True)
@@ -189,17 +209,19 @@ def write_folder(
 
         document = as_document(manifest)
     contents[MANIFEST_NAME] = to_json({**document, "files": listing}).encode()
-    folder = Path(folder)
+    named = folder = Path(folder)
     with _refusing(f"the folder '{folder}'", "-o"):
         folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced
         if not folder.parent.is_dir():
             _check_folder(folder, document.get("schema"))
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with alone_in(folder.parent):
+        with alone_in(folder.parent) as alone:
+            remove_abandoned(folder.parent, alone=alone)
             bring_back(folder)
             check()
             _check_folder(folder, document.get("schema"))
             kept = _replace_folder(folder, contents, listing, board_of(document))
+    _note_written(named)
     logger.debug("wrote '%s', %d files", folder, len(contents))
     return kept
 
@@ -211,13 +233,21 @@ def _replace_folder(
     staging = beside(folder)
     try:
         _write_staging(staging, contents)
-        if not folder.is_dir():
+        kept = {}
+        if folder.is_dir():
+            old = manifest_of(folder)
+            if old is None:  # empty, or as a power cut left it
+                refuse_to_replace_unknown(folder, contents)
+            kept = keep_filled_in(folder, staging, old, listing, board) if old else {}
+            carry_over(folder, staging, set(old["files"]) if old else set(contents))
+        if durable := not is_scratch(folder):
+            sync_tree(staging)
+        if folder.is_dir():
+            put_in_place(staging, folder)
+        else:
             os.replace(staging, folder)
-            return {}
-        old = manifest_of(folder)
-        kept = keep_filled_in(folder, staging, old, listing, board) if old else {}
-        carry_over(folder, staging, set(old["files"]) if old else set())
-        put_in_place(staging, folder)
+        if durable:  # before what stood there is removed: the removal must not reach the disk alone
+            sync_folder(folder.parent)
         return kept
     finally:
         shutil.rmtree(staging, ignore_errors=True)
@@ -225,8 +255,7 @@ def _replace_folder(
 
 def _write_staging(staging: Path, contents: Mapping[str, bytes]) -> None:
     """Write the files of a folder that nobody knows yet."""
-    staging.mkdir(mode=0o755)
-    os.chmod(staging, 0o755)  # whatever the umask
+    staging.mkdir()
     for name, data in contents.items():
         target = staging / name
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -20,8 +20,12 @@ from dzdesign.core.errors import InputError, neighbour
 #: Largest file of options, plant or artefact, some hundred times the largest that dzdesign writes; read as JSON it
 #: takes at most some thirty times as much memory.
 MOST_DOCUMENT = 1 << 24
+#: Largest recording that is held in memory whole.
+MOST_RECORDING = 1 << 30
 #: Largest recording from a pipe.
 MOST_PIPED = 1 << 28
+#: Address space in MiB in which every command has run, with recordings of some MB; most of it is only reserved.
+NEEDED_MIB = 1800
 #: A pipe that gives nothing for so long has nobody at its other end.
 PIPE_PATIENCE_S = 30.0
 PIECE = 1 << 20
@@ -44,6 +48,18 @@ def read_bytes(path: Path, what: str) -> bytes:
     return content
 
 
+def read_recording(path: Path, what: str) -> bytes:
+    """Read a whole recording, which may be far larger than a document; `what` names it."""
+    with open_bytes(path, what) as file:
+        content = file.read(MOST_RECORDING + 1)
+    if len(content) > MOST_RECORDING:
+        raise InputError(
+            f"{what} '{path}' is larger than {MOST_RECORDING >> 20} MiB, too large to be handed to a process of a "
+            "batch; compress it, thin it out, or give it to `dzdesign identify`"
+        )
+    return content
+
+
 def json_object(path: Path) -> dict[str, Any] | None:
     """Return the JSON object that a file holds, or None if it holds anything else; a long measurement is not read."""
     try:
@@ -53,6 +69,20 @@ def json_object(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError, RecursionError):
         return None
     return document if isinstance(document, dict) else None
+
+
+def check_address_space(what: str) -> None:
+    """Refuse work for which this process is not given enough address space, as by ``ulimit -v``; `what` names it."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < NEEDED_MIB << 20:
+        raise InputError(
+            f"{what} needs {NEEDED_MIB} MiB of address space, and this process is limited to {limit >> 20} MiB; raise "
+            "the limit (ulimit -v)"
+        )
 
 
 def reason_of(error: OSError | ValueError) -> str:

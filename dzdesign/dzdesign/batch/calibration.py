@@ -5,7 +5,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,6 +12,7 @@ from dzdesign.batch.outputs import ForOutputs, WantedOutput, make_output, may_en
 from dzdesign.core.artefact_files import TOOL, sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import DzdesignError, one_line
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.firmware_manifest import Calibration
 from dzdesign.report.lot.output_types import NOT_MADE, ValveOutput
@@ -120,8 +120,7 @@ def calibrate(task: Task) -> Outcome:
     """Identify, design, generate and, if asked for, verify one valve; a failure is an outcome, never an exception."""
     if task.refused:
         return task.outcome(FAILED, task.refused)
-    with SOLVER_LOCK, TemporaryDirectory() as temporary:
-        folder = Path(temporary)
+    with SOLVER_LOCK, scratch_folder() as folder:
         try:
             result = _run(task, folder)
         except DzdesignError as error:

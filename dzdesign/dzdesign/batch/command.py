@@ -27,6 +27,7 @@ from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, write_files
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in
+from dzdesign.core.input_files import read_recording
 from dzdesign.core.options import arguments_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.design.firmware_manifest import form_named
@@ -209,7 +210,7 @@ def _task(
     options = {**vars(args), **valve.overrides, "record": _record(valve, args)}
     recordings, refused = [], ""
     try:
-        recordings = [(path.name, read_bytes(path, "ramp file")) for path in valve.recordings()]
+        recordings = [(path.name, read_recording(path, "ramp file")) for path in valve.recordings()]
     except InputError as error:
         refused = str(error)
     return Task(

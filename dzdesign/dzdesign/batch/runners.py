@@ -1,6 +1,7 @@
 """Where valves are calibrated: in processes of this machine by joblib, or on a cluster by Dask's scheduler."""
 
 import logging
+import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
@@ -8,9 +9,10 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from itertools import count, islice
 from threading import Event, Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dzdesign.batch.calibration import Outcome, Task, calibrate
+from dzdesign.batch.parent_watch import end_with
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError
 from dzdesign.report.lot.summary import FAILED
@@ -28,6 +30,8 @@ CONNECT_S = 10
 LOOK_S = 5.0
 #: Loggers of Dask that tell of a lost scheduler in pages of their own.
 TALKATIVE = ("distributed", "distributed.client")
+#: Python then looks for modules neither in the working folder nor beside a script.
+SAFE_PATH = "PYTHONSAFEPATH"
 ENDED = "the process that calibrated it ended without a word (out of memory, or killed)"
 
 
@@ -63,10 +67,26 @@ def _in_processes(tasks: Iterable[Task], jobs: int, work: Work) -> Iterator[Outc
 
     # Of a run that is stopped, by a full disk for one: what to do is said by whoever stops it.
     warnings.filterwarnings("ignore", r"\d+ tasks (which were still|have been)", UserWarning)
-    threads = {} if jobs == 1 else {"backend": "loky", "inner_max_num_threads": 1}
-    with parallel_config(n_jobs=jobs, **threads):
+    processes: dict[str, Any] = {}
+    if jobs > 1:
+        processes = {"backend": "loky", "inner_max_num_threads": 1}
+        processes |= {"initializer": end_with, "initargs": (os.getpid(),)}
+    with _safe_path(), parallel_config(n_jobs=jobs, **processes):
         pool = Parallel(return_as="generator_unordered", pre_dispatch=AHEAD * jobs, batch_size=1)
         yield from pool(delayed(work)(task) for task in tasks)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let processes that are started meanwhile import no module from the working folder: recordings lie there."""
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        os.environ.pop(SAFE_PATH)
+        if before is not None:
+            os.environ[SAFE_PATH] = before
 
 
 def _alone(task: Task, work: Work) -> Outcome:

@@ -4,11 +4,14 @@ Exit status: 0 holds, 1 a requirement does not hold (the message says which), 2 
 happens inside the stage that needs it.
 """
 
+import errno
 import os
 import sys
 
 from dzdesign.core.errors import DzdesignError, RequirementError, clear_line
 
+#: What the system says of an output that takes no more: full, beyond a quota, closed, a device that fails.
+UNPRINTABLE = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EBADF, errno.EIO, errno.EFBIG)
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
 
@@ -19,13 +22,18 @@ def main(argv: list[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a console that can't print a character prints a ? instead
             stream.reconfigure(errors="replace")
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (as long as the process lives)
+    if sys.stdout is None:
+        print("dzdesign: the standard output is closed, and results go there; leave it open", file=sys.stderr)
+        return BAD_INPUT
     call = None
     try:
         argv = sys.argv[1:] if argv is None else argv
         if argv in (["--help"], ["-h"]):
             from dzdesign.command_line.parser import build_parser
 
-            print(build_parser(only="")[0].format_help(), end="")
+            print(build_parser(only="")[0].format_help(), end="", flush=True)
             return 0
         from dzdesign.command_line.invocation import parse
         from dzdesign.command_line.parser import command_module
@@ -34,6 +42,7 @@ def main(argv: list[str] | None = None) -> int:
         call = parse(argv)
         with reporting(quiet=call.quiet, verbose=call.verbose):
             status: int = command_module(call.command).run(call.arguments, call.json)
+            sys.stdout.flush()  # what can't be printed is said here and not when Python ends
             return status
     except RequirementError as error:
         print(f"dzdesign: does not hold: {clear_line(str(error))}", file=sys.stderr)
@@ -50,5 +59,32 @@ def main(argv: list[str] | None = None) -> int:
         print("dzdesign: interrupted; nothing half-written was left", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_nothing_more()
         return PIPE_CLOSED
+    except (MemoryError, OSError, ImportError) as error:
+        if (reason := _reason_in_the_system(error)) is None:
+            raise
+        _print_nothing_more()
+        print(f"dzdesign: {reason}{_what_was_written()}", file=sys.stderr)
+        return BAD_INPUT
+
+
+def _reason_in_the_system(error: Exception) -> str | None:
+    """Return in words why the machine ended a command; None of an error that is a fault of ours."""
+    if isinstance(error, MemoryError) or (isinstance(error, ImportError) and "failed to map" in str(error)):
+        return "memory ran out; close other programs, or raise the limit (ulimit -v)"
+    if isinstance(error, OSError) and error.errno in UNPRINTABLE and error.filename is None:
+        return f"the results can't be printed: {error.strerror}"
+    return None
+
+
+def _what_was_written() -> str:
+    from dzdesign.core.artefact_files import written
+
+    names = ", ".join(f"'{path}'" for path in written)
+    return clear_line(f"; written before that: {names}") if names else "; nothing was written"
+
+
+def _print_nothing_more() -> None:
+    """Lead the standard output nowhere: Python would try once more to print, at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

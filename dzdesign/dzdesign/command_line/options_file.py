@@ -2,13 +2,13 @@
 
 import datetime
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import MACHINE, Argument, flag_of
+from dzdesign.core.toml_documents import read_toml
 
 #: Characters of a key to which the nearest known one is looked for.
 LONGEST_KEY = 80
@@ -21,11 +21,8 @@ Value = str | list[str] | dict[str, str]
 def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Value]:
     """Read options; a key may be written ``meter-floor`` or ``meter_floor``, values as on the command line."""
     content = read_bytes(Path(path), "config file")
-    try:
-        # A number with a point stays the text that it is: an oil of viscosity 46.10 stays one.
-        document = tomllib.loads(content.decode("utf-8-sig"), parse_float=lambda number: number.replace("_", ""))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' is not TOML: {error}; expected lines such as u-max = \"10 V\"") from error
+    # A number with a point stays the text that it is: an oil of viscosity 46.10 stays one.
+    document = read_toml(content, path, 'lines such as u-max = "10 V"', lambda number: number.replace("_", ""))
     known: dict[str, list[Argument]] = {}
     for argument in declared:
         known.setdefault(_key(argument.name).replace("-", "_"), []).append(argument)

@@ -2,12 +2,13 @@
 
 import argparse
 import shutil
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from types import ModuleType
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
 from dzdesign.core.errors import InputError, nearest
@@ -62,6 +63,10 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing the usage."""
         raise InputError(f"{message}; see `{self.prog} --help`")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print help or version; an output that is full is an error here, which argparse keeps to itself."""
+        print(message, end="", file=file or sys.stdout, flush=True)
 
 
 class FrontParser(Parser):

@@ -1,4 +1,4 @@
-"""`dzdesign monitor`: what a firmware sends over its serial line becomes a ramp file, whole or not at all."""
+"""`dzdesign monitor`: what a firmware sends over its serial line becomes a ramp file, line by line as it comes."""
 
 import contextlib
 import os
@@ -10,7 +10,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dzdesign.core.artefact_files import check_file_may_be_written, write_file
+from dzdesign.core.artefact_files import check_file_may_be_written
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.option_readers import number
 from dzdesign.core.options import AnyPath, Option, Text, read_options
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
     from dzdesign.codegen.telemetry.frame import Frame, FrameReader
     from dzdesign.codegen.telemetry.recording import Recording
+    from dzdesign.codegen.telemetry.recording_file import RecordingFile
 
+#: What ends a recording: Ctrl-C, a request to end, a terminal that goes away.
+ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 #: A line with a firmware on it shows a frame within this time.
 FIRST_FRAME_S = 3.0
 #: The longest that a look at the line takes: Ctrl-C is noticed after it.
@@ -55,6 +58,7 @@ def run(arguments: Arguments, json: bool) -> int:
     """Record the telemetry of a firmware; 1 if the line broke before the time that was asked for."""
     from dzdesign.codegen.telemetry.frame import FrameReader
     from dzdesign.codegen.telemetry.recording import Recording, scalings_of
+    from dzdesign.codegen.telemetry.recording_file import recording_file
 
     output, read = Path(arguments.output), read_options(arguments, ["seconds", "baud"])
     check_file_may_be_written(output)
@@ -64,12 +68,22 @@ def run(arguments: Arguments, json: bool) -> int:
     scalings = scalings_of(Path(arguments.firmware), None if given is None else Path(given))
     baud = read["baud"] or scalings.link.baud
     recording, reader = Recording(scalings), FrameReader()
-    with open_port(arguments.port, baud, LOOK_S) as port, _until_interrupted() as stop:
+    with (
+        recording_file(output) as file,
+        open_port(arguments.port, baud, LOOK_S) as port,
+        _until_stopped() as stop,
+    ):
         say(f"listening to {arguments.port} at {baud:g} bit/s; Ctrl-C ends the recording")
-        broken = _record(port, recording, reader, stop, read["seconds"])
-    if not recording:
+        try:
+            broken = _record(port, recording, reader, stop, read["seconds"], file)
+            if recording.frames:
+                file.write(recording.foot(reader))
+        except InputError as error:
+            if not recording.frames:
+                raise
+            raise InputError(f"{error}; the {recording.frames} frames that came before are kept there") from error
+    if not recording.frames:
         raise _nothing(arguments.port, baud, reader)
-    write_file(output, recording.to_csv(reader))
     if json:
         print_json(_document(arguments, recording, reader))
     else:
@@ -80,18 +94,25 @@ def run(arguments: Arguments, json: bool) -> int:
 
 
 @contextlib.contextmanager
-def _until_interrupted() -> Iterator[threading.Event]:
-    """Turn Ctrl-C into an event, so that no frame is cut in two; then put back what it did before."""
+def _until_stopped() -> Iterator[threading.Event]:
+    """Turn what ends a process (Ctrl-C, TERM, a closed terminal) into an event; then put back what it did before."""
     stop = threading.Event()
-    before = signal.signal(signal.SIGINT, lambda *_: stop.set())
+    signals = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
+    before = {each: signal.signal(each, lambda *_: stop.set()) for each in signals}
     try:
         yield stop
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def _record(
-    port: "serial.Serial", recording: "Recording", reader: "FrameReader", stop: threading.Event, seconds: float | None
+    port: "serial.Serial",
+    recording: "Recording",
+    reader: "FrameReader",
+    stop: threading.Event,
+    seconds: float | None,
+    file: "RecordingFile",
 ) -> str:
     """Record until told to stop or the time is over; return why it ended before that, or nothing."""
     begin, first = time.monotonic(), None
@@ -107,11 +128,16 @@ def _record(
             octets = port.read(max(port.in_waiting, 1))
         except OSError as error:  # the adapter was pulled out
             return f"the port broke ({error})"
+        lines, broken = "", ""
         for frame in reader.feed(octets):
             if frame.origin != recording.scalings.origin:
-                return _other_firmware(frame, recording)
+                broken = _other_firmware(frame, recording)
+                break
             first = first or time.monotonic()
-            recording.add(frame)
+            lines += recording.add(frame) if recording.frames else recording.head() + recording.add(frame)
+        file.write(lines)
+        if broken:
+            return broken
     return ""
 
 
@@ -121,12 +147,12 @@ def _other_firmware(frame: "Frame", recording: "Recording") -> str:
 
     if frame.status & STATUS_CALIBRATION:  # such a drive names no compensator, whatever is given
         text = f"the drive reports '{STATUS_BITS[STATUS_CALIBRATION]}' (status {STATUS_CALIBRATION}): its output is off"
-        if recording:
+        if recording.frames:
             return text
         raise InputError(f"{text}; load its valve's block, `dzdesign load BLOCK --port ...`, and record then")
     own = recording.scalings.origin
     text = f"the frames are of the compensator whose SHA-256 begins with {frame.origin:04x}, not {own:04x}"
-    if recording:
+    if recording.frames:
         return text
     raise InputError(
         f"{text} as given; give the folder that the device was built from, or --compensator of the block loaded since"
@@ -146,7 +172,7 @@ def _nothing(port: str, baud: float, reader: "FrameReader") -> InputError:
 def _document(arguments: Arguments, recording: "Recording", reader: "FrameReader") -> dict[str, Any]:
     return {
         "file": os.fspath(arguments.output),
-        "frames": len(recording),
+        "frames": recording.frames,
         "seconds": recording.duration_s,
         "lost": recording.lost,
         "bad_crc": reader.bad_crc,
@@ -158,7 +184,7 @@ def _document(arguments: Arguments, recording: "Recording", reader: "FrameReader
 
 def _print(arguments: Arguments, recording: "Recording", reader: "FrameReader") -> None:
     print(
-        f"{len(recording)} frames in {recording.duration_s:.2f} s: {recording.lost} lost, {reader.bad_crc} with a "
+        f"{recording.frames} frames in {recording.duration_s:.2f} s: {recording.lost} lost, {reader.bad_crc} with a "
         f"wrong CRC, {reader.skipped} octets skipped, {recording.restarts} restarts of the firmware"
     )
     print(f"Faults: {', '.join(recording.faults) or 'none'}")

@@ -1,13 +1,12 @@
 """A valve of the paper through the whole product: ramp tests, identify, design, codegen, the closed loop with the C."""
 
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.derivation.account.published import DP0_MPA, FIRST, RAMP_S, RECORDS_HZ, U_MAX_V
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
@@ -40,13 +39,13 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
     """Run a recovered valve through the product; `say` is told each stage before it begins."""
     name = valve.published.name + (" with hysteresis" if valve.plant.hysteresis_V else "")
     bench = bench_of(valve)
-    with tempfile.TemporaryDirectory(prefix="dzdesign-") as scratch:
+    with scratch_folder() as scratch:
         say(f"{name}: ramp tests of the recovered valve")
         ramps = _ramp_tests(valve, bench)
         say(f"{name}: identify, design, codegen")
         for file, content in ramps.items():
-            (Path(scratch) / file).write_bytes(content)
-        tests = [read_ramp_file(Path(scratch) / file) for file in ramps]  # as a user's are read
+            (scratch / file).write_bytes(content)
+        tests = [read_ramp_file(scratch / file) for file in ramps]  # as a user's are read
         floor = valve.level_L_min * L_MIN  # as an engineer who read Section 4.1 would declare it
         options = IdentifyOptions(
             u_max=float(U_MAX_V),
@@ -62,9 +61,9 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         compensator = design(identified, valve_bytes=valve_json)
         compensator_json = to_json_bytes(compensator).decode()
         firmware = generate(compensator, "host", compensator_json.encode())
-        write_folder(Path(scratch) / "firmware", firmware.contents, firmware.manifest)
+        write_folder(scratch / "firmware", firmware.contents, firmware.manifest)
         say(f"{name}: closed loop")
-        loop = ClosedLoop(valve.plant, Path(scratch) / "firmware", compensator)
+        loop = ClosedLoop(valve.plant, scratch / "firmware", compensator)
         runs = run_valve(valve, loop, compensator)
         beside = run_load_and_oil(valve, loop, product=True) if valve.published is FIRST else None
     place = name.replace(" ", "_")

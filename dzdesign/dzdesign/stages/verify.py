@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, read_bytes, sha256_of, write_folder
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Texts, flag_of, paths_of, texts_of
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.core.units import parse_quantity
 from dzdesign.stages.recordings import expand
 from dzdesign.terminal.progress import say, stage_progress, with_bar
@@ -196,8 +196,8 @@ def _firmware_folder(firmware: "Firmware | Output | AnyPath") -> Iterator[Path]:
     if not isinstance(firmware, Firmware | Output):
         yield Path(firmware)
         return
-    with TemporaryDirectory() as temporary:
-        folder = Path(temporary) / "firmware"
+    with scratch_folder() as temporary:
+        folder = temporary / "firmware"
         write_folder(folder, firmware.contents, firmware.manifest)
         yield folder
 

@@ -16,6 +16,7 @@ import pytest
 
 from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_CALIBRATION, STATUS_RELEASED, Frame
 from dzdesign.codegen.telemetry.recording import COLUMNS, Recording, scalings_of
+from dzdesign.codegen.telemetry.recording_file import recording_file
 from dzdesign.commands.monitor import _other_firmware
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
@@ -233,6 +234,44 @@ def test_a_line_that_breaks_leaves_what_came_and_status_1(bench):
     status, result, said = bench.end()
     assert status == 1 and result["frames"] == 20 and "the port broke" in said
     assert len(table(bench.output)) == 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_what_asks_it_to_end_ends_the_recording_as_ctrl_c_does(bench, number):
+    bench.listen()
+    bench.send([bench.frame(index) for index in range(20)])
+    bench.monitor.send_signal(number)
+    status, result, _ = bench.end()
+    assert status == 0 and result["frames"] == 20 and len(table(bench.output)) == 20
+
+
+@pytest.mark.slow
+def test_a_kill_leaves_every_frame_that_came_in_whole_lines(bench):
+    bench.listen()
+    bench.send([bench.frame(index) for index in range(50)])
+    bench.monitor.kill()
+    bench.monitor.communicate()
+    assert len(table(bench.output)) == 50 and bench.output.read_bytes().endswith(b"\n")
+
+
+def test_a_full_disk_leaves_whole_lines(tmp_path, monkeypatch):
+    real, room = os.write, [25]
+
+    def write(descriptor: int, data: bytes) -> int:
+        if not room[0]:
+            raise OSError(28, "No space left on device")
+        taken = real(descriptor, data[: room[0]])
+        room[0] -= taken
+        return taken
+
+    with recording_file(tmp_path / "ramp.csv") as file:
+        monkeypatch.setattr(os, "write", write)
+        file.write("time_s,u_V\n0,1\n")
+        with pytest.raises(InputError, match="No space left"):
+            file.write("1,2\n2,3\n3,4\n")
+        monkeypatch.undo()
+    assert (tmp_path / "ramp.csv").read_text() == "time_s,u_V\n0,1\n1,2\n2,3\n"
 
 
 @pytest.mark.slow

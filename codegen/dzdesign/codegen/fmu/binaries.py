@@ -11,10 +11,10 @@ from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from dzdesign.codegen.fmu.description import SOURCE, Fmi
 from dzdesign.core.errors import InputError
+from dzdesign.core.scratch import scratch_folder
 
 #: As in the checked core: no contraction to fused products, so that every processor gives the same digits.
 FLAGS = (
@@ -76,8 +76,7 @@ def binaries_of(identifier: str, fmi: Fmi, sources: Mapping[str, bytes]) -> dict
     """Compile the sources for every platform of a version of FMI; path in the FMU to bytes."""
     ziglang_version()
     wanted = [each for each in PLATFORMS if fmi in each.folders]
-    with TemporaryDirectory(prefix="dzdesign-fmu-") as place, ThreadPoolExecutor(WORKERS) as pool:
-        folder = Path(place)
+    with scratch_folder() as folder, ThreadPoolExecutor(WORKERS) as pool:
         for name, content in sources.items():
             (folder / name).write_bytes(content)
         (folder / NO_LIBRARY).mkdir()
@@ -100,7 +99,7 @@ def _compiled(folder: Path, identifier: str, platform: Platform) -> bytes:
         "dylib": (f"-Wl,-install_name,@rpath/{name}",),
     }
     command = [
-        sys.executable, "-m", "ziglang", "cc", "-target", platform.triple, *FLAGS,
+        sys.executable, "-P", "-m", "ziglang", "cc", "-target", platform.triple, *FLAGS,
         *named[platform.ending], "-I.", "-isystem", NO_LIBRARY, SOURCE, "-o", f"{platform.triple}/{name}",
     ]  # fmt: skip
     try:

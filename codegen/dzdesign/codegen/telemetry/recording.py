@@ -1,9 +1,6 @@
 """Recorded telemetry: frames of a firmware in, a ramp file out, scaled by the compensator of that firmware."""
 
-import struct
-from array import array
-from collections.abc import Iterator
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.codegen.project import target_named
@@ -23,7 +20,6 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 
 COLUMNS = ("time_s", "u_V", "pA_MPa", "pB_MPa", "uO_V", "beta", "compare_a", "compare_b", "status")
-_ROW = struct.Struct("<9I")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,69 +54,58 @@ def scalings_of(folder: Path, compensator_file: Path | None = None) -> Scalings:
 
 
 class Recording:
-    """Frames as they came, in 32 bytes each, and what was missed between them."""
+    """What frames say, a line of the ramp file each, and what was missed between them."""
 
     def __init__(self, scalings: Scalings) -> None:
         self.scalings = scalings
-        #: Frames that are missing between others; how often the count of PWM periods went back, as after a reset.
-        self.lost = self.restarts = 0
-        self._rows = bytearray()
-        self._periods = array("q")  # since the first frame, and going on over a restart
+        #: Frames that came; those missing between others; how often the count of PWM periods went back, as by a reset.
+        self.frames = self.lost = self.restarts = 0
+        self._status = 0  # every bit that any frame has
+        self._periods = 0  # since the first frame, and going on over a restart
         self._last = 0
-
-    def __len__(self) -> int:
-        return len(self._periods)
 
     @property
     def duration_s(self) -> float:
         """Time from the first frame to the last, in s."""
-        return self._periods[-1] / self.scalings.link.tick_Hz if self._periods else 0.0
+        return self._periods / self.scalings.link.tick_Hz
 
     @property
     def faults(self) -> list[str]:
         """Faults that any frame reports, in words."""
-        seen = 0
-        for row in _ROW.iter_unpack(self._rows):
-            seen |= row[-1]
-        return [text for bit, text in STATUS_BITS.items() if seen & bit]
+        return [text for bit, text in STATUS_BITS.items() if self._status & bit]
 
-    def add(self, frame: Frame) -> None:
-        """Add a frame; one whose time lies before the last one's begins anew, one frame later."""
+    def add(self, frame: Frame) -> str:
+        """Count a frame and return its line; one whose time lies before the last one's begins anew, one frame later."""
         due = self.scalings.link.frame_ticks
         step = (frame.ticks - self._last) % TICKS_MODULUS
-        if not self._periods:
-            now = 0
-        elif 0 < step < TICKS_MODULUS // 2:
-            now = self._periods[-1] + step
+        if self.frames and 0 < step < TICKS_MODULUS // 2:
+            self._periods += step
             self.lost += max(round(step / due) - 1, 0)
-        else:
-            now = self._periods[-1] + due
+        elif self.frames:
+            self._periods += due
             self.restarts += 1
+        self.frames += 1
         self._last = frame.ticks
-        self._rows += _ROW.pack(*astuple(frame))
-        self._periods.append(now)
+        self._status |= frame.status
+        return self._line(frame)
 
-    def rows(self) -> Iterator[str]:
-        """Yield the lines of the table."""
+    def _line(self, frame: Frame) -> str:
         u_max_V, signals = self.scalings.compensator.u_max_V, self.scalings.compensator.signals
         command, a, b = signals.command, signals.pressure_a, signals.pressure_b
         volts, volts_out = float(command.direction(1) * u_max_V / command.span(1)), float(u_max_V / signals.compare_max)
-        a_MPa, b_MPa = float(a.per_code_MPa), float(b.per_code_MPa)
-        for periods, row in zip(self._periods, _ROW.iter_unpack(self._rows), strict=True):
-            _, _, u_adc, p_a_adc, p_b_adc, beta, compare_a, compare_b, status = row
-            out = (compare_a - compare_b) * volts_out if status & STATUS_RELEASED else 0.0
-            volts_in = (u_adc - command.zero_code) * volts
-            a_now, b_now = (p_a_adc - a.zero_code) * a_MPa, (p_b_adc - b.zero_code) * b_MPa
-            yield (
-                f"{periods / self.scalings.link.tick_Hz:.4f},{volts_in:.5f},{a_now:.5f},{b_now:.5f},"
-                f"{out:.5f},{beta / (1 << BETA_BITS):.5f},{compare_a},{compare_b},{status}\n"
-            )
+        out = (frame.compare_a - frame.compare_b) * volts_out if frame.status & STATUS_RELEASED else 0.0
+        volts_in = (frame.u_adc - command.zero_code) * volts
+        a_now = (frame.p_a_adc - a.zero_code) * float(a.per_code_MPa)
+        b_now = (frame.p_b_adc - b.zero_code) * float(b.per_code_MPa)
+        return (
+            f"{self.duration_s:.4f},{volts_in:.5f},{a_now:.5f},{b_now:.5f},{out:.5f},"
+            f"{frame.beta / (1 << BETA_BITS):.5f},{frame.compare_a},{frame.compare_b},{frame.status}\n"
+        )
 
-    def to_csv(self, reader: FrameReader) -> str:
-        """Return the ramp file: comments on what was recorded and what `reader` missed, then the table."""
+    def head(self) -> str:
+        """Return what stands before the first line: comments and the names of the columns."""
         comments = (
             f"recorded by dzdesign {TOOL['version']} monitor, firmware of compensator SHA-256 {self.scalings.sha256}",
-            f"{len(self)} frames, {self.lost} lost, {reader.bad_crc} with a wrong CRC, {self.restarts} restarts",
             "u_V: command u_i. uO_V: output u_O, negative of solenoid B, 0 while the output is held low; "
             "to look at the valve without its "
             'compensator: --columns "u=uO_V"',
@@ -129,5 +114,10 @@ class Recording:
             "The firmware does not measure the flow: add a column Q_Lmin, your flow meter's reading at each time_s. "
             "The ramp of u_V, recorded by both, tells the shift between the two clocks",
         )
-        head = "".join(f"# {comment}\n" for comment in comments)
-        return head + ",".join(COLUMNS) + "\n" + "".join(self.rows())
+        return "".join(f"# {comment}\n" for comment in comments) + ",".join(COLUMNS) + "\n"
+
+    def foot(self, reader: FrameReader) -> str:
+        """Return what stands after the last line: what was recorded, and what `reader` missed."""
+        return (
+            f"# {self.frames} frames, {self.lost} lost, {reader.bad_crc} with a wrong CRC, {self.restarts} restarts\n"
+        )

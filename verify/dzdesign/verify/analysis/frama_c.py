@@ -9,7 +9,6 @@ import os
 import re
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ import numpy as np
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import UNDEFINED_BEHAVIOUR, Check
@@ -99,12 +99,12 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
     sources = sorted(path.name for path in (folder / "core").glob("*.[ch]"))
     alarms: set[Alarm] = set()
     functions: list[str] = []
-    with tempfile.TemporaryDirectory(prefix="dzdesign-proof-") as name:
+    with scratch_folder() as place:
         for sign, (source, ending) in SOURCES.items():
             if source not in sources:
                 continue
             law = ExactLaw(compensator, sign)
-            work = Path(name) / source
+            work = place / source
             work.mkdir()
             for each in sources:
                 shutil.copyfile(folder / "core" / each, work / each)
@@ -119,8 +119,7 @@ def prove(folder: Path, rows: int | None = None) -> Proof:
 def prove_any_block(folder: Path, machines: tuple[str, ...] = BOTH_WIDTHS) -> Proof:
     """Analyse a core in block form, and its check of blocks, for any octets of a block, any codes and any state."""
     signals, drive = read_compensator(folder).signals, read_compensator(folder).current_drive
-    with tempfile.TemporaryDirectory(prefix="dzdesign-proof-") as name:
-        work = Path(name)
+    with scratch_folder() as work:
         for path in [*(folder / "core").glob("*.[ch]"), PROGRAMS / "proof_block.c"]:
             shutil.copyfile(path, work / path.name)
         sources = sorted(path.name for path in work.glob("dz_*.c"))

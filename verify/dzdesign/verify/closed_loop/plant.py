@@ -5,7 +5,6 @@ that moves the threshold, flow force, a play in the magnetic force (hysteresis),
 """
 
 import math
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.artefact_types import quantity
 from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.toml_documents import read_toml
 
 if TYPE_CHECKING:
     import casadi
@@ -127,10 +127,7 @@ def read_plant(path: Path, say: Callable[[str], None] = lambda _: None) -> Plant
 def read_parameters(path: Path, what: str, others: Sequence[str] = ()) -> dict[str, Any]:
     """Read TOML whose keys are parameters of `Plant`, or `others`; of any other the `InputError` names the nearest."""
     content = read_bytes(path, what)
-    try:
-        values = tomllib.loads(content.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' is not TOML: {error}") from error
+    values = read_toml(content, str(path), "lines such as K_a = 4.0")
     known = [*(field.name for field in fields(Plant)), *others]
     for key in values:
         if key not in known:

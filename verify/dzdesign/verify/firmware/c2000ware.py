@@ -4,13 +4,13 @@ TI's headers are C for a compiler with 16-bit `int` and words of its own. Their 
 (DSP28_DATA_TYPES), and the words mean nothing to a syntax check; what is left is what the firmware relies on.
 """
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.verify.firmware.folder import read_firmware_manifest
 from dzdesign.verify.requirements import C2000WARE, Check
 from dzdesign.verify.toolchain.host_compiler import check_strictly, host_compiler
@@ -61,8 +61,8 @@ def check_against_c2000ware(folder: Path, ware: Path, say: Callable[[str], None]
     say(f"compiling the firmware against {ware}")
     sources = sorted(folder / name for name in manifest.files if name.endswith(".c"))
     try:
-        with tempfile.TemporaryDirectory(prefix="dzdesign-") as temporary:
-            prelude = Path(temporary) / "prelude.h"
+        with scratch_folder() as temporary:
+            prelude = temporary / "prelude.h"
             prelude.write_text(PRELUDE, encoding="utf-8")
             options = ["-include", str(prelude), f"-I{folder / 'core'}", f"-I{folder / TARGET}"]
             for headers in HEADERS:  # TI's headers are not ours to warn about

@@ -3,7 +3,6 @@
 Where a machine has no compiler, Zig's serves: a clang with its own headers and linker, in the wheel `ziglang`.
 """
 
-import atexit
 import ctypes
 import importlib.util
 import logging
@@ -12,10 +11,8 @@ import shlex
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from threading import Lock
 
@@ -23,6 +20,7 @@ import platformdirs
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.scratch import process_folder
 
 #: What the generated core must bear without a word.
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror")
@@ -41,12 +39,9 @@ REDIRECTING = ("CPATH", "C_INCLUDE_PATH", "CCC_OVERRIDE_OPTIONS")
 logger = logging.getLogger(__name__)
 
 
-@cache
 def build_folder() -> Path:
     """Return the folder that everything is built in; it goes when the process ends."""
-    folder = tempfile.mkdtemp(prefix="dzdesign-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Path(folder)
+    return process_folder()
 
 
 def find_compilers() -> tuple[str, ...]:
@@ -62,7 +57,10 @@ def find_compilers() -> tuple[str, ...]:
 def _found(name: str) -> str | None:
     """Return the path of a program, or several words as they are if the first one is a program."""
     path = shutil.which(name)
-    words = [] if path else shlex.split(name, posix=os.name != "nt")
+    try:
+        words = [] if path else shlex.split(name, posix=os.name != "nt")
+    except ValueError as error:
+        raise InputError(f"$CC is {name!r}, which is no compiler's command ({error}); correct or unset it") from error
     return path or (name if len(words) > 1 and shutil.which(words[0]) else None)
 
 

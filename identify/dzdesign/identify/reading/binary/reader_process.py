@@ -14,7 +14,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -24,6 +23,7 @@ import msgspec
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.identify.reading.binary.reader_server import MOST_FOUND, Answer, ListedColumn, Request
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, unreadable
 
@@ -93,8 +93,8 @@ def _on_disk(file: BinaryIO, path: Path) -> Iterator[str]:
     if not isinstance(file, io.BytesIO):
         yield os.path.abspath(path)
         return
-    with tempfile.TemporaryDirectory(prefix="dzdesign-") as folder:
-        place = Path(folder) / "piped"
+    with scratch_folder() as folder:
+        place = folder / "piped"
         place.write_bytes(file.getvalue())
         yield str(place)
 

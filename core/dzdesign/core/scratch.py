@@ -1,0 +1,117 @@
+"""Folders for what a process needs only while it runs; those of a process that was killed go with the next one.
+
+Each is held by a lock that ends with its process, however that ends.
+"""
+
+import atexit
+import contextlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+#: How the folders are called, in the system's folder for temporary files. A folder is hidden until its lock is held.
+PREFIX, HIDDEN = "dzdesign-", ".dzdesign-"
+#: A hidden folder of this age was left by a process that was killed before it held the lock.
+ABANDONED_S = 60.0
+#: Windows locks no folder, but deletes none with an open file: this one.
+IN_USE = ".in-use"
+
+#: The folders of this process, and what ends their locks.
+_held: dict[Path, Callable[[], None]] = {}
+
+
+@contextlib.contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Make a folder that goes at the end of the context."""
+    folder = _made()
+    try:
+        yield folder
+    finally:
+        _remove(folder)
+
+
+@cache
+def process_folder() -> Path:
+    """Return the folder of this process, which goes when the process ends."""
+    folder = _made()
+    atexit.register(_remove, folder)
+    return folder
+
+
+def is_scratch(path: Path) -> bool:
+    """Tell whether a path lies in a folder of this process that goes anyway: no power cut matters to it."""
+    place = Path(os.path.realpath(path))
+    return any(folder == place or folder in place.parents for folder in _held)
+
+
+def remove_scratch() -> None:
+    """Remove the folders of this process now, before it ends by a way on which nothing else is done."""
+    for folder in list(_held):
+        _remove(folder)
+
+
+def _made() -> Path:
+    _remove_abandoned()
+    if os.name != "posix":
+        folder = Path(os.path.realpath(tempfile.mkdtemp(prefix=PREFIX)))
+        _held[folder] = open(folder / IN_USE, "xb").close  # noqa: SIM115
+        return folder
+    hidden = Path(os.path.realpath(tempfile.mkdtemp(prefix=HIDDEN)))
+    lock = _lock(hidden)
+    folder = hidden.with_name(PREFIX + hidden.name.removeprefix(HIDDEN))
+    hidden.rename(folder)
+    _held[folder] = lambda: None if lock is None else os.close(lock)
+    return folder
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder of this process; the lock goes last where it can, so that nobody else removes it too."""
+    unlock = _held.pop(folder, None)
+    if unlock is None:
+        return
+    if os.name != "posix":
+        unlock()
+    shutil.rmtree(folder, ignore_errors=True)
+    if os.name == "posix":
+        unlock()
+
+
+@cache
+def _remove_abandoned() -> None:
+    """Remove the folders of processes that were killed; what can't be looked at or removed is left."""
+    with contextlib.suppress(OSError), os.scandir(tempfile.gettempdir()) as entries:
+        for entry in entries:
+            if entry.name.startswith((PREFIX, HIDDEN)):
+                with contextlib.suppress(OSError):
+                    _remove_if_abandoned(Path(entry.path), hidden=entry.name.startswith(HIDDEN))
+
+
+def _remove_if_abandoned(folder: Path, *, hidden: bool) -> None:
+    if os.name != "posix":
+        os.unlink(folder / IN_USE)  # an error while its process lives, or where there is none
+        shutil.rmtree(folder, ignore_errors=True)
+        return
+    found = os.lstat(folder)
+    if found.st_uid != os.getuid() or (hidden and time.time() - found.st_mtime < ABANDONED_S):
+        return
+    lock = _lock(folder)
+    if lock is not None:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """Return the held lock of a folder as a descriptor; None where another process holds it."""
+    import fcntl
+
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor

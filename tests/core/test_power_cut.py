@@ -1,0 +1,120 @@
+"""What reaches the disk, in which order, and what a power cut or a kill left is made again; nobody's file is lost."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_folder
+from dzdesign.core.errors import InputError
+from dzdesign.core.folder_swap import UNPLACED, alone_in
+
+FILES = {"core/a.c": "int a;\n", "README.md": "read\n"}
+FIRMWARE = {"schema": "dzdesign.firmware/1", "target": "host"}
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="folders are not synced there")
+
+
+@pytest.fixture
+def steps(monkeypatch):
+    """The calls that decide what a power cut leaves: the inode that is synced, and the one that is renamed."""
+    seen: list[tuple[str, int]] = []
+    real_sync, real_replace = os.fsync, os.replace
+
+    def sync(descriptor: int) -> None:
+        seen.append(("sync", os.fstat(descriptor).st_ino))
+        real_sync(descriptor)
+
+    def replace(source, target) -> None:
+        seen.append(("rename", os.stat(source).st_ino))
+        real_replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    monkeypatch.setattr(os, "replace", replace)
+    return seen
+
+
+def test_a_file_is_synced_before_its_rename_and_its_folder_after_it(tmp_path, steps):
+    write_file(tmp_path / "valve.json", "{}")
+    number = (tmp_path / "valve.json").stat().st_ino
+    assert steps == [("sync", number), ("rename", number), ("sync", tmp_path.stat().st_ino)]
+
+
+def test_all_files_of_a_folder_are_synced_then_it_then_its_rename(tmp_path, steps):
+    folder = tmp_path / "firmware"
+    write_folder(folder, FILES, FIRMWARE)
+    inside = [folder / name for name in (*FILES, MANIFEST_NAME, "core", ".")]
+    before = steps[: steps.index(("rename", folder.stat().st_ino))]
+    assert {("sync", path.stat().st_ino) for path in inside} <= set(before)
+    assert before.index(("sync", (folder / "core/a.c").stat().st_ino)) < before.index(
+        ("sync", (folder / "core").stat().st_ino)
+    )
+    assert before[-1] == ("sync", folder.stat().st_ino)
+    assert steps[-1] == ("sync", tmp_path.stat().st_ino)
+
+
+def test_a_replaced_folder_is_removed_only_after_the_new_name_is_on_the_disk(tmp_path, steps, monkeypatch):
+    folder = tmp_path / "firmware"
+    write_folder(folder, FILES, FIRMWARE)
+    monkeypatch.setattr("shutil.rmtree", lambda *_, **__: steps.append(("remove", 0)))
+    write_folder(folder, {**FILES, "README.md": "new\n"}, FIRMWARE)
+    assert steps.index(("remove", 0)) > steps.index(("sync", tmp_path.stat().st_ino), len(steps) - 2)
+
+
+@pytest.mark.parametrize("left", [b"", b"\0" * 400])
+def test_a_folder_that_a_power_cut_erased_is_made_again(tmp_path, left):
+    folder = tmp_path / "firmware"
+    write_folder(folder, FILES, FIRMWARE)
+    for path in folder.rglob("*"):
+        if path.is_file():
+            path.write_bytes(left)
+    (folder / "notes.txt").write_text("mine")
+    write_folder(folder, FILES, FIRMWARE)
+    assert {name: (folder / name).read_text() for name in FILES} == FILES
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
+def test_of_an_erased_folder_no_file_with_a_content_of_its_own_is_lost(tmp_path):
+    folder = tmp_path / "firmware"
+    write_folder(folder, FILES, FIRMWARE)
+    (folder / MANIFEST_NAME).write_bytes(b"")
+    (folder / "README.md").write_text("mine")
+    with pytest.raises(InputError, match=r"README\.md"):
+        write_folder(folder, FILES, FIRMWARE)
+    assert (folder / "README.md").read_text() == "mine"
+    assert not list(tmp_path.glob(f"{UNPLACED}*"))
+
+
+def test_a_folder_without_a_manifest_is_still_somebodys(tmp_path):
+    (tmp_path / "firmware").mkdir()
+    (tmp_path / "firmware/empty.txt").write_bytes(b"")
+    with pytest.raises(InputError, match="not made by dzdesign"):
+        write_folder(tmp_path / "firmware", FILES, FIRMWARE)
+
+
+@pytest.mark.parametrize("write", [
+    lambda place: write_file(place / "valve.json", "{}"),
+    lambda place: write_folder(place / "firmware", FILES, FIRMWARE),
+])  # fmt: skip
+def test_what_a_killed_run_began_goes_with_the_next(tmp_path, write):
+    (tmp_path / f"{UNPLACED}0a1b").mkdir()
+    (tmp_path / f"{UNPLACED}0a1b/half").write_text("half")
+    (tmp_path / f"{UNPLACED}file").write_text("half")
+    write(tmp_path)
+    assert not list(tmp_path.glob(f"{UNPLACED}*"))
+
+
+def test_what_a_link_leads_to_is_replaced_and_the_link_stays(tmp_path):
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept/valve.json").write_text("old")
+    (tmp_path / "valve.json").symlink_to("kept/valve.json")
+    write_file(tmp_path / "valve.json", "new")
+    assert (tmp_path / "valve.json").readlink() == Path("kept/valve.json")
+    assert (tmp_path / "kept/valve.json").read_text() == "new"
+
+
+def test_a_folder_may_be_held_twice_by_one_thread(tmp_path):
+    with alone_in(tmp_path) as outer:
+        write_file(tmp_path / "batch.json", "{}")
+        with alone_in(tmp_path) as inner:
+            assert outer and inner

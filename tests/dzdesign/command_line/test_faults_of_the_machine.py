@@ -1,0 +1,68 @@
+"""A machine that has no room, no memory or no output is one sentence and exit status 2, never a traceback."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.paths import ROOT
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="shells, devices and limits of Linux")
+DZDESIGN = Path(sys.executable).with_name("dzdesign")
+RAMPS = ROOT / "examples" / "paper_valve" / "ramps"
+
+
+def run(words: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a line of a shell, in which ``dz`` is the program."""
+    line = words.replace("dz ", f"'{DZDESIGN}' ", 1)
+    return subprocess.run(
+        ["bash", "-c", line], cwd=folder, env={**os.environ, **environment}, text=True, errors="replace",
+        capture_output=True, timeout=100, check=False,
+    )  # fmt: skip
+
+
+def sentence(done: subprocess.CompletedProcess[str]) -> str:
+    """Return what was said of the fault, and assert that it was one line and exit status 2."""
+    assert done.returncode == 2 and "Traceback" not in done.stderr, done.stderr
+    lines = done.stderr.strip().splitlines()
+    assert lines[-1].startswith("dzdesign: "), done.stderr
+    return lines[-1]
+
+
+@pytest.mark.parametrize("words", ["dz --help", "dz codegen --help", "dz doctor", "dz schema valve"])
+def test_an_output_that_is_full(tmp_path, words):
+    assert "can't be printed: No space left" in sentence(run(f"{words} > /dev/full", tmp_path))
+
+
+def test_a_full_output_names_what_was_written_before(tmp_path):
+    done = run("dz simulate --dp '1 MPa' -o ramps > /dev/full", tmp_path)
+    assert "written before that: 'ramps'" in sentence(done)
+    assert (tmp_path / "ramps/manifest.json").is_file()
+
+
+def test_a_closed_output_is_said_before_any_work(tmp_path):
+    assert "closed" in sentence(run("dz simulate --dp '1 MPa' -o ramps >&-", tmp_path))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_closed_standard_error_says_nothing_and_does_the_work(tmp_path):
+    done = run("dz simulate --dp '1 MPa' -o ramps 2>&-", tmp_path)
+    assert done.returncode == 0 and (tmp_path / "ramps/manifest.json").is_file()
+
+
+def test_too_little_memory_for_recordings(tmp_path):
+    done = run(f"ulimit -v 1000000; '{DZDESIGN}' identify {RAMPS}/ramp_dP1_1.csv.gz -o valve.json", tmp_path)
+    assert "address space" in sentence(done) and not list(tmp_path.iterdir())
+
+
+def test_a_compiler_that_is_no_command(tmp_path):
+    assert "$CC" in run("dz doctor", tmp_path, CC='gcc "').stdout
+
+
+def test_a_working_folder_whose_name_is_not_utf_8(tmp_path):
+    folder = os.fsencode(tmp_path) + b"/bad\xff"
+    os.mkdir(folder)
+    done = run("dz simulate --dp '1 MPa' -o ramps", Path(os.fsdecode(folder)))
+    assert done.returncode == 0, done.stderr
