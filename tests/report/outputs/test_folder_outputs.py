@@ -15,10 +15,10 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
-from dzdesign.report.chain import Chain
+from dzdesign.report.chain import Chain, Place
 from dzdesign.report.outputs.folder_outputs import outputs_of_folder
 from dzdesign.report.outputs.made_output import MadeOutput, MadeOutputs
-from dzdesign.report.outputs.section import with_outputs
+from dzdesign.report.outputs.section import outputs_sections, with_outputs
 from dzdesign.report.page import Headline
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.evidence import Evidence
@@ -240,6 +240,13 @@ def test_a_wrong_output_takes_the_verdict_and_is_named(kind):
     found = with_outputs(said, MadeOutputs(listed=(WRONG,)), chain)
     assert found.kind == "bad" and found.reasons == ("one", "DOES NOT HOLD: fmu/ (fmu): inputs: 3 wrong")
     assert ("fmu/" in found.text) == (kind != "bad") and found.text.endswith("as it was")
+
+
+def test_the_firmware_of_the_report_is_judged_once():
+    chain = Chain(places={"firmware": Place("firmware/manifest.json", WRONG.sha256)}, evidence=evidence_with())
+    said = Headline(kind="bad", text="DOES NOT HOLD", reasons=("inputs: 3 wrong",))
+    made = MadeOutputs(listed=(WRONG,))
+    assert with_outputs(said, made, chain) == said and outputs_sections(chain, made) == {}
 
 
 def test_without_a_firmware_the_verdict_is_of_the_outputs():

@@ -10,9 +10,13 @@ from dzdesign.report.sections.cells import Cell, counted, table_of, verdict, who
 
 def outputs_sections(chain: Chain, made: MadeOutputs) -> dict[str, Section]:
     """Return the section by its anchor; none where the firmware that the report is of is all there is."""
+    return {"outputs": _outputs_section(made)} if _beside_firmware(made, chain) or made.others else {}
+
+
+def _beside_firmware(made: MadeOutputs, chain: Chain) -> list[MadeOutput]:
+    """Return the outputs other than the firmware that the report is of, on which its verdict speaks already."""
     firmware = chain.places.get("firmware")
-    more = [each for each in made.listed if firmware is None or each.sha256 != firmware.sha256]
-    return {"outputs": _outputs_section(made)} if more or made.others else {}
+    return [each for each in made.listed if firmware is None or each.sha256 != firmware.sha256]
 
 
 def _outputs_section(made: MadeOutputs) -> Section:
@@ -46,7 +50,7 @@ def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headlin
     It is not good if one of them is wrong; each that is wrong is named. Where there is no C firmware and no evidence of
     one, the verdict is of the outputs.
     """
-    wrong = [each for each in made.listed if each.is_wrong]
+    wrong = [each for each in _beside_firmware(made, chain) if each.is_wrong]
     if not wrong:
         only_these = made.listed and not (chain.faults or chain.firmware or chain.evidence)
         return _of_outputs_alone(headline, made) if only_these else headline
