@@ -104,13 +104,20 @@ def test_what_a_killed_run_began_goes_with_the_next(tmp_path, write):
     assert not list(tmp_path.glob(f"{UNPLACED}*"))
 
 
-def test_what_a_link_leads_to_is_replaced_and_the_link_stays(tmp_path):
+def test_the_artefact_that_a_link_leads_to_is_replaced_and_the_link_stays(tmp_path):
     (tmp_path / "kept").mkdir()
-    (tmp_path / "kept/valve.json").write_text("old")
+    (tmp_path / "kept/valve.json").write_text('{"schema": "dzdesign.valve/1"}')
     (tmp_path / "valve.json").symlink_to("kept/valve.json")
-    write_file(tmp_path / "valve.json", "new")
+    write_file(tmp_path / "valve.json", "new", "dzdesign.valve/1")
     assert (tmp_path / "valve.json").readlink() == Path("kept/valve.json")
     assert (tmp_path / "kept/valve.json").read_text() == "new"
+
+
+def test_a_link_to_what_is_no_artefact_gives_way(tmp_path):
+    (tmp_path / "work.txt").write_text("years of work")
+    (tmp_path / "plot.svg").symlink_to("work.txt")
+    write_file(tmp_path / "plot.svg", "new")
+    assert (tmp_path / "work.txt").read_text() == "years of work" and not (tmp_path / "plot.svg").is_symlink()
 
 
 def test_a_folder_may_be_held_twice_by_one_thread(tmp_path):

@@ -21,6 +21,14 @@ def test_a_deep_key_is_refused_before_it_is_parsed(text):
     assert time.process_time() - begin < 1
 
 
+@pytest.mark.parametrize("piece", ["a", "a ", "a.", "'", '"', "'a", "a\t", ". ", "a . ", '"a"."', "-."])
+def test_the_search_takes_a_time_as_long_as_the_file(piece):
+    begin = time.process_time()
+    with pytest.raises(InputError):
+        read_toml((piece * 300_000).encode(), "options.toml", "options")
+    assert time.process_time() - begin < 2
+
+
 def test_three_thousand_nested_headers_take_no_second():
     deepest = ".".join("a" * MOST_PARTS)
     text = "\n".join(f"[{deepest}{number}]" for number in range(3000))

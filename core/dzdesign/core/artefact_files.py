@@ -112,7 +112,8 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
     data = content.encode() if isinstance(content, str) else content
     check_file_may_be_written(path, schema, option)
     with _refusing(f"'{path}'", option):
-        place = Path(os.path.realpath(path))  # a link stays, the file that it leads to is replaced
+        # A link to an artefact stays, and its artefact is replaced; a link to anything else gives way.
+        place = Path(os.path.realpath(path)) if schema else Path(path)
         with alone_in(place.parent) as alone:
             remove_abandoned(place.parent, alone=alone)
             _replace_file(place, data)

@@ -10,8 +10,9 @@ from dzdesign.core.errors import InputError
 #: Parts of a dotted key, ``a.b.c``; the deepest that dzdesign reads has two. A parser keeps each one's beginning: of a
 #: line of 200 kB it would make 24 GB.
 MOST_PARTS = 16
-_PART = r"""(?:"[^"\n]*"|'[^'\n]*'|[A-Za-z0-9_-]+)"""
-_DEEP_KEY = re.compile(rf"(?:{_PART}[ \t]*\.[ \t]*){{{MOST_PARTS}}}")
+_PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[A-Za-z0-9_-]++)"""
+#: It begins only where a word does, and takes back nothing: a file is searched in a time as long as the file.
+_DEEP_KEY = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
 
 def read_toml(

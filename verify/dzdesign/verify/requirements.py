@@ -108,7 +108,7 @@ FMU_STARTS = Requirement(id="fmu-starts", title="variables begin as they are des
 FMU_EXCHANGE = Requirement(id="fmu-exchange", title="Model Exchange follows the exact models, without delay")
 FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="compensator and plant, coupled, run as the closed loop")
 #: Of a function for MATLAB.
-MATLAB_SUBSET = Requirement(id="matlab-subset", title="the text is of the subset that is verified")
+MATLAB_SUBSET = Requirement(id="matlab-subset", title="the function is of the subset of MATLAB that is verified")
 MATLAB_RANGES = Requirement(id="matlab-ranges", title="no operation leaves the range of its class")
 MATLAB_INPUTS = Requirement(
     id="matlab-inputs", title="inputs of every class and size are taken or refused as described"
