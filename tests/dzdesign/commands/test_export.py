@@ -102,6 +102,8 @@ def test_its_own_file_is_written_again_and_another_is_left_alone(compensator, tm
         ("--to", "csv", "--dp", "0.2 MPa"),
         ("--to", "west", "--threshold", "0.01"),
         ("--to", "west", "--threshold", "31 %"),
+        ("--to", "west", "--threshold", "0 %"),
+        ("--to", "beckhoff", "--threshold", "0.1 %"),
         ("--to", "beckhoff", "--threshold", "30 %", "-o", "no/such/folder.st"),
         ("--to", "west", "-o", "."),
     ],

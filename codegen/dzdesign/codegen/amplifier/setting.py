@@ -49,13 +49,21 @@ def amplifier_setting(
     Raises
     ------
     InputError
-        If the device's range does not hold the setting, it has fewer solenoids, or an option is not of it.
+        If the device's range does not hold the setting, it has fewer solenoids, an option is not of it, or the
+        threshold is below what a zero command may read.
     """
     signs = compensator.signals.signs
     if len(signs) > 1 and not device.takes_both_signs:
         raise InputError(f"{device.title} drives one solenoid, and the design has two; choose another --to")
     offsets = {sign: fixed_offset(compensator, sign) for sign in signs}
-    rest = max(zero_band(compensator, sign) for sign in signs) if threshold is None else threshold
+    reads = max(zero_band(compensator, sign) for sign in signs)
+    rest = reads if threshold is None else threshold
+    if rest < reads and (device.law == "table" or device.threshold is not None):
+        raise InputError(
+            f"--threshold is {100 * float(rest):.3g} % of command, and a zero command of this design may read up to "
+            f"{100 * float(reads):.3g} %, where the valve must rest; give at least {ceil(reads * 10_000) / 100:.2f} %, "
+            "or design it with a smaller --command-error"
+        )
     if device.law == "table":
         at = Fraction(repr(compensator.valve.sides["positive"].reference.dp_MPa)) if dp_MPa is None else dp_MPa
         return _table(compensator, device, offsets, at, rest)

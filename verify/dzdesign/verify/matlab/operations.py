@@ -49,8 +49,8 @@ def evaluated(function: ReadFunction, codes: np.ndarray) -> Evaluator:
 def corner_inputs(prepared: PreparedInputs) -> tuple[np.ndarray, np.ndarray]:
     """Return codes, (N, 3), and the exact compare value of each, (N,).
 
-    Commands are the corners of the law, their neighbours and the ends of 16 bits; pressures one pair for each difference,
-    and some that are not valid.
+    Commands are the corners of the law, their neighbours and the ends of 16 bits; pressures one pair for each
+    difference, and some that are not valid.
     """
     exact, differences = prepared.exact, prepared.differences
     commands = np.array(_commands(exact))
