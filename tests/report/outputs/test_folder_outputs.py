@@ -15,7 +15,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
-from dzdesign.report.chain import Chain
+from dzdesign.report.chain import Chain, Place
 from dzdesign.report.outputs.folder_outputs import outputs_of_folder
 from dzdesign.report.outputs.made_output import MadeOutput, MadeOutputs
 from dzdesign.report.outputs.section import with_outputs
@@ -235,11 +235,22 @@ WRONG = MadeOutput(kind="fmu", settings="", place="fmu/", sha256="0" * 64, holds
 def test_a_wrong_output_takes_the_verdict_and_is_named(kind):
     said = Headline(kind=kind, text="as it was", reasons=("one",))
     chain = Chain(evidence=evidence_with())
-    right = MadeOutputs(listed=(replace(WRONG, holds=True), replace(WRONG, holds=None)))
+    right = MadeOutputs(listed=(replace(WRONG, holds=True), replace(WRONG, holds=None, place="valve.dcf")))
     assert with_outputs(said, right, chain) == said
     found = with_outputs(said, MadeOutputs(listed=(WRONG,)), chain)
     assert found.kind == "bad" and found.reasons == ("one", "DOES NOT HOLD: fmu/ (fmu): inputs: 3 wrong")
     assert ("fmu/" in found.text) == (kind != "bad") and found.text.endswith("as it was")
+
+
+def test_a_verdict_is_not_good_while_an_output_is_not_verified():
+    untried = MadeOutputs(listed=(replace(WRONG, holds=None, fault=""),))
+    chain, good = Chain(evidence=evidence_with()), Headline(kind="good", text="as it was")
+    found = with_outputs(good, untried, chain)
+    assert (found.kind, found.text) == ("open", "NOT VERIFIED: fmu/. as it was")
+    open_ = replace(good, kind="open")
+    assert with_outputs(open_, untried, chain) == open_
+    itself = replace(chain, places={"firmware": Place("fmu/manifest.json", WRONG.sha256)})  # whose evidence it is
+    assert with_outputs(good, untried, itself) == good
 
 
 def test_without_a_firmware_the_verdict_is_of_the_outputs():

@@ -43,18 +43,29 @@ def _check(output: MadeOutput) -> Cell:
 def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headline:
     """Return the verdict of a report, which speaks of a C firmware, with what is to be said of the outputs.
 
-    It is not good if one of them is wrong; each that is wrong is named. Where there is no C firmware and no evidence of
-    one, the verdict is of the outputs.
+    It is not good if one of them is wrong, or was not verified; each is named. Where there is no C firmware and no
+    evidence of one, the verdict is of the outputs.
     """
     wrong = [each for each in made.listed if each.is_wrong]
     if not wrong:
         only_these = made.listed and not (chain.faults or chain.firmware or chain.evidence)
-        return _of_outputs_alone(headline, made) if only_these else headline
+        return _of_outputs_alone(headline, made) if only_these else _with_untried(headline, made, chain)
     reasons = tuple(f"{each.verdict}: {each.place} ({each.kind}): {each.changed or each.fault}" for each in wrong)
     text, names = headline.text, ", ".join(each.place for each in wrong)
     if headline.kind != "bad":
         text = f"{counted(len(wrong), 'output')} NOT to be used: {names}. {text}"
     return replace(headline, kind="bad", text=text, reasons=(*headline.reasons, *reasons))
+
+
+def _with_untried(headline: Headline, made: MadeOutputs, chain: Chain) -> Headline:
+    """Return a good verdict as open where an output that `verify` takes was not verified; it takes no file alone."""
+    firmware = chain.places.get("firmware")
+    reported = firmware.sha256 if firmware else ""
+    untried = [each.place for each in made.listed
+               if each.holds is None and each.place.endswith("/") and each.sha256 != reported]  # fmt: skip
+    if headline.kind != "good" or not untried:
+        return headline
+    return replace(headline, kind="open", text=f"NOT VERIFIED: {', '.join(untried)}. {headline.text}")
 
 
 def _of_outputs_alone(headline: Headline, made: MadeOutputs) -> Headline:
