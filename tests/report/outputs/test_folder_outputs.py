@@ -112,6 +112,19 @@ def test_of_two_pieces_of_evidence_the_one_that_does_not_hold_counts(folder, dig
     assert found.verdict == "DOES NOT HOLD" and "7 wrong" in found.fault and found.is_wrong
 
 
+def test_what_was_not_checked_is_neither_right_nor_wrong(folder, digest):
+    """Such as a function of MATLAB where Octave is missing."""
+    put_evidence(folder / "b", folder / "plc")
+    put_evidence(folder / "a", folder / "plc", holds=None, text="Octave not found")
+    found = listed(folder, digest)["plc/"]
+    assert (found.verdict, found.is_wrong) == ("NOT CHECKED", False) and "Octave not found" in found.fault
+    good, chain = Headline(kind="good", text="yes"), Chain(evidence=evidence_with())
+    said = with_outputs(good, MadeOutputs(listed=(found,)), chain)
+    assert (said.kind, said.text) == ("open", "NOT CHECKED: plc/. yes") and "Octave not found" in said.reasons[0]
+    put_evidence(folder / "c", folder / "plc", holds=False, text="7 wrong")
+    assert listed(folder, digest)["plc/"].verdict == "DOES NOT HOLD"
+
+
 def test_changed_evidence_is_not_used_and_said(folder, digest):
     put_evidence(folder / "plc_evidence", folder / "plc", holds=False)
     path = folder / "plc_evidence" / OutputEvidence.FILE_NAME
