@@ -464,13 +464,13 @@ def test_the_command_prints_tables_formulas_and_writes_the_artefact(bench, capsy
                   "No limits were given", "Written: assessment.json"):  # fmt: skip
         assert words in out
     document = json.loads((bench / "assessment.json").read_text())
-    overview, first = out.index("Overview, without (before)"), out.index("1.00 MPa, positive")
+    overview, first = out.index("Overview, before → after"), out.index("1.00 MPa, positive")
     assert overview < first
     rows = [line.split() for line in out[overview:first].splitlines() if " positive " in line]
     assert [row[0] for row in rows] == ["1.00", "4.00"]
     for row, item in zip(rows, document["pressures"], strict=True):
         both = item["quantities"]["dead_zone_opening"]
-        assert row[2:4] == [f"{both[name]['value']:.2f}" for name in ("before", "after")]
+        assert row[2:5:2] == [f"{both[name]['value']:.2f}" for name in ("before", "after")]
     assert document["schema"] == "dzdesign.assessment/1" and document["tool"]["name"] == "dzdesign"
     assert [(one["set"], one["source"], len(one["sha256"])) for one in document["made_from"]] == [
         ("before", "before_1.csv", 64), ("before", "before_4.csv", 64),

@@ -57,6 +57,14 @@ def test_folders_of_a_killed_process_go_with_the_next_and_those_of_a_living_one_
     assert not list(place.iterdir())
 
 
+def test_a_users_folder_of_such_a_name_stays(place):
+    (place / f"{PREFIX}mylot").mkdir()
+    (place / f"{PREFIX}mylot/precious.csv").write_text("1")
+    with scratch_folder():
+        pass
+    assert (place / f"{PREFIX}mylot/precious.csv").read_text() == "1"
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no such links")
 def test_nothing_is_removed_through_a_link(place, tmp_path_factory):
     other = tmp_path_factory.mktemp("others")

@@ -11,11 +11,12 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
-from dzdesign.report.figures.characteristic import ORIGIN_WORDS, WITH_WORDS
+from dzdesign.report.characteristic.curves import ORIGIN_WORDS
+from dzdesign.report.figures.characteristic import WITH_WORDS
 from dzdesign.report.language import LANGUAGES, current_language, in_language, table_of_language, word
 from dzdesign.report.logo import LARGEST, logo_uri
 from dzdesign.report.page import SIGNS
-from dzdesign.report.sections.characteristic import NAMES, ORIGINS, VERDICTS
+from dzdesign.report.sections.characteristic import NAMES, VERDICTS
 from dzdesign.report.sections.conditions import RECORDED
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.paths import ROOT
@@ -27,15 +28,19 @@ PNG = base64.b64decode(
 )
 #: Words that are chosen by a value: of a side, a branch, a row.
 CHOSEN = {
-    *NAMES.values(), *ORIGINS.values(), *ORIGIN_WORDS.values(), *WITH_WORDS.values(), *RECORDED, *SIGNS,
+    *NAMES.values(), *ORIGIN_WORDS.values(), *WITH_WORDS.values(), *RECORDED, *SIGNS,
     *(text for _, text, _ in VERDICTS.values()), "Positive commands", "Negative commands", "recordings",
     "No negative commands were tested.", "No positive commands were tested.", "Ramp rate", "Sampling", "Samples",
-    "Flow meter", "Dither", "With", "Without", "Dead zone on opening, measured", "Dead zone on closing, measured",
+    "Flow meter", "Dither", "With", "Without", "Lot of", "valve", "valves",
+    *(f"{what}, {of}" for what in ("Dead zone on opening", "Dead zone on closing", "Flow at zero command")
+      for of in ("measured", "simulated recordings")),
 }  # fmt: skip
 #: Labels and headings that the page translates as they come.
 AS_THEY_COME = {
     "Dead zone on opening", "Dead zone on closing", "Dead zone of the valve", "Simulated closed loop", "Inputs checked",
-    "Certificate", "Certificate of the recording", "Flow at zero command", "quantity", "verdict", "limit",
+    "Calibrated", "Need a look", "Dead zone left on opening", "Dead zone left on closing", "Cost of one lot setting",
+    "Threshold: knee on opening", "Certificate",
+    "Certificate of the recording", "Flow at zero command", "quantity", "verdict", "limit",
 }  # fmt: skip
 
 
@@ -57,8 +62,11 @@ def literals() -> set[str]:
 
 
 def headings() -> set[str]:
-    text = (REPORT / "templates" / "valve.html.jinja").read_text(encoding="utf-8")
-    return set(re.findall(r'\("\w+", "([^"]+)"\)', text[text.index("headings") : text.index("appendices")]))
+    found = set()
+    for name in ("valve", "lot"):
+        text = (REPORT / "templates" / f"{name}.html.jinja").read_text(encoding="utf-8")
+        found |= set(re.findall(r'\("\w+", "([^"]+)"\)', text[text.index("headings") : text.index("appendices")]))
+    return found
 
 
 @pytest.mark.parametrize("language", [each for each in LANGUAGES if each != "en"])

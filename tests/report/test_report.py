@@ -358,7 +358,7 @@ def test_what_was_not_tried_is_said(copied):
 @pytest.mark.slow
 def test_the_plant_of_the_tests_stands_in_the_closed_loop(copied):
     html = report_of_folder(copied).html
-    loop = html[html.index('<section id="loop"') : html.index('<section id="acceptance"')]
+    loop = html[html.index('<section id="loop"') : html.index('<section id="thresholds"')]
     assert "its coil and spool; the flow is the recorded one" in loop and "m_e_kg" in loop and "preload_N" not in loop
     assert "below 0.65" in loop and "an ideal line rises straight from zero command" in loop
 

@@ -14,11 +14,12 @@ from functools import cache
 from pathlib import Path
 
 #: How the folders are called, in the system's folder for temporary files. A folder is hidden until its lock is held.
-PREFIX, HIDDEN = "dzdesign-", ".dzdesign-"
+PREFIX, HIDDEN = "dzdesign-run-", ".dzdesign-run-"
 #: A hidden folder of this age was left by a process that was killed before it held the lock.
 ABANDONED_S = 60.0
-#: Windows locks no folder, but deletes none with an open file: this one.
-IN_USE = ".in-use"
+#: File by which a folder is known as made here; without it none is ever removed. Windows locks no folder, but deletes
+#: none with an open file: this one.
+MARK = ".dzdesign-scratch"
 
 #: The folders of this process, and what ends their locks.
 _held: dict[Path, Callable[[], None]] = {}
@@ -58,9 +59,10 @@ def _made() -> Path:
     _remove_abandoned()
     if os.name != "posix":
         folder = Path(os.path.realpath(tempfile.mkdtemp(prefix=PREFIX)))
-        _held[folder] = open(folder / IN_USE, "xb").close  # noqa: SIM115
+        _held[folder] = open(folder / MARK, "xb").close  # noqa: SIM115
         return folder
     hidden = Path(os.path.realpath(tempfile.mkdtemp(prefix=HIDDEN)))
+    (hidden / MARK).touch()
     lock = _lock(hidden)
     folder = hidden.with_name(PREFIX + hidden.name.removeprefix(HIDDEN))
     hidden.rename(folder)
@@ -92,10 +94,10 @@ def _remove_abandoned() -> None:
 
 def _remove_if_abandoned(folder: Path, *, hidden: bool) -> None:
     if os.name != "posix":
-        os.unlink(folder / IN_USE)  # an error while its process lives, or where there is none
+        os.unlink(folder / MARK)  # an error while its process lives, or where there is none
         shutil.rmtree(folder, ignore_errors=True)
         return
-    found = os.lstat(folder)
+    found = os.lstat(folder / MARK)
     if found.st_uid != os.getuid() or (hidden and time.time() - found.st_mtime < ABANDONED_S):
         return
     lock = _lock(folder)

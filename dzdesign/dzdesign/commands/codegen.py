@@ -14,6 +14,7 @@ EXAMPLES = (
     "dzdesign codegen compensator.json -o firmware",
     "dzdesign codegen valve.json --target host",
     "dzdesign codegen compensator.json --target iec61131 --dialect twincat -o plc",
+    "dzdesign codegen compensator.json --target matlab -o matlab",
     "dzdesign codegen --list-targets",
 )
 

@@ -101,7 +101,7 @@ def export(arguments: ExportArguments) -> AmplifierExport:
         compensator_sha256=digest,
         dead_zones=tuple(row for rows in zones.values() for row in rows),
         notes=notes_of(setting, compensator),
-        checks=_read_back(device, content, compensator, zones),
+        checks=_read_back(device, content, compensator, zones, threshold),
     )
     if output is not None:
         write_file(output, made.content)
@@ -109,13 +109,17 @@ def export(arguments: ExportArguments) -> AmplifierExport:
 
 
 def _read_back(
-    device: "Device", content: bytes, compensator: "Compensator", zones: "Mapping[int, Sequence[FixedDeadZone]]"
+    device: "Device",
+    content: bytes,
+    compensator: "Compensator",
+    zones: "Mapping[int, Sequence[FixedDeadZone]]",
+    threshold: Fraction | None,
 ) -> "tuple[Check, ...]":
     """Check a file before anybody has it; refuse one that does not hold."""
     from dzdesign.verify.amplifier.checks import checks
 
     stated = {sign: [(row.dp_MPa, row.fixed) for row in rows] for sign, rows in zones.items()}
-    found = checks(device.name, content, compensator, stated)
+    found = checks(device.name, content, compensator, stated, threshold)
     if wrong := [check for check in found if not check.holds]:
         raise RequirementError(
             f"the file for {device.name} does not hold as it is read back, so it is not written: {wrong[0].name}: "

@@ -45,22 +45,16 @@ def _overview_of(shown: list["PressureAssessment"], units: "RecordedUnits") -> T
     """Return a row for each pressure drop and side: what most readers look for, before and after."""
     from dzdesign.assess.quantities import QUANTITIES
 
-    headers = [
-        f"{QUANTITIES[key].name} ({_unit(QUANTITIES[key].unit, units)}): {name}"
-        for key in OVERVIEW
-        for name in ("before", "after")
-    ]
-    title = "Overview, without (before) and with the compensator (after); a table for each row follows"
+    quantities = {key: QUANTITIES[key] for key in OVERVIEW}
+    headers = [f"{each.name} ({_unit(each.unit, units)})" for each in quantities.values()]
+    title = "Overview, before → after; a table of each pressure drop follows"
     table = Table(title, f"dP ({units.label('MPa')})", "commands", *headers, words=(0, 1))
     for item in shown:
+        pairs = {key: (item.quantities[key].before, item.quantities[key].after) for key in quantities}
         table.add_row(
             "unknown" if item.dp_MPa is None else units.number(item.dp_MPa, ".2f MPa"),
             item.side,
-            *(
-                _shown(reading, QUANTITIES[key].unit, units)
-                for key in OVERVIEW
-                for reading in (item.quantities[key].before, item.quantities[key].after)
-            ),
+            *(" → ".join(_shown(each, quantities[key].unit, units) for each in pair) for key, pair in pairs.items()),
         )
     return table
 

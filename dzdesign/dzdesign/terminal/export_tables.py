@@ -38,9 +38,11 @@ def print_export(made: "AmplifierExport", console: "Console | None" = None) -> N
         label = "" if len(setting.offsets) == 1 else f"{side} side: "
         put_line(console, label + _offset_line(made, offset, units.of_side(side)))
         rows = [row for row in made.dead_zones if row.side == side]
-        title = "Dead zone that remains, of command (knee): fixed, and by the law, which reads the pressures"
-        title += f", {side} side" if label else ""
-        put_rows(console, title, rows, _columns(made, rows, units.of_side(side), sign))
+        title = f"Dead zone that remains (knee, share of command){f', {side} side' if label else ''}"
+        title += ": with the fixed setting, and with the law, which reads the pressures"
+        if any(row.law_end_L_min is not None for row in rows):
+            title += f"; flow on closing at {_transition_end(made, sign):.2%} of command, the end of the transition"
+        put_rows(console, title, rows, _columns(rows, units.of_side(side)))
     for check in made.checks:
         put_line(console, f"HOLDS  {check.name}: {check.text}")
     for note in made.notes:
@@ -61,9 +63,7 @@ def _offset_line(made: "AmplifierExport", offset: "FixedOffset", units: "Recorde
     )
 
 
-def _columns(
-    made: "AmplifierExport", rows: "Sequence[FixedDeadZone]", units: "RecordedUnits", sign: int
-) -> "dict[str, Callable[[FixedDeadZone], str]]":
+def _columns(rows: "Sequence[FixedDeadZone]", units: "RecordedUnits") -> "dict[str, Callable[[FixedDeadZone], str]]":
     """Return the columns of the table: branches that no test recorded are left out, and so is a missing transition."""
     columns: dict[str, Callable[[FixedDeadZone], str]] = {
         f"dP ({units.label('MPa')})": lambda row: units.number(row.dp_MPa, ".2f MPa"),
@@ -72,12 +72,15 @@ def _columns(
         for branch in (each for each in BRANCHES if any(each in row.fixed for row in rows)):
             columns[f"{whose}: {branch}"] = partial(_share, whose=whose, branch=branch)
     if any(row.law_end_L_min is not None for row in rows):
-        compensator = made.compensator
-        end = compensator.transition_end / compensator.signals.command.span(sign)
         for whose in ("fixed", "law"):
-            header = f"{whose}: flow on closing at {end:.2%} of command ({units.label('L/min')})"
-            columns[header] = partial(_flow, whose=whose, units=units)
+            columns[f"{whose}: flow ({units.label('L/min')})"] = partial(_flow, whose=whose, units=units)
     return columns
+
+
+def _transition_end(made: "AmplifierExport", sign: int) -> float:
+    """Return the command at which the transition ends, as a share of full command."""
+    compensator = made.compensator
+    return float(compensator.transition_end / compensator.signals.command.span(sign))
 
 
 def _share(row: "FixedDeadZone", whose: str, branch: str) -> str:

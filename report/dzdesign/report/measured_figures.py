@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.options import Set
+from dzdesign.report.characteristic.curves import origin_of
 from dzdesign.report.language import word
 from dzdesign.report.page import Figure
 from dzdesign.report.sections.cells import counted
@@ -14,11 +15,12 @@ def measured_figures(assessment: Assessment | None) -> tuple[Figure, ...]:
     after = [item for item in assessment.pressures if item.after] if assessment else []
     if not after or assessment is None:
         return ()
-    found = [_dead_zone(after, branch) for branch in ("opening", "closing")]
-    return (*(each for each in found if each), *_at_zero(after, assessment))
+    of = "measured" if origin_of(assessment) == "recorded" else "simulated recordings"
+    found = [_dead_zone(after, branch, of) for branch in ("opening", "closing")]
+    return (*(each for each in found if each), *_at_zero(after, assessment, of))
 
 
-def _dead_zone(items: Sequence[PressureAssessment], branch: str) -> Figure | None:
+def _dead_zone(items: Sequence[PressureAssessment], branch: str, of: str) -> Figure | None:
     """Return the dead zone before and after: at the onset where the meter shows it, else at the reading flow."""
     for key, where in ((f"onset_{branch}", "at the onset of flow"), (f"dead_zone_{branch}", "at the reading flow")):
         driven = _values(items, key, "after")
@@ -26,7 +28,7 @@ def _dead_zone(items: Sequence[PressureAssessment], branch: str) -> Figure | Non
             bare = _values(items, key, "before")
             both = f"{max(bare):.1f} % → {max(driven):.1f} %" if bare else f"{max(driven):.1f} %"
             return Figure(
-                label=word(f"Dead zone on {branch}, measured"),
+                label=word(f"Dead zone on {branch}, {of}"),
                 value=both,
                 note=f"of command {where}, without → with; the worst of {_places(items)}"
                 + (f". With: {min(driven):.1f} to {max(driven):.1f} %" if len(driven) > 1 else ""),
@@ -34,7 +36,7 @@ def _dead_zone(items: Sequence[PressureAssessment], branch: str) -> Figure | Non
     return None
 
 
-def _at_zero(items: Sequence[PressureAssessment], assessment: Assessment) -> Sequence[Figure]:
+def _at_zero(items: Sequence[PressureAssessment], assessment: Assessment, of: str) -> Sequence[Figure]:
     flows = _values(items, "flow_at_zero", "after")
     if not flows:
         return ()
@@ -42,7 +44,7 @@ def _at_zero(items: Sequence[PressureAssessment], assessment: Assessment) -> Seq
     limited = [limit for limit in assessment.limits if limit.quantity == "flow_at_zero"]
     return (
         Figure(
-            label=word("Flow at zero command, measured"),
+            label=word(f"Flow at zero command, {of}"),
             value=units.text(worst, ".2g L/min"),
             note=f"with the compensator, after closing; the largest of {_places(items)}",
             kind="bad" if any(limit.holds is False for limit in limited) else "text",

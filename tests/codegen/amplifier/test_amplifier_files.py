@@ -246,6 +246,12 @@ def test_a_threshold_is_rounded_up_and_an_offset_down(designs):
     assert counts <= offset * 10_000 < counts + 1
 
 
+def test_full_command_is_the_drive_that_opens_the_valve_fully_at_every_test(designs, monkeypatch):
+    drives = iter([Fraction(70, 100), Fraction(85, 100), Fraction(60, 100)])
+    monkeypatch.setattr("dzdesign.codegen.amplifier.setting.full_drive", lambda *_: next(drives))
+    assert amplifier_setting(designs["one solenoid"], device_named("west")).parameters["MAX:A"] == 8500
+
+
 def test_notes_say_what_is_not_certified(designs):
     notes = {
         name: " ".join(notes_of(amplifier_setting(compensator, device_named("west")), compensator))

@@ -18,7 +18,7 @@ from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.report.chain import Chain, Place
 from dzdesign.report.outputs.folder_outputs import outputs_of_folder
 from dzdesign.report.outputs.made_output import MadeOutput, MadeOutputs
-from dzdesign.report.outputs.section import with_outputs
+from dzdesign.report.outputs.section import outputs_sections, with_outputs
 from dzdesign.report.page import Headline
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.evidence import Evidence
@@ -264,6 +264,13 @@ def test_a_verdict_is_not_good_while_an_output_is_not_verified():
     assert with_outputs(open_, untried, chain) == open_
     itself = replace(chain, places={"firmware": Place("fmu/manifest.json", WRONG.sha256)})  # whose evidence it is
     assert with_outputs(good, untried, itself) == good
+
+
+def test_the_firmware_of_the_report_is_judged_once():
+    chain = Chain(places={"firmware": Place("firmware/manifest.json", WRONG.sha256)}, evidence=evidence_with())
+    said = Headline(kind="bad", text="DOES NOT HOLD", reasons=("inputs: 3 wrong",))
+    made = MadeOutputs(listed=(WRONG,))
+    assert with_outputs(said, made, chain) == said and outputs_sections(chain, made) == {}
 
 
 def test_without_a_firmware_the_verdict_is_of_the_outputs():

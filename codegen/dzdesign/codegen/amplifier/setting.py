@@ -13,6 +13,9 @@ from dzdesign.design.fixed.fixed_offset import FixedOffset, fixed_offset
 from dzdesign.design.fixed.pressure_line import full_drive, pressure_line, zero_band
 from dzdesign.design.signals import SIDE_NAMES
 
+#: A recorded pressure drop is this near to the one that was meant.
+NEAR = Fraction(1, 100)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AmplifierSetting:
@@ -49,29 +52,30 @@ def amplifier_setting(
     Raises
     ------
     InputError
-        If the device's range does not hold the setting, it has fewer solenoids, an option is not of it, or the
-        threshold is below what a zero command may read.
+        If the device's range does not hold the setting, it has fewer solenoids, or an option is not of it.
     """
     signs = compensator.signals.signs
     if len(signs) > 1 and not device.takes_both_signs:
         raise InputError(f"{device.title} drives one solenoid, and the design has two; choose another --to")
     offsets = {sign: fixed_offset(compensator, sign) for sign in signs}
-    reads = max(zero_band(compensator, sign) for sign in signs)
-    rest = reads if threshold is None else threshold
-    if rest < reads and (device.law == "table" or device.threshold is not None):
-        raise InputError(
-            f"--threshold is {100 * float(rest):.3g} % of command, and a zero command of this design may read up to "
-            f"{100 * float(reads):.3g} %, where the valve must rest; give at least {ceil(reads * 10_000) / 100:.2f} %, "
-            "or design it with a smaller --command-error"
-        )
+    rest = max(zero_band(compensator, sign) for sign in signs) if threshold is None else threshold
     if device.law == "table":
         at = Fraction(repr(compensator.valve.sides["positive"].reference.dp_MPa)) if dp_MPa is None else dp_MPa
-        return _table(compensator, device, offsets, at, rest)
+        return _table(compensator, device, offsets, _nominal(at, offsets), rest)
     if dp_MPa is not None:
         raise InputError(f"--dp is of devices that take a whole characteristic, not of {device.title}; leave it out")
     if threshold is not None and device.threshold is None:
         raise InputError(f"{device.title} has no threshold of its dead-zone compensation; leave out --threshold")
     return _jump(compensator, device, offsets, rest) if device.law == "jump" else _added(compensator, device, offsets)
+
+
+def _nominal(dp_MPa: Fraction, offsets: Mapping[int, FixedOffset]) -> Fraction:
+    """Return a pressure drop, or the end of the tests where it is hardly beyond it: tests at 5 MPa were at 4.999."""
+    low = max(offset.dp_MPa[0] for offset in offsets.values())
+    high = min(offset.dp_MPa[1] for offset in offsets.values())
+    if low * (1 - NEAR) <= dp_MPa <= low:
+        return low
+    return high if high <= dp_MPa <= high * (1 + NEAR) else dp_MPa
 
 
 def _down(value: Fraction, unit: int) -> Fraction:

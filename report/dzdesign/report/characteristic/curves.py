@@ -20,8 +20,11 @@ from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.recorded_curve import RecordedBranch
 from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, read_curves
 
-#: Where a curve is from: recordings, or a simulated closed loop.
-Origin = Literal["recorded", "simulated"]
+#: Where a curve is from: recordings of a valve, recordings that are simulated themselves, or a simulated closed loop.
+Origin = Literal["recorded", "example", "simulated"]
+ORIGIN_WORDS: Mapping[Origin, str] = {
+    "recorded": "recorded", "example": "simulated recordings", "simulated": "simulated closed loop",
+}  # fmt: skip
 #: Most points of a simulated branch that are drawn.
 MOST_POINTS = 300
 BRANCHES = ("opening", "closing")
@@ -70,12 +73,18 @@ def characteristic_curves(
     return (*recorded, *_simulated(loops, bare=not recorded))
 
 
+def origin_of(recordings: ValveModel | Assessment) -> Origin:
+    """Return what the recordings of a valve or of an assessment are."""
+    warnings = recordings.warnings if isinstance(recordings, ValveModel) else recordings.notes
+    return "example" if any(warning.code == "simulated" for warning in warnings) else "recorded"
+
+
 def _measured(assessment: Assessment) -> Iterator[CharacteristicCurve]:
     for item in assessment.pressures:
         for name in SETS:
             curve = measured_curve_of(item, name)
             if curve is not None:
-                yield _measured_curve(item, name, curve)
+                yield _measured_curve(item, name, curve, origin_of(assessment))
 
 
 def measured_curve_of(item: PressureAssessment, name: Set) -> MeasuredCurve | None:
@@ -84,14 +93,14 @@ def measured_curve_of(item: PressureAssessment, name: Set) -> MeasuredCurve | No
     return None if ramps is None or isinstance(ramps.curve, UnsetType) else ramps.curve
 
 
-def _measured_curve(item: PressureAssessment, name: Set, curve: MeasuredCurve) -> CharacteristicCurve:
+def _measured_curve(item: PressureAssessment, name: Set, curve: MeasuredCurve, origin: Origin) -> CharacteristicCurve:
     sign = SIDES[item.side]
     named = {word: branch for word, branch in zip(BRANCHES, (curve.rising, curve.falling), strict=True) if branch}
     return CharacteristicCurve(
         side=item.side,
         dp_MPa=item.dp_MPa,
         set=name,
-        origin="recorded",
+        origin=origin,
         branches={
             word: _points(branch.command_percent, branch.q_L_min, 0.01 * sign, sign) for word, branch in named.items()
         },
@@ -115,7 +124,7 @@ def _recorded(valve: ValveModel) -> Iterator[CharacteristicCurve]:
                 side=name,
                 dp_MPa=test.dp_MPa,
                 set="before",
-                origin="recorded",
+                origin=origin_of(valve),
                 branches={
                     word: _points(branch.u_V, branch.q_L_min, sign / valve.u_max_V, sign)
                     for word, branch in named.items()

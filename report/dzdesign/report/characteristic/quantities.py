@@ -15,7 +15,7 @@ from dzdesign.assess.quantities import LOSS, Reading
 from dzdesign.assess.thinned_curves import Line, gain_of, hysteresis_of, linearity_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
-from dzdesign.report.characteristic.curves import CharacteristicCurve, Origin, same_pressure
+from dzdesign.report.characteristic.curves import CharacteristicCurve, Origin, origin_of, same_pressure
 from dzdesign.verify.loop_results import PressureResult
 
 #: Keys in the order of a test report.
@@ -62,13 +62,12 @@ def characteristic_quantities(
 ) -> CharacteristicQuantities:
     """Return the quantities of all sides; `curves` are those that the figure shows."""
     if assessment:
-        return CharacteristicQuantities(
-            pressures=tuple(_of_assessment(assessment)), before="recorded", after="recorded"
-        )
+        origin = origin_of(assessment)
+        return CharacteristicQuantities(pressures=tuple(_of_assessment(assessment)), before=origin, after=origin)
     pressures = _with_symmetry(list(_of_valve_and_loop(valve, loops, curves)))
     return CharacteristicQuantities(
         pressures=pressures,
-        before="recorded" if valve else "simulated" if loops else None,
+        before=origin_of(valve) if valve else "simulated" if loops else None,
         after="simulated" if loops else None,
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.style import CYCLE
-from dzdesign.report.characteristic.curves import CharacteristicCurve, same_pressure
+from dzdesign.report.characteristic.curves import ORIGIN_WORDS, CharacteristicCurve, same_pressure
 from dzdesign.report.figures.figure import (
     LIGHT,
     ReportFigure,
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 DASHES = {"before": ((0, (4, 1.8)), 1.2), "after": ("-", 1.5)}
 SAMPLE: dict[str, Any] = {"marker": "o", "linestyle": "", "ms": 2.8, "mfc": "none", "mew": 0.6}
 WITH_WORDS = {"before": "without the compensator", "after": "with the compensator"}
-ORIGIN_WORDS = {"recorded": "recorded", "simulated": "simulated closed loop"}
 #: Height of the figure, inches; room for the pressure drops at the ends of the curves; of a label, per axis height.
 HEIGHT, LABEL_ROOM, LABEL_HEIGHT = 3.75, 0.62, 0.055
 

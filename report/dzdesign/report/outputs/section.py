@@ -12,9 +12,13 @@ from dzdesign.report.sections.cells import Cell, counted, table_of, verdict, who
 
 def outputs_sections(chain: Chain, made: MadeOutputs) -> dict[str, Section]:
     """Return the section by its anchor; none where the firmware that the report is of is all there is."""
+    return {"outputs": _outputs_section(made)} if _beside_firmware(made, chain) or made.others else {}
+
+
+def _beside_firmware(made: MadeOutputs, chain: Chain) -> list[MadeOutput]:
+    """Return the outputs other than the firmware that the report is of, on which its verdict speaks already."""
     firmware = chain.places.get("firmware")
-    more = [each for each in made.listed if firmware is None or each.sha256 != firmware.sha256]
-    return {"outputs": _outputs_section(made)} if more or made.others else {}
+    return [each for each in made.listed if firmware is None or each.sha256 != firmware.sha256]
 
 
 def _outputs_section(made: MadeOutputs) -> Section:
@@ -48,7 +52,7 @@ def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headlin
     It is not good if one of them is wrong, or was not verified; each is named. Where there is no C firmware and no
     evidence of one, the verdict is of the outputs.
     """
-    wrong = [each for each in made.listed if each.is_wrong]
+    wrong = [each for each in _beside_firmware(made, chain) if each.is_wrong]
     if not wrong:
         only_these = made.listed and not (chain.faults or chain.firmware or chain.evidence)
         return _of_outputs_alone(headline, made) if only_these else _with_untried(headline, made, chain)
@@ -61,10 +65,7 @@ def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headlin
 
 def _with_untried(headline: Headline, made: MadeOutputs, chain: Chain) -> Headline:
     """Return a good verdict as open where an output that `verify` takes was not verified; it takes no file alone."""
-    firmware = chain.places.get("firmware")
-    reported = firmware.sha256 if firmware else ""
-    untried = [each for each in made.listed
-               if each.holds is None and each.place.endswith("/") and each.sha256 != reported]  # fmt: skip
+    untried = [each for each in _beside_firmware(made, chain) if each.holds is None and each.place.endswith("/")]
     if headline.kind != "good" or not untried:
         return headline
     return replace(headline, kind="open", text=f"{_named(untried)}. {headline.text}", reasons=_open_reasons(untried))

@@ -7,6 +7,7 @@ from itertools import chain
 from dzdesign.assess.limits import LIMITED, LimitResult
 from dzdesign.assess.quantities import LOSS, QUANTITIES
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.report.characteristic.curves import ORIGIN_WORDS
 from dzdesign.report.characteristic.quantities import (
     KEYS,
     CharacteristicQuantities,
@@ -35,7 +36,6 @@ NAMES = {
 }
 DECIMALS = {"%": 1, "L/min": 2, "L/min/V": 2}
 IN_RECORDED_UNITS = ("L/min", "L/min/V")
-ORIGINS = {"recorded": "recorded", "simulated": "simulated closed loop"}
 #: Whose formulas stand below the table.
 EXPLAINED = ("hysteresis", "linearity", "symmetry", "gain")
 #: Verdict of a limit -> its word and kind.
@@ -52,7 +52,7 @@ def characteristic_section(found: CharacteristicQuantities, units: RecordedUnits
     if not tables:
         return Section(missing="No characteristic is here: `dzdesign identify` makes valve.json.")
     origins = [
-        f"{word(which)}: {word(ORIGINS[origin])}."
+        f"{word(which)}: {word(ORIGIN_WORDS[origin])}."
         for which, origin in (("Without", found.before), ("With", found.after))
         if origin
     ]

@@ -1,4 +1,4 @@
-/* Written by dzdesign 0.1.0 from template dz_store.h.jinja. Yours to edit: `dzdesign codegen` keeps what */
+/* Written by dzdesign 1.0.0 from template dz_store.h.jinja. Yours to edit: `dzdesign codegen` keeps what */
 /* you change here, and `dzdesign verify` names this file as yours and does not check it. */
 
 /* The memory that two copies of a calibration block are kept in. dz_store.c keeps them in RAM: what was loaded is lost

@@ -29,9 +29,16 @@ Stated = tuple[float, Mapping[str, float]]
 
 
 def checks(
-    device: str, content: bytes, compensator: Compensator, stated: Mapping[int, Sequence[Stated]]
+    device: str,
+    content: bytes,
+    compensator: Compensator,
+    stated: Mapping[int, Sequence[Stated]],
+    zero: Fraction | None = None,
 ) -> tuple[Check, ...]:
-    """Check the file for a device against the valve; `stated` has what was printed of it, by the sign of command."""
+    """Check the file for a device against the valve; `stated` has what was printed of it, by the sign of command.
+
+    Commands up to `zero`, a share of full, may be a zero command; without one, up to the error declared for the design.
+    """
     try:
         laws = read_file(device, content)
     except InputError as error:
@@ -42,19 +49,19 @@ def checks(
     read = f"{len(content.splitlines())} lines, {len(laws)} direction{'s' * (len(laws) > 1)} of command"
     return (
         READ_BACK.check(holds=True, text=read),
-        _safe(device, laws, compensator),
+        _safe(device, laws, compensator, zero),
         _dead_zones(laws, compensator, stated),
     )
 
 
-def _safe(device: str, laws: Mapping[int, FileLaw], compensator: Compensator) -> Check:
+def _safe(device: str, laws: Mapping[int, FileLaw], compensator: Compensator, declared: Fraction | None) -> Check:
     """Compare the largest drive of a command that may be zero with the bound at many pressure drops, exactly."""
     tried, over, margins = 0, 0, []
     for sign in compensator.signals.signs:
         error = compensator.command_error
-        zero = Fraction(error.offset_codes + error.noise_codes, compensator.signals.command.span(sign))
-        law = laws[sign]
-        zero = Fraction(0) if device in EXACT_ZERO else zero
+        of_design = Fraction(error.offset_codes + error.noise_codes, compensator.signals.command.span(sign))
+        zero = of_design if declared is None else declared
+        zero, law = Fraction(0) if device in EXACT_ZERO else zero, laws[sign]
         drive = max(law.just_behind(law.rest), law.drive(zero), *(y for x, y in law.points if x <= zero))
         for bound_V in _bounds_V(compensator, sign):
             tried += 1

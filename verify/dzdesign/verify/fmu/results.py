@@ -7,9 +7,9 @@ import subprocess
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.verify.toolchain.machines import Machine
 
 logger = logging.getLogger(__name__)
@@ -27,8 +27,8 @@ def results_of(
     One that fails, hangs, or whose binary ends it before its results are whole, is a `RequirementError`. What is
     printed goes nowhere. A binary that sets out to forge results can: it runs in the same process.
     """
-    with TemporaryDirectory(prefix="dzdesign-fmu-") as place:
-        file = Path(place) / "results"
+    with scratch_folder() as place:
+        file = place / "results"
         command = [*machine.runner, str(program), *arguments, f"{drive}{file}"]
         begin = time.perf_counter()
         try:

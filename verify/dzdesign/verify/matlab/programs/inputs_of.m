@@ -58,6 +58,8 @@ say_same(name, 'three dimensions', reshape(0 : 170 : 4079, 2, 3, 4), reshape(407
 say_same(name, 'a scalar command', 2000, [900; 1000; 1100], [800; 800; 800]);
 say_same(name, 'scalar pressures', [0, 1000, 4095], 1500, 800);
 say_same(name, 'one pressure a scalar', [0, 1000, 4095], [800, 900, 1000], 800);
+say_same(name, 'pressure A alone an array', 2000, [900; 1000; 1100], 800);
+say_same(name, 'pressure B alone an array', 2000, 1500, [700, 800, 900]);
 say_same(name, 'nothing', [], [], []);
 say_same(name, 'no rows', zeros(0, 3), 1500, 800);
 say_same(name, 'no columns', zeros(3, 0, 'uint16'), zeros(3, 0), 800);
