@@ -212,6 +212,11 @@ def test_the_report_of_the_lot_lists_them_and_sees_another_manifest(made, tmp_pa
     html = report_of_lot(out).html
     assert '<section id="outputs">' in html and "valves/NAME/plc" in html and "iec61131 not made" in html
     assert read_lot(out).faults == ()
+    block = out / "valves" / "V0001" / "plc" / "FB_DeadZone.st"
+    text = block.read_bytes()
+    block.write_bytes(text.replace(b"status := 0;", b"status := 1;"))
+    assert "V0001/plc: changed or missing: FB_DeadZone.st" in read_lot(out).faults[0]
+    block.write_bytes(text)
     path = out / "valves" / "V0000" / "plc" / MANIFEST_NAME
     path.write_bytes(path.read_bytes() + b" ")
     assert "V0000/plc/manifest.json" in read_lot(out).faults[0]

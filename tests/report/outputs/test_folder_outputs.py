@@ -112,6 +112,19 @@ def test_of_two_pieces_of_evidence_the_one_that_does_not_hold_counts(folder, dig
     assert found.verdict == "DOES NOT HOLD" and "7 wrong" in found.fault and found.is_wrong
 
 
+def test_what_was_not_checked_is_neither_right_nor_wrong(folder, digest):
+    """Such as a function of MATLAB where Octave is missing."""
+    put_evidence(folder / "b", folder / "plc")
+    put_evidence(folder / "a", folder / "plc", holds=None, text="Octave not found")
+    found = listed(folder, digest)["plc/"]
+    assert (found.verdict, found.is_wrong) == ("NOT CHECKED", False) and "Octave not found" in found.fault
+    good, chain = Headline(kind="good", text="yes"), Chain(evidence=evidence_with())
+    said = with_outputs(good, MadeOutputs(listed=(found,)), chain)
+    assert (said.kind, said.text) == ("open", "NOT CHECKED: plc/. yes") and "Octave not found" in said.reasons[0]
+    put_evidence(folder / "c", folder / "plc", holds=False, text="7 wrong")
+    assert listed(folder, digest)["plc/"].verdict == "DOES NOT HOLD"
+
+
 def test_changed_evidence_is_not_used_and_said(folder, digest):
     put_evidence(folder / "plc_evidence", folder / "plc", holds=False)
     path = folder / "plc_evidence" / OutputEvidence.FILE_NAME
@@ -235,11 +248,22 @@ WRONG = MadeOutput(kind="fmu", settings="", place="fmu/", sha256="0" * 64, holds
 def test_a_wrong_output_takes_the_verdict_and_is_named(kind):
     said = Headline(kind=kind, text="as it was", reasons=("one",))
     chain = Chain(evidence=evidence_with())
-    right = MadeOutputs(listed=(replace(WRONG, holds=True), replace(WRONG, holds=None)))
+    right = MadeOutputs(listed=(replace(WRONG, holds=True), replace(WRONG, holds=None, place="valve.dcf")))
     assert with_outputs(said, right, chain) == said
     found = with_outputs(said, MadeOutputs(listed=(WRONG,)), chain)
     assert found.kind == "bad" and found.reasons == ("one", "DOES NOT HOLD: fmu/ (fmu): inputs: 3 wrong")
     assert ("fmu/" in found.text) == (kind != "bad") and found.text.endswith("as it was")
+
+
+def test_a_verdict_is_not_good_while_an_output_is_not_verified():
+    untried = MadeOutputs(listed=(replace(WRONG, holds=None, fault=""),))
+    chain, good = Chain(evidence=evidence_with()), Headline(kind="good", text="as it was")
+    found = with_outputs(good, untried, chain)
+    assert (found.kind, found.text) == ("open", "NOT VERIFIED: fmu/. as it was")
+    open_ = replace(good, kind="open")
+    assert with_outputs(open_, untried, chain) == open_
+    itself = replace(chain, places={"firmware": Place("fmu/manifest.json", WRONG.sha256)})  # whose evidence it is
+    assert with_outputs(good, untried, itself) == good
 
 
 def test_the_firmware_of_the_report_is_judged_once():

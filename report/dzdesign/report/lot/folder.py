@@ -16,6 +16,7 @@ from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.input_files import MOST_DOCUMENT
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.report.lot.changed_outputs import change_in
 from dzdesign.report.lot.summary import AGAIN, OK, SUMMARY_NAME, LotSummary, UnfinishedLot
 from dzdesign.report.lot.table import HASHED, OUTPUT_HASH, TABLE, TableRow, read_table
 from dzdesign.report.lot.table_rows import table_rows
@@ -183,6 +184,7 @@ class _LotFiles:
             )
             return {}
         other: list[str] = []
+        changed: list[str] = []
         texts: dict[str, str] = {}
         for row in rows:
             if not NAME.fullmatch(row.name):
@@ -193,12 +195,18 @@ class _LotFiles:
                 content = path.read_bytes() if stated and path.is_file() else b""
                 if stated and sha256_of(content) != stated:
                     other.append(f"{row.name}/{file}")
+                elif content and path.name == MANIFEST_NAME and (change := change_in(path.parent)):
+                    changed.append(f"{row.name}/{path.parent.name}: {change}")
                 elif content and file == "valve.json" and not texts.keys() >= set(row.warnings):
                     valve = read_artefact(content, ValveModel, str(path))
                     texts = {**{each.code: each.text for each in reversed(valve.warnings)}, **texts}
         if other:
             self.faults.append(
                 f"files of valves are not those that the table was made from ({len(other)}): {and_more(other, NAMED)}"
+            )
+        if changed:
+            self.faults.append(
+                f"folders of valves are not as `dzdesign batch` wrote them ({len(changed)}): {and_more(changed, NAMED)}"
             )
         return texts
 

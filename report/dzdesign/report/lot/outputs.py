@@ -38,6 +38,7 @@ def _outputs_table(summary: LotSummary) -> Table:
         ("made", lambda item: in_number_font(whole(item[1].made))),
         ("verified, holds", lambda item: in_number_font(whole(len(item[1].holds)) if summary.verified else "–")),
         ("does not hold", names(lambda output: output.does_not_hold)),
+        ("not verified", names(lambda output: output.not_verified) if summary.verified else lambda _: "–"),
         ("not made", names(lambda output: output.not_made)),
     )
 
@@ -54,6 +55,9 @@ def output_lines(summary: LotSummary) -> list[str]:
         words = [f"made for {output.made} of {summary.valves} valves"]
         words += [f"verified, and holds for {len(output.holds)}"] if summary.verified else ["not verified"]
         words += [f"does not hold for {and_more(output.does_not_hold, NAMED)}"] if output.does_not_hold else []
+        words += [f"NOT VERIFIED for {and_more(output.not_verified, NAMED)}"] * bool(
+            summary.verified and output.not_verified
+        )
         words += [f"not made for {and_more(output.not_made, NAMED)}"] if output.not_made else []
         settings = "".join(f", {word}" for word in setting_words(output.settings))
         lines.append(f"output {target}{settings}: {'; '.join(words)}; in {VALVES}/NAME/{output.folder}")

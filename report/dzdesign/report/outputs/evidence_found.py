@@ -17,6 +17,8 @@ from dzdesign.verify.requirements import Check
 
 #: What `verify` and `batch` leave of an output.
 KINDS = (Evidence, OutputEvidence, BlockCheck)
+#: Verdicts, from the one that counts before all others.
+COUNTS_FIRST = (False, None, True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +27,8 @@ class FoundEvidence:
 
     #: SHA-256 of what it is of.
     of: str
-    holds: bool
+    #: None if a requirement was not checked, and each of the others holds.
+    holds: bool | None
     inputs: int
     place: str
     fault: str = ""
@@ -34,7 +37,7 @@ class FoundEvidence:
 def evidence_in(folders: Iterable[Path], root: Path) -> tuple[dict[str, FoundEvidence], list[str]]:
     """Return the evidence in some folders by the hash of what it is of, and a sentence on each that was not used.
 
-    Of two about the same bytes one that does not hold counts before one that does.
+    Of two about the same bytes one that does not hold counts first, then one that was not checked throughout.
     """
     found: dict[str, FoundEvidence] = {}
     unused: list[str] = []
@@ -45,7 +48,8 @@ def evidence_in(folders: Iterable[Path], root: Path) -> tuple[dict[str, FoundEvi
         except (InputError, OSError) as error:
             unused.append(f"{place} is not used: {error}")
             continue
-        if each.of not in found or not each.holds:
+        known = found.get(each.of)
+        if known is None or COUNTS_FIRST.index(each.holds) < COUNTS_FIRST.index(known.holds):
             found[each.of] = each
     return found, unused
 
@@ -77,11 +81,17 @@ def _read(path: Path, place: str) -> FoundEvidence:
         raise InputError(f"it is {schema_of(type(evidence))}, which is no evidence")
     return FoundEvidence(
         of=evidence.made_from[0].sha256,
-        holds=holds,
+        holds=holds or (None if _only_open(checks) else False),
         inputs=sum(each.inputs for each in evidence.inputs),
         place=place,
         fault=_first_fault(checks),
     )
+
+
+def _only_open(checks: Iterable[Check]) -> bool:
+    """Tell whether nothing is against it but that something was not checked, such as without Octave."""
+    verdicts = {check.holds for check in checks}
+    return None in verdicts and False not in verdicts
 
 
 def _first_fault(checks: Iterable[Check]) -> str:

@@ -17,7 +17,7 @@ class MadeOutput:
     place: str
     #: SHA-256 of its manifest.json; of a file alone that of its bytes.
     sha256: str
-    #: What evidence about these bytes says; None without such evidence.
+    #: What evidence about these bytes says; None without such evidence, or where a requirement was not checked.
     holds: bool | None = None
     #: How many inputs were compared with the exact law.
     inputs: int = 0
@@ -31,7 +31,9 @@ class MadeOutput:
     @property
     def verdict(self) -> str:
         """In words, as the terminal prints it."""
-        return "CHANGED" if self.changed else "NOT VERIFIED" if self.holds is None else verdict_words(self.holds)
+        if self.changed:
+            return "CHANGED"
+        return verdict_words(self.holds) if self.evidence or self.holds is not None else "NOT VERIFIED"
 
     @property
     def is_wrong(self) -> bool:

@@ -1,7 +1,9 @@
 """The section "Outputs of this compensator", and what the verdict of the report says of them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from dzdesign.core.verdicts import verdict_words
 from dzdesign.report.chain import Chain
 from dzdesign.report.outputs.made_output import MadeOutput, MadeOutputs
 from dzdesign.report.page import Headline, Section
@@ -37,7 +39,7 @@ def _outputs_section(made: MadeOutputs) -> Section:
 def _check(output: MadeOutput) -> Cell:
     if output.changed:
         return Cell(text="✗ CHANGED", kind="bad", more=output.changed)
-    if output.holds is None:
+    if output.holds is None and not output.evidence:
         return Cell(text="? NOT VERIFIED", kind="open")
     tried = f"{counted(output.inputs, 'input').replace(str(output.inputs), whole(output.inputs), 1)} tried"
     more = "; ".join(filter(None, [output.fault, tried, output.evidence]))
@@ -47,13 +49,13 @@ def _check(output: MadeOutput) -> Cell:
 def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headline:
     """Return the verdict of a report, which speaks of a C firmware, with what is to be said of the outputs.
 
-    It is not good if one of them is wrong; each that is wrong is named. Where there is no C firmware and no evidence of
-    one, the verdict is of the outputs.
+    It is not good if one of them is wrong, or was not verified; each is named. Where there is no C firmware and no
+    evidence of one, the verdict is of the outputs.
     """
     wrong = [each for each in _beside_firmware(made, chain) if each.is_wrong]
     if not wrong:
         only_these = made.listed and not (chain.faults or chain.firmware or chain.evidence)
-        return _of_outputs_alone(headline, made) if only_these else headline
+        return _of_outputs_alone(headline, made) if only_these else _with_untried(headline, made, chain)
     reasons = tuple(f"{each.verdict}: {each.place} ({each.kind}): {each.changed or each.fault}" for each in wrong)
     text, names = headline.text, ", ".join(each.place for each in wrong)
     if headline.kind != "bad":
@@ -61,10 +63,29 @@ def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headlin
     return replace(headline, kind="bad", text=text, reasons=(*headline.reasons, *reasons))
 
 
+def _with_untried(headline: Headline, made: MadeOutputs, chain: Chain) -> Headline:
+    """Return a good verdict as open where an output that `verify` takes was not verified; it takes no file alone."""
+    untried = [each for each in _beside_firmware(made, chain) if each.holds is None and each.place.endswith("/")]
+    if headline.kind != "good" or not untried:
+        return headline
+    return replace(headline, kind="open", text=f"{_named(untried)}. {headline.text}", reasons=_open_reasons(untried))
+
+
+def _named(untried: Sequence[MadeOutput]) -> str:
+    """Return the outputs by their verdict, those without evidence first."""
+    by_verdict = {verdict: [each.place for each in untried if each.verdict == verdict]
+                  for verdict in ("NOT VERIFIED", verdict_words(None))}  # fmt: skip
+    return "; ".join(f"{verdict}: {', '.join(places)}" for verdict, places in by_verdict.items() if places)
+
+
+def _open_reasons(untried: Sequence[MadeOutput]) -> tuple[str, ...]:
+    return tuple(f"{each.verdict}: {each.place} ({each.kind}): {each.fault}" for each in untried if each.fault)
+
+
 def _of_outputs_alone(headline: Headline, made: MadeOutputs) -> Headline:
     held = ", ".join(each.place for each in made.listed if each.holds)
-    untried = ", ".join(each.place for each in made.listed if each.holds is None)
+    untried = [each for each in made.listed if each.holds is None]
     if untried:
-        text = f"NOT VERIFIED: {untried}" + (f"; every requirement holds of {held}" if held else "")
-        return replace(headline, kind="open", text=text)
+        text = _named(untried) + (f"; every requirement holds of {held}" if held else "")
+        return replace(headline, kind="open", text=text, reasons=_open_reasons(untried))
     return replace(headline, kind="good", text=f"Every requirement holds of {held}; no C firmware is here")
