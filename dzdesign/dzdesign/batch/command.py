@@ -61,7 +61,7 @@ def calibrate_lot(args: BatchArguments) -> LotSummary:
     if source.is_dir() and output.resolve().is_relative_to(source.resolve()):
         raise InputError(f"'{output}' lies in '{source}', whose subfolders are the valves; choose another with -o")
     valves = valves_of(source, args.pattern, (*IDENTIFY, *DEFAULTS, "target"))
-    plant, wanted = _plant(args), wanted_outputs(args)
+    wanted, plant = wanted_outputs(args), _plant(args)
     results = Results(output)
     with _taken(output):
         results.begin([valve.name for valve in valves])
