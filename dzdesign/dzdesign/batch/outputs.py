@@ -58,12 +58,13 @@ def wanted_outputs(args: BatchArguments) -> tuple[WantedOutput, ...]:
     from dzdesign.codegen.other_targets import OTHER_TARGETS, folder_of, settings_of
 
     names = _names(args.outputs)
-    given = chosen_of_outputs(args)
-    for option in (name for name, value in given.items() if value is not None):
+    of_outputs = dict.fromkeys(option for each in OTHER_TARGETS.values() for option in each.options)
+    for option in (name for name in of_outputs if getattr(args, name) is not None):
         owners = [each.name for each in OTHER_TARGETS.values() if option in each.options]
         if not set(owners) & set(names) and not (option == "plant" and args.verify):
             raise InputError(f"{flag_of(option)} is of the output {' or '.join(owners)}; give --outputs {owners[0]} "
                              f"too{' or --verify' if option == 'plant' else ''}, or leave it out")  # fmt: skip
+    given = chosen_of_outputs(args)  # which reads files
     return tuple(
         WantedOutput(
             target=name,
