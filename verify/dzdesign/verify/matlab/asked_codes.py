@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.verify.fmu.binary_core import text_flag
 from dzdesign.verify.matlab.octave import PROGRAMS, run_octave
 from dzdesign.verify.toolchain.compiled_core import CHECK, CompiledCore, Findings, findings_of
@@ -65,8 +65,7 @@ def asked_codes(
     core: CompiledCore, sign: int, prepared: bytes, any_command: int, *, sample: bool = False
 ) -> Iterator[AskedCodes]:
     """Give the codes that the check asks a compiled core for, in a folder that goes afterwards."""
-    with TemporaryDirectory(prefix="dzdesign-matlab-") as place:
-        folder = Path(place)
+    with scratch_folder() as folder:
         made = core.compiled()
         program = _program(folder, sign, any_command, {}, made)
         compiled = _checked(program, prepared, sample, made.read_bytes(), f"the core {core.name}")

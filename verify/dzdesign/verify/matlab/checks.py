@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, RequirementError, and_more
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify.evidence import InputCheck
@@ -131,10 +131,10 @@ def _inputs(octave: str, sign: int, texts: dict[str, bytes]) -> Check:
 
 def input_cases(octave: str, name: str, files: dict[str, bytes]) -> list[tuple[bool, str]]:
     """Return each case of inputs of a function: whether it is as described, and what it was."""
-    with TemporaryDirectory(prefix="dzdesign-matlab-") as place:
+    with scratch_folder() as place:
         for path, content in files.items():
-            (Path(place) / path).write_bytes(content)
-        printed = run_octave(octave, "inputs_of.m", [name, SETUP.removesuffix(".m")], Path(place))
+            (place / path).write_bytes(content)
+        printed = run_octave(octave, "inputs_of.m", [name, SETUP.removesuffix(".m")], place)
     cases = [(line[0] == "1", line[2:]) for line in printed.splitlines() if line[:2] in ("0 ", "1 ")]
     if len(cases) < LEAST_CASES:
         raise RequirementError(f"Octave tried {len(cases)} cases of inputs, expected at least {LEAST_CASES}")
