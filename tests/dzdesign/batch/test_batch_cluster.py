@@ -140,7 +140,8 @@ def test_a_scheduler_that_dies_in_mid_run_is_one_sentence_and_what_is_done_is_ke
     killer.join(30)
     done = whole_folders(tmp_path / "out")
     assert 2 <= len(done) < COUNT, "the scheduler was not killed in mid-run"
-    assert (said.returncode, said.stdout) == (2, "") and said.stderr.splitlines() == [
+    lines = [line for line in said.stderr.splitlines() if ": valve " not in line]  # a line for each that ended before
+    assert (said.returncode, said.stdout) == (2, "") and lines == [
         f"dzdesign: {COUNT} valves, 0 of them done before",
         f"dzdesign: the Dask scheduler at '{address}' is gone; what is done is kept: start one, and give the same "
         "command again with its address",
