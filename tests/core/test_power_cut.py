@@ -120,6 +120,23 @@ def test_a_link_to_what_is_no_artefact_gives_way(tmp_path):
     assert (tmp_path / "work.txt").read_text() == "years of work" and not (tmp_path / "plot.svg").is_symlink()
 
 
+def test_a_read_only_file_that_windows_can_not_sync_is_carried_over(tmp_path, monkeypatch):
+    folder = tmp_path / "firmware"
+    write_folder(folder, FILES, FIRMWARE)
+    (folder / "object").write_text("mine")
+    real = os.open
+
+    def windows(path, flags, *rest):
+        if flags == os.O_RDWR and str(path).endswith("object"):
+            raise PermissionError(13, "Permission denied")
+        return real(path, flags, *rest)
+
+    monkeypatch.setattr("dzdesign.core.disk_sync.FOLDERS_OPEN", False)
+    monkeypatch.setattr(os, "open", windows)
+    write_folder(folder, FILES, FIRMWARE)
+    assert (folder / "object").read_text() == "mine"
+
+
 def test_a_folder_may_be_held_twice_by_one_thread(tmp_path):
     with alone_in(tmp_path) as outer:
         write_file(tmp_path / "batch.json", "{}")

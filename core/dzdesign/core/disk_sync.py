@@ -16,7 +16,12 @@ FOLDERS_OPEN = os.name == "posix"
 def sync_file(path: Path) -> None:
     """Wait until a file's content is on the disk."""
     # Windows syncs only what is open for writing, Linux also what is read-only.
-    descriptor = os.open(path, os.O_RDONLY if FOLDERS_OPEN else os.O_RDWR)
+    try:
+        descriptor = os.open(path, os.O_RDONLY if FOLDERS_OPEN else os.O_RDWR)
+    except PermissionError:
+        if FOLDERS_OPEN:
+            raise
+        return  # a read-only file that was carried over, as of a version control's store
     try:
         os.fsync(descriptor)
     finally:
