@@ -1,0 +1,66 @@
+"""The sentences of a text in Markdown, and the faults of prose whose sentences are too long to be read once."""
+
+import re
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+
+#: Words of a sentence, on average over a text and at most.
+MEAN, MOST = 18, 30
+#: A full stop behind one of these ends no sentence.
+ABBREVIATIONS = re.compile(r"\b(e\.g|i\.e|vs|Eqs?|Figs?|Nos?|approx|al)\.(?=[\s,)])")
+#: A sentence ends before a capital, a digit or code, and before a choice of an option: ``hold: ...``.
+END = re.compile(r"(?<=[.!?])[)\"'\]]*\s+(?=[(\"'\[]*[^\W_a-z]|[a-z][\w-]*: )")
+ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.|:)\s+")
+
+
+def blocks_of(markdown: str) -> Iterator[str]:
+    """Yield the paragraphs and list items of a page: prose alone, without headings, tables, terms, code and comments.
+
+    Examples
+    --------
+    >>> list(blocks_of("# T\\n\\nOne\\nline.\\n\\n- a\\n  b\\n- c\\n\\n    code\\n\\n| x |\\n\\nterm\\n: Is it.\\n"))
+    ['One line.', 'a b', 'c', 'Is it.']
+    """
+    text = re.sub(r"<!--.*?-->", "", markdown, flags=re.DOTALL)
+    text = re.sub(r"^( *)(```+|~~~+|:::+).*?^\1\2 *$", "", text, flags=re.DOTALL | re.MULTILINE)
+    block: list[str] = []
+    is_code = False
+    for line, after in pairwise([*text.splitlines(), "", ""]):
+        is_code = not line.strip() or (line.startswith("    ") and (is_code or not block))
+        is_skipped = is_code or re.match(r"\s*[#|>]|\(\S+\)=|<", line) or re.match(r": ", after)
+        if block and (is_skipped or ITEM.match(line)):
+            yield " ".join(block)
+            block = []
+        if not is_skipped:
+            block.append(ITEM.sub("", line, count=1).strip())
+    if block:
+        yield " ".join(block)
+
+
+def sentences_of(block: str) -> list[str]:
+    """Return the sentences of a paragraph; a piece of code counts as one word, a link or picture as its text.
+
+    Examples
+    --------
+    >>> sentences_of("Run `a b. C`, see Eq. (5) of [it](x.md). Then 2 ways. hold: stay. lower: e.g. by 2.5 %.")
+    ['Run Code, see Eq (5) of it.', 'Then 2 ways.', 'hold: stay.', 'lower: eg by 2.5 %.']
+    """
+    text = re.sub(r"(`+).+?\1", "Code", block)
+    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text).replace("*", "")
+    text = ABBREVIATIONS.sub(lambda found: found[1].replace(".", ""), text)
+    return [sentence for sentence in END.split(text) if words_of(sentence)]
+
+
+def words_of(text: str) -> list[str]:
+    """Return the words of a text: what stands between blanks and has a letter or a digit."""
+    return [word for word in text.split() if re.search(r"\w", word)]
+
+
+def faults_of(blocks: Iterable[str]) -> list[str]:
+    """Return what makes a text hard to read: each sentence that is too long, and a mean that is too high."""
+    sentences = [sentence for block in blocks for sentence in sentences_of(block)]
+    counts = [len(words_of(sentence)) for sentence in sentences]
+    faults = [f"{count} words: {each}" for each, count in zip(sentences, counts, strict=True) if count > MOST]
+    if sum(counts) > MEAN * len(counts):
+        faults.append(f"{sum(counts) / len(counts):.1f} words in a sentence on average")
+    return faults

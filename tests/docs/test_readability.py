@@ -1,0 +1,60 @@
+"""Pages and help that can be read once: sentences of a length that one reading holds, each help text a sentence."""
+
+import doctest
+
+import pytest
+
+from dzdesign.command_line.command_table import COMMANDS
+from dzdesign.command_line.parser import arguments_of_command
+from tests.docs import sentences
+from tests.docs.sentences import MEAN, MOST, blocks_of, faults_of, sentences_of
+from tests.support.paths import ROOT
+
+#: Pages that are held to it.
+PAGES = (
+    "docs/index.md",
+    "docs/concepts/index.md",
+    "docs/howto/add-file-format.md",
+    "docs/howto/index.md",
+    "docs/reference/api.md",
+    "docs/reference/commands.md",
+)
+#: Commands whose help is held to it.
+LATER = {"plan", "identify", "design", "codegen", "verify", "batch", "assess"}
+HELPS = [name for name in COMMANDS if name not in LATER]
+LONG, SHORT = "One " + "two " * MOST, "One two."
+
+
+def test_the_examples_of_the_counting_hold():
+    assert doctest.testmod(sentences) == (0, 2)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_has_sentences_that_can_be_read_once(page):
+    blocks = list(blocks_of((ROOT / page).read_text("utf-8")))
+    assert blocks and faults_of(blocks) == []
+
+
+@pytest.mark.parametrize("name", HELPS)
+def test_the_help_of_a_command_can_be_read_once(name):
+    helps = [argument.described(argument.default_text) for argument in arguments_of_command(name)]
+    assert faults_of([f"{COMMANDS[name].help}.", *helps]) == []
+
+
+def test_a_sentence_that_is_too_long_is_found_wherever_it_stands():
+    for page in (f"{LONG}.", f"- {SHORT}\n- {LONG}.", f"# T\n\nterm\n: {LONG}", f"{SHORT} {SHORT} ({LONG}).\n"):
+        (fault,) = faults_of([*blocks_of(page), *[SHORT] * 9])
+        assert fault.startswith(f"{MOST + 1} words: ")
+    assert faults_of([LONG[4:], *[SHORT] * 9]) == [] and faults_of([]) == []
+
+
+def test_sentences_that_are_long_on_average_are_found():
+    limit = "One " * (MEAN - 1) + "two. "
+    assert faults_of([limit * 3]) == []
+    assert faults_of([limit * 3, "More " + limit]) == ["18.2 words in a sentence on average"]
+
+
+def test_what_is_no_prose_is_not_counted():
+    code = f"```text\n{LONG}\n```\n\n    {LONG}\n\n<!-- {LONG} -->\n\n| {LONG} |\n\n## {LONG}\n"
+    assert list(blocks_of(f"{SHORT}\n\n{code}\n- {SHORT} Three: four.")) == [SHORT, f"{SHORT} Three: four."]
+    assert sentences_of(f"Take `{LONG}. And` or [it]({'x' * 99}).") == ["Take Code or it."]
