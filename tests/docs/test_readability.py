@@ -12,10 +12,14 @@ from tests.support.paths import ROOT
 
 #: Pages that are held to it.
 PAGES = (
-    "docs/index.md",
     "docs/concepts/index.md",
     "docs/howto/add-file-format.md",
+    "docs/howto/amplifier.md",
     "docs/howto/index.md",
+    "docs/howto/machine.md",
+    "docs/howto/own-valve.md",
+    "docs/howto/plc.md",
+    "docs/index.md",
     "docs/reference/api.md",
     "docs/reference/commands.md",
 )
