@@ -198,19 +198,6 @@ def test_a_figure_is_drawn_again_with_the_same_bytes(site, tmp_path):
         assert (tmp_path / f"{name}.svg").read_bytes() == (site / "_images" / f"{name}.svg").read_bytes()
 
 
-def test_the_picture_of_the_readme_is_the_one_of_the_pages(site, request):
-    """It is kept, for a README is read before anything is built; `--update-docs` keeps the new one."""
-    kept, drawn = DOCS / "dead_zone.svg", site / "_images" / "dead_zone.svg"
-    if request.config.getoption("--update-docs"):
-        kept.write_bytes(drawn.read_bytes())
-    number = re.compile(r"-?\d+\.\d+")
-    old, new = (path.read_text(encoding="utf-8") for path in (kept, drawn))
-    assert number.sub("", old) == number.sub("", new)
-    # Points of the page; another processor's last digits are none of them.
-    before, after = ([float(each) for each in number.findall(text)] for text in (old, new))
-    assert after == pytest.approx(before, abs=0.1)
-
-
 def test_the_pages_name_no_file_that_is_not_there():
     """Paths of the repository in the pages, in README, CONTRIBUTING and CHANGELOG, and links of these three."""
     tried = 0
