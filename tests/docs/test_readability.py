@@ -13,6 +13,7 @@ from tests.support.paths import ROOT
 #: Pages that are held to it.
 PAGES = (
     "README.md",
+    "docs/concepts/glossary.md",
     "docs/concepts/index.md",
     "docs/howto/add-file-format.md",
     "docs/howto/amplifier.md",
