@@ -28,6 +28,7 @@ PAGES = (
     "docs/index.md",
     "docs/reference/api.md",
     "docs/reference/commands.md",
+    "docs/tutorial.md",
 )
 #: Commands whose help is held to it.
 LATER = {"plan", "identify", "design", "codegen", "verify", "batch", "assess"}
