@@ -132,6 +132,11 @@ def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
         assert words or len({line.count(",") for line in lines}) == 1, name
 
 
+def test_a_figure_of_a_good_report_shows_no_over_compensation(html):
+    assert "Every requirement holds" in html and "OVER-COMPENSATED" not in html
+    assert "red and hatched where not (0 codes)" in html
+
+
 def test_figures_take_their_colours_from_the_page(html):
     drawings = re.findall(r'<svg class="drawing".*?</svg>', html, re.DOTALL)
     assert len(drawings) == 10

@@ -4,6 +4,7 @@ The check of all inputs (`all_inputs`) counts; this shows. The grid is denser wh
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, differences
-from dzdesign.verify.exhaustive.zero_command import Staircase, counted_dither, guarded_bounds, pressure_drops
+from dzdesign.verify.exhaustive.zero_command import bounds_at, counted_dither, guarded_bounds, pressure_drops
 from dzdesign.verify.loop_results import Side
 from dzdesign.verify.toolchain.compiled_core import loaded_core
 
@@ -39,9 +40,9 @@ def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMa
     exact = ExactLaw(compensator, sign)
     core, status = loaded_core(folder, sign)
     found = differences(exact)
-    bounds = Staircase(guarded_bounds(compensator, sign))
-    steps = pressure_drops(exact, found, bounds.dp_MPa).steps_of(bounds)
-    tested = np.flatnonzero(steps >= 0)
+    bounds = guarded_bounds(compensator, sign)
+    known_V = bounds_at(pressure_drops(exact, found, (Fraction(repr(dp)) for dp in bounds.dp_MPa)), bounds)
+    tested = np.flatnonzero(~np.isnan(known_V))
     commands, grid = _commands(exact), []
     for row in _grid_rows(found, tested).tolist():
         dp_code, pair = int(found.values[row]), _pair(exact, found, row)
@@ -61,7 +62,7 @@ def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMa
                 int(found.values[row]),
                 float(found.values[row]) * a_MPa,
                 (core(exact.zero, *_pair(exact, found, row)) + peak) * volt,
-                float(bounds.bounds_V[steps[row]]),
+                float(known_V[row]),
             )
             for row in tested.tolist()
         ),

@@ -144,10 +144,26 @@ def margins_of_drives(
     """Return what drives at zero command, in units of `unit_V`, leave to each valve's bounds."""
     return [
         _margin(Staircase(each), drops, at_peak, unit_V)
-        if each.premise == "monotone" or len(each.dp_MPa) == 1
+        if _is_staircase(each)
         else margin_of_sagging(SaggingBound(each), drops, at_peak, unit_V)
         for each in bounds
     ]
+
+
+def bounds_at(drops: PressureDrops, bounds: LotSide) -> np.ndarray:
+    """Return what is known of a valve's threshold at each difference of codes, V in doubles; NaN where nothing is."""
+    if _is_staircase(bounds):
+        staircase = Staircase(bounds)
+        steps = drops.steps_of(staircase)
+        return np.where(steps >= 0, np.array(staircase.bounds_V, dtype=float)[steps], np.nan)
+    least, most = (values.astype(float) / drops.scale for values in (drops.least, drops.most))
+    known = SaggingBound(bounds).least_in_doubles(least, most)
+    return np.where(drops.made & np.isfinite(known), known, np.nan)
+
+
+def _is_staircase(bounds: LotSide) -> bool:
+    """Return whether all that is known between the tests follows from monotony."""
+    return bounds.premise == "monotone" or len(bounds.dp_MPa) == 1
 
 
 def counted_dither(compensator: Compensator) -> int:
