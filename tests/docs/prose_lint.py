@@ -1,4 +1,4 @@
-"""Run proselint over the prose of the pages, ``python -m tests.docs.prose_lint [PAGE ...]``, and return its exit status.
+"""Run proselint over the prose of the pages and return its exit status: ``python -m tests.docs.prose_lint [PAGE ...]``.
 
 It takes no Markdown: a table or a listing would be full of repeated words to it. So it reads a file of the paragraphs
 alone for each page, in which each piece of code and each number is a word of its own.
