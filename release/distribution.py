@@ -56,12 +56,15 @@ def write_components(root: Path, output: Path) -> Path:
 
 
 def pack_pages(site: Path, output: Path) -> Path:
-    """Pack the built pages, in order and without times."""
+    """Pack the built pages, in order and without times; what Sphinx keeps beside them names folders of this machine."""
     top = f"{NAME}-{__version__}-docs"
     path = output / f"{top}.zip"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
         for page in sorted(page for page in site.rglob("*") if page.is_file()):
-            entry = zipfile.ZipInfo(f"{top}/{page.relative_to(site).as_posix()}", EARLIEST)
+            name = page.relative_to(site)
+            if any(part.startswith(".") for part in name.parts):  # .doctrees, .buildinfo
+                continue
+            entry = zipfile.ZipInfo(f"{top}/{name.as_posix()}", EARLIEST)
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             packed.writestr(entry, page.read_bytes())
     return path
