@@ -14,8 +14,13 @@ from tests.support.paths import ROOT
 PAGES = (
     "README.md",
     "docs/before-after.md",
+    "docs/concepts/accepted-blocks.md",
+    "docs/concepts/beta.md",
+    "docs/concepts/dead-zone.md",
+    "docs/concepts/every-input.md",
     "docs/concepts/glossary.md",
     "docs/concepts/index.md",
+    "docs/concepts/residual.md",
     "docs/howto/add-file-format.md",
     "docs/howto/add-law.md",
     "docs/howto/add-target.md",
