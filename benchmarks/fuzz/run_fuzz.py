@@ -2,13 +2,14 @@
 
 With atheris (the extra `fuzz`) the mutations are led by coverage of dzdesign's own lines; without it they are blind. A
 finding is written to the working folder as ``crash-...`` and ends the run with status 1; the same file as an argument
-after the target's name tries it again.
+after the target's name tries it again. Once it is corrected, keep the file in ``found/TARGET/``.
 """
 
 import argparse
 import contextlib
 import importlib.util
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -16,8 +17,14 @@ import time
 from pathlib import Path
 
 #: One input takes no longer, s; no input is longer, bytes; and no reader takes more memory, MB.
-SLOWEST_S, LONGEST, MEMORY_MB = 20, 65536, 4096
-NAMES = ("text", "recording", "valve", "compensator", "options", "plant", "tolerances", "words", "telemetry")
+SLOWEST_S, LONGEST, MEMORY_MB = 5, 65536, 2048
+NAMES = (
+    "text", "recording", "low-flow", "valve", "compensator", "artefacts", "lot-table", "curves", "object-code",
+    "options", "plant", "tolerances", "words", "structured-text", "plc-file", "matlab", "fmu", "fmu-description",
+    "binary", "amplifier", "telemetry", "loading-frames", "loading", "calibration-file", "calibration-block",
+)  # fmt: skip
+#: How libFuzzer says how many inputs it tried.
+EXECUTED = re.compile(r"stat::number_of_executed_units:\s*(\d+)")
 
 
 def with_coverage(name: str, seconds: int, seed: int) -> None:
@@ -25,25 +32,29 @@ def with_coverage(name: str, seconds: int, seed: int) -> None:
     import atheris  # pyright: ignore[reportMissingModuleSource, reportMissingImports]: of `make fuzz`
 
     with atheris.instrument_imports(include=["dzdesign"]):
+        from target import found_inputs
         from targets import TARGETS
 
     target = TARGETS[name]
     with tempfile.TemporaryDirectory() as corpus:
-        for number, content in enumerate(target.seeds):
+        for number, content in enumerate([*target.seeds(), *found_inputs(name)]):
             (Path(corpus) / str(number)).write_bytes(content)
-        options = [f"-max_total_time={seconds}", f"-seed={seed}", f"-timeout={SLOWEST_S}", f"-max_len={LONGEST}"]
-        atheris.Setup([sys.argv[0], *options, f"-rss_limit_mb={MEMORY_MB}", "-verbosity=0", corpus], target)
+        limits = [f"-timeout={SLOWEST_S}", f"-max_len={LONGEST}", f"-rss_limit_mb={MEMORY_MB}"]
+        options = [f"-max_total_time={seconds}", f"-seed={seed}", "-verbosity=0", "-print_final_stats=1"]
+        atheris.Setup([sys.argv[0], *options, *limits, corpus], target)
         atheris.Fuzz()
 
 
 def blind(name: str, seconds: float, seed: int) -> int:
     """Fuzz one target without coverage; return how many inputs were tried."""
+    from target import found_inputs
     from targets import TARGETS
 
     target, chance = TARGETS[name], random.Random(f"{seed} {name}")
+    seeds = [*target.seeds(), *found_inputs(name)]
     end, tried = time.monotonic() + seconds, 0
     while time.monotonic() < end or not tried:
-        data = bytearray(chance.choice(target.seeds))
+        data = bytearray(chance.choice(seeds))
         for _ in range(chance.randrange(1, 6)):
             at = chance.randrange(len(data) + 1)
             size = chance.randrange(1, 32)
@@ -56,8 +67,11 @@ def blind(name: str, seconds: float, seed: int) -> int:
                     data[at : at + 1] = chance.choice((b"\0", b"\xff", b'"', b"\n", b"9" * 400, b"[" * 60, b"-", b"e9"))
                 case 3:
                     data[at:at] = data[at : at + size]
+        begin = time.monotonic()
         try:
             target(bytes(data))
+            if (took := time.monotonic() - begin) > SLOWEST_S:
+                raise TimeoutError(f"one input took {took:.0f} s, expected at most {SLOWEST_S} s")
         except BaseException:
             place = Path(f"crash-{name}-{seed}-{tried}")
             place.write_bytes(data)
@@ -94,12 +108,14 @@ def main() -> int:
             command = [sys.executable, __file__, name, "--alone", f"--seconds={seconds}", f"--seed={args.seed}"]
             done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
             wrong, said = done.returncode != 0, done.stdout + done.stderr
+            tried = sum(map(int, EXECUTED.findall(said)))
         else:
-            wrong, said = False, ""
+            wrong, said, tried = False, "", 0
             with contextlib.suppress(KeyboardInterrupt):
-                blind(name, seconds, args.seed)
+                tried = blind(name, seconds, args.seed)
         found += wrong
-        print(f"{name:12} {time.monotonic() - begin:6.0f} s  {'FINDING' if wrong else 'nothing found'}", flush=True)
+        spent = time.monotonic() - begin
+        print(f"{name:18} {spent:6.0f} s {tried:9} inputs  {'FINDING' if wrong else 'nothing found'}", flush=True)
         if wrong:
             print(said[-4000:])
     return 1 if found else 0

@@ -1,48 +1,49 @@
-"""What is fuzzed: bytes in, nothing out; an `InputError` is an answer, any other exception a finding."""
+"""What is fuzzed: readers of recordings, artefacts, tables and options here; outputs and devices beside."""
 
 import gzip
 import io
+import json
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
+import device_targets
+import output_targets
+from target import Target
+
+from dzdesign.assess.assessment import Assessment
 from dzdesign.assess.limits import parse_limits
-from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, FrameReader
 from dzdesign.command_line.options_file import options_from_file
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.errors import InputError
+from dzdesign.core.artefact_types import schema_of
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.units import SI_UNIT, parse_quantity
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.column_labels import find_columns, parse_columns
+from dzdesign.identify.reading.low_flow_table import read_low_flow
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.report.lot.table import TABLE, read_table
+from dzdesign.report.lot.valve_folder import ValveManifest
+from dzdesign.verify.closed_loop.evidence_curves import read_curves
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.tolerances import read_tolerances
+from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.firmware.object_code import HEADER, read_object
+from dzdesign.verify.output_evidence import OutputEvidence
 
 GOLDENS = Path(__file__).parents[2] / "tests" / "goldens"
 CSV = b"# bench 3\ntime_s;u [V];dP (bar);Q_Lmin\n" + b"".join(
     b"%d;%d,5;10;%d\n" % (n, n % 10, n % 7) for n in range(40)
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Target:
-    """One reader, and files to begin with."""
-
-    run: Callable[[bytes], None]
-    seeds: tuple[bytes, ...]
-
-    def __call__(self, data: bytes) -> None:
-        """Read; a refusal must be a sentence of bounded length."""
-        try:
-            self.run(data)
-        except InputError as error:
-            if not 10 < len(str(error)) < 200_000:
-                raise ValueError(f"a refusal of {len(str(error))} characters") from error
+LOW_FLOW = b"# by hand\nu_V,dP_MPa,Q [mL/min],Q_error [mL/min],branch\n4.9,1,12,1,rising\n4.8,1,8,1,falling\n"
+#: Artefacts beside valve.json and compensator.json.
+ARTEFACTS = (FirmwareManifest, OutputManifest, ValveManifest, Evidence, OutputEvidence, Assessment)
 
 
 def _text(data: bytes) -> None:
@@ -75,13 +76,32 @@ def _words(data: bytes) -> None:
             continue
 
 
-def _telemetry(data: bytes) -> None:
-    reader = FrameReader()
-    for start in range(0, len(data), 7):
-        list(reader.feed(data[start : start + 7]))
-    held = len(data) - reader.skipped - reader.frames * FRAME_OCTETS
-    if not 0 <= held < FRAME_OCTETS:
-        raise ValueError(f"{held} octets are neither skipped, nor in a frame, nor held")
+def _artefacts(data: bytes) -> None:
+    for kind in ARTEFACTS:
+        try:
+            read_artefact(data, kind, "manifest.json")
+        except InputError:
+            continue
+
+
+def _curves(data: bytes) -> None:
+    read_curves(data.decode(errors="replace"))
+
+
+def _lot_seed() -> bytes:
+    from dzdesign.report.lot.table import SideFigures, TableRow, table_files
+
+    figures = {"": SideFigures(dp0_MPa=1.0, offset_V=4.9, trend="decreasing")}
+    rows = [
+        TableRow(name=name, status="ok", reason="", sides=figures, record={"serial": name}) for name in ("a", "=1+1")
+    ]
+    return table_files(rows)[TABLE]
+
+
+def _artefact_seeds() -> list[bytes]:
+    short = [json.dumps({"schema": schema_of(kind), "files": {}, "checks": [], "made_from": []}).encode()
+             for kind in ARTEFACTS]  # fmt: skip
+    return [output_targets.output_manifest(), *short]
 
 
 OPTIONS = [
@@ -90,28 +110,48 @@ OPTIONS = [
     for argument in arguments_of_command(name)
     if not argument.is_positional
 ]
+ELF = HEADER.pack(b"\x7fELF\x01\x01".ljust(16, b"\0"), 1, 40, 1, 0, 0, 52, 0, 52, 0, 0, 40, 2, 1)
 TARGETS = {
-    "text": Target(run=_text, seeds=(CSV, CSV.replace(b",", b".").replace(b";", b","), gzip.compress(CSV, mtime=0))),
+    "text": Target(
+        run=_text, seeds=lambda: [CSV, CSV.replace(b",", b".").replace(b";", b","), gzip.compress(CSV, mtime=0)]
+    ),
     "recording": Target(
-        run=_stored(read_ramp_file, "ramp.mat"), seeds=(CSV, b"PAR1", b"ARROW1", b"TDSm", b"MATLAB 5.0")
+        run=_stored(read_ramp_file, "ramp.mat"), seeds=lambda: [CSV, b"PAR1", b"ARROW1", b"TDSm", b"MATLAB 5.0"]
+    ),
+    "low-flow": Target(
+        run=_stored(lambda path: read_low_flow(path, 10.0), "low.csv"),
+        seeds=lambda: [LOW_FLOW, LOW_FLOW.replace(b",", b";")],
     ),
     "valve": Target(
-        run=lambda data: read_artefact(data, ValveModel, "valve.json"), seeds=((GOLDENS / "valve.json").read_bytes(),)
+        run=lambda data: read_artefact(data, ValveModel, "valve.json"),
+        seeds=lambda: [(GOLDENS / "valve.json").read_bytes()],
     ),
     "compensator": Target(
         run=lambda data: read_artefact(data, Compensator, "compensator.json"),
-        seeds=((GOLDENS / "compensator.json").read_bytes(),),
+        seeds=lambda: [(GOLDENS / "compensator.json").read_bytes()],
+    ),
+    "artefacts": Target(run=_artefacts, seeds=_artefact_seeds),
+    "lot-table": Target(run=lambda data: read_table(data, TABLE), seeds=lambda: [_lot_seed()]),
+    "curves": Target(
+        run=_curves, seeds=lambda: [b"dp_code,drive_V\n0,1.5\n1,2.5\n"], refusals=(ValueError,)
+    ),
+    "object-code": Target(
+        run=lambda data: read_object(data), seeds=lambda: [ELF + bytes(80)], refusals=(RequirementError,)
     ),
     "options": Target(
         run=_stored(lambda path: options_from_file(str(path), OPTIONS), "options.toml"),
-        seeds=(b"u-max = '10 V'\ndp = ['1 MPa', 2]\n[columns]\nu = 'AO0:V'\n",),
+        seeds=lambda: [b"u-max = '10 V'\ndp = ['1 MPa', 2]\n[columns]\nu = 'AO0:V'\n"],
     ),
-    "plant": Target(run=_stored(read_plant, "plant.toml"), seeds=(b"K_a = 4\nm_e_kg = 6e-2\nL_c_H = 0x10\n",)),
+    "plant": Target(
+        run=_stored(read_plant, "plant.toml"), seeds=lambda: [b"K_a = 4\nm_e_kg = 6e-2\nL_c_H = 0x10\n"]
+    ),
     "tolerances": Target(
-        run=_stored(read_tolerances, "t.toml"), seeds=(b"plants = 9\nK_a = '3 %'\nm_e_kg = '1 % sd'\n",)
+        run=_stored(read_tolerances, "t.toml"), seeds=lambda: [b"plants = 9\nK_a = '3 %'\nm_e_kg = '1 % sd'\n"]
     ),
     "words": Target(
-        run=_words, seeds=(b"4..20 mA on 150 ohm = 25 MPa", b"0.6 L/min", b"u=AO0:V, Q=Flow", b"hysteresis = 1 %")
+        run=_words,
+        seeds=lambda: [b"4..20 mA on 150 ohm = 25 MPa", b"0.6 L/min", b"u=AO0:V, Q=Flow", b"hysteresis = 1 %"],
     ),
-    "telemetry": Target(run=_telemetry, seeds=(b"\xa5\x5a\x02\x14" + bytes(24), b"\x5a\xa5" * 20)),
+    **output_targets.TARGETS,
+    **device_targets.TARGETS,
 }

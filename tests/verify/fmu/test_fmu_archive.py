@@ -1,6 +1,7 @@
 """An FMU's zip is one that every tool reads alike, with the files of an FMU of ours and no others."""
 
 import struct
+import tracemalloc
 import warnings
 from io import BytesIO
 from zipfile import ZIP_BZIP2, ZIP_DEFLATED, ZipFile, ZipInfo
@@ -88,6 +89,20 @@ def test_a_zip_that_grows_without_end_is_refused(monkeypatch):
         unpacked(archive({"modelDescription.xml": bytes(10**6 + 1)}), "it")
     with pytest.raises(InputError, match="101 files"):
         unpacked(archive({f"x{index}": b"" for index in range(101)}), "it")
+
+
+def test_an_entry_that_unpacks_to_more_than_it_states_takes_no_memory():
+    large = 2**26
+    content = bytearray(archive({"modelDescription.xml": bytes(large)}))
+    for at in (content.find(b"PK\3\4") + 22, content.find(b"PK\1\2") + 24):
+        struct.pack_into("<I", content, at, 100)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError):
+            unpacked(bytes(content), "it")
+        assert tracemalloc.get_traced_memory()[1] < large // 8
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize(

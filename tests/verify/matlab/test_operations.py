@@ -115,8 +115,10 @@ def test_operators_bind_as_in_matlab(text, result):
 
 
 @pytest.mark.parametrize(
-    "text", ["x = ;", "x = (1", "x = 1 +", "x = y;", "3 = x", "f(1, 2) = 3", "x = [1; 2", "if 1", "x = fix(2)"]
-)
+    "text", ["x = ;", "x = (1", "x = 1 +", "x = y;", "3 = x", "f(1, 2) = 3", "x = [1; 2", "if 1", "x = fix(2)",
+     "x = 2 ^ (1 - 3)", "x = 2 ^ 65", "x = bitshift(1, -65)", "x = int32()", "x = max(1)", "x = [1; 2] + [1; 2; 3]",
+     "x = 1" + " + 1" * 51, "x = " + "(" * 31 + "1" + ")" * 31, "x = " + "~" * 31 + "1", "x = " + "9" * 21]
+)  # fmt: skip
 def test_what_is_no_statement_is_refused(text):
     with pytest.raises(InputError, match=r"f\.m"):
         Evaluator(source="f.m", values={}).run(body(text))

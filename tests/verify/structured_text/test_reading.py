@@ -7,7 +7,7 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.verify.structured_text.evaluator import Evaluator
-from dzdesign.verify.structured_text.parser import DEEPEST, parse
+from dzdesign.verify.structured_text.parser import DEEPEST, MOST_HELD, MOST_OPERATIONS, parse
 from dzdesign.verify.structured_text.to_c import block_in_c, place_of
 from dzdesign.verify.structured_text.type_check import check_types
 from dzdesign.verify.toolchain.host_compiler import load_library
@@ -33,6 +33,12 @@ def test_what_is_written_is_read():
     block, _ = read("(* a comment *) IF x > 1 AND NOT seen THEN z := T[2]; ELSE z := C; END_IF; w := 0;")
     assert [each.name for each in block.of_section("VAR_INPUT")] == ["x", "y"]
     assert block.variables["t"].initial == (10, -20, 30) and block.variables["t"].bounds == (1, 3)
+
+
+def test_variables_that_take_all_memory_are_refused():
+    held = f"VAR_TEMP more : ARRAY[1..{MOST_HELD}] OF DINT; END_VAR"
+    with pytest.raises(InputError, match=f"more than {MOST_HELD} numbers"):
+        read(GOOD, HEAD + held)
 
 
 @pytest.mark.parametrize(
@@ -68,6 +74,8 @@ def test_what_is_written_is_read():
         ("z := T;", "line 7, column 6", "array"),
         ("z := x[1];", "line 7, column 6", "array"),
         ("z := " + "(" * (DEEPEST + 1) + "x" + ")" * (DEEPEST + 1) + ";", "line 7, column", "inside of each other"),
+        ("z := x" + " + x" * (MOST_OPERATIONS + 1) + ";", "line 7, column", "operations"),
+        ("FOR i := 1 TO 4096 DO z := x; z := x; z := x; z := x; z := x; END_FOR", "line 7, column 55", "a call has"),
         (END + "z := 1;", "line 8, column 1", "behind"),
         ("z := 30000 * 2;", "line 7, column 12", "alone"),
         ("z := x + (1 + 2) * y;", "line 7, column 13", "alone"),

@@ -18,6 +18,8 @@ ZERO, ONE = Fraction(0), Fraction(1)
 INCREMENTS, HUNDREDTHS, FULL_MV = 16384, 10_000, 10_000
 #: Points of a TF5810 table.
 TABLE_POINTS = 100
+#: A number as files have it; one of another form could be of any size, such as 1e999999999.
+DECIMAL = re.compile(r"-?[0-9]{1,9}(?:\.[0-9]{1,15})?")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +106,7 @@ def _rmc(text: str) -> Mapping[int, FileLaw]:
     number, unit = value.split(" ")
     if name not in ("Dead Band Eliminator", "Output Deadband"):
         raise ValueError(f"'{name}' is no parameter for this")
-    offset = Fraction(number) * {"V": 1000, "mV": 1}[unit] / FULL_MV
+    offset = _number(number) * {"V": 1000, "mV": 1}[unit] / FULL_MV
     law = FileLaw(rest=ZERO, points=((ZERO, offset), (ONE - offset, ONE), (ONE, ONE)))
     return {1: law, -1: law}
 
@@ -116,14 +118,21 @@ def _beckhoff(text: str) -> Mapping[int, FileLaw]:
     count = int(plain.partition("TblCount : INT :=")[2].partition(";")[0])
     if len(numbers) != 2 * count or rest != f"{2 * (TABLE_POINTS - count)}(0.0)" or not count % 2:
         raise ValueError(f"{len(numbers)} numbers stand in a table of {count} points")
-    return _table([(Fraction(x), Fraction(y)) for x, y in zip(numbers[::2], numbers[1::2], strict=True)])
+    return _table([(_number(x), _number(y)) for x, y in zip(numbers[::2], numbers[1::2], strict=True)])
 
 
 def _csv(text: str) -> Mapping[int, FileLaw]:
     header, *rows = [line for line in text.splitlines() if line and not line.startswith("#")]
     if header != "command_percent,drive_percent":
         raise ValueError(f"the columns are '{header}'")
-    return _table([(Fraction(x) / 100, Fraction(y) / 100) for x, y in (row.split(",") for row in rows)])
+    return _table([(_number(x) / 100, _number(y) / 100) for x, y in (row.split(",") for row in rows)])
+
+
+def _number(text: str) -> Fraction:
+    """Return a decimal number; another form is a `ValueError`."""
+    if not DECIMAL.fullmatch(text):
+        raise ValueError(f"{text[:20]!r} is no decimal number")
+    return Fraction(text)
 
 
 def _table(points: Sequence[tuple[Fraction, Fraction]]) -> Mapping[int, FileLaw]:

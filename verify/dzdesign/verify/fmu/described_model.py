@@ -3,6 +3,7 @@
 Units are taken apart by pint; whatever else stands there than must is a fault.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
@@ -74,10 +75,16 @@ def _start(variable: DescribedVariable) -> float | str | None:
     text = variable.start
     if text is None or variable.kind == "boolean":
         return None if text is None else {"false": 0.0, "true": 1.0}.get(text, text)
+    number = _number(text)
+    return text if math.isnan(number) else number
+
+
+def _number(text: str) -> float:
+    """Return a number; of a text that is none NaN, which is equal to no expected number."""
     try:
         return float(text)
     except ValueError:
-        return text
+        return math.nan
 
 
 def _key(fmu: FmuFile, name: str) -> int:
@@ -157,8 +164,8 @@ def _frame_faults(fmu: FmuFile, compensator: Compensator, indicators: int) -> It
         sources = [each.attrib for each in element.iterfind("SourceFiles/File")]
         if element.attrib != attributes or sources != [{"name": "dz_fmu.c"}] * (fmu.fmi == 2):
             yield f"{DESCRIPTION}: {element.tag} has attributes {element.attrib}, expected {attributes}"
-    times = {key: float(value) for key, value in document[4].attrib.items()}
-    if times.pop("stopTime", 0.0) <= 0 or times != {"startTime": 0.0, "stepSize": step_s}:
+    times = {key: _number(value) for key, value in document[4].attrib.items()}
+    if not times.pop("stopTime", 0.0) > 0 or times != {"startTime": 0.0, "stepSize": step_s}:
         yield f"{DESCRIPTION}: DefaultExperiment is {times}, expected steps of {step_s:g} s from 0 on"
 
 

@@ -14,6 +14,8 @@ from dzdesign.core.errors import InputError, quoted
 
 #: Larger than any FMU of ours unpacked, and more files than it has.
 LARGEST_OCTETS, MOST_FILES = 64 * 2**20, 100
+#: Octets that are unpacked at a time.
+STEP = 2**16
 #: A path inside: names with no sign that a system reads as another, none of them dots alone.
 PLAIN = re.compile(r"(?!\.)[A-Za-z0-9_.-]+(?:/(?!\.)[A-Za-z0-9_.-]+)*")
 #: Header in front of an entry, of one in the directory, and the end of an archive: octets, and where they begin.
@@ -34,9 +36,15 @@ def unpacked(content: bytes, source: str) -> dict[str, bytes]:
                 )
             if fault := _fault(content, entries, packed.comment):
                 raise InputError(f"{source}: {fault}, as in no FMU of dzdesign; make it again with `dzdesign codegen`")
-            return {entry.filename: packed.read(entry) for entry in entries}
-    except (BadZipFile, ZlibError, struct.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
+            return {entry.filename: _content(packed, entry) for entry in entries}
+    except (BadZipFile, ZlibError, struct.error, EOFError, RuntimeError, OSError, ValueError) as error:
         raise InputError(f"{source} is no FMU of dzdesign: {error}; make it again with `dzdesign codegen`") from error
+
+
+def _content(packed: ZipFile, entry: ZipInfo) -> bytes:
+    """Return an entry, unpacked in steps: all at once takes the memory of all that is packed, whatever it states."""
+    with packed.open(entry) as file:
+        return b"".join(iter(lambda: file.read(STEP), b""))
 
 
 def _fault(content: bytes, entries: list[ZipInfo], comment: bytes) -> str:

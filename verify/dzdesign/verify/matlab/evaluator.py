@@ -27,6 +27,10 @@ JOINED: Mapping[str, Callable[..., np.ndarray]] = {"&": np.logical_and, "|": np.
 COMPUTED: Mapping[str, Callable[..., np.ndarray]] = {
     "+": np.add, "-": np.subtract, ".*": np.multiply, "*": np.multiply, "max": np.maximum, "min": np.minimum,
 }  # fmt: skip
+#: Arguments of the functions that are known here.
+ARGUMENTS = {"int32": 1, "int64": 1, "uint16": 1, "max": 2, "min": 2, "bitshift": 2}
+#: Bits that a shift moves by at most, and the largest exponent.
+MOST_BITS = 64
 #: Functions that bring the inputs into columns, and the results into the inputs' shape.
 SAME = frozenset({"codes_of", "column_of", "reshape"})
 
@@ -68,11 +72,12 @@ class Evaluator:
 
     def _with_elements(self, each: Statement, mask: Expression, value: Value) -> Value:
         held, where = self._named(each.target, each.line), self._of(mask)
+        self._refuse_unlike(each.line, held, where)
         fits = value.kind in (held.kind, "double") and value.is_scalar and where.kind == "logical"
         if not fits:
             self._fault(each.line, f"elements of {each.target} get a {value.kind}")
         data = np.broadcast_to(held.data, where.data.shape).copy()
-        data[where.data.astype(bool)] = value.data.item()
+        data[where.data.astype(bool)] = self._one(value, each.line)
         return self._checked(Value(held.kind, data), each.line, each.target)
 
     def _of(self, each: Expression) -> Value:
@@ -82,7 +87,7 @@ class Evaluator:
             case "name":
                 return self._named(each.text, each.line)
             case "column":
-                numbers = [self._of(part).data.item() for part in each.parts]
+                numbers = [self._one(self._of(part), each.line) for part in each.parts]
                 return Value("double", np.array(numbers, dtype=object))
             case "operator":
                 return self._operation(each)
@@ -95,6 +100,17 @@ class Evaluator:
             raise InputError(f"{self.source}, line {line}: {name} has no value")
         return self.values[name]
 
+    def _one(self, value: Value, line: int) -> int:
+        """Return the only number of a value."""
+        if not value.is_scalar:
+            raise InputError(f"{self.source}, line {line}: {value.data.size} numbers stand where one is expected")
+        return int(value.data.item())
+
+    def _refuse_unlike(self, line: int, *values: Value) -> None:
+        """Refuse arrays of two sizes in one operation."""
+        if len(sizes := {value.data.size for value in values} - {1}) > 1:
+            raise InputError(f"{self.source}, line {line}: arrays of {' and '.join(map(str, sorted(sizes)))} numbers")
+
     def _operation(self, each: Expression) -> Value:
         operands = [self._of(part) for part in each.parts]
         if len(operands) == 1:
@@ -103,6 +119,7 @@ class Evaluator:
                 return Value("logical", np.logical_not(only.data.astype(bool)))
             return self._checked(Value(only.kind, -only.data), each.line, "-")
         left, right = operands
+        self._refuse_unlike(each.line, left, right)
         if each.text in COMPARED:
             return Value("logical", COMPARED[each.text](left.data, right.data).astype(bool))
         if each.text in JOINED:
@@ -110,16 +127,22 @@ class Evaluator:
                 self._fault(each.line, f"{each.text} of a {left.kind} and a {right.kind}")
             return Value("logical", JOINED[each.text](left.data.astype(bool), right.data.astype(bool)))
         if each.text == "^":
-            power = left.data.item() ** right.data.item()
-            if float(power) != power:
-                self._fault(each.line, f"{power} is no double")
-            return _scalar(power)
+            return self._power(each.line, self._one(left, each.line), self._one(right, each.line))
         if each.text == "*" and not (left.is_scalar or right.is_scalar):
             self._fault(each.line, "* of two arrays")
         return self._computed(each, left, right)
 
+    def _power(self, line: int, base: int, exponent: int) -> Value:
+        if not 0 <= exponent <= MOST_BITS or abs(base) > LIMITS["double"][1]:
+            raise InputError(f"{self.source}, line {line}: the power {base}^{exponent} can't be evaluated")
+        power = base**exponent
+        if float(power) != power:
+            self._fault(line, f"{power} is no double")
+        return _scalar(power)
+
     def _computed(self, each: Expression, left: Value, right: Value) -> Value:
         """Return a sum, product or extreme of two values."""
+        self._refuse_unlike(each.line, left, right)
         if each.text not in COMPUTED:
             raise InputError(f"{self.source}, line {each.line}: {each.text} can't be evaluated")
         kinds = {left.kind, right.kind}
@@ -131,6 +154,9 @@ class Evaluator:
         return self._checked(Value(kind, COMPUTED[each.text](left.data, right.data)), each.line, each.text)
 
     def _call(self, each: Expression) -> Value:
+        wanted = ARGUMENTS.get(each.text, len(each.parts)) if each.text not in self.values else 1
+        if not each.parts or len(each.parts) != wanted:
+            raise InputError(f"{self.source}, line {each.line}: {each.text} has {len(each.parts)} arguments")
         if each.text in self.values:
             return self._element(each)
         if each.text in SAME:
@@ -142,7 +168,9 @@ class Evaluator:
         if each.text in ("max", "min"):
             return self._computed(each, *arguments)
         if each.text == "bitshift":
-            held, by = arguments[0], int(arguments[1].data.item())
+            held, by = arguments[0], self._one(arguments[1], each.line)
+            if by < -MOST_BITS:
+                raise InputError(f"{self.source}, line {each.line}: a shift by {by} bits can't be evaluated")
             if by > 0 or bool(np.any(held.data < 0)) or held.kind == "double":
                 self._fault(each.line, "bitshift of a negative number, of a double, or to the left")
             self.operations += 1

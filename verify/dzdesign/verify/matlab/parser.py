@@ -5,7 +5,9 @@ statements up to ``end``. Operators bind as in MATLAB: ``||``, ``&&``, ``|``, ``
 or ``~``, ``^``.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 from dzdesign.core.errors import InputError
 from dzdesign.verify.matlab.subset import ReadFunction, Token
@@ -14,6 +16,9 @@ from dzdesign.verify.matlab.subset import ReadFunction, Token
 LEVELS = (
     ("||",), ("&&",), ("|",), ("&",), ("<", "<=", ">", ">=", "==", "~="), ("+", "-"), ("*", ".*"),
 )  # fmt: skip
+#: Brackets, signs and branches inside of each other, and operations of one statement; a generated one has 8.
+DEEPEST, MOST_OPERATIONS = 30, 50
+Inner = TypeVar("Inner")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,8 @@ def parse_body(function: ReadFunction, source: str) -> tuple[Statement | Branch,
 class _Reader:
     def __init__(self, words: tuple[Token, ...], source: str) -> None:
         self.words, self.source, self.place = words, source, 0
+        #: How deep the word stands, and operations of its statement.
+        self.depth, self.operations = 0, 0
 
     @property
     def word(self) -> Token:
@@ -72,6 +79,21 @@ class _Reader:
             raise InputError(f"{self.source}, line {word.line}: {word.text!r} stands where {text!r} is expected")
         return word
 
+    def inside(self, part: Callable[[], Inner]) -> Inner:
+        """Read what stands inside of something else, up to a depth."""
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise InputError(f"{self.source}, line {self.word.line}: more than {DEEPEST} parts stand inside each other")
+        found = part()
+        self.depth -= 1
+        return found
+
+    def operation(self, word: Token, *operands: Expression) -> Expression:
+        self.operations += 1
+        if self.operations > MOST_OPERATIONS:
+            raise InputError(f"{self.source}, line {word.line}: a statement has more than {MOST_OPERATIONS} operations")
+        return Expression("operator", word.text, word.line, operands)
+
     def statements(self) -> tuple[Statement | Branch, ...]:
         found: list[Statement | Branch] = []
         while self.place < len(self.words):
@@ -84,11 +106,11 @@ class _Reader:
         return tuple(found)
 
     def statement(self) -> Statement | Branch:
-        line = self.word.line
+        line, self.operations = self.word.line, 0
         if self.word.text == "if":
             self.take()
             condition = self.expression()
-            body = self.statements()
+            body = self.inside(self.statements)
             self.expect("end")
             return Branch(line, condition, body)
         target = self.expression()
@@ -108,17 +130,16 @@ class _Reader:
         left = self.expression(level + 1)
         while self.word.kind == "sign" and self.word.text in LEVELS[level]:
             word = self.take()
-            left = Expression("operator", word.text, word.line, (left, self.expression(level + 1)))
+            left = self.operation(word, left, self.expression(level + 1))
         return left
 
     def signed(self) -> Expression:
         if self.word.kind == "sign" and self.word.text in ("-", "~"):
             word = self.take()
-            return Expression("operator", word.text, word.line, (self.signed(),))
+            return self.operation(word, self.inside(self.signed))
         base = self.primary()
         if self.word.text == "^":
-            word = self.take()
-            return Expression("operator", "^", word.line, (base, self.primary()))
+            return self.operation(self.take(), base, self.primary())
         return base
 
     def primary(self) -> Expression:
@@ -126,7 +147,7 @@ class _Reader:
         if word.kind in ("number", "text"):
             return Expression(word.kind, word.text, word.line)
         if word.text == "(":
-            inside = self.expression()
+            inside = self.inside(self.expression)
             self.expect(")")
             return inside
         if word.text == "[":
@@ -141,7 +162,7 @@ class _Reader:
     def listed(self, end: str, separator: str) -> tuple[Expression, ...]:
         found: list[Expression] = []
         while self.word.text != end:
-            found.append(self.expression())
+            found.append(self.inside(self.expression))
             if self.word.text != end:
                 self.expect(separator)
         self.take()

@@ -23,6 +23,8 @@ CALLED = frozenset({
     "isreal", "issparse", "mat2str", "max", "min", "nargin", "nargout", "numel", "prod", "repmat", "reshape", "size",
     "uint16",
 })  # fmt: skip
+#: Characters of a text; digits of a number, as of one of 64 bits.
+LONGEST, MOST_DIGITS = 200_000, 20
 #: Heading of a function file: outputs, name, inputs.
 OUTPUTS, INPUTS = ("compare", "status", "beta"), ("u_adc", "p_a_adc", "p_b_adc")
 
@@ -70,12 +72,16 @@ def _tokens(text: str, source: str) -> Iterator[Token]:
     line, place = 1, 0
     if not text.isascii():
         raise InputError(f"{source} is no text in ASCII")
+    if len(text) > LONGEST:
+        raise InputError(f"{source} has {len(text)} characters, expected at most {LONGEST}")
     while place < len(text):
         found = TOKENS.match(text, place)
         if found is None or found.lastgroup == "refused":
             near = text[place : place + 12]
             raise InputError(f"{source}, line {line}: {near!r} is not of the subset that is verified")
         kind, word = str(found.lastgroup), found[0]
+        if kind == "number" and len(word) > MOST_DIGITS:
+            raise InputError(f"{source}, line {line}: a number has {len(word)} digits, expected at most {MOST_DIGITS}")
         if kind == "comment" and word[1:2] in ("{", "}"):
             raise InputError(f"{source}, line {line}: a block comment is not of the subset that is verified")
         if kind not in ("blank", "comment", "next"):
@@ -119,7 +125,7 @@ def _assigned(function: ReadFunction) -> Iterator[str]:
             continue
         behind = place + 1
         depth = 0
-        while behind < len(body) and (depth or body[behind].text == "("):
+        while behind < len(body) and body[behind].kind != "line" and (depth or body[behind].text == "("):
             depth += {"(": 1, ")": -1}.get(body[behind].text, 0)
             behind += 1
         if behind < len(body) and body[behind].text == "=":

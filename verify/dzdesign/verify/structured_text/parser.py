@@ -63,6 +63,9 @@ MOST_DIGITS = 10
 MOST = 4096
 #: Characters of a text, and brackets and statements inside of each other.
 LONGEST, DEEPEST = 100_000, 40
+#: Operations of one expression; statements and operations of one call; numbers that variables hold at once. A generated
+#: block has 12, some hundreds and some tens. More would take the checks of all inputs hours, or all memory.
+MOST_OPERATIONS, MOST_EXECUTED, MOST_HELD = 50, 20_000, 256
 
 
 def parse(text: str, source: str) -> FunctionBlock:
@@ -73,10 +76,13 @@ def parse(text: str, source: str) -> FunctionBlock:
 class _Parser:
     def __init__(self, text: str, source: str) -> None:
         self.source, self.at, self.depth, self.rounds = source, 0, 0, 1
+        #: Of the expression that is read, and of a call as far as it is read.
+        self.operations, self.executed = 0, 0
         if len(text) > LONGEST:
             self._refuse(Place(1, 1), f"the text has {len(text)} characters, expected at most {LONGEST}")
         self.tokens = tokens_of(text, source)
         self.variables: dict[str, Variable] = {}
+        self.held = 0
 
     def _refuse(self, place: Place, what: str) -> NoReturn:
         raise InputError(f"{self.source}, {place}: {what}")
@@ -147,6 +153,9 @@ class _Parser:
             self.variables[name.text.lower()] = Variable(
                 place=name.place, name=name.text, section=section, kind=kind, bounds=bounds, initial=initial
             )
+            self.held += 0 if section == "VAR CONSTANT" else bounds[1] - bounds[0] + 1 if bounds else 1
+            if self.held > MOST_HELD:
+                self._refuse(name.place, f"the variables hold more than {MOST_HELD} numbers")
 
     def _bounds(self) -> tuple[int, int]:
         place = self._must("[").place
@@ -191,8 +200,22 @@ class _Parser:
         self.depth -= 1
         return found
 
+    def _executes(self, place: Place) -> None:
+        """Count a statement or an operation, as often as the loops around it have it."""
+        self.executed += self.rounds
+        if self.executed > MOST_EXECUTED:
+            self._refuse(place, f"a call has more than {MOST_EXECUTED} statements and operations")
+
+    def _operation(self, place: Place, operator: str, *operands: Expression) -> Operation:
+        self._executes(place)
+        self.operations += 1
+        if self.operations > MOST_OPERATIONS:
+            self._refuse(place, f"an expression has more than {MOST_OPERATIONS} operations")
+        return Operation(place=place, operator=operator, operands=operands)
+
     def _statement(self) -> Statement:
-        place = self.next.place
+        place, self.operations = self.next.place, 0
+        self._executes(place)
         if self._may("IF"):
             return self._inside(lambda: self._if(place))
         if self._may("FOR"):
@@ -206,6 +229,7 @@ class _Parser:
     def _if(self, place: Place) -> If:
         branches: list[tuple[Expression | None, tuple[Statement, ...]]] = []
         while True:
+            self.operations = 0
             condition = self.expression()
             self._must("THEN")
             branches.append((condition, self._statements("ELSIF", "ELSE", "END_IF")))
@@ -245,7 +269,7 @@ class _Parser:
         sign = self._may(*COMPARED)
         if sign is None:
             return left
-        return Operation(place=sign.place, operator=sign.text, operands=(left, self._sum()))
+        return self._operation(sign.place, sign.text, left, self._sum())
 
     def _sum(self) -> Expression:
         return self._chain(lambda: self._chain(self._signed, "*", "/", "MOD"), "+", "-")
@@ -254,13 +278,13 @@ class _Parser:
         """Read parts with any of the signs between them, from the left."""
         found = part()
         while sign := self._may(*signs):
-            found = Operation(place=sign.place, operator=sign.text, operands=(found, part()))
+            found = self._operation(sign.place, sign.text, found, part())
         return found
 
     def _signed(self) -> Expression:
         if sign := self._may("-", "NOT"):
             operator = "NEG" if sign.text == "-" else "NOT"
-            return Operation(place=sign.place, operator=operator, operands=(self._operand(),))
+            return self._operation(sign.place, operator, self._operand())
         return self._operand()
 
     def _operand(self) -> Expression:
@@ -281,7 +305,7 @@ class _Parser:
             self._must(")")
             if len(operands) != FUNCTIONS[token.text]:
                 self._refuse(token.place, f"{token.text} has {len(operands)} operands")
-            return Operation(place=token.place, operator=token.text, operands=tuple(operands))
+            return self._operation(token.place, token.text, *operands)
         return self._variable()
 
     def _variable(self) -> Name:
