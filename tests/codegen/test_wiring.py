@@ -256,6 +256,6 @@ def test_the_cortex_m4_says_what_its_numbers_are_made_for(firmware):
 def test_the_help_of_design_states_no_default_that_a_target_changes():
     helps = {argument.name: argument.help for argument in arguments_of(DesignChoices)}
     for name in ("command_signal", "pressure_a", "pressure_b"):
-        known = ("the converter's whole range)", "140 ohm for 3 V)", "as ahead of it)")
+        known = ("the converter's whole range)", "140 ohm for 3 V.", "as upstream)")
         assert any(words in helps[name] for words in known)
         assert not re.search(r"0\.\.3 V|x 0\.3\b", helps[name])

@@ -1,11 +1,13 @@
 """Pages and help that can be read once: sentences of a length that one reading holds, each help text a sentence."""
 
 import doctest
+import re
 
 import pytest
 
 from dzdesign.command_line.command_table import COMMANDS
-from dzdesign.command_line.parser import arguments_of_command
+from dzdesign.command_line.parser import CommonArguments, arguments_of_command
+from dzdesign.core.options import arguments_of
 from tests.docs import sentences
 from tests.docs.sentences import MEAN, MOST, blocks_of, faults_of, sentences_of
 from tests.support.paths import ROOT
@@ -51,9 +53,6 @@ PAGES = (
     "docs/reference/commands.md",
     "docs/tutorial.md",
 )
-#: Commands whose help is held to it.
-LATER = {"plan", "identify", "design", "codegen", "verify", "batch", "assess"}
-HELPS = [name for name in COMMANDS if name not in LATER]
 LONG, SHORT = "One " + "two " * MOST, "One two."
 
 
@@ -67,10 +66,27 @@ def test_a_page_has_sentences_that_can_be_read_once(page):
     assert blocks and faults_of(blocks) == []
 
 
-@pytest.mark.parametrize("name", HELPS)
+def helps_of(name):
+    """Return the texts of a command's help: its own line, and each of an argument or option with its default."""
+    arguments = (*arguments_of_command(name), *arguments_of(CommonArguments))
+    return [f"{COMMANDS[name].help}.", *(argument.described(argument.default_text) for argument in arguments)]
+
+
+def unfinished(text):
+    """Return whether a text is no sentence: without a capital or a full stop."""
+    return not re.fullmatch(r"[A-Z].*[^.]\.", text)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
 def test_the_help_of_a_command_can_be_read_once(name):
-    helps = [argument.described(argument.default_text) for argument in arguments_of_command(name)]
-    assert faults_of([f"{COMMANDS[name].help}.", *helps]) == []
+    line, *options = helps_of(name)
+    assert faults_of([line, *options]) == [] and [text for text in options if unfinished(text)] == []
+    assert not unfinished(f"{line[0].upper()}{line[1:]}") and len(line) < 90, "a line of `dzdesign --help`"
+
+
+def test_a_help_text_that_is_no_sentence_is_found():
+    texts = ("Full command (default: 10 V).", "full command.", "Full command", "Full command..", "File; see `a.json`.")
+    assert [text for text in texts if unfinished(text)] == list(texts[1:4])
 
 
 def test_a_sentence_that_is_too_long_is_found_wherever_it_stands():

@@ -112,11 +112,12 @@ class Argument:
         return self.option.command_default or self.option.default or str(self.default or "")
 
     def described(self, default: str) -> str:
-        """Return the help with the words that it takes and its default."""
+        """Return the help with the words that it takes and its default, both in its first sentence."""
         words = self.option.choices if isinstance(self.option.choices, tuple) else ()
         notes = [", ".join(words)] if any(word not in self.help for word in words) else []
         notes += [f"default: {default}"] if default else []
-        return f"{self.help.removesuffix('.')} ({'; '.join(notes)})." if notes else self.help
+        first, stop, others = self.help.partition(". ")
+        return f"{first.removesuffix('.')} ({'; '.join(notes)}).{stop[1:]}{others}" if notes else self.help
 
 
 def flag_of(name: str) -> str:

@@ -31,59 +31,62 @@ class DesignChoices(MachineChoices, CurrentChoices):
     """Options of `design`, as written; None takes the default, so that `codegen` can tell what was given."""
 
     law: Annotated[Text, Option("LAW", LAW, "paper", choices=LAW_NAMES)] = None
-    """Law; `dzdesign derive` states what each one does."""
+    """Law of the compensator. `dzdesign derive` states each law."""
     guard: Annotated[Text, Option("G", LAW, "closing", choices="dzdesign.design.options:GUARDS")] = None
-    """Threshold to protect: closing, mean or opening."""
+    """Threshold that the certificate protects: closing, mean or opening."""
     transition: Annotated[Text, Option("C", LAW, "auto", example="1 %")] = None
-    """Share of the command behind the zero band over which the drive runs from the closing threshold to the opening
-    one; auto: 1 %, or 16 codes where those are more; off: the closing threshold's offset alone, and no zero band."""
+    """Share of the command, behind the zero band, over which the drive runs from the closing threshold to the opening
+    one. auto: 1 %, or 16 codes if that is more. off: no transition and no zero band, with the offset of the closing
+    threshold throughout."""
     command_error: Annotated[Text, Option("E", CONNECTIONS, example="15 + 4 codes")] = None
-    """Error of the code at zero command: offset and peak noise, such as "15 + 4 codes" or "0.4 % + 0.1 %". So many
-    codes count as zero, the zero band (default: the target's converter)."""
+    """Error of the code at zero command, offset and peak noise, such as "15 + 4 codes" or "0.4 % + 0.1 %" (default: the
+    error of the target's converter). The sum is the zero band, whose codes count as zero."""
     below_dp0: Annotated[Text, Option("B", LAW, "hold", choices=BELOW_DP0)] = None
-    """Below dP0: hold beta = 1 as the paper does, or extend it to the tests there."""
+    """Beta below dP0. hold: beta stays 1, as in the paper. extend: beta follows the tests there."""
     above: Annotated[Text, Option("A", LAW, "lower", choices=ABOVE)] = None
-    """Above the highest tested pressure drop: hold the offset (not certified there), lower it with the bound that the
-    curve's premise continues, or release it: the dead zone comes back."""
+    """Offset above the highest tested pressure drop. hold: it stays the same, without a certificate there. lower: it
+    follows the bound that the curve's premise continues. release: it goes to zero, and the dead zone returns."""
     reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min")] = None
-    """Flow at which dead zones are read beside the onset (default: the meter's floor, or the noise level of a meter
-    without one)."""
+    """Flow at which dead zones are read, in addition to the onset (default: the meter's floor, or the noise level of a
+    meter without one)."""
     output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %")] = None
     """Largest drive, in percent of full drive."""
     accept: Annotated[Text, Option("CODE", LAW, choices="dzdesign.design.options:ACCEPTABLE")] = None
-    """Design in spite of this: branch-order, a valve that seems to close above where it opens; or broken-sensor,
-    pressure signals whose failure raises the offset unseen; or both with a comma (default: refuse)."""
+    """Warnings to accept, separated by commas (default: none, the design is refused). branch-order: the valve seems to
+    close above its opening threshold. broken-sensor: a failure of a pressure signal raises the offset undetected."""
     command_signal: Annotated[Text, Option("S", CONNECTIONS, example="0..10 V x 0.3")] = None
-    """Command at the converter: range, shunt, attenuator, offset and what it stands for, such as "-10..10 V x 0.15 +
-    1.5 V" or "4..20 mA on 150 ohm = -10..10 V", which have both signs (default: 0 to 10 V over the converter's whole
-    range)."""
+    """Signal of the command at the converter: range, shunt, attenuator, offset and represented command (default: 0 to
+    10 V over the converter's whole range). Examples with both signs are "-10..10 V x 0.15 + 1.5 V" and "4..20 mA on 150
+    ohm = -10..10 V"."""
     polarity: Annotated[Text, Option("P", CONNECTIONS, "normal", choices=POLARITIES)] = None
-    """Polarity of the command: normal, or inverted, which counts the other way."""
+    """Polarity of the command. normal: more signal is more command. inverted: more signal is less command."""
     pressure_span: Annotated[Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa")] = None
     """Span of both pressure sensors."""
     pressure_a: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
-    """Sensor ahead of the metering edge, such as "4..20 mA on 140 ohm = 25 MPa" (default: 4..20 mA on a
-    shunt with which 21 mA still stand within the converter's range, 140 ohm for 3 V)."""
+    """Signal of the sensor upstream of the metering edge, such as "4..20 mA on 140 ohm = 25 MPa". The default is 4..20
+    mA on a shunt that keeps 21 mA within the converter's range, 140 ohm for 3 V."""
     pressure_b: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
-    """Sensor behind the metering edge (default: as ahead of it)."""
+    """Signal of the sensor downstream of the metering edge (default: as upstream)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "same", choices=NEGATIVE_DP)] = None
-    """Pressure drop of negative commands: same, or swapped, which is B less A."""
+    """Pressure drop at negative commands. same: A minus B, as at positive commands. swapped: B minus A."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
     """Time from full command to zero."""
     hysteresis: Annotated[Text, Option("H", DRIVE, "keep", choices=HYSTERESIS)] = None
-    """What to do about the valve's hysteresis: keep it, or play, which drives a falling command lower by its width."""
+    """Treatment of the valve's hysteresis. keep: no change. play: a falling command is driven lower by the width of the
+    hysteresis."""
     dither: Annotated[Text, Option("D", DRIVE, "off", example="150 Hz 1 %")] = None
-    """Square wave on the output, such as "150 Hz 1 %", plus and minus 1 % of full drive."""
+    """Square wave on the output, such as "150 Hz 1 %" for plus and minus 1 % of full drive."""
     fault_debounce: Annotated[Text, Option("N", DRIVE, "5 samples", example="5 samples")] = None
-    """Valid samples in a row after which a fault is over, such as "5 samples" or "4 ms". It acts at once: an invalid
-    command lets the valve go, a failed pressure gives the smallest beta."""
+    """Number of consecutive valid samples that end a fault, such as "5 samples" or "4 ms". A fault acts at once: an
+    invalid command releases the valve, and a failed pressure selects the smallest beta."""
     fault_latch: Annotated[Text, Option("L", DRIVE, "off", choices=ON_OFF)] = None
-    """Latch faults: on keeps one that has lasted for the debounce until a reset; off."""
+    """Latch of faults. on: a fault that lasts for the debounce time stays until a reset. off: it ends with the
+    debounce."""
     interlock: Annotated[Text, Option("I", DRIVE, "on", choices=ON_OFF)] = None
-    """Interlock: on lets the drive follow, after a reset or an invalid command, only once zero command has been seen
-    for the debounce; off."""
+    """Interlock after a reset or an invalid command. on: the drive follows only after zero command has lasted for the
+    debounce time. off: it follows at once."""
 
 
 #: Text of each option where it is not given. Of signals none: they span the target's whole converter.

@@ -16,27 +16,29 @@ class BatchArguments(OutputChoices, DesignChoices, IdentifyChoices):
     """Arguments of `batch`: beside its own, the options of `identify`, `design` and outputs for every valve."""
 
     source: Annotated[AnyPath, Option("FOLDER")]
-    """Folder with a subfolder of recordings for each valve; or a CSV file with a row for each: name, files (patterns, ;
-    between them), record.NAME, and any option of identify or design that is different for it."""
+    """Folder with a subfolder of recordings for each valve, or a CSV file with a row for each valve. Its columns are
+    name, files (patterns separated by semicolons), record.NAME and any option of identify or design that differs
+    between the valves."""
     _: KW_ONLY
     output: Annotated[AnyPath, Option("DIR", short="-o")] = "batch"
-    """Folder to write; an earlier run there is continued."""
+    """Folder to write. An earlier run in it is continued."""
     jobs: Annotated[
         int | str | None, Option("N", read=whole_number("a number of processes such as 4", least=1, digits=4))
     ] = None
-    """Processes of this machine (default: as many as it has processors)."""
+    """Number of processes on this machine (default: the number of its processors)."""
     dask: Annotated[Text, Option("ADDRESS")] = None
-    """Instead, address of a Dask scheduler, such as tcp://10.0.0.5:8786."""
+    """Address of a Dask scheduler to use instead, such as tcp://10.0.0.5:8786."""
     pattern: Annotated[Text, Option("P")] = None
     """Pattern of the recordings in a subfolder, such as "*.csv" (default: by suffix)."""
     verify: Annotated[bool, Option()] = False
-    """Also verify each valve's firmware and outputs, as the command does."""
+    """Verify each valve's firmware and outputs too, as the command verify does."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
-    """File with the plant of the closed loop, for the verification; of the output fmu also make an FMU of it."""
+    """File with the plant of the closed loop, for the verification. The output fmu then also includes an FMU of the
+    plant."""
     outputs: Annotated[Text, Option("NAMES")] = None
-    """Outputs that each valve is to have beside its firmware, with commas between them: iec61131, fmu."""
+    """Outputs for each valve in addition to its firmware, separated by commas: iec61131, fmu."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
-    """Where the numbers of a valve stand: fixed in a firmware of its own (default), or in a calibration block for one
-    firmware of the lot; each block is tried on every input."""
+    """Form of a valve's numbers (default: fixed). fixed: in a firmware for each valve. block: in a calibration block
+    for one firmware of the lot; each block is tried on every input."""
     target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
-    """Microcontroller; `codegen --list-targets` lists them."""
+    """Microcontroller. `codegen --list-targets` lists them."""

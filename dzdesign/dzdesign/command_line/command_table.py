@@ -17,38 +17,31 @@ class Command(NamedTuple):
 PIPELINE, EVIDENCE, SETUP = "from ramps to firmware", "evidence", "getting started and diagnostics"
 
 COMMANDS = {
-    "plan": Command(PIPELINE, "plan a test series: pressures, ramp times and repeats, with the predicted error"),
-    "init": Command(PIPELINE, "look at recordings and write a commented dzdesign.toml"),
-    "identify": Command(PIPELINE, "ramp tests in, valve.json out: k, thresholds, beta(dP)"),
-    "design": Command(PIPELINE, "valve.json in, compensator.json out: the law with exact coefficients, certified"),
-    "codegen": Command(PIPELINE, "compensator.json in, a folder of C out"),
-    "calibration": Command(PIPELINE, "compensator.json in, one valve's calibration block out; or read one back"),
-    "export": Command(PIPELINE, "compensator.json in, an amplifier's fixed dead-zone parameters out"),
-    "verify": Command(PIPELINE, "firmware in, evidence out: every input, and the closed loop"),
-    "batch": Command(
-        PIPELINE, "many valves: identify, design, codegen for each; one table, one report, the cost of one lot setting"
-    ),
+    "plan": Command(PIPELINE, "plan a test series: pressures, ramp times, repeats and the predicted error"),
+    "init": Command(PIPELINE, "inspect recordings and write a commented dzdesign.toml"),
+    "identify": Command(PIPELINE, "fit the valve to its ramp tests: gain, thresholds and beta(dP), in valve.json"),
+    "design": Command(PIPELINE, "compute the certified law with exact coefficients, in compensator.json"),
+    "codegen": Command(PIPELINE, "write C firmware, or Structured Text, FMUs or a MATLAB function"),
+    "calibration": Command(PIPELINE, "write one valve's calibration block, or read one back"),
+    "export": Command(PIPELINE, "compute the fixed dead-zone parameters of an amplifier"),
+    "verify": Command(PIPELINE, "check a firmware on every input and in closed loop, and write the evidence"),
+    "batch": Command(PIPELINE, "calibrate many valves, with one table and one report"),
     "assess": Command(EVIDENCE, "compare ramp tests without and with the compensator, with limits"),
-    "report": Command(
-        EVIDENCE, "artefacts in, report.html out: the verdict, figures, every requirement, the origin of each number"
-    ),
-    "derive": Command(EVIDENCE, "re-derive the paper's equations: premises, steps and a verdict for each"),
-    "reproduce": Command(
-        EVIDENCE,
-        "the paper's valves through the whole product; every number of the paper beside ours, its figures redrawn",
-    ),
-    "demo": Command(SETUP, "run the whole pipeline on the bundled example"),
-    "simulate": Command(SETUP, "ramp tests of a simulated valve, marked as such"),
-    "monitor": Command(SETUP, "telemetry of a running firmware in, a ramp file out"),
-    "load": Command(SETUP, "a calibration block into a drive, over its serial line"),
-    "doctor": Command(SETUP, "show which compilers, simulators and packages are there, and how to get the rest"),
-    "schema": Command(SETUP, "the JSON Schema of an artefact: its keys, what they mean, their units"),
-    "completion": Command(SETUP, "print the script by which a shell completes commands, options and targets"),
+    "report": Command(EVIDENCE, "write report.html from the artefacts in a folder"),
+    "derive": Command(EVIDENCE, "derive the paper's equations again: premises, steps and a verdict for each"),
+    "reproduce": Command(EVIDENCE, "compute the paper's numbers and figures again, and compare them"),
+    "demo": Command(SETUP, "run the whole chain on the bundled example"),
+    "simulate": Command(SETUP, "simulate ramp tests of a valve; the files are marked as simulated"),
+    "monitor": Command(SETUP, "record the telemetry of a running firmware as a ramp file"),
+    "load": Command(SETUP, "load a calibration block into a drive over its serial line"),
+    "doctor": Command(SETUP, "list compilers, simulators and packages, and how to install what is missing"),
+    "schema": Command(SETUP, "print the JSON Schema of an artefact: its keys, their meaning and units"),
+    "completion": Command(SETUP, "print the script with which a shell completes commands and options"),
 }
 #: Of the front page.
 EXAMPLES = (
-    "dzdesign demo demo                       the whole pipeline on the bundled example",
-    "dzdesign init ramps/*.csv                look at recordings, write dzdesign.toml",
+    "dzdesign demo demo                       run the whole chain on the bundled example",
+    "dzdesign init ramps/*.csv                inspect recordings and write dzdesign.toml",
     "dzdesign identify ramps/*.csv --config dzdesign.toml",
     "dzdesign codegen valve.json --target f28335",
     "dzdesign verify firmware",

@@ -30,13 +30,13 @@ class CommonArguments:
     """Options of every command, before it or after it."""
 
     config: Annotated[str, Option("TOML")] = ""
-    """File with options of the same names; dzdesign init writes one."""
+    """File with options of the same names. `dzdesign init` writes one."""
     json: Annotated[bool, Option()] = False
     """Print the result as JSON."""
     quiet: Annotated[bool, Option(short="-q")] = False
     """Print results and errors only."""
     verbose: Annotated[bool, Option(short="-v")] = False
-    """Log the work with times, files and the solver's output."""
+    """Log times, files and the solver's output."""
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):

@@ -33,10 +33,11 @@ class Arguments(CalibrationArguments):
     """Arguments of the stage, and the file to read instead."""
 
     compensator: Annotated[AnyPath | None, Option("COMPENSATOR.json")] = None  # type: ignore[assignment]
-    """compensator.json; with --read, that or a firmware folder, to compare the block with."""
+    """The compensator.json that the block is made from. With --read, that file or a firmware folder to compare the
+    block with."""
     _: KW_ONLY
     read: Annotated[AnyPath | None, Option("FILE")] = None
-    """Print what a calibration file says, in engineering units, and which compensator it belongs to."""
+    """Calibration file to print in engineering units, with the compensator that it belongs to."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

@@ -24,7 +24,7 @@ class Arguments(GenerateArguments):
     """Arguments of the stage, and what prints the targets instead."""
 
     compensator: Annotated[AnyPath | None, Option("COMPENSATOR.json")] = None  # type: ignore[assignment]
-    """compensator.json; or a valve.json, designed first with the options below."""
+    """The compensator.json of the design, or a valve.json, which is first designed with the options below."""
     _: KW_ONLY
     list_targets: Annotated[bool, Option()] = False
     """Print name and description of every target, microcontrollers before other outputs."""

@@ -23,7 +23,7 @@ class Arguments:
     """Arguments of `completion`."""
 
     shell: Annotated[str, Option("SHELL", choices="shtab:SUPPORTED_SHELLS")]
-    """bash, zsh, fish, powershell or tcsh."""
+    """Shell to complete in: bash, zsh, fish, powershell or tcsh."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

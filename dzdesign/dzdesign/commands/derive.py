@@ -20,13 +20,13 @@ class Arguments:
     """Arguments of `derive`."""
 
     format: Annotated[str, Option("F", choices="dzdesign.derivation.presentation.report:FORMATS")] = "text"
-    """Format: text, json, latex or html."""
+    """Output format: text, json, latex or html."""
     equation: Annotated[Texts, Option("N")] = ()
-    """Number of an equation, such as 18 or T3b: print this one and what it rests on. Repeatable."""
+    """Number of an equation to print with its premises, such as 18 or T3b. Repeatable."""
     paper: Annotated[AnyPath | None, Option("FILE")] = None
-    """The paper as plain text: look each of its numbers up where it stands (default: by digests of the passages)."""
+    """The paper as plain text, to look up each of its numbers (default: digests of the passages are compared)."""
     mutate: Annotated[bool, Option()] = False
-    """Instead, make every statement and every published number wrong, and count what is caught."""
+    """Falsify every statement and every published number instead, and count the faults that are detected."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default: standard output)."""
 

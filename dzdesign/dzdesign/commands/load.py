@@ -40,14 +40,16 @@ class Arguments:
     """Arguments of `load`."""
 
     block: Annotated[AnyPath | None, Option("BLOCK")] = None
-    """Calibration block: a .hex, .bin or .txt file of `dzdesign calibration` (default: ask what the drive holds)."""
+    """Calibration block to load, a .hex, .bin or .txt file of `dzdesign calibration` (default: none, the drive's block
+    is printed)."""
     _: KW_ONLY
     port: Annotated[str, Option("PORT")]
     """Serial port, such as COM5 or /dev/ttyUSB0."""
     baud: Annotated[Text, Option("N", read=number("a number such as 115200, up to 1e9", between=(0.0, 1e9)))] = None
-    """Bits per second (default: those of f28335's firmware)."""
+    """Bit rate in bits per second (default: that of the f28335 firmware)."""
     serial: Annotated[Text, Option("TEXT")] = None
-    """Serial number on the valve: a block of another valve is not loaded, and a drive that holds one ends with 1."""
+    """Serial number on the valve. A block of another valve is not loaded, and a drive that holds one ends with exit
+    status 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,11 +47,11 @@ class Arguments:
     firmware: Annotated[AnyPath, Option("DIR")] = "firmware"
     """Folder made by `dzdesign codegen`, with the scalings."""
     compensator: Annotated[AnyPath | None, Option("FILE")] = None
-    """The compensator.json of the calibration block that was loaded since (default: the firmware's own)."""
+    """The compensator.json of a calibration block that was loaded later (default: the firmware's own)."""
     baud: Annotated[Text, Option("N", read=number("a positive number such as 115200", between=POSITIVE))] = None
-    """Bits per second (default: what the firmware sends)."""
+    """Bit rate in bits per second (default: that of the firmware)."""
     seconds: Annotated[Text, Option("S", read=number("a positive number such as 60", between=POSITIVE))] = None
-    """Time to record from the first frame on (default: until Ctrl-C)."""
+    """Recording time, from the first frame on (default: until Ctrl-C)."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

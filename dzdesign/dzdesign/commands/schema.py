@@ -53,7 +53,7 @@ class Arguments:
     """Arguments of `schema`."""
 
     name: Annotated[Text, Option("NAME", choices=tuple(SCHEMAS))] = None
-    """valve, compensator, firmware, ... (default: list them)."""
+    """Name of the artefact (default: the names are listed)."""
 
 
 def run(arguments: Arguments, json: bool) -> int:

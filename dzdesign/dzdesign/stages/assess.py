@@ -37,25 +37,25 @@ class AssessArguments(RampArguments):
     before: Annotated[Paths, Option("BEFORE")]
     """Recordings without the compensator, as for identify."""
     after: Annotated[Paths, Option("AFTER", named=True)]
-    """Recordings with it; their command is the compensator's input."""
+    """Recordings with the compensator, with its input as the command."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="assessment.json", short="-o")] = None
     """File to write."""
     limits: Annotated[Table, Option("L", example="5 %")] = None
-    """Largest values AFTER, such as "dead_zone_opening = 5 %, flow_at_zero = 0.1 L/min", also of dead_zone_closing,
-    onset_opening, onset_closing, knee_opening, knee_closing, hysteresis, linearity, symmetry, largest_flow_loss. In
-    the options file a table [limits]."""
+    """Largest permitted values with the compensator, such as "dead_zone_opening = 5 %, flow_at_zero = 0.1 L/min".
+    Further names are dead_zone_closing, onset_opening, onset_closing, knee_opening, knee_closing, hysteresis,
+    linearity, symmetry and largest_flow_loss. In the options file this is a table [limits]."""
     reading_flow: Annotated[Text, Option("Q", example="0.6 L/min", read=_flow_or_share)] = None
-    """Flow at which dead zones are read beside the onset, such as "0.6 L/min", or "1 %" of the largest flow before
-    (default: the meter's floor, unless its noise or 0.5 % of the largest flow is more)."""
+    """Flow at which dead zones are read, in addition to the onset, such as "0.6 L/min", or "1 %" of the largest flow
+    before. The default is the largest of the meter's floor, its noise and 0.5 % of the largest flow."""
     linearity_window: Annotated[str, Option("A-B", FIT, read=percent_range("full command such as '10-90'"))] = "10-90"
     """Range of the linearity, in percent of full command."""
     after_columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
-    """Columns of the recordings after, where u is the compensator's input (default: as --columns or [columns])."""
+    """Columns of the recordings with the compensator, with its input as u (default: as --columns or [columns])."""
     after_u_max: Annotated[Text, Option("U", RECORDINGS, example="10 V", read=quantity("voltage"))] = None
-    """Full command of the recordings after (default: as --u-max)."""
+    """Full command of the recordings with the compensator (default: as --u-max)."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
-    """Folder for plots in SVG: flow over command."""
+    """Folder for plots of flow over command, in SVG."""
 
 
 def assess(arguments: AssessArguments) -> "Assessment":

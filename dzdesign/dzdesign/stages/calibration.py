@@ -33,21 +33,22 @@ class CalibrationArguments:
     """Arguments of `calibration`."""
 
     compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
-    """compensator.json, whose numbers are derived again first."""
+    """The compensator.json of the valve. Its numbers are first derived again."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
-    """File to write: .hex is Intel HEX, .bin the octets alone, .txt TI-TXT, .a2l the layout for XCP tools."""
+    """File to write. Its ending selects the format: .hex Intel HEX, .bin raw octets, .txt TI-TXT, .a2l the layout for
+    XCP tools."""
     format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
-    """Format of a file of another ending: hex, bin, txt or a2l (default: by the file's ending)."""
+    """Format of a file with another ending: hex, bin, txt or a2l (default: by the file's ending)."""
     target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
     """Microcontroller whose addresses the file states (default: that of the design)."""
     address: Annotated[Text, Option("N", example="0x330000")] = None
-    """Where the block begins, in units of the target: words of 16 bits on f28335 and f280049c, else octets (default:
-    0x330000 for f28335, 0x98000 for f280049c, else 0)."""
+    """Address of the block, in units of the target (default: 0x330000 for f28335, 0x98000 for f280049c, else 0). The
+    unit is a word of 16 bits on f28335 and f280049c, and an octet elsewhere."""
     serial: Annotated[Text, Option("TEXT")] = None
     """Serial number, at most 24 octets (default: the entry serial of the test record)."""
     record: Annotated[Text, Option("TEXT")] = None
-    """What the valve is filed under, at most 48 octets (default: the entry record of the test record)."""
+    """Reference to the valve's test record, at most 48 octets (default: the entry record of the test record)."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,12 @@ class ReadCalibrationArguments:
     """Arguments of `read_calibration`, on the command line `calibration --read`."""
 
     file: Annotated[AnyPath, Option("FILE")]
-    """File that `calibration` wrote."""
+    """File written by `calibration`."""
     compensator: Annotated["Compensator | AnyPath | None", Option("COMPENSATOR.json")] = None
-    """compensator.json, or a firmware folder that holds one, to compare the block with."""
+    """The compensator.json to compare the block with, or a firmware folder that holds one."""
     _: KW_ONLY
     format: Annotated[Text, Option("NAME", choices=READABLE)] = None
-    """Format of a file of another ending: hex, bin or txt (default: by the file's ending)."""
+    """Format of a file with another ending: hex, bin or txt (default: by the file's ending)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

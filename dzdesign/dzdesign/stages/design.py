@@ -26,12 +26,12 @@ class DesignArguments(DesignChoices):
     """Arguments of `design`."""
 
     valve: Annotated["ValveModel | AnyPath", Option("VALVE.json")]
-    """valve.json, made by `dzdesign identify`."""
+    """The valve.json made by `dzdesign identify`."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="compensator.json", short="-o")] = None
     """File to write."""
     target: Annotated[str, Option("NAME", choices=TARGETS)] = "f28335"
-    """Microcontroller whose converter and timer the law is for; `codegen --list-targets` lists them."""
+    """Microcontroller whose converter and timer the law is designed for. `codegen --list-targets` lists them."""
 
 
 def design_options(choices: DesignChoices, target: str) -> "DesignOptions":

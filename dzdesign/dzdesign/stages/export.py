@@ -32,18 +32,18 @@ class ExportArguments:
     """Arguments of `export`."""
 
     compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
-    """compensator.json, whose numbers are derived again first, or a folder that holds one."""
+    """The compensator.json of the valve, or a folder that holds one. Its numbers are first derived again."""
     _: KW_ONLY
     to: Annotated[Text, Option("DEVICE", choices=DEVICES)] = None
     """Device: west (W.E.St. PAM-199), west-pam190, west-pos123, cia408 (CANopen), rmc (Delta RMC100), rmc75, beckhoff
     (TF5810) or csv."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
-    """File to write (default: none, only what it would set is shown)."""
+    """File to write (default: none, the parameters are only printed)."""
     dp: Annotated[Text, Option("P", example="1 MPa", read=quantity("pressure"))] = None
-    """Of beckhoff and csv, pressure drop whose characteristic is written (default: dP0 of the valve)."""
+    """Pressure drop of the characteristic, for beckhoff and csv (default: dP0 of the valve)."""
     threshold: Annotated[Text, Option("SHARE", example="0.5 %", read=percent("0.5 %"))] = None
-    """Command up to which the valve stays at rest: how far the device's zero command may be off (default: the zero
-    band of the design's command)."""
+    """Command up to which the valve stays at rest, for the error of the device's zero command (default: the zero band
+    of the design's command)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,12 +28,13 @@ class OutputChoices:
     """What can be chosen of an output that is no C firmware: the same in `codegen` and in `batch`."""
 
     dialect: Annotated[Text, Option("NAME", OUTPUTS)] = None
-    """Of iec61131, dialect of the PLC's tool: codesys (default), twincat."""
+    """Dialect of the PLC's tool, for iec61131: codesys or twincat (default: codesys)."""
     interface: Annotated[Text, Option("NAME", OUTPUTS)] = None
-    """Of iec61131, what the function block takes: plc, command in 0.01 % and pressures in 0.1 bar (default), or
-    codes, the converter codes that the compensator was designed for."""
+    """Inputs of the function block, for iec61131 (default: plc). plc: command in 0.01 % and pressures in 0.1 bar.
+    codes: the converter codes of the design."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml", OUTPUTS)] = None
-    """Of fmu, file with a plant, like examples/paper_valve/plant.toml: also make an FMU of the plant."""
+    """File with a plant, for an FMU of the plant in addition, such as examples/paper_valve/plant.toml. It is for the
+    output fmu only."""
 
 
 @dataclass(frozen=True)
@@ -41,20 +42,21 @@ class GenerateArguments(OutputChoices, DesignChoices):
     """Arguments of `codegen`, in Python `generate`."""
 
     compensator: Annotated["Compensator | AnyPath", Option("COMPENSATOR.json")]
-    """compensator.json, or a valve.json, which is designed first with the options of `design`."""
+    """The compensator.json of the design, or a valve.json, which is first designed with the options of `design`."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", short="-o")] = None
-    """Folder to write (default of the command: firmware, or plc, fmu, matlab of such an output)."""
+    """Folder to write (default of the command: firmware, or plc, fmu or matlab for such an output)."""
     target: Annotated[Text, Option("NAME", choices=ALL_TARGETS)] = None
-    """Microcontroller (default: that of the design; of a VALVE.json f28335), or another output: iec61131, fmu,
-    matlab."""
+    """Microcontroller, or another output: iec61131, fmu, matlab (default: the microcontroller of the design, and f28335
+    for a valve.json)."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
-    """Where the numbers of the valve stand: fixed in the core (default), or in a block of data that it is handed."""
+    """Form of the valve's numbers (default: fixed). fixed: constants in the core. block: a block of data that the core
+    receives."""
     vectors: Annotated[int | str, Option("N", read=whole_number("a whole number up to 99999", digits=5))] = "0"
-    """Number of test vectors in vectors.csv: codes and the exact law's answers at every node, corner and fault, then at
-    random codes."""
+    """Number of test vectors in vectors.csv. Each has codes and the exact law's answer, at every node, corner and fault
+    first, then at random codes."""
     replace: Annotated[bool, Option()] = False
-    """Write over the firmware or output of another design in the folder."""
+    """Overwrite the firmware or output of another design in the folder."""
 
 
 def generate(arguments: GenerateArguments) -> "Firmware | Output":

@@ -46,37 +46,38 @@ class IdentifyChoices(RampArguments):
     meter_zero: Annotated[str, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = "0 L/min"
     """Bound of the flow meter's zero error."""
     noise_level: Annotated[Text, Option("Q", METER, example="0.1 L/min", read=quantity("flow"))] = None
-    """Flow below which there is none, if averages over the dead zone resolve it (default: what they resolve, and at
+    """Smallest flow that counts as flow, if averages over the dead zone resolve it (default: the resolved flow, and at
     least 0.5 % of the largest flow)."""
     zero_flow: Annotated[Text, Option("Q", FIT, example="0.1 L/min", read=quantity("flow"))] = None
-    """Flow allowed at zero command, a leak included: the command at which the valve passes it is guarded (default:
-    none is declared, the first flow seen is guarded)."""
+    """Flow that is allowed at zero command, including a leak (default: none). The guarded threshold is then the command
+    at which the valve passes this flow, and otherwise that of the first flow seen."""
     dp0: Annotated[Text, Option("P", FIT, example="1 MPa", read=quantity("pressure"))] = None
     """Reference pressure drop (default: the test nearest to "1 MPa")."""
     x_max: Annotated[Text, Option("X", FIT, example="1.8 mm", read=quantity("length"))] = None
-    """Stroke of the spool, such as "1.8 mm": gives k in V/mm."""
+    """Stroke of the spool, such as "1.8 mm". It gives k in V/mm."""
     confidence: Annotated[float | str, Option("C", FIT, read=number("a number such as 0.99"))] = "0.99"
     """Joint confidence level of all lower bounds."""
     flat_below: Annotated[
         float | str, Option("C", FIT, read=lambda text, option: number("a number such as 0.1")(text, option) / 100)
     ] = "0.1"
-    """Percent of full command: a threshold that changes by less over the tests counts as flat, and beta is 1."""
+    """Change of the threshold over the tests below which it counts as flat and beta is 1, in percent of full
+    command."""
     repeatability: Annotated[Text, Option("S", FIT, example="0.1 %", read=percent("0.1 %"))] = None
     """Standard deviation of the threshold from ramp to ramp, in percent of full command, such as "0.1 %" (default:
-    measured where ramps are repeated, otherwise 0.25 %)."""
+    measured on repeated ramps, otherwise 0.25 %)."""
     curve: Annotated[Text, Option("PREMISE", FIT, choices=PREMISES)] = None
-    """Premise about the threshold between the tests (default: smooth where a curvature is declared, or three or more
-    pressure drops support it, otherwise monotone). line: straight over the pressure drop. smooth: curvature at most M.
-    monotone: it runs one way."""
+    """Premise about the threshold between the tests. line: straight over the pressure drop. smooth: curvature at most
+    M. monotone: it runs one way. The default is smooth where a curvature is declared or three or more pressure drops
+    support it, and monotone otherwise."""
     curvature: Annotated[Text, Option("M", FIT, example="20 mV/MPa^2", read=quantity("curvature"))] = None
-    """M of the premise smooth, such as "20 mV/MPa^2": bound of the threshold's second divided difference, kinks
-    included (default: estimated from the tests)."""
+    """Bound M of the premise smooth, such as "20 mV/MPa^2" (default: estimated from the tests). It bounds the
+    threshold's second divided difference, kinks included."""
     dithered: Annotated[Text, Option("D", RECORDINGS, example="150 Hz 1 %", read=read_dithered)] = None
-    """Dither that the drive superimposed on the command of every recording, frequency and peak of its square wave, such
-    as "150 Hz 1 %" of full command, or "150 Hz 0.1 V". `design --dither` then asks for the same."""
+    """Dither that the drive superimposed on the command of every recording. It is the frequency and peak of a square
+    wave, such as "150 Hz 1 %" of full command, or "150 Hz 0.1 V". `design --dither` then requires the same."""
     record: Annotated[Mapping[str, object] | None, Option("ENTRY", RECORDINGS, by_entry=True)] = None
-    """Entry of the test record, such as "serial = 4711": kept in valve.json and printed in the report, nothing is
-    computed from it. Repeatable. In the options file a table [record]."""
+    """Entry of the test record, such as "serial = 4711". It is kept in valve.json and printed in the report, and
+    nothing is computed from it. Repeatable; in the options file this is a table [record]."""
 
 
 @dataclass(frozen=True)
@@ -84,26 +85,26 @@ class IdentifyArguments(IdentifyChoices):
     """Arguments of `identify`."""
 
     ramps: Annotated[Paths, Option("RAMP")]
-    """Recordings, or patterns such as ramps/*.csv: CSV, TDMS, MAT, HDF5, Parquet or Feather, with columns time_s, u_V,
-    dP_MPa, Q_Lmin."""
+    """Recordings, or patterns such as ramps/*.csv. Formats are CSV, TDMS, MAT, HDF5, Parquet and Feather, with columns
+    time_s, u_V, dP_MPa and Q_Lmin."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="valve.json", short="-o")] = None
     """File to write."""
     low_flow: Annotated[Paths, Option("TABLE.csv", METER)] = ()
-    """Table of flows measured by hand below the meter's floor, with a measuring glass or by a cylinder's drift: columns
-    u_V, dP_MPa, Q [mL/min], Q_error [mL/min] and branch (opening or closing). Repeatable."""
+    """Table of flows below the meter's floor, measured by hand with a measuring glass or by a cylinder's drift. Columns
+    are u_V, dP_MPa, Q [mL/min], Q_error [mL/min] and branch (opening or closing). Repeatable."""
     order: Annotated[Paths | None, Option("FILE", RECORDINGS)] = None
-    """Recordings in the order in which they were taken, such as "p1.csv, p5.csv, p1_again.csv", to tell a drift of the
-    valve from the pressure drop (default: from date and time in the recordings). Repeatable; in the options file also
-    a list."""
+    """Recordings in the order of the measurement, such as "p1.csv, p5.csv, p1_again.csv" (default: by date and time in
+    the recordings). The order separates a drift of the valve from the effect of the pressure drop. Repeatable; in the
+    options file also a list."""
     from_: Annotated[Table, Option("T", RECORDINGS, example="12.3 s")] = None
-    """Time of a recording's clock before which its rows are left out, such as "12.3 s" (dates count from the first
-    row). In the options file also a table [from] from file name or pattern to time."""
+    """Start time on a recording's clock, such as "12.3 s"; earlier rows are left out. Dates count from the first row.
+    In the options file also a table [from] from file name or pattern to time."""
     to: Annotated[Table, Option("T", RECORDINGS, example="62.1 s")] = None
-    """Time after which its rows are left out. In the options file also a table [to]."""
+    """End time on a recording's clock; later rows are left out. In the options file also a table [to]."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
-    """Folder for plots in SVG and PNG: flow of each pressure drop with its knees, onsets and residuals; thresholds,
-    bounds and beta over dP."""
+    """Folder for plots in SVG and PNG. They show the flow at each pressure drop with knees, onsets and residuals, and
+    thresholds, bounds and beta over dP."""
 
 
 def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":

@@ -22,7 +22,7 @@ class InitArguments(ColumnArguments):
     """Recordings, as for identify (default: ramps/*, or *.csv)."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", command_default="dzdesign.toml", short="-o")] = None
-    """File to write; one that exists is never overwritten."""
+    """File to write. An existing file is never overwritten."""
 
 
 def init(arguments: InitArguments) -> "Proposal":

@@ -31,27 +31,27 @@ class PlanArguments:
     """Arguments of `plan`."""
 
     pilot: Annotated["ValveModel | AnyPath | None", Option("VALVE.json")] = None
-    """valve.json of a quick series of this valve: noise, thresholds, flow gain and repeatability are then taken from
-    it."""
+    """The valve.json of a quick series of this valve. It supplies noise, thresholds, flow gain and repeatability."""
     _: KW_ONLY
     side: Annotated[Text, Option("SIDE", choices=("positive", "negative"))] = None
-    """Side of the pilot series' valve that is to be recorded (default: its only one, or the positive one)."""
+    """Side of the pilot series' valve to be recorded, positive or negative (default: its only one, or the positive
+    one)."""
     budget: Annotated[str, Option("T", example="30 min", read=quantity("time"))] = "30 min"
-    """Time for the whole series, pauses included."""
+    """Time for the whole series, including pauses."""
     loss: Annotated[Text, Option("U", example="150 mV", read=quantity("voltage"))] = None
-    """Mean distance of the certified offset below the threshold that is enough, such as "150 mV": the shortest series
-    that reaches it is planned (default: the smallest that the time allows)."""
+    """Acceptable mean distance of the certified offset below the threshold, such as "150 mV". The plan is the shortest
+    series that reaches it (default: the smallest distance that the time allows)."""
     seed: Annotated[
         int | str, Option("N", read=whole_number("a whole number of zero or more, such as 1", digits=18))
     ] = "1"
     """Random seed of the order of the ramps."""
     dp_range: Annotated[Text, Option("P..P", EXPECTED, "1..5 MPa", "1..5 MPa", quantity_range("pressure"))] = None
-    """Lowest and highest pressure drop to be certified; one value plans a series at that pressure drop."""
+    """Lowest and highest pressure drop to be certified. One value plans a series at that pressure drop."""
     dead_zone: Annotated[Text, Option("S", EXPECTED, "50 %", "50 %", percent("50 %"))] = None
     """Closing threshold at the lowest pressure drop, in percent of full command."""
     threshold_change: Annotated[Text, Option("S", EXPECTED, "2 %", "2 %", percent("2 %", signed=True))] = None
-    """Fall of the threshold from the lowest to the highest pressure drop, in percent of full command; of a threshold
-    that rises a negative one, --threshold-change=-2%."""
+    """Fall of the threshold from the lowest to the highest pressure drop, in percent of full command. A rise is
+    negative: --threshold-change=-2%."""
     max_flow: Annotated[Text, Option("Q", EXPECTED, "15 L/min", "15 L/min", quantity("flow"))] = None
     """Flow at full command and the lowest pressure drop."""
     repeatability: Annotated[Text, Option("S", EXPECTED, "0.25 %", "0.1 %", percent("0.1 %"))] = None
@@ -63,20 +63,20 @@ class PlanArguments:
     ramp_times: Annotated[str, Option("T..T", RECORDINGS, example="20..200 s", read=quantity_range("time"))] = (
         "20..200 s"
     )
-    """Shortest and longest time of a ramp from zero to full command; one value fixes it."""
+    """Shortest and longest time of a ramp from zero to full command. One value fixes it."""
     pause: Annotated[str, Option("T", RECORDINGS, example="20 s", read=quantity("time"))] = "20 s"
-    """Time between two ramps, to set the pressure drop and settle at zero command."""
+    """Time between two ramps, for setting the pressure drop and settling at zero command."""
     noise: Annotated[Text, Option("Q", METER, "0.15 L/min", "0.15 L/min", quantity("flow"))] = None
     """Standard deviation of one reading of the flow."""
     meter_floor: Annotated[Text, Option("Q", METER, "0 L/min", "0.6 L/min", quantity("flow"))] = None
     """Flow below which the meter reads zero."""
     meter_lag: Annotated[Text, Option("T", METER, "0.1 s", "0.1 s", with_tolerance("time"))] = None
-    """Lag of the flow meter that identify will be given, with its tolerance: "0.1 s +- 0.02 s" (without one 20 %, and
-    at least 0.05 s)."""
+    """Lag of the flow meter for identify, with its tolerance, such as "0.1 s +- 0.02 s". Without a tolerance it is 20
+    %, and at least 0.05 s."""
     meter_zero: Annotated[Text, Option("Q", METER, "0 L/min", "0.1 L/min", quantity("flow"))] = None
     """Bound of the flow meter's zero error."""
     units: Annotated[Texts | None, Option("U", RECORDINGS, read=read_units)] = None
-    """Units of what is printed, such as "bar, %" (default: those of the pilot series)."""
+    """Units of the printed results, such as "bar, %" (default: those of the pilot series)."""
     confidence: Annotated[float | str, Option("C", FIT, read=number("a number such as 0.99", (0.5, 1.0)))] = "0.99"
     """Joint confidence level of all lower bounds."""
 

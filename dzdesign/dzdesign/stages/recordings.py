@@ -57,16 +57,16 @@ class ColumnArguments:
     """How the columns of recordings are found."""
 
     columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
-    """Columns, such as "u=AO0:V, Q=Flow (L/min)": a quantity, its label in the file and, after a colon, the unit that
-    the label lacks. Quantities are time, u, Q and dP, or in its place pressures of ports of the metering edge: pP, pA,
-    pB, pT. In the options file a table [columns]."""
+    """Columns, such as "u=AO0:V, Q=Flow (L/min)". Each entry is a quantity, its label in the file and, after a colon, a
+    unit that the label lacks. Quantities are time, u, Q and dP, or in place of dP the pressures of the ports: pP, pA,
+    pB, pT. In the options file this is a table [columns]."""
     dp: Annotated[Table, Option("P", RECORDINGS, example="1 MPa")] = None
-    """Pressure drop of files without a column of it, such as "1 MPa". In the options file also a table [dp] from file
+    """Pressure drop of files without a column for it, such as "1 MPa". In the options file also a table [dp] from file
     name or pattern to pressure."""
     sample_rate: Annotated[Text, Option("F", RECORDINGS, example="100 Hz", read=read_sample_rate)] = None
-    """Samples a second of files without a column of time, such as "100 Hz"."""
+    """Sampling rate of files without a time column, such as "100 Hz"."""
     skip_rows: Annotated[int | str | None, Option("N", RECORDINGS, read=read_skip_rows)] = None
-    """Rows above the header of a text file, such as a logger's preamble (default: found)."""
+    """Number of rows above the header of a text file, such as a logger's preamble (default: found)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,12 +78,12 @@ class RampArguments(ColumnArguments):
     meter_floor: Annotated[Text, Option("Q", METER, example="0.6 L/min", read=quantity("flow"))] = None
     """Flow below which the meter reads zero (default: found)."""
     meter_lag: Annotated[Text, Option("T", METER, example="0.1 s", read=with_tolerance("time"))] = None
-    """Lag of the flow meter, with its tolerance: "0.1 s +- 0.02 s" (default: found from ramps of two rates; without a
-    tolerance 20 %, and at least 0.05 s)."""
+    """Lag of the flow meter, with its tolerance, such as "0.1 s +- 0.02 s" (default: found from ramps of two rates).
+    Without a tolerance it is 20 %, and at least 0.05 s."""
     units: Annotated[Texts | None, Option("U", RECORDINGS, read=read_units)] = None
-    """Units of what is printed and drawn, such as "bar, %, mA": of pressure, flow, command ("%" of full command, or a
-    voltage) and current (default: those of the recordings). Repeatable; in the options file also a list. Files stay in
-    V, MPa and L/min."""
+    """Units of printed and drawn results, such as "bar, %, mA" (default: those of the recordings). They are of
+    pressure, flow, command ("%" of full command, or a voltage) and current. Files stay in V, MPa and L/min. Repeatable;
+    in the options file also a list."""
     knee_window: Annotated[str, Option("A-B", FIT, read=percent_range("the largest flow such as '12-50'"))] = "12-50"
     """Flow range of the straight-line fit, in percent of maximum flow."""
 

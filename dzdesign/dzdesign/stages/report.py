@@ -21,14 +21,14 @@ class ReportArguments:
     """Arguments of `report`."""
 
     folder: Annotated[AnyPath, Option("DIR")]
-    """Folder of demo, verify, codegen or batch, or with valve.json or compensator.json."""
+    """Folder of demo, verify, codegen or batch, or a folder with valve.json or compensator.json."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default of the command: report.html with the evidence, or in the folder)."""
     language: Annotated[str, Option("CODE", choices=LANGUAGES)] = "en"
-    """Language of headings and labels; sentences that state findings are English."""
+    """Language of headings and labels. Sentences that state findings are in English."""
     logo: Annotated[AnyPath | None, Option("IMAGE")] = None
-    """Logo beside the title of a valve's report: PNG, JPEG or GIF, embedded in the page."""
+    """Logo beside the title of a valve's report. The page embeds a PNG, JPEG or GIF."""
 
 
 def report(arguments: ReportArguments) -> "Report":

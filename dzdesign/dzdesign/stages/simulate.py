@@ -25,23 +25,23 @@ class SimulateArguments:
     """Arguments of `simulate`."""
 
     output: Annotated[AnyPath | None, Option("DIR", command_default="ramps", short="-o")] = None
-    """Folder to write, with the recordings."""
+    """Folder for the recordings."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
     """File with the plant (default: that of the paper's valve)."""
     firmware: Annotated[AnyPath | None, Option("DIR")] = None
-    """Folder made by `dzdesign codegen`, whose compensator then drives the valve."""
+    """Folder made by `dzdesign codegen`. Its compensator then drives the valve."""
     dp: Annotated[Texts, Option("P", example="1 MPa")] = ()
-    """Pressure drop of a ramp test; repeatable (default: 0.5, 1, 2, 3, 4 and 5 MPa)."""
+    """Pressure drop of a ramp test (default: 0.5, 1, 2, 3, 4 and 5 MPa). Repeatable."""
     repeats: Annotated[
         int | str, Option("N", read=whole_number("a whole number such as 3", least=1, digits=3))
     ] = "1"
-    """Ramps at each pressure drop, one file each; from 2 on in random order, with date and time."""
+    """Number of ramps at each pressure drop, one file each. From 2 on they are in random order, with date and time."""
     repeatability: Annotated[Text, Option("S", example="0.1 %", read=percent("0.1 %"))] = None
     """Standard deviation of the threshold from ramp to ramp, in percent of full command (default: 0)."""
     ramp_time: Annotated[str, Option("T", example="100 s", read=quantity("time"))] = "100 s"
     """Time from zero to full command."""
     dither: Annotated[Text, Option("D", example="150 Hz 1 %", read=read_dithered)] = None
-    """Dither about the command of the ramps, for `identify --dithered` (default: none)."""
+    """Dither on the command of the ramps, for `identify --dithered` (default: none)."""
     seed: Annotated[
         int | str, Option("N", read=whole_number("a whole number of zero or more, such as 1", digits=18))
     ] = "1"

@@ -39,33 +39,33 @@ class VerifyArguments:
     """Folder made by `dzdesign codegen`."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", command_default="evidence", short="-o")] = None
-    """Folder to write, with the evidence."""
+    """Folder for the evidence."""
     ramps: Annotated[Paths, Option("RAMP", several=True)] = ()
-    """Recordings that valve.json was made from, or patterns such as "ramps/*.csv", in any order: identify again, and
-    compare with the valve that the firmware carries (default: its thresholds are taken as stated)."""
+    """Recordings of valve.json, or patterns such as "ramps/*.csv", in any order (default: the thresholds are taken as
+    stated). The valve is identified again and compared with the valve of the firmware."""
     blocks: Annotated[Paths, Option("FILE", several=True)] = ()
-    """Calibration blocks of other valves, or patterns such as "lot/valves/*/calibration.bin": try each with this
-    firmware, of block form, on every input. Its compensator.json lies beside it."""
+    """Calibration blocks of other valves, or patterns such as "lot/valves/*/calibration.bin", each beside its
+    compensator.json. Each is tried with this firmware, of block form, on every input."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
-    """File with the plant of the closed loop, like examples/paper_valve/plant.toml (default: made of the identified
-    thresholds)."""
+    """File with the plant of the closed loop, such as examples/paper_valve/plant.toml (default: a plant made from the
+    identified thresholds)."""
     back_pressure: Annotated[Texts, Option("P", example="1 MPa")] = ()
-    """Pressure behind the metering edge in the closed loop; repeatable. Ramps run at the highest, failing sensors at
-    each (default: 0 and 1 MPa, or what the sensors span beside the tested pressure drops)."""
+    """Pressure behind the metering edge in the closed loop (default: 0 and 1 MPa, or the span that the sensors have
+    beside the tested pressure drops). Ramps run at the highest pressure, and failing sensors at each. Repeatable."""
     tolerances: Annotated[AnyPath | None, Option("TOL.toml", CHECKS)] = None
-    """File with how many machines to draw from the declared budget, like examples/paper_valve/machines.toml, or with a
-    series of plants, like examples/paper_valve/tolerances.toml, which needs a plant."""
+    """File with the number of machines to draw from the declared budget, such as examples/paper_valve/machines.toml.
+    With --plant, a file with a series of plants, such as examples/paper_valve/tolerances.toml."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
-    """Folder of headers that your board files include, such as your chip's. Repeatable."""
+    """Folder of headers for your board files, such as those of your chip. Repeatable."""
     c2000ware: Annotated[AnyPath | None, Option("DIR", CHECKS)] = None
-    """Folder of your C2000Ware: also compile f28335 firmware against its headers."""
+    """Folder of your C2000Ware. The f28335 firmware is then compiled against its headers too."""
     mutate: Annotated[bool, Option(group=CHECKS)] = False
-    """Also make the C wrong in every place, and count what is caught."""
+    """Insert a fault at every place of the C, one at a time, and count the faults that are detected."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
-    """Also check machine code: every input on a Cortex-M4 in QEMU, a sample on an AVR in simavr; of FMUs every input
-    in Wine and in QEMU."""
+    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr. FMUs run every
+    input in Wine and in QEMU."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
-    """Also prove by Frama-C that nothing overflows a 16-bit int."""
+    """Prove with Frama-C that nothing overflows a 16-bit int."""
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":

@@ -100,7 +100,7 @@ def test_every_declaration_has_a_sentence_and_a_known_group():
     declared = [argument for name in COMMANDS for argument in arguments_of_command(name)]
     assert len(declared) > 100
     for argument in declared:
-        assert argument.help[0].isupper() or argument.is_positional, argument
+        assert argument.help[0].isupper(), argument
         assert argument.help.endswith("."), argument
         assert argument.option.group in ("", *GROUPS), argument
         assert argument.option.metavar or bool in argument.kinds, argument
