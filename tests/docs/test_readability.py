@@ -49,6 +49,7 @@ PAGES = (
     "docs/howto/simulation.md",
     "docs/howto/worn-valve.md",
     "docs/index.md",
+    "docs/not-proved.md",
     "docs/reference/api.md",
     "docs/reference/commands.md",
     "docs/tutorial.md",
