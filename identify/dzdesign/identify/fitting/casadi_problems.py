@@ -25,6 +25,7 @@ IPOPT: Settings = {
     "print_time": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
+    "ipopt.option_file_name": "",
     "ipopt.max_iter": 300,
     "ipopt.tol": 1e-10,
     "ipopt.compl_inf_tol": 1e-10,

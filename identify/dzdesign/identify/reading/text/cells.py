@@ -56,7 +56,7 @@ def split_line(line: str, separator: str, number: int, path: Path) -> list[str]:
         If a quote is never closed.
     """
     if separator == BLANKS:
-        return line.split()
+        return line.split() or [line]  # a line of blanks that only Unicode knows has a cell, too
     if '"' not in line:
         return line.split(separator)
     try:
