@@ -51,7 +51,13 @@ PAGES = (
     "docs/index.md",
     "docs/not-proved.md",
     "docs/reference/api.md",
+    "docs/reference/budget.md",
+    "docs/reference/calibration.md",
     "docs/reference/commands.md",
+    "docs/reference/dependencies.md",
+    "docs/reference/files.md",
+    "docs/reference/firmware.md",
+    "docs/reference/warnings.md",
     "docs/tutorial.md",
 )
 LONG, SHORT = "One " + "two " * MOST, "One two."
