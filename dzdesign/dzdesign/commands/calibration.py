@@ -22,7 +22,7 @@ EXAMPLES = (
     "dzdesign calibration compensator.json -o valve.hex",
     "dzdesign calibration compensator.json -o valve.txt --serial 4711",
     "dzdesign calibration --read valve.hex",
-    "dzdesign calibration --read valve.hex firmware      # does it belong to this firmware's compensator?",
+    "dzdesign calibration --read valve.hex firmware      # compare it with this firmware's compensator",
 )
 #: Options that a block is written with.
 OF_WRITING = ("output", "target", "address", "serial", "record")

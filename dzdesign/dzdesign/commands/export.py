@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dzdesign.stages.export import AmplifierExport
 
 EXAMPLES = (
-    "dzdesign export compensator.json --to west        # what would it set, what does that leave?",
+    "dzdesign export compensator.json --to west        # print the parameters and the dead zone that remains",
     "dzdesign export compensator.json --to west -o pam199.txt",
     "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold '1 %'",
     'dzdesign export compensator.json --to beckhoff -o table.st --dp "2 MPa"',
