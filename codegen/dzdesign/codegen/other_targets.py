@@ -2,7 +2,7 @@
 
 Each is made by a module that offers ``output_files(compensator, origin, settings) -> Mapping[str, bytes]``: relative
 path to content, without compensator.json and the manifest, which every output has. The same input gives the same bytes.
-A module may also offer ``note_of(compensator) -> str``: what of this design the output leaves out.
+A module may also offer ``note_of(compensator, settings) -> str``: what of this design the output leaves out.
 """
 
 from collections.abc import Mapping
@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 
+from dzdesign.codegen.amplifier.device import DEVICE_NAMES
 from dzdesign.codegen.earlier_firmware import refuse_another_design
 from dzdesign.codegen.project import TARGET_NAMES, target_named
 from dzdesign.core.artefact_files import sha256_of, write_folder
@@ -36,6 +37,8 @@ class OtherTarget:
     #: Option of `codegen` that is of this kind, as a field's name, to the values that it takes, the default first;
     #: with none listed any text is taken, by default an empty one.
     options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    #: Those of the options without a default: one must be given.
+    required: tuple[str, ...] = ()
     #: Folder that it is written into where no other is named; without one that of its name.
     folder: str = ""
 
@@ -61,6 +64,13 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
             name="matlab",
             description="a function of MATLAB and Octave in integer arithmetic, and C for Simulink's C Caller block",
             module="dzdesign.codegen.matlab.files",
+        ),
+        OtherTarget(
+            name="amplifier",
+            description="fixed parameters of the amplifier --device, and a table of the dead zones that they leave",
+            module="dzdesign.codegen.amplifier.output",
+            options={"device": DEVICE_NAMES, "table_dp": (), "threshold": ()},
+            required=("device",),
         ),
     )
 }
@@ -105,10 +115,11 @@ def folder_of(target: str) -> str:
     return (OTHER_TARGETS[target].folder or target) if target in OTHER_TARGETS else FIRMWARE_FOLDER
 
 
-def settings_of(target: str, given: Mapping[str, str | None]) -> dict[str, str]:
+def settings_of(target: str, given: Mapping[str, str | None], chosen_by: str = "--target") -> dict[str, str]:
     """Return the settings of a target out of the options of all of them; None stands for one that was not given.
 
-    An option of another target, and an unknown value, are an `InputError`.
+    An option of another target, an unknown value, and a missing one without a default are an `InputError`; `chosen_by`
+    is the option that names the target.
     """
     own = OTHER_TARGETS[target].options if target in OTHER_TARGETS else {}
     for name in (name for name, value in given.items() if value is not None and name not in own):
@@ -119,6 +130,9 @@ def settings_of(target: str, given: Mapping[str, str | None]) -> dict[str, str]:
     settings = {}
     for name, values in own.items():
         value = given.get(name)
+        if value is None and name in OTHER_TARGETS[target].required:
+            raise InputError(f"{flag_of(name)} is missing, which {chosen_by} {target} needs; "
+                             f"known: {', '.join(values)}")  # fmt: skip
         if value is not None and values and value not in values:
             raise InputError(f"{flag_of(name)}: '{value[:40]}' is unknown{nearest(value, values)}; "
                              f"known: {', '.join(values)}")  # fmt: skip
@@ -148,7 +162,7 @@ def generate_output(
     )
     module = import_module(OTHER_TARGETS[target].module)
     made: Mapping[str, bytes] = module.output_files(compensator, origin, settings)
-    note = module.note_of(compensator) if hasattr(module, "note_of") else ""
+    note = module.note_of(compensator, settings) if hasattr(module, "note_of") else ""
     files = {**made, Compensator.FILE_NAME: document}
     manifest = OutputManifest(
         tool=THIS_TOOL,

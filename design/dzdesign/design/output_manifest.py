@@ -41,12 +41,12 @@ class OutputManifest(Artefact):
 
 
 def setting_words(settings: Mapping[str, str]) -> list[str]:
-    """Return each setting that is not empty; of a long one, such as a plant, the name alone.
+    """Return each setting that is not empty, as its option is called; of a long one, such as a plant, the name alone.
 
     Examples
     --------
-    >>> setting_words({"dialect": "codesys", "plant": ""}), setting_words({"plant": "{" + 20 * " " + "}"})
-    (['dialect codesys'], ['with a plant'])
+    >>> setting_words({"table_dp": "2 MPa", "plant": ""}), setting_words({"plant": "{" + 20 * " " + "}"})
+    (['table-dp 2 MPa'], ['with a plant'])
     """
-    return [f"{name} {value}" if len(value) <= LONGEST_SETTING else f"with a {name}"
-            for name, value in settings.items() if value]  # fmt: skip
+    words = {name.replace("_", "-"): value for name, value in settings.items() if value}
+    return [f"{name} {value}" if len(value) <= LONGEST_SETTING else f"with a {name}" for name, value in words.items()]

@@ -36,7 +36,8 @@ class BatchArguments(OutputChoices, DesignChoices, IdentifyChoices):
     """File with the plant of the closed loop, for the verification. The output fmu then also includes an FMU of the
     plant."""
     outputs: Annotated[Text, Option("NAMES")] = None
-    """Outputs for each valve in addition to its firmware, separated by commas: iec61131, fmu."""
+    """Outputs for each valve in addition to its firmware, separated by commas: iec61131, fmu, matlab,
+    amplifier."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
     """Form of a valve's numbers (default: fixed). fixed: in a firmware for each valve. block: in a calibration block
     for one firmware of the lot; each block is tried on every input."""

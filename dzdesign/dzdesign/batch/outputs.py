@@ -68,7 +68,7 @@ def wanted_outputs(args: BatchArguments) -> tuple[WantedOutput, ...]:
     return tuple(
         WantedOutput(
             target=name,
-            settings=settings_of(name, {option: given[option] for option in OTHER_TARGETS[name].options}),
+            settings=settings_of(name, {option: given[option] for option in OTHER_TARGETS[name].options}, "--outputs"),
             folder=folder_of(name),
         )
         for name in names

@@ -15,6 +15,7 @@ EXAMPLES = (
     "dzdesign codegen valve.json --target host",
     "dzdesign codegen compensator.json --target iec61131 --dialect twincat -o plc",
     "dzdesign codegen compensator.json --target matlab -o matlab",
+    "dzdesign codegen compensator.json --target amplifier --device west -o amplifier",
     "dzdesign codegen --list-targets",
 )
 

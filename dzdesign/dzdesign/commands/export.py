@@ -15,7 +15,7 @@ EXAMPLES = (
     "dzdesign export compensator.json --to west        # print the parameters and the dead zone that remains",
     "dzdesign export compensator.json --to west -o pam199.txt",
     "dzdesign export compensator.json --to cia408 -o valve.dcf --threshold '1 %'",
-    'dzdesign export compensator.json --to beckhoff -o table.st --dp "2 MPa"',
+    'dzdesign export compensator.json --to beckhoff -o table.st --table-dp "2 MPa"',
 )
 
 

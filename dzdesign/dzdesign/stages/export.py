@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, write_file
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.option_readers import percent, quantity
-from dzdesign.core.options import AnyPath, Option, Text, read_options
-from dzdesign.core.worded import in_units
+from dzdesign.core.options import AnyPath, Option, Text
+from dzdesign.stages.generate import DEVICES
 from dzdesign.stages.given_compensator import given_compensator, refuse_underived
 
 if TYPE_CHECKING:
@@ -20,11 +20,6 @@ if TYPE_CHECKING:
     from dzdesign.design.fixed.dead_zones import FixedDeadZone
     from dzdesign.verify.requirements import Check
 
-#: Where the names of the devices stand.
-DEVICES = "dzdesign.codegen.amplifier.device:DEVICE_NAMES"
-#: A larger share of command is no threshold of a zero command.
-LARGEST_THRESHOLD = 0.3
-PA_IN_MPA = 10**6
 
 
 @dataclass(frozen=True)
@@ -39,7 +34,7 @@ class ExportArguments:
     (TF5810) or csv."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default: none, the parameters are only printed)."""
-    dp: Annotated[Text, Option("P", example="1 MPa", read=quantity("pressure"))] = None
+    table_dp: Annotated[Text, Option("P", example="1 MPa", read=quantity("pressure"))] = None
     """Pressure drop of the characteristic, for beckhoff and csv (default: dP0 of the valve)."""
     threshold: Annotated[Text, Option("SHARE", example="0.5 %", read=percent("0.5 %"))] = None
     """Command up to which the valve stays at rest, for the error of the device's zero command (default: the zero band
@@ -77,21 +72,19 @@ def export(arguments: ExportArguments) -> AmplifierExport:
     """
     from dzdesign.codegen.amplifier.device import device_named
     from dzdesign.codegen.amplifier.files import amplifier_file
+    from dzdesign.codegen.amplifier.given import given_dp_MPa, given_threshold
     from dzdesign.codegen.amplifier.notes import notes_of
     from dzdesign.codegen.amplifier.setting import amplifier_setting
     from dzdesign.design.fixed.dead_zones import dead_zones
 
     device = device_named(arguments.to)
     output = None if arguments.output is None else Path(arguments.output)
-    dp_MPa, threshold = _dp_and_threshold(arguments)
+    dp_MPa, threshold = given_dp_MPa(arguments.table_dp), given_threshold(arguments.threshold)
     if output is not None:
         _check_output(output, device)
     compensator, digest, source = given_compensator(arguments.compensator)
     refuse_underived(compensator, source, of_file=compensator is not arguments.compensator)
-    try:
-        setting = amplifier_setting(compensator, device, dp_MPa=dp_MPa, threshold=threshold)
-    except InputError as error:
-        raise InputError(in_units(error, compensator.valve.recorded_units)) from error
+    setting = amplifier_setting(compensator, device, dp_MPa=dp_MPa, threshold=threshold)
     content = amplifier_file(setting, compensator, digest)
     zones = {sign: dead_zones(compensator, drives, sign) for sign, drives in setting.characteristics.items()}
     made = AmplifierExport(
@@ -126,20 +119,6 @@ def _read_back(
             f"{wrong[0].text}; this is a fault of dzdesign"
         )
     return found
-
-
-def _dp_and_threshold(arguments: ExportArguments) -> tuple[Fraction | None, Fraction | None]:
-    """Return the pressure drop, MPa, and the threshold, a share, that were given."""
-    given = [name for name in ("dp", "threshold") if getattr(arguments, name) is not None]
-    found = read_options(arguments, given)
-    threshold = found.get("threshold")
-    if threshold is not None and threshold > LARGEST_THRESHOLD:
-        raise InputError(
-            f"--threshold is '{arguments.threshold}', expected at most {LARGEST_THRESHOLD:.0%}: the valve rests at "
-            "every command up to it"
-        )
-    exact = {name: Fraction(repr(value)) for name, value in found.items()}
-    return exact["dp"] / PA_IN_MPA if "dp" in exact else None, exact.get("threshold")
 
 
 def _check_output(output: Path, device: "Device") -> None:

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, parse_document, read_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.core.option_readers import whole_number
+from dzdesign.core.option_readers import percent, quantity, whole_number
 from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, flag_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.stages.design import design_options
 
 #: Where the names of all targets stand, microcontrollers and others.
 ALL_TARGETS = "dzdesign.codegen.other_targets:ALL_TARGET_NAMES"
+#: Where the names of the amplifiers stand.
+DEVICES = "dzdesign.codegen.amplifier.device:DEVICE_NAMES"
 #: Forms of the core, the default first.
 FORMS = "dzdesign.design.firmware_manifest:FORMS"
 
@@ -35,6 +37,12 @@ class OutputChoices:
     plant: Annotated[AnyPath | None, Option("PLANT.toml", OUTPUTS)] = None
     """File with a plant, for an FMU of the plant in addition, such as examples/paper_valve/plant.toml. It is for the
     output fmu only."""
+    device: Annotated[Text, Option("DEVICE", OUTPUTS, choices=DEVICES)] = None
+    """Device, for amplifier: west, west-pam190, west-pos123, cia408, rmc, rmc75, beckhoff or csv."""
+    table_dp: Annotated[Text, Option("P", OUTPUTS, example="1 MPa", read=quantity("pressure"))] = None
+    """Pressure drop of the characteristic, for amplifier with beckhoff or csv (default: dP0 of the valve)."""
+    threshold: Annotated[Text, Option("SHARE", OUTPUTS, example="0.5 %", read=percent("0.5 %"))] = None
+    """Command up to which the valve stays at rest, for amplifier (default: the zero band of the design's command)."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +53,10 @@ class GenerateArguments(OutputChoices, DesignChoices):
     """The compensator.json of the design, or a valve.json, which is first designed with the options of `design`."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("DIR", short="-o")] = None
-    """Folder to write (default of the command: firmware, or plc, fmu or matlab for such an output)."""
+    """Folder to write (default of the command: firmware, or plc, fmu, matlab or amplifier for such an output)."""
     target: Annotated[Text, Option("NAME", choices=ALL_TARGETS)] = None
-    """Microcontroller, or another output: iec61131, fmu, matlab (default: the microcontroller of the design, and f28335
-    for a valve.json)."""
+    """Microcontroller, or another output: iec61131, fmu, matlab, amplifier (default: the microcontroller of the design,
+    and f28335 for a valve.json)."""
     calibration: Annotated[Text, Option("FORM", choices=FORMS)] = None
     """Form of the valve's numbers (default: fixed). fixed: constants in the core. block: a block of data that the core
     receives."""
@@ -117,8 +125,10 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
     """Return the options that are of one output that is no C firmware alone, as they were given; a plant is read."""
+    from dzdesign.codegen.amplifier.given import given_dp_MPa, given_threshold
     from dzdesign.codegen.other_targets import OTHER_TARGETS
 
+    given_dp_MPa(arguments.table_dp), given_threshold(arguments.threshold)  # a wrong one is refused before any file
     given = {name: getattr(arguments, name) for other in OTHER_TARGETS.values() for name in other.options}
     return given | {"plant": None if arguments.plant is None else _plant_text(Path(arguments.plant))}
 

@@ -116,7 +116,7 @@ def test_the_script_names_every_file_and_function_of_the_core():
 
 
 def test_what_a_function_leaves_out_is_said():
-    note = note_of(compensator_of(GOLDENS_FULL))
+    note = note_of(compensator_of(GOLDENS_FULL), {})
     assert all(name in note for name in ("dither", "ramps", "debouncing", "latching", "interlock"))
 
 

@@ -102,7 +102,7 @@ def test_plcopen_declares_every_variable_with_its_type():
 def test_what_a_block_leaves_out_is_said(text):
     assert "Not in it: current control and telemetry" in " ".join(text.split())
     both = compensator(GOLDENS_FULL)
-    assert all(name in note_of(both) for name in ("dither", "ramps", "debouncing", "latching", "interlock"))
+    assert all(name in note_of(both, {}) for name in ("dither", "ramps", "debouncing", "latching", "interlock"))
     assert "dither" in structured_text(both, DIGEST, "plc")
 
 

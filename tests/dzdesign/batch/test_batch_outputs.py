@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -52,6 +53,9 @@ V0002,V0002/*.csv,current,3.5 ohm 40 mH,1 A,18..32 V,0..1.2 A on 2 ohm + 0.15 V
         {"outputs": "fmu", "dialect": "twincat"},
         {"outputs": "iec61131", "plant": "examples/paper_valve/plant.toml"},
         {"interface": "codes"},
+        {"outputs": "amplifier"},
+        {"outputs": "iec61131", "device": "west"},
+        {"outputs": "amplifier", "device": "west", "threshold": "0.01"},
     ],
     ids=lambda given: " ".join(f"{name} {value}" for name, value in given.items()),
 )
@@ -206,8 +210,6 @@ def test_what_is_good_is_kept_and_a_lost_output_made_again(made, capsys):
 
 @pytest.mark.slow
 def test_the_report_of_the_lot_lists_them_and_sees_another_manifest(made, tmp_path):
-    import shutil
-
     out = shutil.copytree(made / "out", tmp_path / "out")
     html = report_of_lot(out).html
     assert '<section id="outputs">' in html and "valves/NAME/plc" in html and "iec61131 not made" in html
@@ -220,6 +222,29 @@ def test_the_report_of_the_lot_lists_them_and_sees_another_manifest(made, tmp_pa
     path = out / "valves" / "V0000" / "plc" / MANIFEST_NAME
     path.write_bytes(path.read_bytes() + b" ")
     assert "V0000/plc/manifest.json" in read_lot(out).faults[0]
+
+
+@pytest.mark.slow
+def test_each_valve_has_the_parameters_of_its_amplifier(made, tmp_path, monkeypatch, capsys):
+    """With the firmware's verification taken as held; that of the parameters is made."""
+    monkeypatch.setattr(verify_stage, "verify_firmware", held)
+    lot, out = tmp_path / "lot", tmp_path / "out"
+    for name in ("V0000", "V0001"):
+        shutil.copytree(made / name, lot / name)
+    words = ["--meter-lag", "0.1 s", "--jobs", "1", "--outputs", "amplifier", "--device", "west", "--verify"]
+    assert main(["batch", str(lot), "-o", str(out), *words]) == 0
+    capsys.readouterr()
+    summary = read_artefact((out / "batch.json").read_bytes(), LotSummary, "batch.json").outputs["amplifier"]
+    assert (summary.holds, summary.settings["device"]) == (("V0000", "V0001"), "west")
+    files = [(out / "valves" / name / "amplifier" / "west.txt").read_bytes() for name in ("V0000", "V0001")]
+    assert files[0] != files[1] and all(content.startswith(b"MIN:A ") for content in files)
+    assert (out / "valves" / "V0000" / "amplifier_evidence" / "evidence.json").is_file()
+    html = report_of_lot(out).html
+    assert '<td class="text">amplifier</td><td class="text">device west</td>' in html
+    before = set(read_lot(out).faults)  # the evidence of the firmware, which was not verified
+    (out / "valves" / "V0001" / "amplifier" / "west.txt").write_bytes(files[0])
+    [fault] = set(read_lot(out).faults) - before
+    assert "V0001/amplifier: changed or missing: west.txt" in fault
 
 
 def held(arguments, **_):

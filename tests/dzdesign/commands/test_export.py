@@ -97,9 +97,9 @@ def test_its_own_file_is_written_again_and_another_is_left_alone(compensator, tm
         (),
         ("--to", "wset"),
         ("--to", "rmc"),
-        ("--to", "west", "--dp", "1 MPa"),
-        ("--to", "csv", "--dp", "1 kg"),
-        ("--to", "csv", "--dp", "0.2 MPa"),
+        ("--to", "west", "--table-dp", "1 MPa"),
+        ("--to", "csv", "--table-dp", "1 kg"),
+        ("--to", "csv", "--table-dp", "0.2 MPa"),
         ("--to", "west", "--threshold", "0.01"),
         ("--to", "west", "--threshold", "31 %"),
         ("--to", "beckhoff", "--threshold", "30 %", "-o", "no/such/folder.st"),
@@ -128,9 +128,9 @@ def test_a_compensator_whose_numbers_do_not_follow_is_refused(compensator, tmp_p
 
 
 def test_a_larger_threshold_and_another_pressure_change_the_file(compensator, unproven):
-    law = {text: api.export(compensator, to="beckhoff", dp=text).content for text in ("1 MPa", "30 bar")}
-    assert law["1 MPa"] != law["30 bar"] == api.export(compensator, to="beckhoff", dp="3 MPa").content
-    near, at = (api.export(compensator, to="csv", dp=text).content for text in ("5.04 MPa", "5 MPa"))
+    law = {text: api.export(compensator, to="beckhoff", table_dp=text).content for text in ("1 MPa", "30 bar")}
+    assert law["1 MPa"] != law["30 bar"] == api.export(compensator, to="beckhoff", table_dp="3 MPa").content
+    near, at = (api.export(compensator, to="csv", table_dp=text).content for text in ("5.04 MPa", "5 MPa"))
     assert near == at
     for device in ("west", "cia408", "beckhoff"):
         assert all(check.holds for check in api.export(compensator, to=device, threshold="0 %").checks)
@@ -144,7 +144,7 @@ def test_what_is_said_is_in_the_units_of_the_recordings(compensator, unproven):
     units = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0))
     in_bar = replace(made, valve=replace(made.valve, recorded_units=units))
     with pytest.raises(InputError, match="is 80 bar, outside the tests from 10 bar to 50 bar"):
-        api.export(in_bar, to="csv", dp="80 bar")
+        api.export(in_bar, to="csv", table_dp="80 bar")
     found = api.export(in_bar, to="csv")
     assert "above 50.0 bar" in found.notes[0]
     console = Console(file=io.StringIO(), width=200)

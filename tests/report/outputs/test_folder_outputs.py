@@ -90,6 +90,20 @@ def test_each_output_stands_with_its_hash_and_without_evidence_it_is_not_verifie
     assert listed(folder / "plc", digest) == listed(folder / "firmware", digest) == found
 
 
+def test_the_parameters_of_an_amplifier_are_listed_with_their_device_and_checked(folder, digest, compensator, document):
+    given = {"device": "csv", "table_dp": "2 MPa"}
+    output = generate_output(compensator, "amplifier", settings_of("amplifier", given), document)
+    write_output(output, folder / "amplifier")
+    found = listed(folder, digest)["amplifier/"]
+    assert (found.kind, found.settings) == ("amplifier", "device csv, table-dp 2 MPa")
+    put_evidence(folder / "evidence", folder / "amplifier")
+    assert listed(folder, digest)["amplifier/"].verdict == "HOLDS"
+    path = folder / "amplifier" / "csv.csv"
+    path.write_bytes(path.read_bytes().replace(b"0.4640", b"0.4641"))
+    found = listed(folder, digest)["amplifier/"]
+    assert found.verdict == "CHANGED" and "csv.csv" in found.changed
+
+
 @pytest.mark.parametrize("name", ["plc_evidence", "any name"])
 def test_evidence_is_found_by_the_hash_of_the_manifest(folder, digest, name):
     put_evidence(folder / name, folder / "plc")

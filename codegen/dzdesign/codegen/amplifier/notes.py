@@ -15,8 +15,13 @@ EITHER = "below {low} and above {high} nothing is certified"
 OTHER = "at another pressure drop than {low} nothing is certified"
 
 
-def notes_of(setting: AmplifierSetting, compensator: Compensator) -> tuple[str, ...]:
-    """Return what the setting does not hold for, what the device's sources leave open, and what is still to be done."""
+def notes_of(
+    setting: AmplifierSetting, compensator: Compensator, *, beside_compensator: bool = False
+) -> tuple[str, ...]:
+    """Return what the setting does not hold for, what the device's sources leave open, and what is still to be done.
+
+    A file `beside_compensator` lies in a folder with what it was made from.
+    """
     device, units = setting.device, compensator.valve.recorded_units
     notes = []
     for sign, offset in setting.offsets.items():
@@ -40,7 +45,7 @@ def notes_of(setting: AmplifierSetting, compensator: Compensator) -> tuple[str, 
         notes.append("the offset stays lower by the design's dither: the amplifier's own must be no larger")
     notes += [f"not confirmed: {device.unconfirmed}"] if device.unconfirmed else []
     notes += [device.hint] if device.hint else []
-    if device.format in WITHOUT_COMMENTS:
+    if device.format in WITHOUT_COMMENTS and not beside_compensator:
         notes.append("the format has no comments, so the file does not say what it was made from; keep this output")
     return tuple(notes)
 

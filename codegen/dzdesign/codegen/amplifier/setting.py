@@ -7,6 +7,7 @@ from math import ceil, floor
 
 from dzdesign.codegen.amplifier.device import Device, Parameter
 from dzdesign.core.errors import InputError
+from dzdesign.core.worded import errors_in
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed.characteristic import Characteristic, added, jump
 from dzdesign.design.fixed.fixed_offset import FixedOffset, fixed_offset
@@ -54,16 +55,25 @@ def amplifier_setting(
     InputError
         If the device's range does not hold the setting, it has fewer solenoids, or an option is not of it.
     """
+    with errors_in(compensator.valve.recorded_units):
+        return _setting(compensator, device, dp_MPa, threshold)
+
+
+def _setting(
+    compensator: Compensator, device: Device, dp_MPa: Fraction | None, threshold: Fraction | None
+) -> AmplifierSetting:
     signs = compensator.signals.signs
     if len(signs) > 1 and not device.takes_both_signs:
-        raise InputError(f"{device.title} drives one solenoid, and the design has two; choose another --to")
+        raise InputError(f"{device.title} drives one solenoid, and the design has two; choose another device")
     offsets = {sign: fixed_offset(compensator, sign) for sign in signs}
     rest = max(zero_band(compensator, sign) for sign in signs) if threshold is None else threshold
     if device.law == "table":
         at = Fraction(repr(compensator.valve.sides["positive"].reference.dp_MPa)) if dp_MPa is None else dp_MPa
         return _table(compensator, device, offsets, _nominal(at, offsets), rest)
     if dp_MPa is not None:
-        raise InputError(f"--dp is of devices that take a whole characteristic, not of {device.title}; leave it out")
+        raise InputError(
+            f"--table-dp is of devices that take a whole characteristic, not of {device.title}; leave it out"
+        )
     if threshold is not None and device.threshold is None:
         raise InputError(f"{device.title} has no threshold of its dead-zone compensation; leave out --threshold")
     return _jump(compensator, device, offsets, rest) if device.law == "jump" else _added(compensator, device, offsets)
@@ -151,7 +161,7 @@ def _offset_counts(device: Device, offset: FixedOffset) -> int:
     """Return the offset rounded down to the device's step; one beyond its range is refused."""
     parameter, counts = _parameter(device, device.offset), floor(offset.share * device.counts_of_full)
     instead = device.instead or "a design with PLC or drive needs no such parameter (see codegen --list-targets)"
-    _check_range(device, parameter, parameter.name(offset.sign), counts, f"choose another --to: {instead}")
+    _check_range(device, parameter, parameter.name(offset.sign), counts, f"choose another device: {instead}")
     return counts
 
 
@@ -167,7 +177,7 @@ def _full_counts(compensator: Compensator, device: Device, sign: int) -> int:
     if limit < device.full.least:
         raise InputError(
             f"{device.title} drives at least {device.in_unit(device.full.least)} at full command, and the design "
-            f"allows {device.in_unit(limit)}; design it with a larger --output-max, or choose another --to"
+            f"allows {device.in_unit(limit)}; design it with a larger --output-max, or choose another device"
         )
     return min(max(floor(max(drives) * unit), device.full.least), limit, device.full.most)
 
@@ -176,7 +186,7 @@ def _refuse_a_limit(compensator: Compensator, device: Device) -> None:
     if (limit := _limit(compensator)) < 1:
         raise InputError(
             f"{device.title} has no limit of its drive here, and the design allows {float(limit):.1%} of full drive; "
-            "design it without --output-max, or choose another --to"
+            "design it without --output-max, or choose another device"
         )
 
 

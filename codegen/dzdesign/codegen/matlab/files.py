@@ -52,8 +52,9 @@ def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Map
     return {**files, **{name: made[name].encode() for name in names}}
 
 
-def note_of(compensator: Compensator) -> str:
+def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
     """Return what of a design a function of the law has not; empty where it has all of it."""
+    del settings  # it has none
     left_out = ", ".join(left_out_of(compensator))
     return f"dz_comp.m is the law alone and leaves out, of this design: {left_out}" if left_out else ""
 

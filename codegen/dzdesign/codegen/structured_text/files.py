@@ -43,8 +43,9 @@ def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Map
     return files
 
 
-def note_of(compensator: Compensator) -> str:
+def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
     """Return what of a design a function block has not; empty where it has all of it."""
+    del settings  # whichever they are
     left_out = ", ".join(left_out_of(compensator))
     return f"the function block leaves out, of this design: {left_out}" if left_out else ""
 

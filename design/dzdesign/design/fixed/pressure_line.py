@@ -44,7 +44,7 @@ def pressure_line(
     if not low <= dp_MPa <= high:
         raise InputError(
             worded(
-                "--dp is {dp:.4g MPa}, outside the tests from {low:.4g MPa} to {high:.4g MPa}; choose one inside",
+                "--table-dp is {dp:.4g MPa}, outside the tests from {low:.4g MPa} to {high:.4g MPa}; choose one inside",
                 dp=float(dp_MPa),
                 low=float(low),
                 high=float(high),

@@ -43,6 +43,7 @@ KINDS: Mapping[str, OutputKind] = {
         options={"--machine-code": "dzdesign.verify.fmu.other_machines"},
     ),
     "matlab": OutputKind(module="dzdesign.verify.matlab.checks"),
+    "amplifier": OutputKind(module="dzdesign.verify.amplifier.output_checks"),
 }
 
 

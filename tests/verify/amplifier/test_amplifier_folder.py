@@ -1,0 +1,192 @@
+"""`verify` of a folder for an amplifier: an edited file, table or manifest does not hold, in whatever combination."""
+
+import json
+
+import pytest
+
+from dzdesign import api
+from dzdesign.codegen.other_targets import generate_output, settings_of, write_output
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.regeneration import output_regenerated
+from dzdesign.verify.amplifier import output_checks
+from dzdesign.verify.amplifier.checks import DEAD_ZONES, READ_BACK, SAFE
+from dzdesign.verify.amplifier.output_checks import LAW_DEAD_ZONES
+from dzdesign.verify.outputs.dispatch import verify_output
+from dzdesign.verify.requirements import FILES
+from tests.support.paths import GOLDENS, GOLDENS_FULL
+
+TABLE, FIRST = "dead_zones.csv", "positive,1.000000,opening,"
+#: Design, and the settings of a folder that has seeded faults.
+WEST, CSV = ("one", {"device": "west"}), ("one", {"device": "csv", "table_dp": "2 MPa"})
+BOTH = ("two", {"device": "west"})
+
+
+@pytest.fixture(scope="module")
+def designs():
+    two = read_artefact((GOLDENS_FULL / "compensator.json").read_bytes(), Compensator, "compensator.json")
+    return {"one": api.design(GOLDENS / "valve.json"), "two": two}
+
+
+@pytest.fixture
+def written(designs, tmp_path):
+    """Return the folder of a design and settings."""
+
+    def write(name, given):
+        made = designs[name]
+        output = generate_output(made, "amplifier", settings_of("amplifier", given), to_json_bytes(made))
+        write_output(output, tmp_path / "amplifier")
+        return tmp_path / "amplifier"
+
+    return write
+
+
+def edited(folder, name, old, new, *, with_manifest):
+    """Change a file, and the hash of it in the manifest where that is wanted too."""
+    path, manifest = folder / name, folder / MANIFEST_NAME
+    content = path.read_bytes()
+    assert content.count(old.encode()) == 1
+    path.write_bytes(content.replace(old.encode(), new.encode()))
+    if with_manifest:
+        document = json.loads(manifest.read_text())
+        document["files"][name] = sha256_of(path.read_bytes())
+        manifest.write_text(json.dumps(document, indent=2) + "\n")
+
+
+def found_of(folder):
+    """Return what this room alone finds, by id; not what the hashes of the manifest tell."""
+    manifest = read_artefact((folder / MANIFEST_NAME).read_bytes(), OutputManifest, MANIFEST_NAME)
+    compensator = read_artefact((folder / "compensator.json").read_bytes(), Compensator, "compensator.json")
+    checks = output_checks.checks(folder, manifest, compensator, lambda _: None).checks
+    return {check.id: check for check in checks}
+
+
+def failed(folder):
+    return {name for name, check in found_of(folder).items() if check.holds is not True}
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [WEST, CSV, BOTH, ("one", {"device": "west", "threshold": "2 %"}), ("one", {"device": "west-pam190"})]
+    + [("one", {"device": device}) for device in ("beckhoff", "cia408", "rmc75", "west-pos123")],
+    ids=str,
+)
+def test_what_was_generated_holds(written, name, given):
+    found = found_of(written(name, given))
+    assert set(found) == {READ_BACK.id, SAFE.id, DEAD_ZONES.id, LAW_DEAD_ZONES.id}
+    assert all(check.holds for check in found.values())
+
+
+def line_of(folder, start, column, value):
+    """Return a line of the table as it is, and with another value in one of its columns."""
+    [line] = [each for each in (folder / TABLE).read_text().splitlines() if each.startswith(start)]
+    cells = line.split(",")
+    cells[column] = value
+    return line, ",".join(cells)
+
+
+@pytest.mark.parametrize(
+    ("of", "name", "old", "new", "wrong"),
+    [
+        (WEST, "west.txt", "MIN:A 4956", "MIN:A 4966", SAFE),
+        (WEST, "west.txt", "MIN:A 4956", "MIN:A 4856", DEAD_ZONES),
+        (WEST, "west.txt", "MIN:A 4956", "MIN 4956", READ_BACK),
+        (WEST, TABLE, "positive,1.000000,opening", "positive,2.000000,opening", DEAD_ZONES),
+        (WEST, TABLE, "positive,1.000000,opening", "positive,2.000000,opening", LAW_DEAD_ZONES),
+        (WEST, TABLE, "positive,1.000000,opening", "negative,1.000000,opening", DEAD_ZONES),
+        (WEST, TABLE, "positive,1.000000,opening", "positive,1.000000,closing", DEAD_ZONES),
+        (WEST, TABLE, "positive,1.000000,opening", "Infinity,1.000000,opening", DEAD_ZONES),
+        (WEST, TABLE, "dead_zone_law\n", "dead_zone_law,\n", DEAD_ZONES),
+        (BOTH, "west.txt", "MIN:B 27", "MIN:B 28", SAFE),
+    ],
+)
+def test_an_edit_is_found_though_the_manifest_was_edited_with_it(written, of, name, old, new, wrong):
+    folder = written(*of)
+    edited(folder, name, old, new, with_manifest=True)
+    assert wrong.id in failed(folder)
+    assert output_regenerated(folder).holds is False
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "wrong"),
+    [
+        (3, "0.000000", DEAD_ZONES),
+        (3, "inf", DEAD_ZONES),
+        (3, "nan", DEAD_ZONES),  # of which no difference is too large
+        (3, "-inf", DEAD_ZONES),
+        (4, "nan", DEAD_ZONES),
+        (4, "0.010738", LAW_DEAD_ZONES),
+        (4, "inf", LAW_DEAD_ZONES),
+        (3, "0.0837", DEAD_ZONES),
+    ],
+)
+def test_a_forged_number_of_the_table_is_found(written, column, value, wrong):
+    folder = written(*WEST)
+    old, new = line_of(folder, FIRST, column, value)
+    edited(folder, TABLE, old, new, with_manifest=True)
+    assert wrong.id in failed(folder)
+
+
+@pytest.mark.parametrize("lines", [slice(0, 6), slice(0, 5), slice(0, 1), slice(0, 0)], ids=str)
+def test_a_table_without_its_last_lines_is_found(written, lines):
+    folder = written(*WEST)
+    text = (folder / TABLE).read_text()
+    kept = "".join(text.splitlines(keepends=True)[lines])
+    edited(folder, TABLE, text, kept, with_manifest=True)
+    assert DEAD_ZONES.id in failed(folder)
+
+
+def test_the_file_of_another_device_or_a_second_one_is_found(written):
+    folder = written(*WEST)
+    path = folder / MANIFEST_NAME
+    document = json.loads(path.read_text())
+    for settings, more in (
+        ({"device": "cia408"}, {}),
+        ({"device": "west-pam190"}, {}),
+        ({}, {}),
+        ({"threshold": "1 MPa"}, {}),
+        ({}, {"west.old": "0" * 64}),
+    ):
+        given = {**document["settings"], **settings} if settings or more else {}
+        path.write_text(json.dumps({**document, "settings": given, "files": {**document["files"], **more}}))
+        assert failed(folder) == {READ_BACK.id}
+
+
+def test_a_larger_threshold_than_the_files_is_found(written):
+    """`verify` takes the threshold that counts as zero from the settings: of a jump behind it the file is unsafe."""
+    folder = written(*WEST)
+    path = folder / MANIFEST_NAME
+    document = json.loads(path.read_text())
+    document["settings"]["threshold"] = "5 %"
+    path.write_text(json.dumps(document))
+    assert SAFE.id in failed(folder)
+
+
+@pytest.mark.parametrize("with_manifest", [False, True])
+@pytest.mark.parametrize(
+    ("name", "old", "new"), [("west.txt", "MIN:A 4956", "MIN:A 4966"), (TABLE, "opening,0.08", "opening,0.07")]
+)
+def test_the_command_says_what_does_not_hold(written, tmp_path, monkeypatch, capsys, name, old, new, with_manifest):
+    folder = written(*WEST)
+    monkeypatch.chdir(tmp_path)
+    assert main(["verify", str(folder), "-q"]) == 0
+    assert "Every requirement holds" in capsys.readouterr().out
+    edited(folder, name, old, new, with_manifest=with_manifest)
+    assert main(["verify", str(folder), "-q"]) == 1
+    printed = capsys.readouterr().out
+    missed = [line for line in printed.splitlines() if line.startswith("DOES NOT HOLD")]
+    wrong = SAFE if name == "west.txt" else DEAD_ZONES
+    assert any(wrong.title in line for line in missed)
+    assert any(FILES.title in line for line in missed) == (not with_manifest)
+    assert sum("generated now" in line for line in missed) == 1
+
+
+def test_the_evidence_names_the_settings(written):
+    evidence = verify_output(written(*CSV)).evidence
+    assert evidence.settings == {"device": "csv", "table_dp": "2 MPa", "threshold": ""} and evidence.holds
+    assert evidence.target == "amplifier"
+    assert LAW_DEAD_ZONES.id in {check.id for check in evidence.checks}
