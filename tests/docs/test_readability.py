@@ -14,6 +14,8 @@ from tests.support.paths import ROOT
 
 #: Pages that are held to it.
 PAGES = (
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
     "README.md",
     "docs/before-after.md",
     "docs/concepts/accepted-blocks.md",
