@@ -53,14 +53,17 @@ def given_blocks(folder: Path, files: Iterable[Path]) -> list[GivenBlock]:
     return [_given_block(path, beside) for path in wanted]
 
 
-def blocks_checked(folder: Path, given: Iterable[GivenBlock]) -> "list[Check]":
-    """Try each block with the firmware in `folder` on every input, and return a requirement for each."""
+def blocks_checked(folder: Path, given: Iterable[GivenBlock], code: Path | None = None) -> "list[Check]":
+    """Try each block with the firmware in `folder` on every input, and return a requirement for each.
+
+    What is compiled and run is taken from `code`, by default the folder itself.
+    """
     from dzdesign.codegen.calibration.packing import unpack
     from dzdesign.verify.exhaustive.block_check import BlockFirmware
     from dzdesign.verify.firmware.folder import read_firmware_manifest
     from dzdesign.verify.requirements import CALIBRATION_BLOCK
 
-    firmware, target, blocks = BlockFirmware(folder), read_firmware_manifest(folder).target, list(given)
+    firmware, target, blocks = BlockFirmware(code or folder), read_firmware_manifest(folder).target, list(given)
     checks = [_checked(firmware, target, each) for each in blocks]
     read = [(each.path, unpack(each.octets, f"'{each.path}'")) for each in blocks]
     right = [
@@ -70,7 +73,7 @@ def blocks_checked(folder: Path, given: Iterable[GivenBlock]) -> "list[Check]":
     ]
     return [
         *checks,
-        *drives_checked(folder, right),
+        *drives_checked(code or folder, right),
         *(CALIBRATION_BLOCK.check(holds=False, name=f"{CALIBRATION_BLOCK.title}: {name}", text=fault)
           for name, fault in repeated(read)),
     ]  # fmt: skip

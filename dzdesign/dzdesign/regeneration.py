@@ -4,7 +4,7 @@ Stands here and not in verify, which shares no code with what it checks: this on
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError, MissingToolError, quoted
 
 if TYPE_CHECKING:
+    from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.design.output_manifest import OutputManifest
@@ -31,19 +32,16 @@ def regenerated(folder: Path, include: Sequence[Path] = ()) -> "Check":
     tells an edited file from a generated one, so the firmware does not hold. Nor is it where the user's headers can't
     be compiled.
     """
-    from dzdesign.codegen.project import TARGET_NAMES, generate
-    from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
+    from dzdesign.codegen.project import TARGET_NAMES
+    from dzdesign.verify.firmware.folder import read_firmware_manifest
     from dzdesign.verify.firmware.generated_meaning import compare_meaning
     from dzdesign.verify.requirements import REGENERATED
 
     manifest = read_firmware_manifest(folder)
-    if reason := _not_generated_here(manifest, TARGET_NAMES):
+    if reason := not_generated_here(manifest, TARGET_NAMES):
         return REGENERATED.check(holds=None, text=reason)
-    content = read_bytes(folder / "compensator.json", "compensator")
     try:
-        firmware = generate(
-            read_compensator(folder), manifest.target, content, manifest.calibration, manifest.vectors
-        )
+        firmware = firmware_again(folder, manifest)
     except InputError as error:
         return REGENERATED.check(holds=False, text=str(error))
     expected = firmware.manifest
@@ -66,33 +64,66 @@ def regenerated(folder: Path, include: Sequence[Path] = ()) -> "Check":
     return REGENERATED.check(holds=True, text=text)
 
 
-def output_regenerated(folder: Path) -> "Check":
-    """Tell whether every file of an output that is no C firmware is what `codegen` makes of compensator.json now.
+def firmware_again(folder: Path, manifest: "FirmwareManifest") -> "Firmware":
+    """Generate the firmware of a folder's compensator.json, of the kind that the manifest names.
 
-    It is not checked where the output was compiled, and the compiler is missing here or another one.
+    What `generate` refuses is an `InputError`, and so is a compensator.json that can't be read.
     """
+    from dzdesign.codegen.project import generate
+    from dzdesign.verify.firmware.folder import read_compensator
+
+    content = read_bytes(folder / "compensator.json", "compensator")
+    return generate(read_compensator(folder), manifest.target, content, manifest.calibration, manifest.vectors)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputAgain:
+    """What `codegen` makes of the compensator.json of an output now, or why it makes none."""
+
+    output: "Output | None" = None
+    reason: str = ""
+    #: Of none: whether this version and this machine could make it.
+    refused: bool = False
+
+
+def output_again(folder: Path) -> OutputAgain:
+    """Generate an output that is no C firmware from its compensator.json; one that can't be read is an `InputError`."""
     from importlib import import_module
 
     from dzdesign.codegen.other_targets import OTHER_TARGETS, generate_output, settings_of
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.outputs.folder import read_output_manifest
-    from dzdesign.verify.requirements import REGENERATED
 
     manifest = read_output_manifest(folder)
-    if reason := _not_generated_here(manifest, OTHER_TARGETS):
-        return REGENERATED.check(holds=None, text=reason)
-    content = read_bytes(folder / "compensator.json", "compensator")
+    if reason := not_generated_here(manifest, OTHER_TARGETS):
+        return OutputAgain(reason=reason)
+    content, compensator = read_bytes(folder / "compensator.json", "compensator"), read_compensator(folder)
     compiled = getattr(import_module(OTHER_TARGETS[manifest.target].module), "made_by_another_compiler", None)
     try:
         settings = settings_of(manifest.target, manifest.settings)
         there = {name: (folder / name).read_bytes() for name in manifest.files if (folder / name).is_file()}
         if compiled and (reason := compiled(there)):
-            return REGENERATED.check(holds=None, text=f"{reason}; verify it with the one that made it")
-        output = generate_output(read_compensator(folder), manifest.target, settings, content)
+            return OutputAgain(reason=f"{reason}; verify it with the one that made it")
+        return OutputAgain(output=generate_output(compensator, manifest.target, settings, content))
     except MissingToolError as error:
-        return REGENERATED.check(holds=None, text=str(error))
+        return OutputAgain(reason=str(error))
     except InputError as error:
-        return REGENERATED.check(holds=False, text=str(error))
+        return OutputAgain(reason=str(error), refused=True)
+
+
+def output_regenerated(folder: Path, again: OutputAgain | None = None) -> "Check":
+    """Tell whether every file of an output that is no C firmware is what `codegen` makes of compensator.json now.
+
+    It is not checked where the output was compiled, and the compiler is missing here or another one. `again` is the
+    output where it was generated before.
+    """
+    from dzdesign.verify.outputs.folder import read_output_manifest
+    from dzdesign.verify.requirements import REGENERATED
+
+    manifest, again = read_output_manifest(folder), again or output_again(folder)
+    output = again.output
+    if output is None:
+        return REGENERATED.check(holds=False if again.refused else None, text=again.reason)
     others = [name for name, text in output.contents.items() if _digest(folder / name) != sha256_of(text)]
     others += _others_in_manifest(folder, manifest, output.manifest)
     if others:
@@ -128,7 +159,7 @@ def _faults_of_the_users(folder: Path, firmware: "Firmware") -> list[str]:
     return found + list(interference(folder, theirs, firmware.files, frozenset(board)))
 
 
-def _not_generated_here(manifest: "Manifest", known: Collection[str]) -> str:
+def not_generated_here(manifest: "Manifest", known: Collection[str]) -> str:
     """Return why this version can't generate a firmware again, and what to do; nothing where it can."""
     tool = f"{manifest.tool.name} {manifest.tool.version}"
     this = f"{THIS_TOOL.name} {THIS_TOOL.version}"

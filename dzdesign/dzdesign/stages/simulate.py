@@ -1,6 +1,7 @@
 """`simulate`: plant -> ramp tests, marked as simulated."""
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -63,7 +64,10 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     ------
     InputError
         If a file or an option can't be read.
+    RequirementError
+        If the firmware's code is not what this version generates from its compensator.json: it is not run.
     """
+    from dzdesign.changed_code import code_of_firmware
     from dzdesign.verify.closed_loop.plant import Plant, read_plant
     from dzdesign.verify.closed_loop.simulated_recordings import Bench, Series, simulated_files
 
@@ -78,9 +82,12 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     series = Series(repeats=read["repeats"], scatter_V=(read["repeatability"] or 0.0) * plant.u_max_V)
     firmware = Path(arguments.firmware) if arguments.firmware is not None else None
     dither = read["dither"] and read["dither"].of(AS_COMPUTED, plant.u_max_V)
-    with stage_progress() as stage:
+    with (
+        nullcontext() if firmware is None else code_of_firmware(firmware, otherwise="") as code,
+        stage_progress() as stage,
+    ):
         files, manifest = simulated_files(
-            plant, pressures, read["ramp_time"], Bench(seed=read["seed"]), say=stage, firmware=firmware, series=series,
+            plant, pressures, read["ramp_time"], Bench(seed=read["seed"]), say=stage, firmware=code, series=series,
             dither=dither,
         )  # fmt: skip
     if arguments.output is not None:

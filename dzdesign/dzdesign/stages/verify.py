@@ -66,6 +66,8 @@ class VerifyArguments:
     input in Wine and in QEMU."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
     """Prove with Frama-C that nothing overflows a 16-bit int."""
+    run_changed: Annotated[bool, Option(group=CHECKS)] = False
+    """Compile and run changed code too. Give this option only for a folder that you trust."""
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
@@ -77,6 +79,8 @@ def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
     ------
     InputError
         If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
+    RequirementError
+        If the folder's code is not what this version generates from its compensator.json: it is not run.
     """
     from dzdesign.verify.outputs.folder import holds_output
 
@@ -98,19 +102,24 @@ def verify_output_folder(
     folder: Path, arguments: VerifyArguments, identified: "ValveModel | None" = None
 ) -> "OutputVerification":
     """Verify an output that is no C firmware; `identified` is as in `verify_firmware`."""
-    from dzdesign.regeneration import output_regenerated
+    from dzdesign.changed_code import code_of_output
+    from dzdesign.regeneration import output_again, output_regenerated
     from dzdesign.reidentification import GivenFiles, identified_again
     from dzdesign.verify.firmware.folder import read_compensator
-    from dzdesign.verify.outputs.dispatch import SCHEMA, output_evidence_files, verify_output
+    from dzdesign.verify.outputs.dispatch import SCHEMA, kind_for, output_evidence_files, verify_output
     from dzdesign.verify.verification import evidence_manifest
 
     given = [flag_of(name) for name in OF_FIRMWARE if getattr(arguments, name)]
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
     recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
-    with stage_progress() as stage:
-        verification = verify_output(folder, given, stage)
-    added = [output_regenerated(folder)]
+    again = None
+    if kind_for(folder, given).runs:
+        with stage_progress("generating the output again"):
+            again = output_again(folder)
+    with code_of_output(folder, again, run_changed=arguments.run_changed) as code, stage_progress() as stage:
+        verification = verify_output(folder, given, stage, code)
+    added = [output_regenerated(folder, again)]
     if recordings:
         with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
             added.append(identified_again(read_compensator(folder), recordings, identified))
@@ -124,7 +133,20 @@ def verify_output_folder(
 def _verify_firmware(
     folder: Path, arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
 ) -> "Verification":
-    """Verify a C firmware."""
+    """Verify a C firmware, if its code may be run."""
+    from dzdesign.changed_code import code_of_firmware
+    from dzdesign.verify.verification import SCHEMA
+
+    if arguments.output is not None:
+        check_folder_may_be_written(Path(arguments.output), SCHEMA)
+    with code_of_firmware(folder, run_changed=arguments.run_changed) as code:
+        return _verify_code(folder, code, arguments, plant_source, identified)
+
+
+def _verify_code(
+    folder: Path, code: Path, arguments: VerifyArguments, plant_source: str, identified: "ValveModel | None"
+) -> "Verification":
+    """Verify a C firmware whose code is compiled and run from a folder of its own."""
     from dzdesign.block_checks import blocks_checked, given_blocks
     from dzdesign.regeneration import regenerated
     from dzdesign.reidentification import GivenFiles, identified_again
@@ -133,11 +155,9 @@ def _verify_firmware(
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
     from dzdesign.verify.firmware.folder import read_compensator
-    from dzdesign.verify.verification import SCHEMA, evidence_files, evidence_manifest
+    from dzdesign.verify.verification import evidence_files, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
-    if arguments.output is not None:
-        check_folder_may_be_written(Path(arguments.output), SCHEMA)
     plant, digest = None, None
     if arguments.plant is not None:
         plant = read_plant(Path(arguments.plant), say)
@@ -154,15 +174,15 @@ def _verify_firmware(
     with stage_progress() as stage:
         verification = verify_folder(
             folder, plant, plant_source, digest, tolerances=tolerances, backs_MPa=backs_MPa,
-            include=include, say=stage, watch=stage.each,
+            include=include, code=code, say=stage, watch=stage.each,
         )  # fmt: skip
     if recordings:
         with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
             added.append(identified_again(read_compensator(folder), recordings, identified))
     if blocks:
         with stage_progress("comparing every input with each of the calibration blocks"):
-            added += blocks_checked(folder, blocks)
-    more, mutants = _further_checks(arguments, folder, verification)
+            added += blocks_checked(folder, blocks, code)
+    more, mutants = _further_checks(arguments, code, verification)
     verification = verification.with_checks(regenerated(folder, include), *added, *more)
     if mutants:
         verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))

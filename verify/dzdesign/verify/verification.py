@@ -81,6 +81,7 @@ def verify(
     tolerances: Tolerances | None = None,
     backs_MPa: Sequence[float] | None = None,
     include: Sequence[Path] = (),
+    code: Path | None = None,
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
 ) -> Verification:
@@ -89,22 +90,24 @@ def verify(
     Without a `plant` the recorded characteristic stands in for the valve in the closed loop; `plant_source` and
     `plant_sha256` are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about
     it. `sequence` is the command over time, by default 0-10 V in 100 s and back; `backs_MPa` are the pressures behind
-    the edge. In `include` lie headers of the user's board files. `say` is told each stage before it begins; `watch` is
-    handed the pieces of a long one and their number, and gives them back one by one, as they are done.
+    the edge. In `include` lie headers of the user's board files. What is compiled and run is taken from `code`, by
+    default the folder itself: whoever does not trust it gives one with the same code. `say` is told each stage before
+    it begins; `watch` is handed the pieces of a long one and their number, and gives them back as they are done.
 
     A folder that is no firmware, and a machine without a C compiler, are an `InputError`.
     """
     manifest, compensator = _read(folder, plant, tolerances, include)
     host_compiler()
+    code = code or folder
     say("compiling the core with every warning an error")
     given = (plant, sequence or RampSequence(), tolerances, backs_MPa)
-    run = _run_core(folder, manifest, compensator, given, say, watch)
+    run = _run_core(code, manifest, compensator, given, say, watch)
     core, current, loop = run.core, run.current, run.loop
     board, law = board_compiles(folder, manifest, include), law_follows(compensator)
     checks = (
         files_unchanged(folder, manifest),
         manifest_follows(folder, manifest, compensator),
-        *own_block_accepted(folder, manifest),
+        *own_block_accepted(code, manifest),
         *vectors_follow(folder, manifest, compensator),
         *core.checks,
         *current.checks,

@@ -14,6 +14,8 @@ from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, discard, stored
 
 ACCEPTANCE, LINKED_HEADER, PROGRAM = "dz_calibration.c", "dz_block.h", "own_block.c"
+#: Files of a target with the block as C, which are compiled here too.
+OF_BLOCK = (BLOCK_SOURCE, LINKED_HEADER)
 
 
 def own_block_accepted(folder: Path, manifest: FirmwareManifest) -> tuple[Check, ...]:

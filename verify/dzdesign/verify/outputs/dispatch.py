@@ -33,6 +33,8 @@ class OutputKind:
     #: Options of `verify`, as flags such as --machine-code, that make sense for it beside --output and --ramps, to the
     #: module with the ``checks`` that are made where one is given.
     options: Mapping[str, str] = field(default_factory=dict)
+    #: Whether its files are code that the checks compile or run as they are.
+    runs: bool = False
 
 
 #: Target, as the manifest names it, to its checks.
@@ -41,8 +43,9 @@ KINDS: Mapping[str, OutputKind] = {
     "fmu": OutputKind(
         module="dzdesign.verify.fmu.checks",
         options={"--machine-code": "dzdesign.verify.fmu.other_machines"},
+        runs=True,
     ),
-    "matlab": OutputKind(module="dzdesign.verify.matlab.checks"),
+    "matlab": OutputKind(module="dzdesign.verify.matlab.checks", runs=True),
     "amplifier": OutputKind(module="dzdesign.verify.amplifier.output_checks"),
 }
 
@@ -74,21 +77,30 @@ def kind_of(manifest: OutputManifest, source: str) -> OutputKind:
     return KINDS[manifest.target]
 
 
-def verify_output(folder: Path, options: Sequence[str] = (), say: Say = lambda _: None) -> OutputVerification:
-    """Verify the folder of an output, made by `dzdesign codegen`.
-
-    `options` are the flags that were given; one that makes no sense for this kind is an `InputError`, and so is a
-    folder that is no output. `say` is told each stage before it begins.
-    """
+def kind_for(folder: Path, options: Sequence[str] = ()) -> OutputKind:
+    """Return how the output in a folder is checked; an option that makes no sense for its kind is an `InputError`."""
     manifest = read_output_manifest(folder)
     kind = kind_of(manifest, f"'{folder / MANIFEST_NAME}'")
     for flag in (flag for flag in options if flag not in kind.options):
         raise InputError(f"{flag} is for a C firmware, and '{folder}' is an output for {manifest.target}; leave it out")
+    return kind
+
+
+def verify_output(
+    folder: Path, options: Sequence[str] = (), say: Say = lambda _: None, code: Path | None = None
+) -> OutputVerification:
+    """Verify the folder of an output, made by `dzdesign codegen`.
+
+    `options` are the flags that were given; one that makes no sense for this kind is an `InputError`, and so is a
+    folder that is no output. What is compiled and run is taken from `code`, by default the folder itself. `say` is told
+    each stage before it begins.
+    """
+    kind, manifest = kind_for(folder, options), read_output_manifest(folder)
     compensator = read_compensator(folder)
     unchanged = files_unchanged(folder, manifest)
     modules = (kind.module, *(kind.options[flag] for flag in options))
     rooms: list[CheckOutput] = [import_module(module).checks for module in modules]
-    found = [check(folder, manifest, compensator, say) for check in rooms]
+    found = [check(code or folder, manifest, compensator, say) for check in rooms]
     of_all: tuple[Check, ...] = (
         certificate_follows(compensator),
         bounds_follow(compensator),
