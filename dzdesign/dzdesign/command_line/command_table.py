@@ -21,7 +21,7 @@ COMMANDS = {
     "init": Command(PIPELINE, "inspect recordings and write a commented dzdesign.toml"),
     "identify": Command(PIPELINE, "fit the valve to its ramp tests: gain, thresholds and beta(dP), in valve.json"),
     "design": Command(PIPELINE, "compute the certified law with exact coefficients, in compensator.json"),
-    "codegen": Command(PIPELINE, "write C firmware, or Structured Text, FMUs or a MATLAB function"),
+    "codegen": Command(PIPELINE, "write C firmware, or Structured Text, FMUs, a MATLAB function, an amplifier's file"),
     "calibration": Command(PIPELINE, "write one valve's calibration block, or read one back"),
     "export": Command(PIPELINE, "compute the fixed dead-zone parameters of an amplifier"),
     "verify": Command(PIPELINE, "check a firmware on every input and in closed loop, and write the evidence"),
