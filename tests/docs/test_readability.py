@@ -25,6 +25,7 @@ PAGES = (
     "docs/concepts/glossary.md",
     "docs/concepts/index.md",
     "docs/concepts/residual.md",
+    "docs/derivation.md",
     "docs/howto/add-file-format.md",
     "docs/howto/add-law.md",
     "docs/howto/add-target.md",
@@ -60,6 +61,7 @@ PAGES = (
     "docs/reference/files.md",
     "docs/reference/firmware.md",
     "docs/reference/warnings.md",
+    "docs/reproduction.md",
     "docs/tutorial.md",
 )
 LONG, SHORT = "One " + "two " * MOST, "One two."
