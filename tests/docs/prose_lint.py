@@ -21,14 +21,19 @@ NUMBER = re.compile(r"\bCode\b|[-±]?\d[\w.,:/-]*\b")
 def prose_of(markdown: str) -> str:
     """Return the paragraphs of a page as proselint takes them: no quotes, and no two pieces of code or numbers alike.
 
+    Each ends with a full stop: a word at the end of a list's item is not repeated by the next one.
+
     Examples
     --------
-    >>> print(prose_of("Use `a` or `b` of \\"five\\".\\n\\n- 20 or 20 V."))
+    >>> print(prose_of("Use `a` or `b` of \\"five\\".\\n\\n- 20 or 20 V\\n- V a."))
     Use Code0 or Code1 of five.
     <BLANKLINE>
     N2 or N3 V.
+    <BLANKLINE>
+    V a.
     """
-    paragraphs = "\n\n".join(" ".join(sentences_of(block)) for block in blocks_of(markdown))
+    blocks = (" ".join(sentences_of(block)) for block in blocks_of(markdown))
+    paragraphs = "\n\n".join(block if block.endswith((".", "!", "?")) else f"{block}." for block in blocks)
     count = itertools.count()
     words = NUMBER.sub(lambda found: f"{'Code' if found[0] == 'Code' else 'N'}{next(count)}", paragraphs)
     return re.sub(r'["“”…]|\.\.\.', "", words)
