@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test quick coverage lint docs dist goldens lock clean fuzz bench bench-batch bench-c2000ware bench-faults bench-identify bench-isr bench-loading bench-paper bench-verify
+.PHONY: demo test quick coverage lint docs dist goldens lock clean fuzz bench bench-batch bench-c2000ware bench-faults bench-identify bench-isr bench-loading bench-outputs bench-paper bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -54,6 +54,10 @@ bench-c2000ware: $(STAMP)
 # Minutes, most of them for mutants; `make bench-verify BENCH=--quick` tries a part of those.
 bench-verify: $(STAMP)
 	$(BIN)/python benchmarks/verify/run.py $(BENCH)
+
+# FMUs and, most of an hour, wrong function blocks and MATLAB functions; `make bench-outputs BENCH=--quick` tries some.
+bench-outputs: $(VENV)/.bench
+	$(BIN)/python benchmarks/outputs/run.py $(BENCH)
 
 # Loading calibration blocks, 10 000 faulty exchanges: some minutes.
 bench-loading: $(STAMP)

@@ -15,7 +15,8 @@ from scoreboard import Row, kept_rows, markdown, say
 FOLDER = Path(__file__).parent
 #: Benchmark to whether it can be had `--quick`.
 BENCHMARKS = {
-    "identify": True, "isr": False, "verify": True, "batch": True, "paper": True, "loading": True, "blocks": True,
+    "identify": True, "isr": False, "verify": True, "outputs": True, "batch": True, "paper": True, "loading": True,
+    "blocks": True,
 }  # fmt: skip
 NO_ROWS = "ended without rows"
 

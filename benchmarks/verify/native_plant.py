@@ -12,7 +12,7 @@ from time import process_time
 
 import numpy as np
 from current_valve import CONTROLLED
-from firmware import example_valve
+from example_valve import example_valve
 from scoreboard import Row, print_rows, say
 from small_budgets import designed
 from stand_in_flow import RECORDINGS, valve_of

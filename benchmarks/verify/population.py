@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
-from firmware import example_valve
+from example_valve import example_valve
 from loop_peers import core_of
 from plant import fold_map_speed
 from scoreboard import Row, print_rows, say

@@ -17,7 +17,6 @@ from calibration_blocks import print_blocks  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
 from current_population import print_current_population  # noqa: E402
 from current_valve import print_current_valve  # noqa: E402
-from fmus import print_fmus  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from native_plant import print_native_plant  # noqa: E402
@@ -43,7 +42,6 @@ PARTS = {
     "current-population": (print_current_population, 1),
     "above": (print_above, 0),
     "blocks": (print_blocks, 24),
-    "fmus": (print_fmus, 0),
 }
 
 

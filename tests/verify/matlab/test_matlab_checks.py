@@ -253,7 +253,7 @@ def test_answers_for_other_codes_are_refused(folder):
 
 @needs_octave
 def test_most_wrong_functions_are_caught_by_a_sample(folder):
-    """Twenty here; benchmarks/verify/matlab_mutants.py judges sixty of each function on every input."""
+    """Twenty here; benchmarks/outputs/matlab_mutants.py judges sixty of each function on every input."""
     text, script = (folder / "dz_comp.m").read_text(), (folder / "setup_c_caller.m").read_bytes()
     assert len(mutants(text)) > 150
     chosen = evenly(mutants(text), 20)

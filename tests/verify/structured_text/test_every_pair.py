@@ -24,7 +24,7 @@ from tests.support.paths import GOLDENS, GOLDENS_FULL
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
-#: Pressure drops and pressures of a quick check; all of them are tried by `verify` and benchmarks/verify.
+#: Pressure drops and pressures of a quick check; all of them are tried by `verify` and benchmarks/outputs.
 SOME = {"plc": (range(-60, 2400, 61), range(-300, 4300, 230)), "codes": (range(-40, 3300, 97), range(0, 4096, 211))}
 
 
@@ -142,7 +142,7 @@ def test_in_units_of_a_plc_the_law_is_that_of_the_share_of_full_command(one_plc)
 @pytest.mark.slow
 @pytest.mark.parametrize(("root", "interface"), [(GOLDENS, "plc"), (GOLDENS_FULL, "codes")])
 def test_wrong_blocks_are_caught(root, interface):
-    """Some here; benchmarks/verify/block_mutants.py judges sixty of each on every input."""
+    """Some here; benchmarks/outputs/block_mutants.py judges sixty of each on every input."""
     made = compensator(root)
     text, tables = structured_text(made, "0" * 64, interface), ExactTables(made, interface)
     found = {mutant: killer(mutant, tables, *SOME[interface]) for mutant in evenly(mutants(text), 8)}

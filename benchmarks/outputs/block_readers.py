@@ -4,9 +4,11 @@ Its parser takes every ambiguity in turn, half a minute a block, so this is no t
 refused. `pip install blark`; it is under the GPL, and nothing of the product imports it.
 """
 
-import sys
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
+
+from scoreboard import Row, print_rows
 
 from dzdesign.codegen.other_targets import generate_output
 from dzdesign.core.artefact_reading import read_artefact
@@ -14,7 +16,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 
 ROOT = Path(__file__).parents[2]
-NAME = "FB_DeadZone"
+NAME, ROOTS = "FB_DeadZone", ("goldens", "goldens_full")
 
 
 def texts(root: str, dialect: str, interface: str) -> dict[str, str]:
@@ -41,21 +43,24 @@ def errors(text: str) -> int:
     return int(parse_source_code(text).exception is not None)
 
 
-def main() -> int:
-    """Read the blocks of both golden compensators; return how many can't be, or are read with an error in them."""
-    wrong, read = 0, {}
-    for root in ("goldens", "goldens_full"):
-        for dialect in ("codesys", "twincat"):
-            for interface in ("plc", "codes"):
-                for name, text in texts(root, dialect, interface).items():
-                    if text not in read:
-                        read[text] = errors(text)
-                        print(f"{root} {dialect} {interface} {name}: {read[text]} errors", flush=True)
-                    wrong += read[text]
-    broken = next(iter(read)).replace("END_IF", "END_WHILE", 1)
-    print("a block with an error in it:", "refused" if errors(broken) else "read", flush=True)
-    return wrong + (not errors(broken))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def print_block_readers(quick: bool = False, seed: int = 0) -> list[Row]:
+    """Read the blocks of both golden compensators, print and return the rows; quick: those of one compensator."""
+    del seed  # nothing is drawn
+    if find_spec("blark") is None:
+        rows = [Row(what="blark is not installed: pip install blark", value=1, limit=0)]
+    else:
+        every = [
+            text
+            for root in (ROOTS[:1] if quick else ROOTS)
+            for dialect in ("codesys", "twincat")
+            for interface in ("plc", "codes")
+            for text in texts(root, dialect, interface).values()
+        ]
+        different = list(dict.fromkeys(every))
+        broken = different[0].replace("END_IF", "END_WHILE", 1)
+        rows = [
+            Row(what=f"texts of {len(different)} that blark can't read", value=sum(map(errors, different)), limit=0),
+            Row(what="blocks with an error in them that it reads", value=1 - errors(broken), limit=0),
+        ]
+    print_rows("Function blocks in another parser", rows)
+    return rows

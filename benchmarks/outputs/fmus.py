@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 
-from firmware import example_valve
+from example_valve import example_valve
 from scoreboard import Row, print_rows, say
 
 from dzdesign.codegen.other_targets import generate_output, write_output
@@ -34,7 +34,7 @@ def print_fmus(quick: bool = False, seed: int = 0) -> list[Row]:
     every_code = {"pressure_a": "0..3 V", "pressure_b": "0..3 V", "accept": "broken-sensor"}
     compensator = design(example_valve(), options_of(every_code, target_named("f28335").inputs()))
     plant = json.dumps(asdict(read_plant(example_folder() / "plant.toml")))
-    with tempfile.TemporaryDirectory(prefix="bench-verify-") as place:
+    with tempfile.TemporaryDirectory(prefix="bench-outputs-") as place:
         folder = Path(place) / "fmus"
         begin = perf_counter()
         first, again = (generate_output(compensator, "fmu", {"plant": plant}) for _ in range(2))

@@ -7,6 +7,9 @@ goes first, so that most of them take a second.
 import sys
 from pathlib import Path
 
+from mutants_judged import EQUAL, rows_of
+from scoreboard import Row, print_rows
+
 from dzdesign.codegen.structured_text.files import structured_text
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
@@ -28,15 +31,18 @@ def judge(root: str, interface: str, count: int) -> dict[str, int]:
     text, found = structured_text(compensator, "0" * 64, interface), {}
     tables = ExactTables(compensator, interface)
     for mutant in evenly(mutants(text), count):
-        caught = killer(mutant, tables, *SOME[interface]) or killer(mutant, tables) or "equal on every input"
+        caught = killer(mutant, tables, *SOME[interface]) or killer(mutant, tables) or EQUAL
         found[caught] = found.get(caught, 0) + 1
-        if caught.startswith("equal"):
+        if caught == EQUAL:
             print(f"  equal, line {mutant.line}, {mutant.change}: {text.splitlines()[mutant.line - 1].strip()[:90]}")
     return found
 
 
-if __name__ == "__main__":
-    wanted = CASES[:1] if "--quick" in sys.argv else CASES
-    for case in wanted:
-        print(*case, flush=True)
-        print("  " + ", ".join(f"{name} {number}" for name, number in sorted(judge(*case, COUNT).items())), flush=True)
+def print_block_mutants(quick: bool = False, seed: int = 0) -> list[Row]:
+    """Judge the mutants, print and return the rows; quick: of one block."""
+    del seed  # the mutants are spread evenly over the text
+    rows = []
+    for root, interface in CASES[:1] if quick else CASES:
+        rows += rows_of(f"{root} {interface}", judge(root, interface, COUNT))
+    print_rows("Wrong function blocks", rows)
+    return rows

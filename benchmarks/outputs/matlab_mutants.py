@@ -8,6 +8,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from mutants_judged import EQUAL, rows_of
+from scoreboard import Row, print_rows
+
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 from dzdesign.verify.exhaustive.exact_law import ExactLaw  # noqa: E402
@@ -34,7 +37,7 @@ def judge(root: str, name: str, sign: int, count: int) -> dict[str, int]:
         with sampled_codes(folder, made, sign) as sample, every as everything:
             caught = killers(chosen, OCTAVE, text, script, name, sample, everything)
         for mutant, killer in zip(chosen, caught, strict=True):
-            word = killer or "equal on every input"
+            word = killer or EQUAL
             found[word] = found.get(word, 0) + 1
             if not killer:
                 line = text.splitlines()[mutant.line - 1].strip()[:90]
@@ -42,10 +45,14 @@ def judge(root: str, name: str, sign: int, count: int) -> dict[str, int]:
     return found
 
 
-if __name__ == "__main__":
-    wanted = CASES[:1] if "--quick" in sys.argv else CASES
+def print_matlab_mutants(quick: bool = False, seed: int = 0) -> list[Row]:
+    """Judge the mutants, print and return the rows; quick: of one function. Without Octave that misses."""
+    del seed  # the mutants are spread evenly over the text
+    rows = []
     if OCTAVE is None:
-        sys.exit("no octave-cli on the path: apt install octave")
-    for case in wanted:
-        print(*case, flush=True)
-        print("  " + ", ".join(f"{name} {number}" for name, number in sorted(judge(*case, COUNT).items())), flush=True)
+        rows.append(Row(what="octave-cli is not on the path: apt install octave", value=1, limit=0))
+    else:
+        for root, name, sign in CASES[:1] if quick else CASES:
+            rows += rows_of(f"{root} {name}", judge(root, name, sign, COUNT))
+    print_rows("Wrong functions for MATLAB", rows)
+    return rows
