@@ -663,7 +663,7 @@ def test_recordings_with_the_compensator_say_whose_and_the_pages_options_are_tak
 def test_a_simulated_recording_with_the_compensator_needs_a_firmware(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "--firmware", "nowhere", "-o", "after"]) == 2
-    assert "compensator of the firmware 'nowhere" in capsys.readouterr().err
+    assert "firmware manifest 'nowhere" in capsys.readouterr().err
     assert not (tmp_path / "after").exists()
 
 
