@@ -13,9 +13,9 @@ from dzdesign.core.artefact_files import TOOL
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.presentation.writer import anchor
 from dzdesign.report.figures.figure import PALETTE, ReportFigure, data_uri
-from dzdesign.report.language import current_language, word
+from dzdesign.report.language import current_language, stays_english, word
 from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
-from dzdesign.report.sections.cells import Table
+from dzdesign.report.sections.cells import Cell, Table
 
 if TYPE_CHECKING:
     import markupsafe
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Characters of a word of the language; what is longer is a name or a hash.
 LONGEST_WORD = 18
+#: Kinds of cells whose words are the report's own.
+TRANSLATED = ("good", "bad", "open", "number")
 #: Kind of a verdict -> the sign before it.
 SIGNS = {"good": "✓", "bad": "✗", "open": "?"}
 
@@ -159,13 +161,33 @@ def render(page: Page) -> str:
     """Return a page as HTML."""
     environment = strict_templates("dzdesign.report", lstrip_blocks=True, autoescape=True)
     environment.filters.update(
-        data_uri=data_uri, anchor=anchor, words=_words, cell=_cell, translated=word, css_text=_css_text
+        data_uri=data_uri, anchor=anchor, words=_words, cell=_cell, translated=word, css_text=_css_text, lang=_lang,
+        in_words=_in_words, has_english=_has_english,
     )
     content = {each.name: getattr(page, each.name) for each in fields(page)}
     html: str = environment.get_template(page.template).render(
         tool=TOOL, palette=PALETTE, language=current_language(), **content
     )
     return html
+
+
+def _lang(text: str) -> "markupsafe.Markup":
+    """Return the attribute of a sentence that stays English in a report of another language; empty of others."""
+    from markupsafe import Markup
+
+    return Markup(' lang="en"') if stays_english(text) else Markup("")
+
+
+def _has_english(section: Section) -> bool:
+    """Return whether sentences of a section stay English in a report of another language."""
+    groups = (line for _, lines in section.groups for line in lines)
+    notes = (note for table in section.tables if table for note in table.notes)
+    return any(map(stays_english, (section.missing, *section.lines, *groups, *notes)))
+
+
+def _in_words(cell: Cell) -> str:
+    """Return the text of a cell; a plain one may be somebody's name, so only what makes it translates it."""
+    return cell.text if cell.kind not in TRANSLATED else word(cell.text)
 
 
 def _css_text(text: str) -> "markupsafe.Markup":

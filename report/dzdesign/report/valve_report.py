@@ -143,9 +143,9 @@ def _sections(chain: Chain) -> dict[str, Section]:
 
 def _title(chain: Chain) -> str:
     count = len(chain.compensator.lot) if chain.compensator else 0
-    what = f"Lot setting of {count} valves: dead-zone compensator" if count else word("Dead-zone compensator")
+    what = f"Lot setting of {count} valves: dead-zone compensator" if count else "Dead-zone compensator"
     if chain.firmware:
-        return f"{what} {word('for')} {chain.firmware.target}, {word('law')} “{chain.firmware.law}”"
+        return word(f"{what} for {chain.firmware.target}, law “{chain.firmware.law}”")
     if chain.compensator:
-        return what
+        return word(what)
     return word("Valve, identified from ramp tests" if chain.valve else "Evidence of a dead-zone compensator")

@@ -16,6 +16,7 @@ from urllib.parse import quote
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.style import HUES, plot_style
+from dzdesign.report.language import word
 
 if TYPE_CHECKING:
     import numpy as np
@@ -183,10 +184,21 @@ def apart(places: Sequence[float], room: float) -> list[float]:
 
 def to_report_figure(figure: "Figure", name: str, caption: str, description: str, csv: str) -> ReportFigure:
     """Return a figure as the page shows it; see `ReportFigure`."""
+    _translate(figure)
     _make_room_for_ticks(figure)
+    caption, description = word(caption), word(description)
     return ReportFigure(
         name=name, caption=caption, description=description, svg=_svg_of(figure, name, description), csv=csv
     )
+
+
+def _translate(figure: "Figure") -> None:
+    """Put the texts of a figure into the language of the report, before it is laid out."""
+    from matplotlib.text import Text
+
+    for each in figure.findobj(Text):
+        if isinstance(each, Text) and each.get_text() != word(each.get_text()):
+            each.set_text(word(each.get_text()))
 
 
 def _make_room_for_ticks(figure: "Figure") -> None:

@@ -34,7 +34,7 @@ def make_lot_report(lot: Lot) -> Report:
     if lot.summary and lot.calibrated and not lot.summary.verified:
         missing.append("the evidence of each valve: `dzdesign batch --verify` makes it")
     page = Page(
-        title=f"{word('Lot of')} {whole(lot.expected)} {word('valve' if lot.expected == 1 else 'valves')}",
+        title=word(f"Lot of {whole(lot.expected)} {'valve' if lot.expected == 1 else 'valves'}"),
         verdict=verdict,
         figures=key_figures_of_lot(lot, spreads),
         template="lot.html.jinja",

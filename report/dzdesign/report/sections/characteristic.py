@@ -52,16 +52,16 @@ def characteristic_section(found: CharacteristicQuantities, units: RecordedUnits
     if not tables:
         return Section(missing="No characteristic is here: `dzdesign identify` makes valve.json.")
     origins = [
-        f"{word(which)}: {word(ORIGIN_WORDS[origin])}."
+        f"{which}: {ORIGIN_WORDS[origin]}."
         for which, origin in (("Without", found.before), ("With", found.after))
         if origin
     ]
-    arrow = word("Values without → with the compensator" if found.after else "Values without the compensator")
+    arrow = "Values without → with the compensator" if found.after else "Values without the compensator"
     tables[-1] = replace(
         tables[-1],
         notes=(
-            f"{word('Terms as in ISO 10770-1; the formulas are those of dzdesign, and no conformity is claimed')}.",
-            *(f"{word(NAMES[key])}: {QUANTITIES[key].formula}." for key in EXPLAINED),
+            "Terms as in ISO 10770-1; the formulas are those of dzdesign, and no conformity is claimed.",
+            *(f"{NAMES[key]}: {QUANTITIES[key].formula}." for key in EXPLAINED),
         ),
     )
     return Section(
@@ -74,7 +74,7 @@ def _reading_flows(pressures: Sequence[PressureQuantities], units: RecordedUnits
     flows = [each.reading_flow_L_min for each in pressures if each.reading_flow_L_min > 0]
     if flows:
         ends = dict.fromkeys(units.text(end, ".2f L/min") for end in (min(flows), max(flows)))
-        yield f"{word('Reading flow')}: {' … '.join(ends)}."
+        yield f"Reading flow: {' … '.join(ends)}."
 
 
 def _side_table(pressures: Sequence[PressureQuantities], side: str, units: RecordedUnits) -> Table:
@@ -84,10 +84,10 @@ def _side_table(pressures: Sequence[PressureQuantities], side: str, units: Recor
     head = [
         "–" if each.dp_MPa is None else units.number(each.dp_MPa, ".2f MPa") for each in pressures
     ]
-    limits = (word("limit"), word("verdict")) if limited else ()
+    limits = ("limit", "verdict") if limited else ()
     return Table(
-        caption=f"{word(f'{side.capitalize()} commands')}, {word('at pressure drops in')} {units.label('MPa')}",
-        columns=(word("quantity"), word("unit"), *head, *limits),
+        caption=f"{side.capitalize()} commands, at pressure drops in {units.label('MPa')}",
+        columns=("quantity", "unit", *head, *limits),
         rows=tuple(_row(key, pressures, units, with_limits=bool(limited)) for key in keys),
     )
 
@@ -138,4 +138,4 @@ def _verdict(limits: Sequence[LimitResult]) -> Cell:
     outcomes = {one.holds for one in limits}
     worst = False if False in outcomes else None if None in outcomes else True
     sign, text, kind = VERDICTS[worst]
-    return Cell(text=f"{sign} {word(text)}", kind=kind)
+    return Cell(text=f"{sign} {text}", kind=kind)

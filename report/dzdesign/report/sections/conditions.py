@@ -19,6 +19,7 @@ RECORDED = {
     "Oil": ("oil", "fluid", "öl", "druckflüssigkeit", "hydraulic oil", "hydrauliköl"),
     "Oil temperature": (
         "oil temperature", "temperature", "oil temp", "fluid temperature", "öltemperatur", "temperatur",
+        "temperatur der druckflüssigkeit",
     ),
     "Filter": ("filter", "flow filter", "signal filter", "messfilter"),
 }  # fmt: skip
@@ -43,7 +44,7 @@ def conditions_section(valve: ValveModel | None, assessment: Assessment | None) 
     else:
         meter, floor = (valve.meter.lag_in_words(), valve.meter.floor_L_min) if valve else ("", 0.0)
     rows += [
-        ("Flow meter", [f"{meter}; {word('floor')} {units.text(floor, '.2f L/min')}"]),
+        ("Flow meter", [f"{word(meter)}; {word('floor')} {units.text(floor, '.2f L/min')}"]),
         *([("Dither", [valve.dither_in_words])] if valve and valve.dither else []),
         *((name, [_entry(valve.record if valve else {}, known)]) for name, known in RECORDED.items()),
     ]
@@ -56,8 +57,8 @@ def conditions_section(valve: ValveModel | None, assessment: Assessment | None) 
     return Section(
         tables=(
             Table(
-                caption=word("Recordings"),
-                columns=("", *map(word, heads)),
+                caption="Recordings",
+                columns=("", *heads),
                 rows=tuple(
                     (Cell(text=word(name)), *(_cell(values[min(i, len(values) - 1)]) for i in range(len(heads))))
                     for name, values in rows

@@ -12,6 +12,7 @@ from dzdesign.report.figures.closed_loop import dead_zone_figure, loop_figure
 from dzdesign.report.figures.figure import Curves, ReportFigure
 from dzdesign.report.figures.input_map import map_figure
 from dzdesign.report.figures.zero_command import zero_figure
+from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import (
     Cell,
@@ -150,7 +151,7 @@ def readings_table(pressures: Sequence[PressureResult], units: RecordedUnits) ->
         f"Dead zones read {units.span(min(flows), max(flows), '.2f L/min')}, in per cent of command; an ideal line "
         "rises straight from zero command",
         pressures,
-        ("side", lambda one: one.side),
+        ("side", lambda one: word(one.side)),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         ("opening without (%)", lambda one: number(100 * one.reading_opening_without, 1)),
         ("opening with (%)", lambda one: number(100 * one.reading_opening, 1)),
@@ -166,7 +167,7 @@ def loops_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Ta
     return table_of(
         f"Dead zones at the onset of flow in per cent of command, flows in {flow}",
         pressures,
-        ("side", lambda one: one.side),
+        ("side", lambda one: word(one.side)),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         ("opening without (%)", lambda one: number(100 * one.dead_zone_opening, 1)),
         ("opening with (%)", lambda one: number(100 * one.residual_opening, 1)),
@@ -195,7 +196,7 @@ def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -
         (f"behind the edge ({units.label('MPa')})", lambda one: recorded(one.back_MPa, ".2f MPa", units)),
         (f"at zero, at the end ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
         (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
-        ("required", lambda one: _required(one, units) if one.must_shut else f"{one.not_required}: not required"),
+        ("required", lambda one: word(_required(one, units) if one.must_shut else f"{one.not_required}: not required")),
     )
 
 
@@ -223,7 +224,7 @@ def series_table(series: MonteCarlo | None, units: RecordedUnits) -> Table | Non
     return table_of(
         "Series of plants: median (1 to 99 %). No requirement: the certificate is of the tests' valve",
         series.pressures,
-        ("side", lambda one: one.side),
+        ("side", lambda one: word(one.side)),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         ("opening with (%)", lambda one: spread(one.residual_opening, percent)),
         ("closing with (%)", lambda one: spread(one.residual_closing, percent)),
@@ -236,9 +237,10 @@ def checks_section(evidence: Evidence | None) -> Section:
     """Return the section with every requirement."""
     if evidence is None:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
-    tried = [(verdict(check.holds), check.name, check.text) for check in evidence.checks]
+    tried = [(verdict(check.holds), word(check.name), check.text) for check in evidence.checks]
     untried = untried_requirements(evidence)
-    rows = [*tried, *((verdict(None), each.title, f"to try it: {each.how}".replace("`", "")) for each in untried)]
+    how = [word(f"to try it: {each.how}").replace("`", "") for each in untried]
+    rows = [*tried, *((verdict(None), word(each.title), text) for each, text in zip(untried, how, strict=True))]
     table = table_of(
         f"{len(tried)} requirements tried, {len(untried)} not",
         rows,
