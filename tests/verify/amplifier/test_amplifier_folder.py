@@ -190,3 +190,9 @@ def test_the_evidence_names_the_settings(written):
     assert evidence.settings == {"device": "csv", "table_dp": "2 MPa", "threshold": ""} and evidence.holds
     assert evidence.target == "amplifier"
     assert LAW_DEAD_ZONES.id in {check.id for check in evidence.checks}
+
+
+def test_an_option_of_other_outputs_is_refused_by_name(written, capsys, wording):
+    folder = written(*WEST)
+    assert main(["verify", str(folder), "--machine-code"]) == 2
+    wording("amplifier folder: --machine-code", capsys.readouterr().err.replace(str(folder), "amplifier"))

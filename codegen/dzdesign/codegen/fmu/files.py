@@ -77,6 +77,13 @@ def output_files(
             for part in parts for fmi in VERSIONS}  # fmt: skip
 
 
+def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
+    """Return how to have an FMU of the plant too; empty where there is one, or can't be one."""
+    if settings.get("plant") or compensator.current_drive is not None:
+        return ""
+    return "no FMU of the plant is made; for one, give --plant PLANT.toml, such as examples/paper_valve/plant.toml"
+
+
 def made_by_another_compiler(files: Mapping[str, bytes]) -> str:
     """Return why binaries are others than this machine's compiler makes; empty if it is the one that made them."""
     this = f"ziglang {ziglang_version()}"

@@ -82,7 +82,10 @@ def kind_for(folder: Path, options: Sequence[str] = ()) -> OutputKind:
     manifest = read_output_manifest(folder)
     kind = kind_of(manifest, f"'{folder / MANIFEST_NAME}'")
     for flag in (flag for flag in options if flag not in kind.options):
-        raise InputError(f"{flag} is for a C firmware, and '{folder}' is an output for {manifest.target}; leave it out")
+        others = "".join(f" or an output for {name}" for name, other in KINDS.items() if flag in other.options)
+        raise InputError(
+            f"{flag} is for a C firmware{others}, and '{folder}' is an output for {manifest.target}; leave it out"
+        )
     return kind
 
 
