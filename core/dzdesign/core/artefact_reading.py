@@ -23,6 +23,8 @@ STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]|(\[\.\.\.\])")
 ANY_KEY = "[...]"
 
 AnArtefact = TypeVar("AnArtefact", bound=Artefact)
+#: An artefact, or a dataclass in one.
+Stored = TypeVar("Stored")
 Path = list[str | int]
 
 logger = logging.getLogger(__name__)
@@ -63,8 +65,8 @@ def read_artefact(
     return artefact
 
 
-def rounded(artefact: AnArtefact, decimals: int) -> AnArtefact:
-    """Return an artefact with every float in it rounded, as its file is to have them."""
+def rounded(artefact: Stored, decimals: int) -> Stored:
+    """Return an artefact, or a part of one, with every float in it rounded, as its file is to have them."""
     return convert(_rounded(as_document(artefact), decimals), type(artefact), dec_hook=_decoded)
 
 

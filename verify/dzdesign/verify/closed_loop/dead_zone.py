@@ -7,6 +7,7 @@ import numpy as np
 from dzdesign.identify.valve.reading_flow import dead_zone_at, ideal_line
 from dzdesign.identify.valve.recorded_curve import RecordedCurve
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
+from dzdesign.verify.closed_loop.stored_digits import stored
 from dzdesign.verify.loop_results import PressureResult, Side
 
 #: The onset: flow counts as flow from this share of the largest flow on, as no meter stands between.
@@ -74,7 +75,7 @@ def compare_at_pressure(
         q_max_direct_L_min=float(direct.q_L_min.max()),
         q_max_L_min=largest,
     )
-    return LoopComparison(result=result, direct=direct, compensated=with_core)
+    return LoopComparison(result=stored(result), direct=direct, compensated=with_core)
 
 
 def dead_zone(run: LoopRun, level: float, *, rising: bool) -> float:

@@ -20,6 +20,7 @@ from dzdesign.design.machine.machine import Machine
 from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, DrawnMachine, drawn_machine, worst_ends
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RECORD_S
 from dzdesign.verify.closed_loop.scene import SETTLE_S, Scene
+from dzdesign.verify.closed_loop.stored_digits import DECIMALS
 from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
 from dzdesign.verify.exhaustive.zero_command import Staircase, guarded_bounds
 from dzdesign.verify.loop_results import Population, Side
@@ -200,8 +201,8 @@ def run_population(
         confidence=CONFIDENCE,
         upper_limit=upper_limit(flowing, machines),
         pressures=count,
-        largest_L_min=max(worst[0], 0.0),
-        largest_dp_MPa=worst[2],
+        largest_L_min=round(max(worst[0], 0.0), DECIMALS),
+        largest_dp_MPa=round(worst[2], DECIMALS),
         worst=worst[1].in_words() if worst[1] else {},
         drawn=tuple(name for name in COMPONENTS if name in drawn),
     )

@@ -12,6 +12,7 @@ from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.readings import NO_ERRORS, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
+from dzdesign.verify.closed_loop.stored_digits import stored
 from dzdesign.verify.loop_results import ScenarioResult, Side
 
 #: Two periods a record: as often as the core samples, 1.25 kHz.
@@ -125,7 +126,7 @@ class Scene:
         ended_MPa = self.dp_MPa if end_MPa is None else end_MPa
         shut = judged or np.flatnonzero(held_for(run.command <= 0, round(self.settle_s / STEP_S)))
         q_peak = float(run.q_largest_L_min[shut].max(initial=0.0))
-        return ScenarioResult(
+        found = ScenarioResult(
             name=name,
             side=self.side,
             dp_MPa=self.dp_MPa,
@@ -139,6 +140,7 @@ class Scene:
             not_required=not_required,
             figures={key: float(value) for key, value in figures.items()},
         )
+        return stored(found)
 
 
 def ramp(start: float, end: float, seconds: float = RAMP_S) -> np.ndarray:

@@ -16,6 +16,7 @@ from dzdesign.core.errors import InputError, quoted
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant, read_parameters
+from dzdesign.verify.closed_loop.stored_digits import DECIMALS
 from dzdesign.verify.loop_results import MonteCarlo, Scatter, Side, Spread
 
 #: Keys of a file of tolerances beside the parameters.
@@ -124,8 +125,8 @@ def scatter(
 
 def _spread_of(values: np.ndarray, drawn: Sequence[Mapping[str, float]], worst: int) -> Spread:
     """Return the quantiles of one quantity, and the plant at its bad end."""
-    p01, p05, p50, p95, p99 = map(float, np.quantile(values, QUANTILES))
-    return Spread(p01=p01, p05=p05, p50=p50, p95=p95, p99=p99, worst=float(values[worst]), worst_plant=drawn[worst])
+    p01, p05, p50, p95, p99, end = np.round([*np.quantile(values, QUANTILES), values[worst]], DECIMALS).tolist()
+    return Spread(p01=p01, p05=p05, p50=p50, p95=p95, p99=p99, worst=end, worst_plant=drawn[worst])
 
 
 def monte_carlo(tolerances: Tolerances, found: Sequence[Scatter]) -> MonteCarlo:

@@ -10,6 +10,7 @@ from dzdesign.design.current.circuit import CoilCircuit
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.scene import Scene
+from dzdesign.verify.closed_loop.stored_digits import stored
 from dzdesign.verify.current.results import ValveAtCorners
 from dzdesign.verify.loop_results import flow_in_words
 from dzdesign.verify.requirements import CURRENT_VALVE, Check
@@ -29,7 +30,7 @@ def valve_at_corners(scene: Scene, circuit: CoilCircuit) -> ValveAtCorners:
     loops = [scene.loop.with_coil()]
     loops += [scene.loop.with_coil(resistance=ohm, inductance=henry, supply_V=volts) for ohm, henry, volts in ends]
     openings, at_zero, released = zip(*(_read(loop, command, scene.dp_MPa, level) for loop in loops), strict=True)
-    return ValveAtCorners(
+    found = ValveAtCorners(
         dp_MPa=scene.dp_MPa,
         runs=len(loops),
         opening_least=min(openings),
@@ -40,6 +41,7 @@ def valve_at_corners(scene: Scene, circuit: CoilCircuit) -> ValveAtCorners:
         leak_L_min=scene.loop.leak_L_min(scene.dp_MPa),
         allowed_at_zero_L_min=scene.loop.allowed_at_zero_L_min(scene.dp_MPa),
     )
+    return stored(found)
 
 
 def _read(loop: ClosedLoop, command: np.ndarray, dp_MPa: float, level: float) -> tuple[float, float, float]:

@@ -14,6 +14,7 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, PERIODS_PER_RECORD, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.scene import Scene
+from dzdesign.verify.closed_loop.stored_digits import stored_comparison
 from dzdesign.verify.integrator.compiled_calls import compiled_core
 from dzdesign.verify.integrator.direct_drive import unlike_direct_values
 from dzdesign.verify.integrator.reference_loop import ReferenceLoop, ReferenceRun
@@ -35,7 +36,7 @@ def compare_with_integrator(
     """Run every window in both loops; return what is between them, and whether it is little enough."""
     say("comparing the plant with CasADi's integrator")
     try:
-        found = tuple(_compared(firmware, windows_of(scenes)))
+        found = tuple(map(stored_comparison, _compared(firmware, windows_of(scenes))))
     except RuntimeError as error:  # of CasADi, of an integrator that gives up
         reason = next((line for line in reversed(str(error).splitlines()) if line.strip()), "no reason given")
         text = f"CVODES gave up ({reason.strip()[:100]}): correct mass, spring, damping or coil in --plant"
