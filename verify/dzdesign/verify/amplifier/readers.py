@@ -20,6 +20,16 @@ INCREMENTS, HUNDREDTHS, FULL_MV = 16384, 10_000, 10_000
 TABLE_POINTS = 100
 #: A number as files have it; one of another form could be of any size, such as 1e999999999.
 DECIMAL = re.compile(r"-?[0-9]{1,9}(?:\.[0-9]{1,15})?")
+COUNT = re.compile(r"0|[1-9][0-9]{0,8}")
+#: A character that no file has: another line end, for one, may part lines here and not in the device.
+STRANGE = re.compile(r"[^\r\n -~]")
+#: Objects of CiA 408 that the dead band has; beside them a file would set what nobody certified.
+OBJECTS = {"6342", "6343", "6343sub1", "6344", "6344sub1", "6345", "6345sub1"}
+#: All of a TF5810 file but its comments.
+TABLE_TEXT = re.compile(
+    r"\s*VAR_GLOBAL\s+ValveCharacteristicTable : ARRAY\[1\.\.100,1\.\.2\] OF LREAL := \[([^\]]*)\];"
+    r"\s+ValveCharacteristicTblCount : INT := ([0-9]+);\s+END_VAR\s*"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,10 +64,12 @@ def read_file(device: str, content: bytes) -> Mapping[int, FileLaw]:
     InputError
         If the text is none of that device's.
     """
-    text = content.decode("ascii", "replace")
+    text = content.decode("latin-1")
     family = device.partition("-")[0]
     if family not in READERS:
         raise InputError(f"there is no reader of files for '{device}', expected one of {', '.join(READERS)}")
+    if found := STRANGE.search(text):
+        raise InputError(f"the file for {device} can't be read back: it has the character {found[0]!r}")
     try:
         return READERS[family](text)
     except (KeyError, IndexError, ValueError, ZeroDivisionError, configparser.Error) as error:
@@ -77,7 +89,9 @@ def _west(text: str) -> Mapping[int, FileLaw]:
     found: dict[str, int] = {}
     for line in text.splitlines():
         name, value = line.split(" ")
-        found[name] = int(value)
+        if name in found:
+            raise ValueError(f"'{name}' stands there twice")
+        found[name] = _count(value)
     names = {1: ":A", -1: ":B"} if "MIN:A" in found else {1: ""}
     there = {sign: end for sign, end in names.items() if f"MIN{end}" in found}
     sides = {sign: (found.pop(f"MIN{end}"), found.pop(f"MAX{end}")) for sign, end in there.items()}
@@ -92,8 +106,12 @@ def _cia408(text: str) -> Mapping[int, FileLaw]:
     entries.read_string(text)
 
     def value(section: str) -> int:
-        return int(entries[section]["ParameterValue"], 0)
+        return _count(entries[section]["ParameterValue"])
 
+    objects = {section for section in entries.sections() if re.match(r"[0-9A-Fa-f]{4}", section)}
+    if objects != OBJECTS or entries.defaults():
+        others = sorted(objects ^ OBJECTS) or sorted(entries.defaults())
+        raise ValueError(f"its objects are not those of the dead band: {', '.join(others)[:40]}")
     if value("6342") != 1:
         raise ValueError("0x6342 is not 1, the function that jumps")
     sides = {1: (value("6343sub1"), INCREMENTS), -1: (value("6344sub1"), INCREMENTS)}
@@ -112,10 +130,11 @@ def _rmc(text: str) -> Mapping[int, FileLaw]:
 
 
 def _beckhoff(text: str) -> Mapping[int, FileLaw]:
-    plain = re.sub(r"\(\*.*?\*\)", "", text, flags=re.DOTALL)
-    listed = plain.partition("OF LREAL := [")[2].partition("]")[0].split(",")
-    *numbers, rest = [item.strip() for item in listed]
-    count = int(plain.partition("TblCount : INT :=")[2].partition(";")[0])
+    declared = TABLE_TEXT.fullmatch(re.sub(r"\(\*.*?\*\)", "", text, flags=re.DOTALL))
+    if declared is None:
+        raise ValueError("beside comments it is not the declaration of one table and its count")
+    *numbers, rest = [item.strip() for item in declared[1].split(",")]
+    count = _count(declared[2])
     if len(numbers) != 2 * count or rest != f"{2 * (TABLE_POINTS - count)}(0.0)" or not count % 2:
         raise ValueError(f"{len(numbers)} numbers stand in a table of {count} points")
     return _table([(_number(x), _number(y)) for x, y in zip(numbers[::2], numbers[1::2], strict=True)])
@@ -126,6 +145,13 @@ def _csv(text: str) -> Mapping[int, FileLaw]:
     if header != "command_percent,drive_percent":
         raise ValueError(f"the columns are '{header}'")
     return _table([(_number(x) / 100, _number(y) / 100) for x, y in (row.split(",") for row in rows)])
+
+
+def _count(text: str) -> int:
+    """Return a whole number as it is written in digits; another form, which a device may read otherwise, is none."""
+    if not COUNT.fullmatch(text):
+        raise ValueError(f"{text[:20]!r} is no whole number")
+    return int(text)
 
 
 def _number(text: str) -> Fraction:
