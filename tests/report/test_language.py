@@ -20,6 +20,8 @@ from dzdesign.report.characteristic.curves import ORIGIN_WORDS
 from dzdesign.report.figures.characteristic import WITH_WORDS
 from dzdesign.report.language import LANGUAGES, current_language, in_language, stays_english, table_of_language, word
 from dzdesign.report.logo import LARGEST, logo_uri
+from dzdesign.report.lot.report import report_of_lot
+from dzdesign.report.lot.table import SideFigures, TableRow
 from dzdesign.report.page import SIGNS
 from dzdesign.report.sections.characteristic import EXPLAINED, NAMES
 from dzdesign.report.sections.conditions import RECORDED
@@ -28,6 +30,7 @@ from dzdesign.verify import requirements
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.paths import ROOT
 from tests.support.synthetic import Truth, synthetic_ramp
+from tests.support.synthetic_lots import write_lot_folder
 
 REPORT = ROOT / "report" / "dzdesign" / "report"
 PNG = base64.b64decode(
@@ -143,6 +146,13 @@ def test_no_fixed_word_of_a_german_report_is_english(german_demo, tag):
     assert [each for each in plain if ENGLISH.search(each)] == []
 
 
+def test_a_legend_fits_its_figure_in_german_too(german_demo):
+    """No text begins left of the drawing: a legend that is wider than its figure would."""
+    drawings = re.findall(r'<svg class="drawing".*?</svg>', german_demo, re.DOTALL)
+    starts = [float(x) for each in drawings for x in re.findall(r"text-anchor: start[^>]* x=\"(-?[\d.]+)\"", each)]
+    assert len(starts) > 30 and min(starts) > 0
+
+
 def test_a_german_report_says_where_findings_are_english(german_demo):
     words = "Befunde im Wortlaut der Nachweise, englisch."
     checks = german_demo[german_demo.index('<section id="checks">') :]
@@ -200,6 +210,14 @@ def test_a_german_report_with_a_logo_needs_nothing_from_outside(valve_folder, ca
     assert main(["report", str(valve_folder), *options]) == 1
     assert page.read_bytes() == again
     capsys.readouterr()
+
+
+def test_a_lot_has_a_logo_too(tmp_path):
+    (tmp_path / "logo.png").write_bytes(PNG)
+    rows = [TableRow(name="V1", status="failed", reason="no recording", sides={"": SideFigures()})]
+    html = report_of_lot(write_lot_folder(tmp_path / "lot", rows), logo_uri(tmp_path / "logo.png")).html
+    (image,) = Page(html).of("img")
+    assert base64.b64decode(image["src"].removeprefix("data:image/png;base64,")) == PNG
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ class ReportArguments:
     language: Annotated[str, Option("CODE", choices=LANGUAGES)] = "en"
     """Language of headings and labels. Sentences that state findings are in English."""
     logo: Annotated[AnyPath | None, Option("IMAGE")] = None
-    """Logo beside the title of a valve's report. The page embeds a PNG, JPEG or GIF."""
+    """Logo beside the title. The page embeds a PNG, JPEG or GIF."""
 
 
 def report(arguments: ReportArguments) -> "Report":
@@ -54,7 +54,7 @@ def report(arguments: ReportArguments) -> "Report":
     logo = "" if arguments.logo is None else logo_uri(Path(arguments.logo))
     with in_language(arguments.language):
         if is_lot(folder):
-            made = report_of_lot(folder)
+            made = report_of_lot(folder, logo)
         else:
             refuse_uncalibrated(folder)
             made = report_of_folder(folder, logo)

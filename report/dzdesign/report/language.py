@@ -20,8 +20,7 @@ from dzdesign.core.errors import InputError, nearest
 LANGUAGES = ("en", "de")
 #: What parts the sentences of a text, and the clauses of a sentence; each may stand in the table on its own.
 PARTED = (re.compile(r"((?<!\bEq)(?<!\bs\.[ed])\. )"), re.compile(r"(; )"))
-#: An English word, no name of a file or an option: what stands in a place of a phrase and in no table has none, or is
-#: one word, somebody's name.
+#: An English word, no name of a file or an option: what stands in a place of a phrase and in no table has none.
 ENGLISH = re.compile(r"(?<![\w.`/-])[a-z]{3,}(?![\w./])")
 #: Characters of a text that is looked up: a longer one is no phrase.
 LONGEST = 2000
@@ -104,7 +103,7 @@ def _phrase(language: str, english: str) -> str | None:
         return table[english]
     for literals, key in _patterns(language):
         filled = [(each, _translated(language, each)) for each in _fill(literals, english) or ()]
-        if filled and all(known or " " not in each or not ENGLISH.search(each) for each, known in filled):
+        if filled and all(known or not ENGLISH.search(each) for each, known in filled):
             return table[key].format(*(known or each for each, known in filled))
     return None
 

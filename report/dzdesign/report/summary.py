@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from dzdesign.assess.limits import LIMITED
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED, verdict_words
 from dzdesign.design.compensator import Compensator
@@ -87,8 +88,9 @@ def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headlin
 
 def _limits(chain: Chain) -> list[Check]:
     """Return the user's limits on recordings as requirements, if there are any."""
+    names = {key: each.name for key, each in LIMITED.items()}
     return [
-        Check(id="limit", name=f"limit of {each.quantity}, {each.place}", holds=each.holds, text=each.text)
+        Check(id="limit", name=f"limit of {names[each.quantity]}, {each.place}", holds=each.holds, text=each.text)
         for each in (chain.assessment.limits if chain.assessment else ())
     ]
 

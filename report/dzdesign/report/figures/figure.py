@@ -44,7 +44,9 @@ WIDTH = 7.4
 #: Left margin, and the width of numbers on the axis for which it has room: of ``5.150``.
 LEFT, TICKS_IN_MARGIN = 0.6, 0.345
 #: Of the numbers on axes, points.
-TICK_SIZE = 8.5
+TICK_SIZE = LEGEND_SIZE = 8.5
+#: How often the words of a legend that is too wide are made smaller, by 7 % each.
+SMALLER = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +100,7 @@ def figure_style() -> Iterator[None]:
         axes__titlesize=9.5,
         xtick__labelsize=TICK_SIZE,
         ytick__labelsize=TICK_SIZE,
-        legend__fontsize=8.5,
+        legend__fontsize=LEGEND_SIZE,
         svg__fonttype="none",  # to be searched, read out, and set in the page's own font
     ):
         yield
@@ -186,6 +188,7 @@ def to_report_figure(figure: "Figure", name: str, caption: str, description: str
     """Return a figure as the page shows it; see `ReportFigure`."""
     _translate(figure)
     _make_room_for_ticks(figure)
+    _make_room_for_legend(figure)
     caption, description = word(caption), word(description)
     return ReportFigure(
         name=name, caption=caption, description=description, svg=_svg_of(figure, name, description), csv=csv
@@ -212,6 +215,16 @@ def _make_room_for_ticks(figure: "Figure") -> None:
     surplus = TICK_SIZE * em / 72 - TICKS_IN_MARGIN
     if surplus > 0:
         figure.subplots_adjust(left=(LEFT + surplus + 0.04) / WIDTH)
+
+
+def _make_room_for_legend(figure: "Figure") -> None:
+    """Make the words of a legend below the axes smaller where it is wider than the figure."""
+    for legend in figure.legends:
+        for step in range(1, SMALLER + 1):
+            if legend.get_window_extent().width <= figure.bbox.width:
+                break
+            for text in legend.get_texts():
+                text.set_fontsize(LEGEND_SIZE * 0.93**step)
 
 
 def _svg_of(figure: "Figure", name: str, description: str) -> str:

@@ -21,12 +21,12 @@ from dzdesign.report.sections.cells import whole
 IN_VERDICT, ANOMALIES_IN_VERDICT = 8, 3
 
 
-def report_of_lot(folder: Path) -> Report:
-    """Make the report of the folder of a lot, finished or stopped."""
-    return make_lot_report(read_lot(folder))
+def report_of_lot(folder: Path, logo: str = "") -> Report:
+    """Make the report of the folder of a lot, finished or stopped; `logo` is a data: address."""
+    return make_lot_report(read_lot(folder), logo)
 
 
-def make_lot_report(lot: Lot) -> Report:
+def make_lot_report(lot: Lot, logo: str = "") -> Report:
     """Make the report of a lot."""
     verdict = lot_headline(lot)
     spreads = spreads_of(lot.rows, lot.units)
@@ -40,6 +40,7 @@ def make_lot_report(lot: Lot) -> Report:
         template="lot.html.jinja",
         sections=sections_of(lot, spreads),
         missing=missing,
+        logo=logo,
     )
     return report_of(page, lot.faults)
 
