@@ -1,7 +1,10 @@
 """`dzdesign init RAMP...`: look at recordings, write a commented dzdesign.toml with what was seen and what was not."""
 
 import os
+import re
+import shlex
 
+from dzdesign.core.errors import one_line
 from dzdesign.core.options import paths_of
 from dzdesign.initial_options.guided import init_by_questions
 from dzdesign.stages.init import InitArguments, init
@@ -12,6 +15,8 @@ Arguments = InitArguments
 EXAMPLES = ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml")
 #: Names of recordings that are repeated in the command to give next.
 MOST_NAMES = 3
+#: A name or a pattern in which no shell finds anything but a name or a pattern.
+PLAIN = re.compile(r"[\w ./*?:\[\],+@%=-]*")
 
 
 def run(arguments: Arguments, json: bool) -> int:
@@ -29,14 +34,17 @@ def run(arguments: Arguments, json: bool) -> int:
         })  # fmt: skip
         return 1 if proposal.opens else 0
     for line in (*(() if asked else proposal.seen), *(f"open: {line}" for line in proposal.opens)):
-        print(line)
+        print(one_line(line))
     ramps = [os.fspath(path) for path in paths_of(arguments.ramps)]
     names = " ".join(map(_word, ramps)) if 0 < len(ramps) <= MOST_NAMES else "RAMP..."
-    print(f"Written: {output}" + ("; fill in what is open, then" if proposal.opens else "; read it, then"))
+    print(f"Written: {one_line(output)}" + ("; fill in what is open, then" if proposal.opens else "; read it, then"))
     print(f"  dzdesign identify {names} --config {_word(output)}")
     return 1 if proposal.opens else 0
 
 
 def _word(name: str) -> str:
-    """Return a name as one word of any shell; a pattern stays one."""
+    """Return a name as one word of any shell; a pattern stays one, and what a shell would run is in quotes."""
+    name = one_line(name)
+    if os.name != "nt" and not PLAIN.fullmatch(name):
+        return shlex.quote(name)
     return f'"{name}"' if " " in name else name

@@ -70,7 +70,7 @@ def _with_columns_that_can_be_read(
 def _say_new(proposal: "Proposal", said: list[str]) -> None:
     """Print what was seen and is not said yet."""
     new = [line for line in proposal.seen if line not in said]
-    print("".join(f"{line}\n" for line in new), end="")
+    print("".join(f"{one_line(line)}\n" for line in new), end="")
     said += new
 
 

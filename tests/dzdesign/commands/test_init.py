@@ -1,6 +1,8 @@
 """`dzdesign init`: the file that it writes is accepted, and identify runs with it on these recordings as they are."""
 
 import json
+import os
+import shlex
 import shutil
 import tomllib
 from pathlib import Path
@@ -406,3 +408,13 @@ def test_the_look_is_of_labels_and_units(here):
     assert set(found.known) == {"time", "Q"}
     assert "is it the drop, pA or pB?" in found.unclear["dP"]
     assert pressures_in_name("a_1.5MPa_40bar.csv") == () and pressures_in_name("ramp 12,5 Bar up.csv") == ("12.5 bar",)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="names that Windows has not")
+@pytest.mark.parametrize("name", ["$(touch x).csv", ";touch x;.csv", "`id` a.csv", "a'b.csv", "a b.csv", "&.csv"])
+def test_the_command_to_give_next_is_one_that_a_shell_reads_as_it_is_meant(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).write_text("time_s,u_V\n0,1\n", encoding="utf-8")
+    main(["init", name, "-o", "options.toml"])
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert shlex.split(last) == ["dzdesign", "identify", name, "--config", "options.toml"]
