@@ -8,6 +8,7 @@ import pytest
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import CommonArguments, arguments_of_command
 from dzdesign.core.options import arguments_of
+from dzdesign.identify.data_quality.catalogue import catalogue
 from tests.docs import sentences
 from tests.docs.prose_lint import pages
 from tests.docs.sentences import MEAN, MOST, blocks_of, faults_of, sentences_of
@@ -52,6 +53,11 @@ def test_the_help_of_a_command_can_be_read_once(name):
 def test_a_help_text_that_is_no_sentence_is_found():
     texts = ("Full command (default: 10 V).", "full command.", "Full command", "Full command..", "File; see `a.json`.")
     assert [text for text in texts if unfinished(text)] == list(texts[1:4])
+
+
+def test_what_a_warning_means_can_be_read_once():
+    said = [" ".join(text.split()) for entry in catalogue().values() for text in (entry.meaning, entry.remedy)]
+    assert len(said) > 80 and faults_of(said) == []
 
 
 def test_a_sentence_that_is_too_long_is_found_wherever_it_stands():

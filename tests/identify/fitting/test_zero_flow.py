@@ -136,7 +136,7 @@ class TestWhatCannotBePromised:
         side = model.positive
         assert side.zero_flow_L_min == pytest.approx(side.certificate.level_L_min, rel=0.05)
         assert side.certificate.zero_flow_L_min == pytest.approx(0.02)
-        assert "can't be told" in warning(model).text
+        assert "less than the recordings resolve" in warning(model).text
 
     def test_at_one_pressure_a_reading_at_rest_counts_as_a_leak(self):
         valve = replace(WORN, zero=0.3)
