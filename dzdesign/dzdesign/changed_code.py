@@ -113,7 +113,8 @@ def _bytes_of(path: Path) -> bytes | None:
 
 def _words(names: list[str]) -> str:
     this = f"{THIS_TOOL.name} {THIS_TOOL.version}"
-    return f"{and_more(names, MOST_NAMED)} is not what {this} generates from its compensator.json"
+    verb = "is" if len(names) == 1 else "are"
+    return f"{and_more(names, MOST_NAMED)} {verb} not what {this} generates from its compensator.json"
 
 
 def _refusal(folder: Path, reason: str, otherwise: str) -> RequirementError:

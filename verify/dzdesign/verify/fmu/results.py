@@ -3,20 +3,20 @@
 import logging
 import re
 import shlex
-import subprocess
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.scratch import scratch_folder
+from dzdesign.verify.toolchain.confinement import MOST_WRITTEN, run_confined
 from dzdesign.verify.toolchain.machines import Machine
 
 logger = logging.getLogger(__name__)
 
 #: Last line of results that are whole, and how the line of a refusal begins.
 END, REFUSED = "end", "refused "
-NUMBERS = re.compile(r"[\d ]*")
+NUMBERS = re.compile(r"(?:\d{1,20}(?: |$))*", re.ASCII)
 
 
 def results_of(
@@ -31,19 +31,23 @@ def results_of(
         file = place / "results"
         command = [*machine.runner, str(program), *arguments, f"{drive}{file}"]
         begin = time.perf_counter()
-        try:
-            done = subprocess.run(
-                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=place,
-                timeout=machine.run_timeout_s, check=False,
-            )  # fmt: skip
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise RequirementError(f"{what} on the {machine.name} did not end: {error}") from error
+        ended = run_confined(
+            command, f"{what} on the {machine.name}", machine.run_timeout_s, memory=machine.memory, results=place,
+            confined=machine.confined,
+        )  # fmt: skip
         logger.debug("%s (%.3f s)", shlex.join(command), time.perf_counter() - begin)
-        lines = file.read_bytes().decode("ascii", "replace").splitlines() if file.is_file() else []
+        lines = _lines(file)
     refusal = next((line.removeprefix(REFUSED)[:200] for line in lines if line.startswith(REFUSED)), "")
-    if done.returncode:
-        reason = f"signal {-done.returncode}" if done.returncode < 0 else f"exit status {done.returncode}"
-        raise RequirementError(f"{what} on the {machine.name} ended with {reason}{': ' * bool(refusal)}{refusal}")
+    if ended.reason:
+        raise RequirementError(f"{what} on the {machine.name} ended with {ended.reason}{': ' * bool(refusal)}{refusal}")
     if not lines or lines[-1] != END or not all(NUMBERS.fullmatch(line) for line in lines[:-1]):
         raise RequirementError(f"{what} on the {machine.name} ended before its results were whole")
     return [list(map(int, line.split())) for line in lines[:-1] if line.strip()]
+
+
+def _lines(file: Path) -> list[str]:
+    """Return the lines of a file of results; of what is no plain file none."""
+    if file.is_symlink() or not file.is_file():
+        return []
+    with file.open("rb") as opened:
+        return opened.read(MOST_WRITTEN).decode("ascii", "replace").splitlines()

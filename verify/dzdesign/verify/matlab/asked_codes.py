@@ -57,7 +57,7 @@ class AskedCodes:
     def judged(self, answers: Mapping[str, Path], text: bytes, what: str) -> Findings:
         """Return what the check finds of the answers, output to file, of a function with this text."""
         program = _program(self.folder, self.sign, self.any_command, answers, core=None)
-        return _checked(program, self.prepared, self.sample, text, what)
+        return _checked(program, self.prepared, self.sample, text, what, self.folder)
 
 
 @contextmanager
@@ -68,7 +68,7 @@ def asked_codes(
     with scratch_folder() as folder:
         made = core.compiled()
         program = _program(folder, sign, any_command, {}, made)
-        compiled = _checked(program, prepared, sample, made.read_bytes(), f"the core {core.name}")
+        compiled = _checked(program, prepared, sample, made.read_bytes(), f"the core {core.name}", folder)
         yield AskedCodes(
             folder=folder, sign=sign, prepared=prepared, sample=sample, compiled=compiled, any_command=any_command
         )
@@ -92,8 +92,8 @@ def _program(folder: Path, sign: int, any_command: int, answers: Mapping[str, Pa
     return HOST.link(objects if core is None else [*objects, core], "the check of answers")
 
 
-def _checked(program: Path, prepared: bytes, sample: bool, checked: bytes, what: str) -> Findings:
-    printed = HOST.run(program, [str(stored(prepared)), *(["sample"] if sample else [])], what)
+def _checked(program: Path, prepared: bytes, sample: bool, checked: bytes, what: str, folder: Path) -> Findings:
+    printed = HOST.run(program, [str(stored(prepared)), *(["sample"] if sample else [])], what, folder)
     return findings_of(printed, sha256_of(checked), what)
 
 

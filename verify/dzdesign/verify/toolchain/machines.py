@@ -7,7 +7,6 @@ import logging
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Mapping
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
+from dzdesign.verify.toolchain.confinement import MOST_MEMORY, numbers_in, run_confined
 from dzdesign.verify.toolchain.host_compiler import alone, build_folder, built, host_compiler, words_of
 
 logger = logging.getLogger(__name__)
@@ -57,6 +57,10 @@ class Machine:
     small: bool = False
     #: A run that takes longer hangs.
     run_timeout_s: float = 60.0
+    #: Most address space of the program, bytes; 0: any, as a simulator needs.
+    memory: int = MOST_MEMORY
+    #: Whether the program runs with limits and without rights that it does not need.
+    confined: bool = True
 
     def missing(self) -> str:
         """Return what was not found, with what to install, or an empty text."""
@@ -84,24 +88,23 @@ class Machine:
         ending = ".exe" if sys.platform == "win32" and not self.compiler else ""
         return built(f"program{ending}", [*words_of(self._compiler), *map(str, objects), *flags], {}, what)
 
-    def run(self, program: Path, arguments: list[str], what: str) -> list[list[int]]:
-        """Run a program and return the lines of numbers that it printed; if it fails or hangs, `RequirementError`."""
+    def run(self, program: Path, arguments: list[str], what: str, results: Path | None = None) -> list[list[int]]:
+        """Run a program and return the lines of numbers that it printed; if it fails or hangs, `RequirementError`.
+
+        `results` is the one folder in which it may write.
+        """
         command = [*self.runner, str(program), *arguments]
         begin = time.perf_counter()
-        try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
-                timeout=self.run_timeout_s, check=False,
-            )  # fmt: skip
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise RequirementError(f"{what} on the {self.name} did not end: {error}") from error
+        ended = run_confined(
+            command, f"{what} on the {self.name}", self.run_timeout_s, memory=self.memory, results=results,
+            confined=self.confined,
+        )  # fmt: skip
         logger.debug("%s (%.3f s)", shlex.join(command), time.perf_counter() - begin)
-        if done.returncode:
-            reason = f"signal {-done.returncode}" if done.returncode < 0 else f"exit status {done.returncode}"
-            raise RequirementError(f"{what} on the {self.name} ended with {reason}: {done.stderr.strip()[:200]}")
+        if ended.reason:
+            said = f": {ended.complaint.strip()[:200]}" if ended.complaint.strip() else ""
+            raise RequirementError(f"{what} on the {self.name} ended with {ended.reason}{said}")
         # QEMU's semihosting writes to stderr where stdout is no terminal of its own.
-        printed = ESCAPES.sub("", done.stdout + "\n" + done.stderr).replace(" .", " ")
-        return [list(map(int, line.split())) for line in printed.splitlines() if re.fullmatch(r"\s*\d[\d\s]*", line)]
+        return numbers_in(ESCAPES.sub("", ended.printed + "\n" + ended.complaint).replace(" .", " "))
 
 
 def stored(content: bytes) -> Path:
@@ -141,6 +144,7 @@ CORTEX_M4 = Machine(
     ),
     needs={"arm-none-eabi-gcc": "gcc-arm-none-eabi", "qemu-system-arm": "qemu-system-arm"},
     run_timeout_s=300.0,
+    memory=0,
 )  # fmt: skip
 CHIP, CLOCK_HZ = "atmega1280", 16_000_000
 _AVR = (f"-mmcu={CHIP}", f"-DF_CPU={CLOCK_HZ}UL")
@@ -160,4 +164,5 @@ AVR = Machine(
     needs={"avr-gcc": "gcc-avr avr-libc", "simavr": "simavr"},
     small=True,
     run_timeout_s=300.0,
+    memory=0,
 )
