@@ -168,7 +168,8 @@ def _at_zero(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
     return Figure(
         label="Flow at zero command",
         value="none" if flow <= 1e-9 and unseen is None else f"{value} {unit}",
-        note=f"in the simulated loop, after closing, {worst_of(loops, units)}{hidden}{of_it}; without β it would be "
+        note=f"in the simulated loop, after closing, {worst_of(loops, units)}{hidden}{of_it}; "
+        "without the correction for the pressure drop (β) it would be "
         f"{bare.in_words(bare.q_zero_without_beta_L_min, units)} {unit}",
         kind="text" if flow <= 1e-9 or within else "bad",
     )
@@ -208,9 +209,12 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         value=f"{100 * worst.confidence:g} %",
         note=f"confidence that the drive at zero command stays below the {worst.guard} threshold "
         f"{units.span(low, high, '.2f MPa')}; smallest margin "
-        f"{units.text(1e3 * float(worst.smallest_margin_V), '.3f mV')} of the exact law under "
-        "the certified offset, half a count kept for the rounding"
-        + (f"; {units.text(least, '.3f mV')} of the C's compare values under the threshold's bound" if inputs else "")
+        + (
+            f"{units.text(least, '.3f mV')}, of the C's output under the threshold's lower bound"
+            if inputs
+            else f"{units.text(1e3 * float(worst.smallest_margin_V), '.3f mV')}, of the exact law under the certified "
+            "offset, beside half a count for the rounding"
+        )
         + (
             f". F{at_zero.none_in_words(worst.guard, units)[1:]}"
             if worst.zero_flow_L_min is None
@@ -238,9 +242,9 @@ def _inputs(evidence: Evidence) -> Figure:
     if not evidence.inputs:
         return Figure(label="Inputs checked", value=NOT_CHECKED, note="the C did not get so far", kind="open")
     wrong, every = sum(each.wrong for each in evidence.inputs), sum(each.inputs for each in evidence.inputs)
-    pairs = "pairs of command and pressure-difference code"
+    pairs = "pairs of command code and pressure-difference code"
     if wrong:
         return Figure(
             label="Inputs checked", value=f"{whole(wrong)} wrong", note=f"of {whole(every)} {pairs}", kind="bad"
         )
-    return Figure(label="Inputs checked", value=whole(every), note=f"{pairs}, none wrong")
+    return Figure(label="Inputs checked", value=whole(every), note=f"{pairs}; on each the C gives what the law does")
