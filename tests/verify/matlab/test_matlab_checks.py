@@ -184,7 +184,7 @@ def test_without_octave_the_function_is_not_checked_and_the_c_is(folder, few, mo
 
 @pytest.mark.parametrize("name", ["dz_comp.m", "setup_c_caller.m", "core/dz_comp.c", "core/dz_comp.h"])
 def test_what_is_not_as_generated_is_not_run(folder, name, monkeypatch):
-    monkeypatch.setattr(octave_module.subprocess, "run", lambda *_, **__: pytest.fail("a program was run"))
+    monkeypatch.setattr(octave_module, "run_program", lambda *_, **__: pytest.fail("a program was run"))
     edited(folder, name, "\n", "\n\n", told=False)
     (check,) = checks_of(folder).checks
     assert (check.id, check.holds) == ("exact-law", False) and name in check.text
@@ -194,7 +194,7 @@ def test_what_is_not_as_generated_is_not_run(folder, name, monkeypatch):
 
 @pytest.mark.parametrize("line", ["system('touch it');", "if true\nend", "x = @sin;", "!touch it", "cd ..;"])
 def test_what_is_not_of_the_subset_is_not_run_though_the_manifest_has_it(folder, line, monkeypatch):
-    monkeypatch.setattr(octave_module.subprocess, "run", lambda *_, **__: pytest.fail("a program was run"))
+    monkeypatch.setattr(octave_module, "run_program", lambda *_, **__: pytest.fail("a program was run"))
     edited(folder, "dz_comp.m", "    % ---- signals ----\n", f"    {line}\n")
     (check,) = checks_of(folder).checks
     assert (check.id, check.holds) == ("matlab-subset", False)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from dzdesign.codegen.fmu.description import SOURCE, Fmi
 from dzdesign.core.errors import MissingToolError
+from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import scratch_folder
 
 #: As in the checked core: no contraction to fused products, so that every processor gives the same digits.
@@ -103,8 +104,8 @@ def _compiled(folder: Path, identifier: str, platform: Platform) -> bytes:
         *named[platform.ending], "-I.", "-isystem", NO_LIBRARY, SOURCE, "-o", f"{platform.triple}/{name}",
     ]  # fmt: skip
     try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=LONGEST_S,
+        done = run_program(
+            command, cwd=folder, timeout=LONGEST_S,
             env={name: value for name, value in os.environ.items() if name not in REDIRECTING},
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -20,6 +20,7 @@ import numpy as np
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.firmware.folder import read_compensator
@@ -213,10 +214,8 @@ def _analysed(work: Path, program: str, sources: list[str], machine: str, main: 
         *sources, "-then", "-report-csv", report.name,
     ]  # fmt: skip
     try:
-        done = subprocess.run(
-            command, cwd=work, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
-            timeout=TIMEOUT_S, check=False, env={**os.environ, "PWD": str(work)},  # which it trusts, not the folder
-        )  # fmt: skip
+        # It trusts PWD, not the folder.
+        done = run_program(command, cwd=work, timeout=TIMEOUT_S, env={**os.environ, "PWD": str(work)})
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RequirementError(f"{PROGRAM} did not end: {error}") from error
     if done.returncode or not report.exists():

@@ -10,6 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.running import run_program
 
 PROGRAMS = Path(str(files("dzdesign.verify.matlab"))) / "programs"
 #: The one without a window first.
@@ -43,10 +44,7 @@ def available_octave() -> Octave:
     if path is None:
         return Octave(missing=MISSING)
     try:
-        done = subprocess.run(
-            [path, "--version"], capture_output=True, text=True, errors="replace", timeout=60.0, check=False,
-            stdin=subprocess.DEVNULL,
-        )  # fmt: skip
+        done = run_program([path, "--version"], timeout=60.0)
     except (OSError, subprocess.TimeoutExpired) as error:
         return Octave(missing=f"'{path}' does not run: {error}")
     found = re.search(r"GNU Octave, version (\S+)", done.stdout)
@@ -61,9 +59,8 @@ def run_octave(path: str, program: str, arguments: Sequence[str], folder: Path, 
     It has the time of so many functions.
     """
     try:
-        done = subprocess.run(
+        done = run_program(
             [path, *FLAGS, str(PROGRAMS / program), *arguments], cwd=folder, env=_environment(folder),
-            capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False,
             timeout=TIMEOUT_S * functions,
         )  # fmt: skip
     except subprocess.TimeoutExpired as error:

@@ -24,6 +24,7 @@ from threading import Event, Timer
 from typing import IO
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.running import ended_with_this_process
 from dzdesign.verify.toolchain.host_compiler import build_folder, built, host_compiler, words_of
 
 LAUNCHER = "confined"
@@ -100,7 +101,8 @@ def _status(
     timer = Timer(timeout_s, end_late)  # a wait with a time limit would look every 50 ms
     timer.start()
     try:
-        status = process.wait()
+        with ended_with_this_process(process.pid):
+            status = process.wait()
     finally:
         timer.cancel()
         _end(process)

@@ -20,6 +20,7 @@ import platformdirs
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import process_folder
 
 #: What the generated core must bear without a word.
@@ -121,10 +122,7 @@ def host_compiler() -> str:
 def run_compiler(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run a compiler, and log the command; whoever calls decides what one means that can't be run or does not end."""
     begin = time.perf_counter()
-    done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=TIMEOUT_S, check=False,
-        env=environment(),
-    )  # fmt: skip
+    done = run_program(command, cwd=folder, timeout=TIMEOUT_S, env=environment())
     logger.debug("%s (%.3f s)", shlex.join(command), time.perf_counter() - begin)
     return done
 
