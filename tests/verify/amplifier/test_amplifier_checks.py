@@ -8,6 +8,7 @@ import pytest
 from dzdesign import api
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES, device_named
 from dzdesign.codegen.amplifier.files import amplifier_file
+from dzdesign.codegen.amplifier.notes import notes_of
 from dzdesign.codegen.amplifier.setting import amplifier_setting
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import RequirementError
@@ -87,6 +88,11 @@ def test_a_file_as_written_holds(designs, name, device):
         ("one", "csv", "0.4640,49.5", "0.4640,49.7", SAFE),
         ("one", "csv", "command_percent", "drive", READ_BACK),
         ("one", "csv", "0.0000,0.0000", "0.0000,1.0000", READ_BACK),
+        ("one", "csv", "100.0000,9", "100.0000,109", READ_BACK),
+        # Drive for a side that the design has not.
+        ("one", "west", "TRIGGER 47", "TRIGGER 47\r\nMIN:B 9000\r\nMAX:B 9999", READ_BACK),
+        ("one", "cia408", "ParameterValue=0\r", "ParameterValue=9000\r", READ_BACK),
+        ("one", "csv", "0.0000,0.0000", "-100.0000,-99.0000\r\n-0.0100,-98.0000\r\n0.0000,0.0000", READ_BACK),
         ("two", "west", "MIN:B 27", "MIN:B 28", SAFE),
         ("two", "csv", "-", "", READ_BACK),
     ],
@@ -95,6 +101,19 @@ def test_a_seeded_fault_is_found(designs, name, device, old, new, wrong):
     content, stated = exported(designs[name], device)
     assert old.encode() in content
     assert wrong.id in failed(device, content.replace(old.encode(), new.encode()), designs[name], stated)
+
+
+@pytest.mark.parametrize(("share", "said"), [("0", True), ("0.001", True), ("0.3", False), (None, False)])
+def test_a_threshold_below_the_designs_reading_of_zero_is_said(designs, share, said):
+    """Of a command at the design's 0.46 % a table with a threshold of 0.1 % opens the valve: its check must say so."""
+    threshold = None if share is None else Fraction(share)
+    setting = amplifier_setting(designs["one"], device_named("csv"), threshold=threshold)
+    content = amplifier_file(setting, designs["one"], DIGEST)
+    _, safe, _ = checks("csv", content, designs["one"], {}, threshold)
+    assert safe.id == SAFE.id and safe.holds
+    assert ("the design declares 0.46%" in safe.text) is said
+    assert any("flow at zero command is possible" in note and "--threshold" in note
+               for note in notes_of(setting, designs["one"])) is said  # fmt: skip
 
 
 def test_dead_zones_of_something_else_are_found(designs):

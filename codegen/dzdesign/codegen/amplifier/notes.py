@@ -3,6 +3,7 @@
 from dzdesign.codegen.amplifier.files import WITHOUT_COMMENTS
 from dzdesign.codegen.amplifier.setting import AmplifierSetting
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.fixed.pressure_line import zero_band
 from dzdesign.design.signals import SIDE_NAMES
 
 #: Where the threshold is lower than at any test, by its trend.
@@ -34,6 +35,7 @@ def notes_of(
         notes.append("the valve's negative side is left out: the design's command has one sign")
     if compensator.valve.simulated:
         notes.append("the recordings are simulated: an example, not for a machine")
+    notes += _of_zero_command(setting, compensator)
     notes += _of_the_machine(compensator)
     if compensator.lot:
         count = len(compensator.lot)
@@ -48,6 +50,15 @@ def notes_of(
     if device.format in WITHOUT_COMMENTS and not beside_compensator:
         notes.append("the format has no comments, so the file does not say what it was made from; keep this output")
     return tuple(notes)
+
+
+def _of_zero_command(setting: AmplifierSetting, compensator: Compensator) -> list[str]:
+    """Return what a threshold below the reading of a zero command, as declared for the design, leaves open."""
+    declared = max(zero_band(compensator, sign) for sign in setting.offsets)
+    if setting.threshold is None or setting.threshold >= declared:
+        return []
+    counted = f"only commands up to --threshold, {float(setting.threshold):.2%}, count as zero"
+    return [f"{counted}: the design declares {float(declared):.2%}; between them flow at zero command is possible"]
 
 
 def _of_the_machine(compensator: Compensator) -> list[str]:

@@ -1,7 +1,7 @@
 """The fixed compensation of a compensator in the steps of a device: rounded to the safe side, its range checked."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor
 
@@ -31,6 +31,8 @@ class AmplifierSetting:
     offsets: Mapping[int, FixedOffset]
     #: Pressure drop that a table is of, MPa.
     dp_MPa: Fraction | None = None
+    #: Command up to which one counts as zero, a share of full, where it was given.
+    threshold: Fraction | None = None
 
 
 def amplifier_setting(
@@ -56,7 +58,7 @@ def amplifier_setting(
         If the device's range does not hold the setting, it has fewer solenoids, or an option is not of it.
     """
     with errors_in(compensator.valve.recorded_units):
-        return _setting(compensator, device, dp_MPa, threshold)
+        return replace(_setting(compensator, device, dp_MPa, threshold), threshold=threshold)
 
 
 def _setting(

@@ -28,6 +28,8 @@ STEPS = 40_000
 ROUNDED = 0.51e-6
 #: Devices that read no command, so that a zero command is exactly that.
 EXACT_ZERO = ("rmc", "rmc75")
+#: Devices with one offset, which acts on commands of both signs whatever the design has.
+BOTH_SIGNS = EXACT_ZERO
 #: Of one side: pressure drop, MPa, and share of command to the knee by branch.
 Stated = tuple[float, Mapping[str, float]]
 
@@ -50,6 +52,10 @@ def checks(
     signs = compensator.signals.signs
     if missing := [SIDE_NAMES[sign] for sign in signs if sign not in laws]:
         return (READ_BACK.check(holds=False, text=f"nothing in it is of {' and '.join(missing)} commands"),)
+    others = [SIDE_NAMES[sign] for sign in laws.keys() - set(signs) if _adds(laws[sign])]
+    if others and device not in BOTH_SIGNS:
+        text = f"it compensates {others[0]} commands, which the design has not: nothing is certified of them"
+        return (READ_BACK.check(holds=False, text=text),)
     read = f"{len(content.splitlines())} lines, {len(laws)} direction{'s' * (len(laws) > 1)} of command"
     return (
         READ_BACK.check(holds=True, text=read),
@@ -58,13 +64,18 @@ def checks(
     )
 
 
+def _adds(law: FileLaw) -> bool:
+    """Return whether a law drives more than its command anywhere: then it compensates a dead zone."""
+    return any(drive > command for command, drive in law.points)
+
+
 def _safe(device: str, laws: Mapping[int, FileLaw], compensator: Compensator, declared: Fraction | None) -> Check:
     """Compare the largest drive of a command that may be zero with the bound at many pressure drops, exactly."""
-    tried, over, margins = 0, 0, []
+    tried, over, margins, of_design = 0, 0, [], Fraction(0)
     for sign in compensator.signals.signs:
         error = compensator.command_error
-        of_design = Fraction(error.offset_codes + error.noise_codes, compensator.signals.command.span(sign))
-        zero = of_design if declared is None else declared
+        of_side = Fraction(error.offset_codes + error.noise_codes, compensator.signals.command.span(sign))
+        of_design, zero = max(of_design, of_side), of_side if declared is None else declared
         zero, law = Fraction(0) if device in EXACT_ZERO else zero, laws[sign]
         drive = max(law.just_behind(law.rest), law.drive(zero), *(y for x, y in law.points if x <= zero))
         for bound_V in _bounds_V(compensator, sign):
@@ -73,6 +84,9 @@ def _safe(device: str, laws: Mapping[int, FileLaw], compensator: Compensator, de
             over += margins[-1] < 0
     smallest = compensator.valve.recorded_units.text(1e3 * float(min(margins)), ".3f mV")
     text = f"{tried} pressure drops, {over} over-compensated, smallest margin {smallest}"
+    if declared is not None and declared < of_design:
+        counted = f"only commands up to {float(declared):.2%} count as zero"
+        text += f"; {counted}, and the design declares {float(of_design):.2%}"
     return SAFE.check(holds=not over, text=text)
 
 

@@ -167,6 +167,8 @@ def _table(points: Sequence[tuple[Fraction, Fraction]]) -> Mapping[int, FileLaw]
         raise ValueError("the points do not rise")
     if (ZERO, ZERO) not in points or points[-1][0] != 1:
         raise ValueError("the points do not pass zero and reach full command")
+    if any(abs(drive) > 1 for _, drive in points):
+        raise ValueError("a point is beyond full drive")
     laws = {1: FileLaw(rest=ZERO, points=tuple(point for point in points if point[0] >= 0))}
     negative = tuple((-x, -y) for x, y in reversed(points) if x <= 0)
     if len(negative) > 2:
