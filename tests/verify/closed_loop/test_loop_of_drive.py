@@ -79,7 +79,7 @@ def test_a_dither_that_the_certificate_does_not_count_is_seen_at_the_waves_top(t
     _, leaking = compared(tmp_path / "leaking", change=uncounted, **NO_DITHER)
     assert leaking.result.q_zero_L_min > 1e-3
     ends = leaking.compensated.q_L_min[-25:]
-    assert leaking.result.q_zero_L_min >= ends.max() * (1 - 1e-12)
+    assert leaking.result.q_zero_L_min >= ends.max() - 1e-9  # stored to nine decimals
 
 
 @pytest.mark.slow
