@@ -5,6 +5,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 from target import Target
@@ -57,9 +58,10 @@ def compensator(folder: str = "goldens") -> Compensator:
 @cache
 def _made(target: str) -> Output:
     """Return an output; FMUs are without binaries, which take seconds to compile."""
-    of, binaries.PLATFORMS = compensator(), ()
+    of = compensator()
     settings = {"iec61131": BLOCK_SETTINGS, "fmu": {"plant": ""}}.get(target, {})
-    return generate_output(of, target, settings, to_json_bytes(of))
+    with patch.object(binaries, "PLATFORMS", ()):
+        return generate_output(of, target, settings, to_json_bytes(of))
 
 
 def _output(target: str) -> Mapping[str, bytes]:
