@@ -236,7 +236,7 @@ def test_a_rule_between_fields_is_named_with_its_place():
 )
 def test_a_value_that_would_be_written_otherwise_is_refused(place, fault):
     text = refusal(changed(*place, to=fault))
-    assert "'spare." in text and "follows from the rest" in text
+    assert "'spare." in text and "the rest of the file gives" in text
 
 
 def test_further_keys_are_ignored_and_logged(caplog):

@@ -79,7 +79,7 @@ def test_what_design_wrote_follows(document):
         (("sides", "positive", "drive_range_over_u_max"), [3, 5], "drive_range_over_u_max' is 0.600000, but"),
         (("signals", "command", "full_code"), 3000, "'signals.command.full_code' is 3000, but 4095 follows"),
         (("signals", "pressure_a", "span_MPa"), [25, 1], "certificate"),
-        (("valve", "meter", "floor_L_min"), 0.1, "follows from the rest of it"),
+        (("valve", "meter", "floor_L_min"), 0.1, "the rest of the file gives"),
         (("options", "output_max"), "90 %", "'drive_functions.compare_limit' is 60000, but 54000 follows"),
         (("options", "polarity"), "upside down", "--polarity is 'upside down'"),
         (("options", "colour"), "red", "'options.colour' is 'red', but nothing follows"),
@@ -232,7 +232,7 @@ def test_the_target_is_compared_with_the_one_of_that_name(document):
 
 
 def test_verify_says_that_the_design_was_for_another_target(example_valve, tmp_path):
-    for designed, said in (("cortex-m4", "was designed for cortex-m4, this is for f28335"), ("f28335", "as it says")):
+    for designed, said in (("cortex-m4", "was designed for cortex-m4, this is for f28335"), ("f28335", "with it")):
         firmware = generate(designed_for(example_valve, designed), "f28335")
         write_folder(tmp_path / designed, firmware.files, firmware.manifest)
         folder = tmp_path / designed

@@ -10,6 +10,8 @@ MEAN, MOST = 18, 30
 ABBREVIATIONS = re.compile(r"\b(e\.g|i\.e|vs|Eqs?|Figs?|Nos?|approx|al)\.(?=[\s,)])")
 #: A sentence ends before a capital, a digit or code, and before a choice of an option: ``hold: ...``.
 END = re.compile(r"(?<=[.!?])[)\"'\]]*\s+(?=[(\"'\[]*[^\W_a-z]|[a-z][\w-]*: )")
+#: What a message quotes: a file, a value. An apostrophe within a word begins none.
+QUOTATION = re.compile(r"(?<!\w)'[^']*'|\"[^\"]*\"")
 ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.|:)\s+")
 
 
@@ -51,6 +53,18 @@ def sentences_of(block: str) -> list[str]:
     return [sentence for sentence in END.split(text) if words_of(sentence)]
 
 
+def clauses_of(message: str) -> list[str]:
+    """Return the parts of a message that are read at once: sentences, cut at a semicolon too; a quotation is one word.
+
+    Examples
+    --------
+    >>> clauses_of("dzdesign: 'a b.csv' row 2 is empty, expected \\"1 V\\"; give one. See `a; b`.")
+    ['Quotation row 2 is empty, expected Quotation', 'give one.', 'See Code.']
+    """
+    lines = (QUOTATION.sub("Quotation", line.removeprefix("dzdesign: ")) for line in message.splitlines())
+    return [clause for line in lines for sentence in sentences_of(line) for clause in sentence.split("; ")]
+
+
 def words_of(text: str) -> list[str]:
     """Return the words of a text: what stands between blanks and has a letter or a digit."""
     return [word for word in text.split() if re.search(r"\w", word)]
@@ -58,9 +72,13 @@ def words_of(text: str) -> list[str]:
 
 def faults_of(blocks: Iterable[str]) -> list[str]:
     """Return what makes a text hard to read: each sentence that is too long, and a mean that is too high."""
-    sentences = [sentence for block in blocks for sentence in sentences_of(block)]
+    return too_long([sentence for block in blocks for sentence in sentences_of(block)], mean=MEAN, most=MOST)
+
+
+def too_long(sentences: list[str], *, mean: int, most: int) -> list[str]:
+    """Return each sentence of more than `most` words; and the mean number of words, if it is above `mean`."""
     counts = [len(words_of(sentence)) for sentence in sentences]
-    faults = [f"{count} words: {each}" for each, count in zip(sentences, counts, strict=True) if count > MOST]
-    if sum(counts) > MEAN * len(counts):
+    faults = [f"{count} words: {each}" for each, count in zip(sentences, counts, strict=True) if count > most]
+    if sum(counts) > mean * len(counts):
         faults.append(f"{sum(counts) / len(counts):.1f} words in a sentence on average")
     return faults

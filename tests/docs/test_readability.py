@@ -11,14 +11,17 @@ from dzdesign.core.options import arguments_of
 from dzdesign.identify.data_quality.catalogue import catalogue
 from tests.docs import sentences
 from tests.docs.prose_lint import pages
-from tests.docs.sentences import MEAN, MOST, blocks_of, faults_of, sentences_of
+from tests.docs.sentences import MEAN, MOST, blocks_of, clauses_of, faults_of, sentences_of, too_long
 from tests.support.paths import ROOT
+from tests.support.wording import read_messages
 
+#: Words of a message between full stops and semicolons, on average over all messages and at most.
+MESSAGE_MEAN, MESSAGE_MOST = 12, 35
 LONG, SHORT = "One " + "two " * MOST, "One two."
 
 
 def test_the_examples_of_the_counting_hold():
-    assert doctest.testmod(sentences) == (0, 2)
+    assert doctest.testmod(sentences) == (0, 3)
 
 
 @pytest.mark.parametrize("page", pages(), ids=lambda page: page.relative_to(ROOT).as_posix())
@@ -58,6 +61,26 @@ def test_a_help_text_that_is_no_sentence_is_found():
 def test_what_a_warning_means_can_be_read_once():
     said = [" ".join(text.split()) for entry in catalogue().values() for text in (entry.meaning, entry.remedy)]
     assert len(said) > 80 and faults_of(said) == []
+
+
+def faults_of_messages(messages):
+    """Return what makes messages hard to read; those that differ in figures alone count once."""
+    clauses = {re.sub(r"\d+", "0", clause): clause for text in messages for clause in clauses_of(text)}
+    return too_long(list(clauses.values()), mean=MESSAGE_MEAN, most=MESSAGE_MOST)
+
+
+def test_a_message_can_be_read_once():
+    messages = read_messages()
+    assert len(messages) > 700 and faults_of_messages(messages.values()) == []
+
+
+def test_a_message_that_is_too_long_is_found():
+    filler = " ".join(["long"] * (MESSAGE_MOST - 3))
+    good, seeded = f"'a b.csv': the {filler} end; keep one", f"'a b.csv': the very {filler} end; keep one"
+    assert faults_of_messages([good, *("give one", "keep one", "see --help")] * 2) == []
+    (fault,) = faults_of_messages([seeded, "give one", "see --help"])
+    assert fault.startswith(f"{MESSAGE_MOST + 1} words: Quotation: the very long")
+    assert faults_of_messages([good, "two"]) == ["12.7 words in a sentence on average"]
 
 
 def test_a_sentence_that_is_too_long_is_found_wherever_it_stands():

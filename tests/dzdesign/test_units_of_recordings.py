@@ -179,7 +179,7 @@ def test_warnings_carry_the_units_in_the_file_too(valve):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"gain": 0.0}, r"at \d+\.\d+ mA is -?\d\.\d+ gpm above that at zero"),
+        ({"gain": 0.0}, r"to \d+\.\d+ mA the flow rises by \d\.\d+ gpm"),
         ({"gain": -1.0}, r"by \d\.\d+ gpm from zero to \d+\.\d\d mA"),
         ({"scale": lambda u: 4 + 0.05 * u}, r"runs from \d\.\d+ to 4\.\d+ mA"),
         ({"dp": 1e-7}, r"the pressure drop is \S+ bar, expected \S+ to \S+ bar"),

@@ -154,7 +154,7 @@ def test_a_file_of_ones_own_in_the_core_is_told_where_it_belongs(firmware_folder
     (firmware_folder / "core" / "my.c").write_text("")
     added = files_unchanged(firmware_folder, manifest)
     assert added.holds is False
-    assert added.text == "core/my.c: not generated; core/ is the compensator alone, keep files of your own in board/"
+    assert added.text == "core/my.c: not generated, but core/ holds only generated files; move your own files to board/"
 
 
 def test_a_file_whose_line_was_taken_from_the_manifest_is_refused(firmware_folder, wording):

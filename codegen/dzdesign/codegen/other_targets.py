@@ -132,7 +132,7 @@ def settings_of(target: str, given: Mapping[str, str | None], chosen_by: str = "
     for name, values in own.items():
         value = given.get(name)
         if value is None and name in OTHER_TARGETS[target].required:
-            raise InputError(f"{flag_of(name)} is missing, which {chosen_by} {target} needs; "
+            raise InputError(f"{chosen_by} {target} needs {flag_of(name)}; "
                              f"known: {', '.join(values)}")  # fmt: skip
         if value is not None and values and value not in values:
             raise InputError(f"{flag_of(name)}: '{value[:40]}' is unknown{nearest(value, values)}; "

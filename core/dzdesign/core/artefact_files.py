@@ -54,7 +54,7 @@ def check_place_of_files(folder: Path, option: str) -> None:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
             os.lstat(folder)  # a name that can't be one, or too long
         nearest = next(one for one in (folder, *folder.absolute().parents) if os.path.lexists(one))
-        reason = None if nearest.is_dir() else "is no folder"
+        reason = None if nearest.is_dir() else "is not a folder"
         if reason is None and not os.access(nearest, os.W_OK | os.X_OK):
             reason = "is a folder that can't be written into"
     except (OSError, ValueError) as error:
@@ -100,7 +100,8 @@ def check_file_may_be_written(path: Path, schema: str | None = None, option: str
         document = json_object(path)
     if document is None or family_of(document.get("schema")) != family_of(schema):
         raise InputError(
-            f"'{path}' exists and is no {schema} of dzdesign, so it is left alone; choose another name with {option}"
+            f"'{path}' exists and is not a {schema} file of dzdesign, so it is not overwritten; choose another name "
+            f"with {option}"
         )
 
 

@@ -58,7 +58,7 @@ def read_artefact(
         if value is MISSING:
             raise InputError(f"'{source}' lacks the key '{place}'; {remedy}")
         raise InputError(
-            f"'{source}': '{place}' is {quoted(value)}, but {quoted(follows)} follows from the rest of it; {remedy}"
+            f"'{source}': '{place}' is {quoted(value)}, but the rest of the file gives {quoted(follows)}; {remedy}"
         )
     if unknown:
         logger.info("'%s': keys without a meaning here are ignored: %s", source, and_more(unknown, MOST_NAMED))

@@ -96,7 +96,7 @@ def read_dithered(text: str, option: str) -> DeclaredDither:
     found = re.fullmatch(r"(\d{1,9}(?:\.\d{0,15})?)\s?([^\d\s.,][^\d.,]{0,39})", peak)
     if found is None:
         raise InputError(
-            f"{option} is {quoted(text)}: its peak {quoted(peak)} is no number with a unit, expected one such as in "
+            f"{option} is {quoted(text)}: its peak {quoted(peak)} is not a number with a unit, expected one such as in "
             f"'{EXAMPLE}'"
         )
     number, unit = float(found[1]), found[2].strip()

@@ -40,7 +40,7 @@ def check_inside(folder: Path, names: Iterable[str], source: str) -> None:
     home = os.path.realpath(folder)
     for name in names:
         if not _is_name_inside(name):
-            raise InputError(f"{source} names '{name[:80]}', which is no file inside of the folder; make it again")
+            raise InputError(f"{source} names '{name[:80]}', which is not a file inside the folder; make it again")
         path = Path(folder) / name
         try:
             found = os.path.realpath(path, strict=True)
@@ -51,7 +51,7 @@ def check_inside(folder: Path, names: Iterable[str], source: str) -> None:
         if os.path.commonpath([home, found]) != home:
             raise InputError(f"'{path}' is a link to a place outside of '{folder}'; put the file itself there")
         if not os.path.isfile(found):
-            raise InputError(f"'{path}', which {source} names, is no file; make the folder again")
+            raise InputError(f"'{path}', which {source} names, is not a file; make the folder again")
 
 
 def check_folder_is_ours(folder: Path, schema: str | None) -> None:

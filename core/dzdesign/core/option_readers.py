@@ -94,7 +94,7 @@ def percent_range(of: str) -> Callable[[str, str], tuple[float, float]]:
     def read(text: str, option: str) -> tuple[float, float]:
         ends = re.fullmatch(f"{digits}-{digits}", text, re.ASCII)
         if ends is None:
-            raise InputError(f"{option} is {quoted(text)}, expected two per cents of {of}")
+            raise InputError(f"{option} is {quoted(text)}, expected two percentages of {of}")
         return float(ends[1]) / 100, float(ends[2]) / 100
 
     return read

@@ -142,8 +142,8 @@ def _curve_of(side: SideModel, guard: str) -> CertifiedCurve:
     if guard in side.certified:
         return side.certified[guard]
     raise InputError(
-        f"the ramp tests bound the {' and the '.join(side.certified)} threshold, but the {guard} one is to be guarded; "
-        + _remedy(side, guard)
+        f"--guard {guard} needs a bound of the {guard} threshold, but the ramp tests bound only the "
+        f"{' and the '.join(side.certified)} threshold; " + _remedy(side, guard)
     )
 
 
@@ -154,8 +154,8 @@ def _remedy(side: SideModel, guard: str) -> str:
     if guard != "closing" and not has_rising:
         return "record the rising branch too, or take --guard closing, the safer one"
     return (
-        "make valve.json again with `dzdesign identify`; if it is still missing, no offset lies under that threshold's "
-        "bounds: take one that is there"
+        "make valve.json again with `dzdesign identify`; if the bound is still missing, no offset lies below it, so "
+        "choose another --guard"
     )
 
 

@@ -79,7 +79,7 @@ def parse_signal(text: str, option: str) -> PinSignal:
     """
     found = read_signal_range(text, f"{option} is {quoted(text)}")
     if found is None or not found.unit:
-        raise InputError(f"{option}: {quoted(text)} is no signal, expected one such as {EXAMPLE}")
+        raise InputError(f"{option}: {quoted(text)} is not a signal, expected one such as {EXAMPLE}")
     factor = Fraction(repr(si_factor(found.unit, "voltage" if found.shunt_ohm is None else "current")))
     if not found.low < found.high:
         ends = f"{float(found.low):g} to {float(found.high):g}"

@@ -42,7 +42,7 @@ def _beside_evidence(folder: Path) -> Path:
     from dzdesign.verify.outputs.folder import holds_output
 
     if not folder.is_dir():
-        raise InputError(f"'{folder}' is no folder, expected one with artefacts of dzdesign; check the name")
+        raise InputError(f"'{folder}' is not a folder, expected one with artefacts of dzdesign; check the name")
     for place in (folder, folder / "evidence"):
         if (place / VERIFICATION_NAME).is_file():
             return place / REPORT_NAME

@@ -60,7 +60,8 @@ def _named(item: str, paths: Sequence[Path], tests: "Sequence[RampTest]") -> lis
                 break
         else:
             name = pieces[0].strip()
-            raise _wrong(f"names '{name}', which is no recording here{nearest(name, [test.source for test in tests])}")
+            suggestion = nearest(name, [test.source for test in tests])
+            raise _wrong(f"names '{name}', but no such recording was given{suggestion}")
         found.append(place)
         pieces = pieces[count:]
     return found

@@ -209,7 +209,7 @@ def refuse_copies(tests: Sequence["RampTest | LowFlowTable"]) -> None:
     for test in tests:
         if test.sha256 in known:
             raise InputError(
-                f"'{test.source}' is byte for byte the same recording as '{known[test.sha256]}'; give it once "
+                f"'{test.source}' is an exact copy of the recording '{known[test.sha256]}'; give it once "
                 "(a repeated ramp test is welcome, a copy is no repetition)"
             )
         known[test.sha256] = test.source

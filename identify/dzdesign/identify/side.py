@@ -176,9 +176,9 @@ def _refuse_unlike_repeats(between: BetweenRamps, threshold: Threshold) -> None:
     if between.origin == "repeats" and between.degrees < FEW_DEGREES and threshold.bound.min() <= 0:
         raise InputError(
             worded(
-                "ramps at one pressure drop differ: their thresholds scatter by {sd:.0f mV} (one standard deviation, "
-                "degrees of freedom: {degrees:.0f}), so that no lower bound above zero follows; record two more ramps "
-                "there, or leave out the one that is unlike the rest",
+                "repeated ramps at one pressure drop differ too much. Their thresholds scatter by {sd:.0f mV} (one "
+                "standard deviation, degrees of freedom: {degrees:.0f}), so no lower bound lies above zero; record two "
+                "more ramps there, or leave out the one that differs from the rest",
                 sd=1e3 * between.sd,
                 degrees=between.degrees,
             )

@@ -27,7 +27,7 @@ def read_artefact_folder(folder: Path) -> dict[str, bytes]:
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InputError(f"'{folder}' is no folder, expected one with artefacts of dzdesign; check the name")
+        raise InputError(f"'{folder}' is not a folder, expected one with artefacts of dzdesign; check the name")
     try:
         folder, root = folder.resolve(), artefact_root(folder)
         within = sorted(place for place in root.iterdir() if place.is_dir() and not place.name.startswith("."))

@@ -121,5 +121,5 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(words, here, capsys, w
 
 
 def test_another_option_is_named_where_it_chose_the_output():
-    with pytest.raises(InputError, match="--device is missing, which --outputs amplifier needs"):
+    with pytest.raises(InputError, match="--outputs amplifier needs --device"):
         settings_of("amplifier", {}, "--outputs")

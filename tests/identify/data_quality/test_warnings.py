@@ -395,7 +395,7 @@ class TestClippedMeter:
         quiet = identify(self.recordings(tmp_path, cut, noise=0.0))
         assert warned(quiet, "meter-clipped") and not warned(quiet, "meter-zero")
         (first, *_) = warned(quiet, "meter-clipped")
-        assert "the recordings can't tell which. It is taken as cut off, which is safe" in first.text
+        assert "can't show which it is, so the flow is taken as cut off, which is safe" in first.text
         assert quiet.positive.tests[0].u_guard_lower_V < 5.375  # where the first of them closes
 
 

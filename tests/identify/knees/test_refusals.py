@@ -70,7 +70,7 @@ def test_a_flow_of_the_wrong_sign_is_not_called_a_shut_valve(wording):
 def test_a_refused_rise_is_said_beside_what_was_expected(wording):
     with wording.refusal(InputError) as refusal:
         identify([synthetic_ramp(1.0, Truth(noise=6.0))])
-    rise, least = (float(str(refusal.value).split(before)[1].split()[0]) for before in (" V is ", "more than "))
+    rise, least = (float(str(refusal.value).split(before)[1].split()[0]) for before in ("rises by ", "more than "))
     assert rise < least
 
 

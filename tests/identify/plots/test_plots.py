@@ -324,9 +324,9 @@ class TestBadFolder:
     @pytest.mark.parametrize(
         ("plots", "said"),
         [
-            ("a.csv", "'a.csv' is no folder"),
-            ("a.csv/plots", "a.csv' is no folder"),
-            ("loose", "'loose' is no folder"),
+            ("a.csv", "'a.csv' is not a folder"),
+            ("a.csv/plots", "a.csv' is not a folder"),
+            ("loose", "'loose' is not a folder"),
             ("", "--plots is empty"),
             ("valve.json", "where -o puts a file"),
             ("valve.json/plots", "where -o puts a file"),

@@ -227,7 +227,7 @@ def test_a_document_is_read_up_to_a_bound_only(tmp_path):
     with open(path, "wb") as file:
         file.truncate(10**11)  # takes no room
     assert "is larger than 16 MiB" in outcome(read_bytes, path, "valve file")
-    assert "is no dzdesign.valve/1" in outcome(write_file, path, "{}", "dzdesign.valve/1")
+    assert "is not a dzdesign.valve/1 file" in outcome(write_file, path, "{}", "dzdesign.valve/1")
 
 
 # documents

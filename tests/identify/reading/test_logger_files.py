@@ -305,9 +305,9 @@ def test_stamps(here, first, second, seconds):
 @pytest.mark.parametrize(
     ("cells", "words"),
     [
-        (["03:04"], "'03:04' may be hours and minutes, minutes and seconds or a date"),
+        (["03:04"], "'03:04' is ambiguous, as it may be hours and minutes, minutes and seconds, or a date"),
         (["04:05,5"], "may be hours and minutes, minutes and seconds"),
-        (["2026-11-22"], "or a date, expected seconds as a number, or a time such as"),
+        (["2026-11-22"], "or a date; expected seconds as a number, or a time such as"),
         (["01/02/2026 23:59:59", "02/02/2026 00:00:00"], "it is 1 or 31 days, as it can't be told which number is"),
         (["03:04:05", "soon"], "row 3, column 'time': 'soon' is no time, expected one such as"),
         (["99/99/2026 03:04:05"], "'99/99/2026' is no date"),

@@ -66,7 +66,7 @@ def _setting(
 ) -> AmplifierSetting:
     signs = compensator.signals.signs
     if len(signs) > 1 and not device.takes_both_signs:
-        raise InputError(f"{device.title} drives one solenoid, and the design has two; choose another device")
+        raise InputError(f"{device.title} drives one solenoid, but the design has two; choose another device")
     offsets = {sign: fixed_offset(compensator, sign) for sign in signs}
     rest = max(zero_band(compensator, sign) for sign in signs) if threshold is None else threshold
     if device.law == "table":
@@ -74,10 +74,11 @@ def _setting(
         return _table(compensator, device, offsets, _nominal(at, offsets), rest)
     if dp_MPa is not None:
         raise InputError(
-            f"--table-dp is of devices that take a whole characteristic, not of {device.title}; leave it out"
+            f"--table-dp applies to devices with a table of the characteristic, but {device.title} has none; leave it "
+            "out"
         )
     if threshold is not None and device.threshold is None:
-        raise InputError(f"{device.title} has no threshold of its dead-zone compensation; leave out --threshold")
+        raise InputError(f"{device.title} has no threshold parameter for --threshold; leave it out")
     return _jump(compensator, device, offsets, rest) if device.law == "jump" else _added(compensator, device, offsets)
 
 

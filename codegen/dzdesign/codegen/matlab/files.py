@@ -41,7 +41,7 @@ def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Map
     del settings  # it has none
     if compensator.current_drive is not None:
         raise InputError(
-            "the compensator controls the current, which the law alone, as a function of MATLAB, does not; design it "
+            "the compensator controls the current, but a MATLAB function holds only the law; design it "
             "again with --drive duty, or take --target fmu or a C firmware"
         )
     signs, digest = compensator.signals.signs, origin.compensator_json

@@ -99,10 +99,10 @@ class CurrentDrive:
             return ()
         share = self.release_overshoot_A / self.circuit.rated_A
         return (
-            f"as the drive is released the current passes its set point by up to "
-            f"{units.text(self.release_overshoot_A, '.2g A')} ({share:.1%} of the rated one), however low the output "
-            "begins: the valve may open by it at zero command; declare narrower ranges of inductance, resistance or "
-            "supply, or measure the supply",
+            f"when the drive is released, the current exceeds its set point by up to "
+            f"{units.text(self.release_overshoot_A, '.2g A')} ({share:.1%} of the rated current), even from the lowest "
+            "initial output. The valve may open briefly at zero command; declare narrower ranges of inductance, "
+            "resistance or supply, or measure the supply",
         )
 
     def _weak_in_words(self, units: RecordedUnits) -> tuple[str, ...]:

@@ -108,8 +108,8 @@ def _tested(group: DescribedTests, rows: Sequence[LowFlow]) -> np.ndarray:
             expected = "{high:.3g MPa}" if dp[0] == dp[-1] else "{low:.3g #MPa} to {high:.3g MPa}"
             raise InputError(
                 worded(
-                    "{source}: its pressure drop is {at:.3g MPa}, expected " + expected + " as in the ramp tests; "
-                    "measure it there, or record a ramp at its pressure drop",
+                    "{source}: the pressure drop is {at:.3g MPa}, expected " + expected + " as in the ramp tests; "
+                    "measure the flow there, or record a ramp at this pressure drop",
                     source=row.source, at=row.dp_MPa, low=dp[0], high=dp[-1],
                 )
             )  # fmt: skip
@@ -132,7 +132,8 @@ def _refuse_another_valve(row: LowFlow, dp: np.ndarray, guarding: Guarding, grou
             raise InputError(
                 worded(
                     "{source} has {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, but the ramps allow {low:.3g #L/min} "
-                    "to {high:.3g L/min} there: check its units, its branch, and whether it is of this valve",
+                    "to {high:.3g L/min} there; check the units and the branch, and whether the row belongs to this "
+                    "valve",
                     source=row.source, flow=row.q_L_min, u=row.u_V, at=row.dp_MPa, low=least, high=most,
                 )
             )  # fmt: skip
@@ -184,9 +185,9 @@ def _lowered(
 
 def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) -> Worded:
     return worded(
-        "{source} shows at least {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}, below the threshold on {branch} of "
-        "{threshold:.4g V} that the ramps show, and more than the {least:.3g L/min} that count as none: add a row "
-        "of {branch} at a lower command where no more flows, or declare what may flow by --zero-flow",
+        "{source} shows at least {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}. This command lies below the threshold "
+        "on {branch} from the ramps, {threshold:.4g V}, and a flow of up to {least:.3g L/min} counts as none; add a "
+        "row of {branch} at a lower command with no more flow than that, or declare the allowed flow by --zero-flow",
         source=row.source, flow=row.at_least_L_min, u=row.u_V, at=row.dp_MPa, branch=IN_WORDS[branch],
         threshold=threshold, least=least,
     )  # fmt: skip

@@ -23,16 +23,16 @@ def unknown_threshold(group: DescribedTests, guarding: Guarding) -> Worded | Non
     knee, knee_se = (float(each[worst, guarding.column]) for each in (guarding.knees.knee, guarding.knees.knee_se))
     dp, source = group.tests[worst].dp, group.tests[worst].test.source
     return worded(
-        "the threshold's lower bound is {bound:.3f V}, not above zero: {at} {known} {se:.2g dV} (standard error); "
+        "the threshold's lower bound is {bound:.3f V}, not above zero. {at} {known} {se:.2g dV}; "
         "record that pressure drop more often or on slower ramps, or leave it out",
         bound=bound,
-        at=worded("{source}:", source=source) if dp is None else worded("at {dp:.3g MPa}", dp=dp / MPA),
+        at=worded("In {source}", source=source) if dp is None else worded("At {dp:.3g MPa}", dp=dp / MPA),
         known=worded(
-            "flow goes on below the knee of {knee:.4g V}, a soft edge, and where it ends, about {value:.4g V}, is "
-            "known to",
+            "the edge is soft: flow continues below the knee of {knee:.4g V}, and ends at about {value:.4g V} with a "
+            "standard error of",
             knee=knee, value=value,
         )
         if knee - value > SOFT * knee_se
-        else worded("the threshold of {value:.4g V} is known to", value=value),
+        else worded("the threshold of {value:.4g V} has a standard error of", value=value),
         se=se,
     )  # fmt: skip

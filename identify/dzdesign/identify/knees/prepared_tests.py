@@ -204,8 +204,8 @@ def _refuse_mixed_branches(described: list[DescribedTest]) -> None:
             remedy = (
                 "record every pressure drop up and down, or leave that file out"
                 if by_option is None
-                else f"--from and --to leave out {by_option.from_s:.1f} to {by_option.to_s:.1f} s of it, and with that "
-                "a branch: choose seconds before and after a whole ramp, or leave that file out"
+                else f"--from and --to leave out {by_option.from_s:.1f} to {by_option.to_s:.1f} s, which holds the "
+                "branch; choose seconds before and after a whole ramp, or leave that file out"
             )
             source = lacking[0].test.source
             raise InputError(f"'{source}' has no {name} branch while other ramp tests have one; {remedy}")

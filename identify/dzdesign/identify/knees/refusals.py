@@ -71,9 +71,9 @@ def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: f
             )
         raise InputError(
             worded(
-                "'{source}': the valve never opens, as far as the meter shows: the flow at {top:.2f V} is "
-                "{rise:.3f L/min} above that at zero, expected more than {least:.3f #L/min} (6 times the meter's noise "
-                "of {noise:.3f L/min}); check the solenoid, the supply and the column of Q, or average the readings",
+                "'{source}': the flow does not show the valve opening. From zero command to {top:.2f V} the flow rises "
+                "by {rise:.3f L/min}, expected more than {least:.3f #L/min} (6 times the meter's noise of "
+                "{noise:.3f L/min}); check the solenoid, the supply and the column of Q, or average the readings",
                 source=source,
                 top=branch.u.max(),
                 rise=rise / L_MIN,
@@ -100,9 +100,10 @@ def refuse_a_jump(read: PreparedBranch, u_max: float) -> None:
         return
     raise InputError(
         worded(
-            "'{source}': the flow jumps at {at:.2f V}: of {count} readings there next to none lies between {least:.0%} "
-            "and {most:.0%} of the largest flow of {flow:.3g L/min}, expected a straight rise; either the meter starts "
-            "above that (take one of a smaller range, or leave out this pressure drop) or the valve only switches",
+            "'{source}': the flow jumps at {at:.2f V}, expected a straight rise. Of {count} readings there, almost "
+            "none lies between {least:.0%} and {most:.0%} of the largest flow of {flow:.3g L/min}. Either the valve "
+            "only switches, or the meter starts above that flow; use a meter of a smaller range, or leave out this "
+            "pressure drop",
             source=read.source,
             at=0.5 * (low + high),
             count=inside.sum(),

@@ -106,8 +106,8 @@ def _columns(path: Path, labels: list[str]) -> dict[str, tuple[int, Column]]:
         ("u", "the command"),
         ("dP", "the pressure drop over the metering edge during the reading"),
         ("Q", "the flow"),
-        ("error", "the flow's largest error: of volume and time, of a cylinder its own leak too"),
-        ("branch", "opening or closing: on which way the command was reached"),
+        ("error", "the largest error of the flow from volume, time and, with a cylinder, its leakage"),
+        ("branch", "which states whether the command was reached while opening or closing"),
     ):
         if name not in found:
             raise InputError(
@@ -132,7 +132,7 @@ class _Row:
         u, dp, q, error = (self.number_of(name) for name in ("u", "dP", "Q", "error"))
         branch = self.cells[self.columns["branch"][0]].lower()
         if branch not in BRANCHES:
-            raise self.wrong("branch", f"expected {' or '.join(('opening', 'closing'))}: the way to that command")
+            raise self.wrong("branch", "expected opening or closing, the direction in which the command was reached")
         if abs(u) > ABOVE_FULL * self.u_max:
             raise self.wrong("u", f"expected at most full command, {self.u_max:g} V; give --u-max, or correct it")
         if not SMALLEST_DP <= dp <= LARGEST_DP:
@@ -142,11 +142,11 @@ class _Row:
                 "through any edge",
             )
         if not error > 0:
-            raise self.wrong("error", "expected more than zero: what volume, time and leaks may be wrong by")
+            raise self.wrong("error", "expected more than zero; give the largest error from volume, time and leakage")
         if u < 0:
             q = abs(q)  # counted from zero down, as a cylinder that moves the other way
         if q < -error:
-            raise self.wrong("Q", "expected a flow the way of the command: a cylinder that is driven back tells none")
+            raise self.wrong("Q", "expected a flow in the direction of the command; leave out readings against it")
         return LowFlow(
             source=f"{source}, row {self.number}", branch=BRANCHES[branch], u_V=u, dp_MPa=dp / MPA,
             q_L_min=max(q, 0.0) / L_MIN, q_error_L_min=error / L_MIN,
@@ -170,7 +170,7 @@ class _Row:
         scaling = scaling_of(self.path, quantity, column, self.u_max)
         scaled = value * scaling.gain + scaling.offset
         if not math.isfinite(scaled) or abs(scaled) > LARGEST_DP:
-            raise self.wrong(name, "expected a number that a valve gives")
+            raise self.wrong(name, "expected a plausible value for a valve")
         return scaled
 
     def wrong(self, name: str, expected: str) -> InputError:
@@ -187,7 +187,7 @@ def _refuse_two_marks(rows: Sequence[_Row]) -> None:
         for name in ("u", "dP", "Q", "error"):
             known |= row.marks(name)
             if len(known) > 1:
-                raise row.wrong(name, "expected one decimal mark in the whole table, and no mark of thousands")
+                raise row.wrong(name, "expected one decimal mark in the whole table, and no thousands separator")
 
 
 def _refuse_two_signs(rows: Sequence[_Row]) -> None:
@@ -198,7 +198,7 @@ def _refuse_two_signs(rows: Sequence[_Row]) -> None:
         if row.number_of("u") < 0 and abs(flow) > row.number_of("error"):
             signs.add(flow > 0)
         if len(signs) > 1:
-            raise row.wrong("Q", "expected flows of one sign at all negative commands: one of them tells of no edge")
+            raise row.wrong("Q", "expected flows of one sign at all negative commands; correct or leave out the others")
 
 
 def _refuse_repeated(path: Path, rows: Sequence[LowFlow]) -> None:

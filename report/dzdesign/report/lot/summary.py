@@ -16,7 +16,7 @@ SUMMARY_NAME = "batch.json"
 #: Instead of a valve's name: one setting that is safe for all.
 LOT_SETTING = "the lot setting"
 #: What to do about a file of a lot that is not as it was written.
-AGAIN = "run the batch again, which takes up what is done"
+AGAIN = "run the batch again, which continues from the finished valves"
 #: No number of a lot is larger: volts, MPa, percent, shares.
 LARGEST = 1e6
 

@@ -152,7 +152,7 @@ def read_table(content: bytes, source: str) -> list[TableRow]:
         reader = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
         heading, *lines = [*reader] or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"'{source}' is no table in UTF-8: {error}; {AGAIN}") from error
+        raise InputError(f"'{source}' is not a table in UTF-8: {error}; {AGAIN}") from error
     sides = ("positive", "negative") if column_of("positive", SIDE_COLUMNS[0]) in heading else ("",)
     wanted = (*FIRST, *LAST, *(column_of(side, column) for side in sides for column in SIDE_COLUMNS))
     lost = [column for column in wanted if column not in heading]

@@ -61,7 +61,7 @@ def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:
     """Refuse folders of headers that are none, or of a target whose board files are not compiled here."""
     for place in include:
         if not place.is_dir():
-            raise InputError(f"'{place}' is no folder, expected one with headers after --include; check the name")
+            raise InputError(f"--include: '{place}' is not a folder, expected one with headers; check the name")
     if include and manifest.target not in COMPILERS:
         raise InputError(
             f"--include is for the board files of {', '.join(COMPILERS)}, and this firmware is for "
@@ -110,6 +110,6 @@ def board_compiles(folder: Path, manifest: FirmwareManifest, include: Sequence[P
             text = f"{first_error(done.stderr)} ({Path(compiler).name})"
             return BoardCompiled(checks=(requirements.BOARD_FILES.check(holds=False, text=text),))
     added = f" and {', '.join(user_sources)}" if user_sources else ""
-    text = f"one by one, with {', '.join(changed)} as you changed them{added} ({Path(compiler).name}); not linked, and "
-    text += "what they do is not checked"
+    text = f"each file compiles, with your changes in {', '.join(changed)}{added} ({Path(compiler).name}); they are "
+    text += "not linked, and their behaviour is not checked"
     return BoardCompiled(checks=(requirements.BOARD_FILES.check(holds=True, text=text),))

@@ -70,4 +70,4 @@ def check_firmware_inside(folder: Path) -> None:
     home = os.path.realpath(folder)
     for path in sorted(folder.rglob("*")):
         if os.path.realpath(path) != os.path.join(home, path.relative_to(folder)):  # also a junction of Windows
-            raise InputError(f"'{path}' is a link, which no firmware has; put what it leads to in its place")
+            raise InputError(f"'{path}' is a link, expected files and folders; replace it by what it points to")

@@ -28,7 +28,7 @@ def manifest_follows(folder: Path, manifest: FirmwareManifest, compensator: Comp
     if faults:
         more = f", and {len(faults) - 1} more" if len(faults) > 1 else ""
         return MANIFEST.check(holds=False, text=f"{faults[0]}{more}; make the firmware again with `dzdesign codegen`")
-    text = f"law, target, hashes and {len(manifest.constants)} constants in {len(manifest.core)} files as it says"
+    text = f"law, target, hashes and {len(manifest.constants)} constants in {len(manifest.core)} files agree with it"
     if compensator.target and compensator.target.name != manifest.target:  # both may count alike
         text += f"; the compensator was designed for {compensator.target.name}, this is for {manifest.target}"
     return MANIFEST.check(holds=True, text=text)

@@ -27,15 +27,15 @@ def files_unchanged(folder: Path, manifest: FirmwareManifest) -> Check:
         return requirements.FILES.check(holds=False, text=fault)
     text = f"{len(manifest.files) - len(filled_in) - len(projects)} files as generated"
     if projects:
-        text += f"; yours in part, changed, and compared where all is generated again: {', '.join(projects)}"
+        text += f"; you changed {', '.join(projects)}, whose generated parts are compared with a new generation"
     if filled_in:
-        text += f"; yours, changed, and not checked: {', '.join(filled_in)}"
+        text += f"; you changed these files, which are not checked: {', '.join(filled_in)}"
     if user:
-        text += f"; yours, in {USER_FOLDER}/, and not checked: {and_more(user, MOST_NAMED)}"
+        text += f"; your files in {USER_FOLDER}/ are not checked: {and_more(user, MOST_NAMED)}"
     if objects := _objects(folder, manifest, built):
-        text += f"; built, and not checked, so build anew: {and_more(objects, MOST_NAMED)}"
+        text += f"; object files are not checked, so build them again: {and_more(objects, MOST_NAMED)}"
     if built:
-        text += f"; built by CMake, and not checked: {', '.join(sorted(tree.name for tree in built))}"
+        text += f"; CMake's build folders are not checked: {', '.join(sorted(tree.name for tree in built))}"
     return requirements.FILES.check(holds=True, text=text)
 
 
@@ -43,20 +43,23 @@ def _fault(manifest: FirmwareManifest, changed: list[str], added: list[str], use
     """Return the first fault in words, or an empty text."""
     claimed = [name for name in sorted(manifest.board) if not _may_be_filled_in(name, manifest)]
     if claimed:
-        return f"the manifest calls {', '.join(claimed)} the user's to fill in, which is none of a target's files"
+        return f"the manifest lists {', '.join(claimed)} as board files of the user, but no target has such a file"
     if changed:
         return f"changed or missing: {', '.join(changed)}"
     if foreign := [name for name in added if _is_core(name)]:
-        place = f"core/ is the compensator alone, keep files of your own in {USER_FOLDER}/"
-        return f"{', '.join(foreign)}: not generated; {place}"
+        place = f"core/ holds only generated files; move your own files to {USER_FOLDER}/"
+        return f"{', '.join(foreign)}: not generated, but {place}"
     unlisted = [name for name in manifest.files if _is_core(name) and name not in manifest.core]
     if unlisted or not manifest.core:
         return f"the manifest does not name {', '.join(unlisted) or 'any file of the core'}"
     generated = _names(manifest)
     if shadows := [name for name in added if is_taken_for(PurePosixPath(name).name, generated)]:
-        return f"{', '.join(shadows)}: not generated, but named as a generated file, for which it may be taken"
+        return (
+            f"{', '.join(shadows)}: not generated, but a compiler may take it for the generated file of the same name; "
+            "rename it"
+        )
     if others := [name for name in added if name not in user]:
-        place = f"keep source and project files of your own in {USER_FOLDER}/, beside core/, or outside"
+        place = f"keep your own source and project files in {USER_FOLDER}/, beside core/, or outside the firmware"
         return f"the manifest does not name {', '.join(others)}; {place}"
     return ""
 

@@ -56,7 +56,7 @@ def manifest_follows(folder: Path, manifest: OutputManifest, compensator: Compen
         text = f"{and_more(faults, 1)}; make the output again with `dzdesign codegen`"
         return OUTPUT_MANIFEST.check(holds=False, text=text)
     settings = manifest.settings_in_words
-    return OUTPUT_MANIFEST.check(holds=True, text=f"law, target{settings} and hashes as it says")
+    return OUTPUT_MANIFEST.check(holds=True, text=f"law, target{settings} and hashes agree with the manifest")
 
 
 def _faults_of_origin(folder: Path, manifest: OutputManifest, compensator: Compensator) -> Iterator[str]:

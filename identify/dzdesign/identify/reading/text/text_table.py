@@ -103,8 +103,8 @@ class TextTable(Table):
         cell = self._first(label)
         if is_unclear(cell):
             raise InputError(
-                f"'{self.path}' column '{label}': '{cell}' may be hours and minutes, minutes and seconds or a date, "
-                f"expected seconds as a number, or a time such as {EXAMPLE}"
+                f"'{self.path}' column '{label}': '{cell}' is ambiguous, as it may be hours and minutes, minutes and "
+                f"seconds, or a date; expected seconds as a number, or a time such as {EXAMPLE}"
             )
         return is_stamp(cell)
 
