@@ -9,6 +9,7 @@ import pytest
 
 from dzdesign import api
 from dzdesign.command_line.parser import build_parser
+from dzdesign.example import example_folder
 from tests.support.documented_commands import agrees, commands_of, try_page
 from tests.support.octave import OCTAVE
 from tests.support.paths import ROOT
@@ -41,7 +42,8 @@ def after_tutorial(tmp_path_factory, request):
     """The folder in which the tutorial was run, and what was wrong with the page."""
     folder = tmp_path_factory.mktemp("docs") / "tutorial"
     folder.mkdir()
-    (folder / "examples").symlink_to(ROOT / "examples")
+    (folder / "demo").mkdir()
+    (folder / "demo" / "example").symlink_to(example_folder())  # as `dzdesign demo demo` leaves it
     return folder, try_page(TUTORIAL, folder, request.config.getoption("--update-docs"))
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from dzdesign.core.artefact_files import check_folder_may_be_written
+from dzdesign.core.artefact_files import TOOL, check_folder_may_be_written, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 from dzdesign.example import example_folder
@@ -19,6 +19,8 @@ EXAMPLES = ("dzdesign demo demo",)
 #: The flow meter of the bundled recordings, as their first lines tell it.
 METER_LAG, METER_FLOOR = "0.1 s", "0.6 L/min"
 RECORD = {"valve": "simulated by dzdesign, no measurement"}
+#: Where recordings and plant go, for a user to repeat each step: the pages of the documentation read them there.
+EXAMPLE, EXAMPLE_SCHEMA = "example", "dzdesign.example/1"
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Arguments:
     """Arguments of `demo`."""
 
     folder: Annotated[AnyPath, Option("DIR")]
-    """Folder for the artefacts."""
+    """Folder for the artefacts, and for the example's recordings and plant in its folder `example`."""
 
 
 def run(arguments: Arguments, json: bool) -> int:
@@ -35,12 +37,16 @@ def run(arguments: Arguments, json: bool) -> int:
     from dzdesign.terminal.verification_tables import print_demo
 
     folder, example = Path(arguments.folder), example_folder()
-    for part in ("firmware", "evidence"):
+    for part in ("firmware", "evidence", EXAMPLE):
         check_folder_may_be_written(folder / part)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"the folder '{folder}' can't be made: {error.strerror}") from error
+    bundled = {
+        file.relative_to(example).as_posix(): file.read_bytes() for file in sorted(example.rglob("*")) if file.is_file()
+    }
+    write_folder(folder / EXAMPLE, bundled, {"schema": EXAMPLE_SCHEMA, "tool": TOOL})
     with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
     expected = sum(verdict.as_expected for verdict in verdicts)

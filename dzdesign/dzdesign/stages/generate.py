@@ -35,7 +35,7 @@ class OutputChoices:
     """Inputs of the function block, for iec61131 (default: plc). plc: command in 0.01 % and pressures in 0.1 bar.
     codes: the converter codes of the design."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml", OUTPUTS)] = None
-    """File with a plant, for an FMU of the plant in addition, such as examples/paper_valve/plant.toml. It is for the
+    """File with a plant, for an FMU of the plant in addition, such as demo/example/plant.toml. It is for the
     output fmu only."""
     device: Annotated[Text, Option("DEVICE", OUTPUTS, choices=DEVICES)] = None
     """Device, for amplifier: west, west-pam190, west-pos123, cia408, rmc, rmc75, beckhoff or csv."""

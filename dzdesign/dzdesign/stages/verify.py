@@ -47,14 +47,14 @@ class VerifyArguments:
     """Calibration blocks of other valves, or patterns such as "lot/valves/*/calibration.bin", each beside its
     compensator.json. Each is tried with this firmware, of block form, on every input."""
     plant: Annotated[AnyPath | None, Option("PLANT.toml")] = None
-    """File with the plant of the closed loop, such as examples/paper_valve/plant.toml (default: a plant made from the
+    """File with the plant of the closed loop, such as demo/example/plant.toml (default: a plant made from the
     identified thresholds)."""
     back_pressure: Annotated[Texts, Option("P", example="1 MPa")] = ()
     """Pressure behind the metering edge in the closed loop (default: 0 and 1 MPa, or the span that the sensors have
     beside the tested pressure drops). Ramps run at the highest pressure, and failing sensors at each. Repeatable."""
     tolerances: Annotated[AnyPath | None, Option("TOL.toml", CHECKS)] = None
-    """File with the number of machines to draw from the declared budget, such as examples/paper_valve/machines.toml.
-    With --plant, a file with a series of plants, such as examples/paper_valve/tolerances.toml."""
+    """File with the number of machines to draw from the declared budget, such as demo/example/machines.toml.
+    With --plant, a file with a series of plants, such as demo/example/tolerances.toml."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
     """Folder of headers for your board files, such as those of your chip. Repeatable."""
     c2000ware: Annotated[AnyPath | None, Option("DIR", CHECKS)] = None

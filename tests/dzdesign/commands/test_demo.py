@@ -3,11 +3,13 @@
 import json
 import re
 from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
+from dzdesign.example import example_folder
 from dzdesign.verify.requirements import AS_STATED, RAMPS
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
@@ -39,6 +41,14 @@ def test_demo_leaves_every_artefact_with_its_origin(demo):
     assert again["holds"] is True and "in this run" in again["text"]
     assert [(each["inputs"], each["wrong"]) for each in evidence["inputs"]] == [(INPUTS, 0)]
     assert (demo / "evidence" / "closed_loop_positive.csv").read_text().startswith("time_s,command_percent,")
+
+
+@needs_compiler
+def test_demo_leaves_the_recordings_for_the_steps_of_the_tutorial(demo):
+    bundled, left = example_folder(), demo / "example"
+    names = {file.relative_to(bundled) for file in bundled.rglob("*") if file.is_file()}
+    assert {file.relative_to(left) for file in left.rglob("*") if file.is_file()} == {*names, Path("manifest.json")}
+    assert len(names) > 20 and all((left / name).read_bytes() == (bundled / name).read_bytes() for name in names)
 
 
 @needs_compiler

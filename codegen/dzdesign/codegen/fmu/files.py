@@ -81,7 +81,7 @@ def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
     """Return how to have an FMU of the plant too; empty where there is one, or can't be one."""
     if settings.get("plant") or compensator.current_drive is not None:
         return ""
-    return "no FMU of the plant is made; for one, give --plant PLANT.toml, such as examples/paper_valve/plant.toml"
+    return "no FMU of the plant is made; for one, give --plant PLANT.toml, such as demo/example/plant.toml"
 
 
 def made_by_another_compiler(files: Mapping[str, bytes]) -> str:
