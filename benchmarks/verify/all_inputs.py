@@ -14,8 +14,8 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.verify.analysis.machine_code import check_on_machine
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
-from dzdesign.verify.toolchain.host_compiler import load_library
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST
+from tests.support.c_library import load_library
 
 ROUNDS, QUICK_ROUNDS, SIMULATED_ROUNDS = 25, 3, 5
 #: Inputs of the comparison with ctypes and Fraction, of which the whole is extrapolated.

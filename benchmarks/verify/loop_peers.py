@@ -16,7 +16,7 @@ import numpy as np
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, derivatives, orifice
-from dzdesign.verify.toolchain.host_compiler import load_library
+from tests.support.c_library import load_library
 
 #: PWM periods between two samples of the core.
 TICKS = 2

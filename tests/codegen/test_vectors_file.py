@@ -17,8 +17,9 @@ from dzdesign.design.side_law import Sides
 from dzdesign.regeneration import regenerated
 from dzdesign.verify.exhaustive.stored_vectors import vectors_follow
 from dzdesign.verify.firmware.unchanged_files import files_unchanged
-from dzdesign.verify.toolchain.host_compiler import host_compiler, load_library, words_of
+from dzdesign.verify.toolchain.host_compiler import host_compiler, words_of
 from tests.support.attacked_firmware import edit
+from tests.support.c_library import load_library
 from tests.support.documented_commands import FILE
 from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.paths import ROOT

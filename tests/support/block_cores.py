@@ -10,7 +10,7 @@ from dzdesign.codegen.calibration.packing import pack
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.toolchain.host_compiler import load_library
+from tests.support.c_library import load_library
 
 
 def block_folder(compensator: Compensator, folder: Path) -> Path:

@@ -10,7 +10,7 @@ from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import NODE_MASK, PLAY_NODES
 from dzdesign.codegen.calibration.limits import LARGEST_DROP, largest_node
 from dzdesign.codegen.calibration.packing import pack
-from dzdesign.verify.toolchain.host_compiler import load_library
+from tests.support.c_library import load_library
 from tests.support.paths import TESTS
 
 INT32, INT63 = 2**31 - 1, 2**63 - 1

@@ -2,16 +2,17 @@
 
 import platform
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from dzdesign.core.errors import DzdesignError
+from dzdesign.core.processes.programs import find_program
+from dzdesign.core.processes.running import run_program
 from dzdesign.terminal.page import new_console, print_json, put_line, put_rows
 
-TINY = "int dz_tiny(int a);\nint dz_tiny(int a) { return 3 * a; }\n"
+TINY = "#include <stdint.h>\nint32_t dz_tiny(int32_t a);\nint32_t dz_tiny(int32_t a) { return 3 * a; }\n"
 #: A program that says nothing of its version within this time is taken as it is, s.
 PATIENCE_S = 20
 
@@ -67,7 +68,7 @@ class Installation:
     dzdesign: str | None
     python: str
     system: str
-    #: Whether a library was compiled, loaded and called, and by which compiler or why not.
+    #: Whether a program was compiled and answered, and by which compiler or why not.
     compiles: bool
     compiler: str
     programs: dict[str, dict[str, str] | None]
@@ -100,14 +101,11 @@ def _found(tool: Tool) -> dict[str, str] | None:
     """Return path and version of a program, or None."""
     from dzdesign.verify.toolchain.host_compiler import find_zig
 
-    path = find_zig() if tool.name == "zig" else shutil.which(tool.name)
+    path = find_zig() if tool.name == "zig" else find_program(tool.name)
     if path is None:
         return None
     try:
-        done = subprocess.run(
-            [path, *tool.ask], capture_output=True, text=True, errors="replace", timeout=PATIENCE_S, check=False,
-            stdin=subprocess.DEVNULL,
-        )  # fmt: skip
+        done = run_program([path, *tool.ask], timeout=PATIENCE_S)
     except (OSError, subprocess.TimeoutExpired) as error:
         return {"path": path, "version": f"does not run: {error}"}
     number = re.search(r"\d+\.\d+(?:\.\d+)?\S*", done.stdout + done.stderr) if tool.ask != ("--help",) else None
@@ -136,15 +134,17 @@ def _version(package: str) -> str | None:
 
 
 def _compiles() -> tuple[bool, str]:
-    """Compile a tiny shared library, load it and call it; return whether that works, and with what or why not."""
-    from dzdesign.verify.toolchain.host_compiler import host_compiler, load_library
+    """Compile a tiny program and have it answer; return whether that works, and with what or why not."""
+    from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+    from dzdesign.verify.toolchain.host_compiler import host_compiler
 
+    tripled = Function("dz_tiny", ("int32_t",), "int32_t")
     try:
         compiler = host_compiler()
-        answer = load_library({"tiny.c": TINY}, "a tiny library").dz_tiny(14)
-    except (DzdesignError, OSError, AttributeError) as error:
+        answer = ConfinedLibrary({"tiny.c": TINY}, [tripled], "a tiny program").call(tripled.name, 14)
+    except (DzdesignError, OSError) as error:
         return False, str(error)
-    return (True, compiler) if answer == 42 else (False, f"{compiler}: its library counts 3 * 14 = {answer}")
+    return (True, compiler) if answer == 42 else (False, f"{compiler}: its program counts 3 * 14 = {answer}")
 
 
 def _print(found: Installation, missing: list[str]) -> None:

@@ -13,9 +13,9 @@ from dzdesign.codegen.project import generate
 from dzdesign.verify.current.current_checks import read_controller
 from dzdesign.verify.current.state_check import check_states
 from dzdesign.verify.exhaustive.drive_check import drive_follows, drive_samples
-from dzdesign.verify.toolchain.host_compiler import load_library
 from tests.codegen.core.test_drive import Drive, compensator_named
 from tests.support.block_cores import block_folder
+from tests.support.c_library import load_library
 from tests.support.core_variants import variant
 from tests.support.current_loops import PLAIN, SUPPLY
 from tests.support.synthetic import needs_compiler

@@ -10,9 +10,9 @@ from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import SUPPLY_MASK
 from dzdesign.codegen.calibration.packing import pack
-from dzdesign.verify.toolchain.host_compiler import load_library
 from tests.codegen.calibration.test_check import with_current
 from tests.support.block_corners import corners, current_corners
+from tests.support.c_library import load_library
 from tests.support.claimed_blocks import TriedBlocks, random_octets
 from tests.support.core_variants import variant
 from tests.support.paths import TESTS

@@ -67,7 +67,7 @@ def stated_compare(compensator, command: int, dp_code: int) -> int:
 def wrong_codes(compensator, folder, seed: int) -> int:
     """Count where the compiled core differs from `stated_compare`, of 300 random pairs of codes and the corners."""
     from dzdesign.codegen.project import generate
-    from dzdesign.verify.toolchain.host_compiler import load_library
+    from tests.support.c_library import load_library
 
     firmware = generate(compensator, "f28335")
     write_folder(folder, firmware.files, firmware.manifest)

@@ -23,7 +23,7 @@ from dzdesign.design.zero_band import CommandError
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.drive_check import drive_samples as sequence
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
-from dzdesign.verify.toolchain.host_compiler import load_library
+from tests.support.c_library import load_library
 from tests.support.golden_firmware import FULL, GOLDENS, full_options, golden_compensator
 from tests.support.synthetic import needs_compiler
 

@@ -220,7 +220,7 @@ def test_a_state_read_once_is_torn(firmware):
 
 @needs_compiler
 def test_beta_of_the_frame_is_the_compensators_at_every_difference(example_compensator, example_firmware):
-    from dzdesign.verify.toolchain.host_compiler import load_library
+    from tests.support.c_library import load_library
 
     sources = {name: example_firmware.files[f"core/{name}"] for name in ("dz_comp.c", "dz_comp.h")}
     core = load_library(sources, "dz_comp.c")

@@ -10,7 +10,7 @@ from dzdesign.verify.structured_text.evaluator import Evaluator
 from dzdesign.verify.structured_text.parser import DEEPEST, MOST_HELD, MOST_OPERATIONS, parse
 from dzdesign.verify.structured_text.to_c import block_in_c, place_of
 from dzdesign.verify.structured_text.type_check import check_types
-from dzdesign.verify.toolchain.host_compiler import load_library
+from tests.support.c_library import load_library
 from tests.support.synthetic import needs_compiler
 
 HEAD = """FUNCTION_BLOCK B

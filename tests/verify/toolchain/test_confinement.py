@@ -70,9 +70,9 @@ def test_any_end_is_one_sentence(case):
 
 def test_the_limit_of_cpu_time_is_one_too(monkeypatch):
     monkeypatch.setattr(confinement.os, "cpu_count", lambda: 1)
-    launcher = confinement._launcher(1.0, 0, None)
+    launcher = confinement.limits(1.0, 0, None)
     assert launcher[1] == "1"
-    monkeypatch.setattr(confinement, "_launcher", lambda *_: launcher)
+    monkeypatch.setattr(confinement, "limits", lambda *_: launcher)
     ended = run_confined([str(program("for (;;) {\n    }"))], "the core", 60.0)
     assert ended.reason.endswith("it reached the limit of CPU time")
 

@@ -14,6 +14,8 @@ from functools import cache
 from pathlib import Path
 from threading import Lock
 
+from dzdesign.core.processes.programs import program_environment, with_full_name
+
 #: The watch: lines such as +4711 and -4711 on its input, until that ends.
 WATCH = """
 import os, signal, sys
@@ -40,6 +42,8 @@ def run_program(
 ) -> subprocess.CompletedProcess[str]:
     """Run a program without input, and return its exit status and what it wrote.
 
+    It is never one of the working folder, and neither is what it starts by name.
+
     Raises
     ------
     OSError
@@ -47,6 +51,7 @@ def run_program(
     subprocess.TimeoutExpired
         If it does not end in time (s); it was ended then, with all that it had started.
     """
+    command, env = with_full_name(command), program_environment(env)
     if os.name != "posix":
         return subprocess.run(
             command, cwd=cwd, env=env, timeout=timeout, check=False, capture_output=True, text=True, errors="replace",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.running import run_program
 from dzdesign.verify.analysis.longest_path import WORD, Bound, bounds
 from dzdesign.verify.toolchain.bound_block import block_of
 from dzdesign.verify.toolchain.compiled_core import embedded
@@ -192,7 +193,8 @@ def _version(machine: Machine) -> str:
 
 def _printed(*command: str) -> str:
     try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=True, timeout=60)
+        done = run_program(command, timeout=60)
+        done.check_returncode()
     except (OSError, subprocess.SubprocessError) as error:
         raise RequirementError(f"{command[0]} failed: {error}") from error
     return done.stdout

@@ -20,6 +20,7 @@ import numpy as np
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.programs import find_program
 from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
@@ -67,7 +68,7 @@ class Proof:
 
 def proof_check(folder: Path) -> Check:
     """Return the requirement that no input makes the core's C overflow, index beyond a table or shift too far."""
-    if not shutil.which(PROGRAM):
+    if not find_program(PROGRAM):
         return UNDEFINED_BEHAVIOUR.check(holds=None, text=f"not run: {PROGRAM} not found; apt install frama-c-base")
     try:
         proof = prove(folder)
@@ -133,9 +134,7 @@ def prove_any_block(folder: Path, machines: tuple[str, ...] = BOTH_WIDTHS) -> Pr
         with ThreadPoolExecutor(max(1, min(os.cpu_count() or 1, 8))) as pool:
             found = list(pool.map(lambda run: _analysed(work, "proof_block.c", sources, run[0], run[1], what), runs))
     functions = ("dz_comp", "dz_beta", "dz_status", "dz_calibration_check", *(["dz_current_tick"] if drive else []))
-    return Proof(
-        version=_version(), functions=functions, alarms=tuple(sorted(set().union(*found))), widths=machines
-    )
+    return Proof(version=_version(), functions=functions, alarms=tuple(sorted(set().union(*found))), widths=machines)
 
 
 def _of_side(work: Path, sources: list[str], rows: int) -> set[Alarm]:
@@ -233,5 +232,8 @@ def _analysed(work: Path, program: str, sources: list[str], machine: str, main: 
 
 
 def _version() -> str:
-    done = subprocess.run([PROGRAM, "-version"], capture_output=True, text=True, errors="replace", check=False)
+    try:
+        done = run_program([PROGRAM, "-version"], timeout=TIMEOUT_S)
+    except (OSError, subprocess.TimeoutExpired):
+        return "of an unknown version"
     return re.sub(r"\s+", " ", done.stdout).strip() or "of an unknown version"

@@ -1,8 +1,9 @@
 """The coil of a drive by current in the valve's closed loop: what plant_coil.h and loop.c are given of it."""
 
-import ctypes
 from dataclasses import dataclass, replace
 from importlib.resources import files
+
+import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
@@ -34,9 +35,9 @@ class CoilAtSupply:
             ),
         )
 
-    def pointers(self) -> tuple[object, object]:
+    def structs(self) -> tuple[np.ndarray, np.ndarray]:
         """Return coil and sensor as dz_loop() takes them."""
-        return ctypes.byref(self.around.coil_struct(self.corner)), ctypes.byref(self.around.sensor_struct())
+        return self.around.coil_struct(self.corner), self.around.sensor_struct()
 
 
 def nominal_coil(compensator: Compensator) -> CoilAtSupply | None:

@@ -1,7 +1,6 @@
 """The compiled core in closed loop with the plant: ramps up and down, the pulse resolved, pressures through the ADC."""
 
 import copy
-import ctypes
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -18,7 +17,7 @@ from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
 from dzdesign.verify.toolchain.bound_block import core_sources
-from dzdesign.verify.toolchain.host_compiler import load_library
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
 PERIODS_PER_RECORD = 25
@@ -33,6 +32,8 @@ NO_FLOW_L_MIN = 1e-9
 RAMP_RESERVE = 1.1
 #: No contraction to fused products: every processor gives the same digits.
 FLOATING = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+#: As loop.c has it: choices, series and channels, plant, coil and sensor; the record.
+DZ_LOOP = Function("dz_loop", (*["in"] * 16, "out"))
 MODES = ("direct", "compensated", "without beta")
 
 
@@ -127,7 +128,7 @@ class ClosedLoop:
         #: Of a drive by current the coil, at a supply.
         self.coil = nominal_coil(compensator) if firmware and compensator else None
         sources |= coil_sources(self.coil)
-        self._library = load_library(sources, "the closed loop", FLOATING)
+        self._library = ConfinedLibrary(sources, [DZ_LOOP], "the closed loop", FLOATING)
         #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
         self._dither = dither or _recorded_dither(compensator)
         #: Without a compensator no code is read, and any scaling serves.
@@ -284,10 +285,7 @@ class ClosedLoop:
             channels.zeros, channels.fulls, channels.spans, errors.table,
             plant.up_to(float(supply.max())), plant.coarse, plant.fine, self._curve,
         )  # fmt: skip
-        *given, recording = (
-            None if each is None else each.ctypes.data_as(ctypes.c_void_p) for each in (*series, record)
-        )
-        self._library.dz_loop(*given, *(coil.pointers() if coil else (None, None)), recording)
+        self._library.call("dz_loop", *series, *(coil.structs() if coil else (None, None)), record)
         recorded = dict(zip(RECORDED, record.T, strict=True))
         time = np.arange(command.size) * periods_per_record * PWM_PERIOD_S
         return LoopRun(time=time, command=command, position_mm=1e3 * recorded.pop("position_m"), **recorded)

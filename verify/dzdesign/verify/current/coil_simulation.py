@@ -1,6 +1,5 @@
 """The controller in C in a loop with a coil, the PWM resolved: programs/coil_loop.c for one corner after another."""
 
-import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,28 +11,22 @@ from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.state_check import PROGRAMS, tick_macro
-from dzdesign.verify.toolchain.host_compiler import load_library
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
 
 #: `struct trace` of programs/coil_loop.h.
 TRACE = np.dtype([("mean_A", "<f8"), ("compare", "<u2"), ("total", "<u2"), ("faults", "<u2"), ("_", "<u2")])
 
 
-class CoilStruct(ctypes.Structure):
-    """`struct coil` of programs/coil.h."""
-
-    _fields_ = [
-        *((name, ctypes.c_double) for name in ("resistance_ohm", "inductance_H", "supply_V", "freewheel_V")),
-        *((name, ctypes.c_double) for name in ("period_s", "full_counts", "rated_A")),
-        *((name, ctypes.c_int32) for name in ("samples", "samples_before", "stuck")),
-    ]
-
-
-class SensorStruct(ctypes.Structure):
-    """`struct sensor` of programs/coil.h."""
-
-    _fields_ = [
-        (name, ctypes.c_double) for name in ("V_per_A", "offset_V", "codes_per_V", "code_max", "supply_divider")
-    ]
+#: `struct coil` and `struct sensor` of programs/coil.h.
+COIL = np.dtype(
+    [(name, "<f8") for name in ("resistance_ohm", "inductance_H", "supply_V", "freewheel_V")]
+    + [(name, "<f8") for name in ("period_s", "full_counts", "rated_A")]
+    + [(name, "<i4") for name in ("samples", "samples_before", "stuck")],
+    align=True,
+)
+SENSOR = np.dtype([(name, "<f8") for name in ("V_per_A", "offset_V", "codes_per_V", "code_max", "supply_divider")])
+#: Coils, from which period on each, and their number; sensor; set points and their number; traces.
+COIL_LOOP = Function("coil_loop", ("in", "in", "uint32_t", "in", "in", "uint32_t", "out"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,25 +44,21 @@ class CoilLoop:
         """Codes of the converter for a current."""
         return self.sensor.V_per_A * self.converter.levels / float(self.converter.full_V)
 
-    def coil_struct(self, corner: Corner, *, stuck: bool = False) -> CoilStruct:
+    def coil_struct(self, corner: Corner, *, stuck: bool = False) -> np.ndarray:
         """Return a coil at a supply as the C takes it; of one that is stuck the switch stays on."""
         sampling = self.sampling
-        return CoilStruct(
-            *corner,
-            self.circuit.freewheel_V,
-            sampling.period_s,
-            self.loop.full_counts,
-            self.circuit.rated_A,
-            sampling.samples,
-            sampling.before,
-            stuck,
-        )
+        values = (
+            *corner, self.circuit.freewheel_V, sampling.period_s, self.loop.full_counts, self.circuit.rated_A,
+            sampling.samples, sampling.before, stuck,
+        )  # fmt: skip
+        return np.array([values], dtype=COIL)
 
-    def sensor_struct(self) -> SensorStruct:
+    def sensor_struct(self) -> np.ndarray:
         """Return the sensor as the C takes it."""
         sensor, converter = self.sensor, self.converter
         codes_per_V = converter.levels / float(converter.full_V)
-        return SensorStruct(sensor.V_per_A, sensor.offset_V, codes_per_V, converter.code_max, sensor.supply_divider)
+        values = (sensor.V_per_A, sensor.offset_V, codes_per_V, converter.code_max, sensor.supply_divider)
+        return np.array([values], dtype=SENSOR)
 
     def with_offset(self, codes: float) -> "CoilLoop":
         """Return it with a sensor whose zero is off by so many codes."""
@@ -123,7 +112,9 @@ class CoilSimulation:
         names = ("coil.h", "coil_loop.c", "coil_loop.h")
         sources = {name: (PROGRAMS / name).read_text("utf-8") for name in names}
         own = {name: core[name] for name in ("dz_current.c", "dz_current.h")}
-        self._library = load_library(sources | own | {"tick.h": tick_macro(around.loop)}, "the coil's loop")
+        self._library = ConfinedLibrary(
+            sources | own | {"tick.h": tick_macro(around.loop)}, [COIL_LOOP], "the coil's loop"
+        )
 
     def run(
         self,
@@ -137,13 +128,8 @@ class CoilSimulation:
         asked = np.ascontiguousarray(set_points, dtype=np.uint16)
         found = np.zeros(len(asked), dtype=TRACE)
         coils = [around.coil_struct(corner), *(around.coil_struct(each.corner, stuck=each.stuck) for each in changes)]
-        self._library.coil_loop(
-            (CoilStruct * len(coils))(*coils),
-            (ctypes.c_uint32 * len(coils))(0, *(each.period for each in changes)),
-            ctypes.c_uint32(len(coils)),
-            ctypes.byref(around.sensor_struct()),
-            asked.ctypes.data_as(ctypes.c_void_p),
-            ctypes.c_uint32(len(asked)),
-            found.ctypes.data_as(ctypes.c_void_p),
+        begins = np.array([0, *(each.period for each in changes)], dtype=np.uint32)
+        self._library.call(
+            "coil_loop", np.concatenate(coils), begins, len(coils), around.sensor_struct(), asked, len(asked), found
         )
         return Traces(**{name: found[name].copy() for name in ("mean_A", "compare", "total", "faults")})

@@ -1,6 +1,5 @@
 """The controller in C against the exact one, over random and hostile states; other machines by hashes of the same."""
 
-import ctypes
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -19,7 +18,7 @@ from dzdesign.verify.current.exact_controller import (
     ExactController,
     exact_ticks,
 )
-from dzdesign.verify.toolchain.host_compiler import load_library
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
 from dzdesign.verify.toolchain.machines import HOST, Machine
 
 PROGRAMS = Path(str(files("dzdesign.verify.current"))) / "programs"
@@ -35,6 +34,12 @@ STATE = np.dtype(
 #: `struct period` of programs/current_states.h.
 PERIOD = np.dtype(
     [("before", STATE), ("after", STATE), ("set_point", "<u2"), ("total", "<u2"), ("supply_code", "<u2"), ("_", "<u2")]
+)
+#: Of programs/current_states.h.
+FUNCTIONS = (
+    Function("current_states", ("uint32_t", "uint32_t", "out"), "uint32_t"),
+    Function("current_offsets", ("uint32_t", "uint32_t", "out", "out"), "uint32_t"),
+    Function("current_initial", ("both",)),
 )
 COMPARED = ("integral", "compare", "faults", "over_ticks", "open_ticks", "ramped")
 
@@ -100,31 +105,25 @@ class HostStates:
 
     def __init__(self, loop: CurrentLoop, core: Mapping[str, str]) -> None:
         self._loop = loop
-        self._library = load_library(program_files(loop, core), "the current controller")
-        for name in ("current_states", "current_offsets"):
-            getattr(self._library, name).restype = ctypes.c_uint32
+        self._library = ConfinedLibrary(program_files(loop, core), FUNCTIONS, "the current controller")
 
     def periods(self, seed: int, count: int) -> tuple[np.ndarray, int]:
         """Return so many periods, and their hash."""
         found = np.zeros(count, dtype=PERIOD)
-        pointer = found.ctypes.data_as(ctypes.c_void_p)
-        hashed = self._library.current_states(ctypes.c_uint32(seed), ctypes.c_uint32(count), pointer)
-        return found, hashed
+        return found, self._library.call("current_states", seed, count, found)
 
     def initial(self) -> dict[str, int]:
         """Return the state before anything."""
         found = np.full(1, 0, dtype=STATE)
         found.view(np.uint8)[:] = 0xAA  # what is not set shows
-        self._library.current_initial(found.ctypes.data_as(ctypes.c_void_p))
+        self._library.call("current_initial", found)
         return {name: int(found[name][0]) for name in STATE.names or ()}
 
     def offsets(self, seed: int, count: int) -> tuple[np.ndarray, np.ndarray, int]:
         """Return the states at the end of so many calibrations, their sums, and the hash."""
         ends = np.zeros(count, dtype=STATE)
         sums = np.zeros((count, (1 << self._loop.offset_shift) + 1), dtype=np.uint16)
-        pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (ends, sums)]
-        hashed = self._library.current_offsets(ctypes.c_uint32(seed), ctypes.c_uint32(count), *pointers)
-        return ends, sums, hashed
+        return ends, sums, self._library.call("current_offsets", seed, count, ends, sums)
 
 
 def _initial(loop: CurrentLoop) -> dict[str, int]:

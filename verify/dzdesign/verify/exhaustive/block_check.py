@@ -1,7 +1,5 @@
 """One firmware in block form with the calibration blocks of many valves: each on every input, compiled once."""
 
-import ctypes
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -22,11 +20,13 @@ from dzdesign.verify.loop_results import about
 from dzdesign.verify.requirements import CALIBRATION_BLOCK, Check
 from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
-from dzdesign.verify.toolchain.host_compiler import load_library
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
 from dzdesign.verify.toolchain.machines import discard
 
 #: The C that decides which blocks the core may use.
 ACCEPTANCE = "dz_calibration.c"
+#: Octets of a block, and what is wrong with one.
+FUNCTIONS = (Function("dz_size", (), "uint32_t"), Function("dz_calibration_check", ("in",), "uint16_t"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,21 +93,17 @@ class BlockFirmware:
 
     def _refused(self, block: bytes) -> int:
         """Return what the compiled check finds wrong; it reads as many octets as its block has."""
-        size, accepts = self._accepts
+        size = self._library.call("dz_size")
         if len(block) != size:
             raise RequirementError(f"the block has {len(block)} octets, this firmware's core takes {size}")
-        return accepts(ctypes.create_string_buffer(block, size))
+        return self._library.call("dz_calibration_check", block)
 
     @cached_property
-    def _accepts(self) -> tuple[int, Callable[..., int]]:
+    def _library(self) -> ConfinedLibrary:
         texts = {name: content.decode(errors="surrogateescape") for name, content in self._acceptance.items()}
-        size = f'#include "{BLOCK_HEADER}"\nunsigned long dz_size(void);\n'
-        size += "unsigned long dz_size(void)\n{\n    return sizeof(struct dz_calibration);\n}\n"
-        library = load_library({**texts, "dz_size.c": size}, "the check of a block")
-        library.dz_size.restype = ctypes.c_ulong
-        accepts = library.dz_calibration_check
-        accepts.restype = ctypes.c_uint16
-        return library.dz_size(), accepts
+        size = f'#include <stdint.h>\n#include "{BLOCK_HEADER}"\nuint32_t dz_size(void);\n'
+        size += "uint32_t dz_size(void)\n{\n    return (uint32_t)sizeof(struct dz_calibration);\n}\n"
+        return ConfinedLibrary({**texts, "dz_size.c": size}, FUNCTIONS, "the check of a block")
 
     def _every_input(self, block: bytes, compensator: Compensator, sign: int) -> InputCheck:
         prepared = PreparedInputs(ExactLaw(compensator, sign))

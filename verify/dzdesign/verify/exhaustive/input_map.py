@@ -14,7 +14,7 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, differences
 from dzdesign.verify.exhaustive.zero_command import bounds_at, counted_dither, guarded_bounds, pressure_drops
 from dzdesign.verify.loop_results import Side
-from dzdesign.verify.toolchain.compiled_core import loaded_core
+from dzdesign.verify.toolchain.compiled_core import core_answers
 
 #: Columns of the grid over the converter's codes; rows over all differences, and over the tested ones.
 COMMANDS, WIDE_ROWS, TESTED_ROWS = 46, 36, 54
@@ -38,19 +38,20 @@ class InputMap:
 def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
     """Call one side of the compiled core over the grid."""
     exact = ExactLaw(compensator, sign)
-    core, status = loaded_core(folder, sign)
     found = differences(exact)
     bounds = guarded_bounds(compensator, sign)
     known_V = bounds_at(pressure_drops(exact, found, (Fraction(repr(dp)) for dp in bounds.dp_MPa)), bounds)
     tested = np.flatnonzero(~np.isnan(known_V))
-    commands, grid = _commands(exact), []
-    for row in _grid_rows(found, tested).tolist():
-        dp_code, pair = int(found.values[row]), _pair(exact, found, row)
-        corners = exact.corners(exact.betas(dp_code))
-        for code in commands:
-            given = core(code, *pair)
+    commands, rows, grid = _commands(exact), _grid_rows(found, tested).tolist(), []
+    drawn = [(code, *_pair(exact, found, row)) for row in rows for code in commands]
+    resting = [(exact.zero, *_pair(exact, found, row)) for row in tested.tolist()]
+    answers = core_answers(folder, sign, np.array([*drawn, *resting])).tolist()
+    for place, row in enumerate(rows):
+        dp_code = int(found.values[row])
+        corners, begin = exact.corners(exact.betas(dp_code)), place * len(commands)
+        for code, (given, status) in zip(commands, answers[begin : begin + len(commands)], strict=True):
             error = given - exact.compare_value(code, corners) if code in exact.sound_commands else 0
-            grid.append((code, dp_code, given, error, status(code, *pair)))
+            grid.append((code, dp_code, given, error, status))
     a_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
     volt = float(compensator.u_max_V) / exact.compare_max
     peak = counted_dither(compensator)
@@ -61,10 +62,10 @@ def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMa
             (
                 int(found.values[row]),
                 float(found.values[row]) * a_MPa,
-                (core(exact.zero, *_pair(exact, found, row)) + peak) * volt,
+                (given + peak) * volt,
                 float(known_V[row]),
             )
-            for row in tested.tolist()
+            for row, (given, _) in zip(tested.tolist(), answers[len(drawn) :], strict=True)
         ),
     )
 

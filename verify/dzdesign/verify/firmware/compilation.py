@@ -1,13 +1,13 @@
 """Whether the firmware's C compiles: the core strictly, and the files that its user filled in."""
 
 import re
-import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.processes.programs import find_program
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
 from dzdesign.verify.firmware.project_file import is_project
@@ -83,7 +83,7 @@ def board_compiles(folder: Path, manifest: FirmwareManifest, include: Sequence[P
     changed = changed_board_files(folder, manifest)
     if not changed or not compiler:
         return BoardCompiled()
-    if not shutil.which(compiler):
+    if not find_program(compiler):
         return BoardCompiled(not_compiled=f"{compiler} is not on the path; install it, then `verify`")
     place = (folder / changed[0]).parent
     sources = sorted(name for name in manifest.files if (folder / name).parent == place and name.endswith(".c"))

@@ -7,7 +7,6 @@ the same, and so must the code and the symbols of the objects: an attribute, a t
 
 import posixpath
 import re
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +15,7 @@ from functools import cache
 from pathlib import Path, PurePosixPath
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.programs import find_program
 from dzdesign.verify.firmware.compilation import COMPILERS, ELSEWHERE
 from dzdesign.verify.firmware.object_code import ObjectCode, read_object
 from dzdesign.verify.firmware.unchanged_files import USER_FOLDER
@@ -119,7 +119,7 @@ def compare_meaning(
         sources = [name for name in sources if reached & _included(name, code)]
     if not compiler or not headers or not sources:
         return MeaningCompared()
-    if not shutil.which(compiler):
+    if not find_program(compiler):
         text = f"{compiler} is not on the path, so nothing tells whether your headers change what the generated C means"
         return MeaningCompared(not_compared=f"{text}; install it, then `verify`")
     place = posixpath.dirname(headers[0])

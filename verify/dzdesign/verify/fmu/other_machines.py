@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from shutil import which
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.programs import find_program
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify.fmu.binary_core import SIMULATED, FmuCore, Simulated
@@ -54,7 +54,7 @@ def checks(
 
 def _missing(simulated: Simulated) -> str:
     """Return what a simulator lacks here, with what to install; nothing where it is there."""
-    absent = [name for name in simulated.needs if not (which(name) or Path(name).exists())]
+    absent = [name for name in simulated.needs if not (find_program(name) or Path(name).exists())]
     words = [f"{name} not found; apt install {simulated.needs[name]}" for name in absent]
     if find_zig() is None:
         words.append('ziglang not found; run `pip install "dzdesign[fmu]"`')

@@ -4,19 +4,18 @@ The rule that both keep: the wave begins with its upper half at the first period
 zero, and it stays within the PWM's range.
 """
 
-import ctypes
-
 import numpy as np
 
 from dzdesign.verify.closed_loop.loop import LoopRun
 from dzdesign.verify.integrator.compiled_calls import CompiledDrive
 from dzdesign.verify.integrator.windows import REST_S, Course, Window
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary
 
 #: A standing command, as a share of full command, and for how long the drive has it beyond its own ramps, s.
 STANDING, STANDS_S = 0.5, 0.2
 
 
-def unlike_direct_values(window: Window, library: ctypes.CDLL, course: Course, compensated: LoopRun) -> int:
+def unlike_direct_values(window: Window, library: ConfinedLibrary, course: Course, compensated: LoopRun) -> int:
     """Return in how many PWM periods the native loop's direct command has another wave than the drive gives it.
 
     `course` has a value for each period, and `compensated` is the native run through it, whose pressures are real ones.
@@ -34,7 +33,7 @@ def unlike_direct_values(window: Window, library: ctypes.CDLL, course: Course, c
     return int(np.count_nonzero(run.compare != expected))
 
 
-def _wave_of_drive(window: Window, library: ctypes.CDLL, pressures: tuple[int, int]) -> np.ndarray:
+def _wave_of_drive(window: Window, library: ConfinedLibrary, pressures: tuple[int, int]) -> np.ndarray:
     """Return what the compiled drive adds to its law over one wave, from the first period of its upper half on, (P,).
 
     Of a drive that adds nothing it is a zero.
@@ -44,11 +43,10 @@ def _wave_of_drive(window: Window, library: ctypes.CDLL, pressures: tuple[int, i
     rate_Hz = scene.compensator.signals.tick_Hz
     rest, ramp, stands = (round(time * rate_Hz) for time in (loop.waits_s + REST_S, loop.slowest_ramp_s, STANDS_S))
     standing = command.zero_code + round(STANDING * command.direction(scene.sign) * command.span(scene.sign))
-    added = []
-    for k in range(rest + ramp + stands):
-        if k % drive.periods_per_sample == 0:
-            drive.sample((command.zero_code if k < rest else standing, *pressures))
-        added.append(drive.tick(without_dither=False) - drive.law)
-    wave = np.array(added[-stands:])
+    periods = rest + ramp + stands
+    samples = range(0, periods, drive.periods_per_sample)
+    codes = [(command.zero_code if k < rest else standing, *pressures) for k in samples]
+    a, b, law, _ = drive.samples(np.array(codes))[:periods].T
+    wave = ((a if scene.sign > 0 else b) - law)[-stands:]
     begins = np.flatnonzero((wave[1:] > 0) & (wave[:-1] <= 0)) + 1
     return wave[begins[0] : begins[1]] if begins.size > 1 else np.zeros(1)

@@ -7,7 +7,6 @@ current the spool feels the mean current of the period. A stand-in's flow is tha
 told by its beginning, its middle and its end.
 """
 
-import ctypes
 from dataclasses import dataclass
 from math import floor
 
@@ -23,6 +22,7 @@ from dzdesign.verify.integrator.edge import edge_of
 from dzdesign.verify.integrator.spool import Acting, CvodesSpool, SpoolState
 from dzdesign.verify.integrator.switched_coil import SwitchedCoil
 from dzdesign.verify.integrator.windows import Course
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary
 
 PERIOD_MS = 1e3 * PWM_PERIOD_S
 #: A pressure as near as this to the border of a code, in codes, may be converted to either.
@@ -49,7 +49,7 @@ class ReferenceLoop:
     """One plant, one side of a drive, from rest."""
 
     def __init__(
-        self, plant: Plant | StandIn, library: ctypes.CDLL, signals: Signals, sign: int, coil: CoilAtSupply | None,
+        self, plant: Plant | StandIn, library: ConfinedLibrary, signals: Signals, sign: int, coil: CoilAtSupply | None,
         *, without_dither: bool, drive: float = 1.0,
     ) -> None:  # fmt: skip
         self._parameters, self._signals, self._sign = plant.parameters, signals, sign
@@ -72,20 +72,24 @@ class ReferenceLoop:
         self._noise = errors.seed
         count = end - begin
         position, flow, written = np.empty(count), np.empty(count), np.empty(count)
-        compare, supplied = 0, None
+        supplied, every = None, self._drive.periods_per_sample
+        waiting: list[tuple[int, int, int]] = []
+        compare = [0]  # before the first period, and in each one that is known
         for k in range(end):
             supply = float(course.supply_MPa[k])
             if supply != supplied:
                 self._edge.supplied(self._state.position, supply)
                 supplied = supply
-            in_force = compare
-            if k % self._drive.periods_per_sample == 0:
-                self._drive.sample(self._codes(course, k, errors, native_codes[k], at_rest=k < begin))
-            compare = self._drive.tick(without_dither=self._without_dither)
+            if k % every == 0:
+                waiting.append(self._codes(course, k, errors, native_codes[k], at_rest=k < begin))
+                if k + every > begin:  # until then all codes are known, and the core is called once
+                    compare += self._drive.compare_values(np.array(waiting), without_dither=self._without_dither)
+                    waiting.clear()
             if k >= begin:
-                self._period(in_force, compare, supply, float(course.added_V[k]))
+                in_force, new = compare[k], compare[k + 1]
+                self._period(in_force, new, supply, float(course.added_V[k]))
                 position[k - begin], flow[k - begin] = self._state.position, self._edge.q_L_min
-                written[k - begin] = compare
+                written[k - begin] = new
         return ReferenceRun(
             position_mm=position, q_L_min=flow, compare=written, impacts=self._state.impacts,
             codes_at_border=self._codes_at_border, unlike_codes=self._unlike_codes,

@@ -4,7 +4,6 @@ Written from the circuit: L di/dt = supply - R i with the switch on; -freewheel 
 blocks at no current. Nothing of coil.h is used here.
 """
 
-import ctypes
 from collections.abc import Sequence
 from math import floor
 
@@ -14,12 +13,13 @@ from dzdesign.verify.closed_loop.coil_in_loop import CoilAtSupply
 from dzdesign.verify.integrator.compiled_calls import CompiledController
 from dzdesign.verify.integrator.cvodes import Cvodes
 from dzdesign.verify.integrator.spool import SHORTEST_MS
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary
 
 
 class SwitchedCoil:
     """A coil at a supply, with its sensor, around the compiled controller; begins without current."""
 
-    def __init__(self, coil: CoilAtSupply, library: ctypes.CDLL) -> None:
+    def __init__(self, coil: CoilAtSupply, library: ConfinedLibrary) -> None:
         around = coil.around
         self._corner, self._circuit, self._sampling = coil.corner, around.circuit, around.sampling
         self._sensor, self._converter = around.sensor, around.converter

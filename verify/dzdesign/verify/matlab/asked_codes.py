@@ -25,6 +25,8 @@ from dzdesign.verify.toolchain.machines import PROGRAMS as CHECK_PROGRAMS
 ADAPTER = "asked_codes.c"
 #: What the check calls, in the order of the function's outputs.
 OUTPUTS = ("core", "status", "beta")
+#: Folder of what Octave answers, the one in which it may write.
+ANSWERS = "answers"
 ENDINGS = {1: "", -1: "_negative"}
 #: Octets of the codes of an input, and of an answer.
 CODES_SIZE, ANSWER_SIZE = 6, 2
@@ -107,6 +109,7 @@ def answers_of(
     work = asked.folder / "functions"
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir()
+    (asked.folder / ANSWERS).mkdir(exist_ok=True)
     for name, text in functions.items():
         (work / f"{name}.m").write_bytes(text)
     jobs = [(output, first, count) for output in outputs for first, count in _pieces(asked.count(output))]
@@ -116,7 +119,7 @@ def answers_of(
         files = [part for name in functions for part in (name, str(_answers(asked, name, output, first)))]
         number = str(OUTPUTS.index(output) + 1)
         arguments = [number, str(asked.codes(output)), str(first), str(count), *files]
-        run_octave(octave, "answers_of.m", arguments, work, len(functions))
+        run_octave(octave, "answers_of.m", arguments, work, asked.folder / ANSWERS, len(functions))
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, 4)) as pool:
         list(pool.map(run, jobs))
@@ -132,7 +135,7 @@ def _pieces(count: int) -> list[tuple[int, int]]:
 
 
 def _answers(asked: AskedCodes, name: str, output: str, first: int) -> Path:
-    return asked.folder / f"{name}_{output}_{first}.bin"
+    return asked.folder / ANSWERS / f"{name}_{output}_{first}.bin"
 
 
 def _joined(asked: AskedCodes, name: str, output: str) -> Path | str:

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +9,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.programs import find_program
 from dzdesign.core.processes.running import run_program
+from dzdesign.verify.toolchain.confinement import run_confined
 
 PROGRAMS = Path(str(files("dzdesign.verify.matlab"))) / "programs"
 #: The one without a window first.
@@ -26,7 +27,7 @@ LONGEST = 300
 
 def find_octave() -> str | None:
     """Return the path of Octave, or None."""
-    return next((path for name in NAMES if (path := shutil.which(name))), None)
+    return next((path for name in NAMES if (path := find_program(name))), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,29 +54,25 @@ def available_octave() -> Octave:
     return Octave(path=path, versions={"octave": f"GNU Octave {found.group(1)}"})
 
 
-def run_octave(path: str, program: str, arguments: Sequence[str], folder: Path, functions: int = 1) -> str:
+def run_octave(
+    path: str, program: str, arguments: Sequence[str], folder: Path, results: Path | None = None, functions: int = 1
+) -> str:
     """Run a program of this room in a folder and return what it prints; if it fails or hangs, `RequirementError`.
 
-    It has the time of so many functions.
+    It writes nowhere but in `results`, and has the time of so many functions.
     """
-    try:
-        done = run_program(
-            [path, *FLAGS, str(PROGRAMS / program), *arguments], cwd=folder, env=_environment(folder),
-            timeout=TIMEOUT_S * functions,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired as error:
-        raise RequirementError(f"Octave did not end within {error.timeout:g} s") from error
-    except OSError as error:
-        raise RequirementError(f"Octave did not start: {error}") from error
-    if done.returncode:
-        said = " ".join((done.stderr or done.stdout).split())[:LONGEST]
-        raise RequirementError(f"Octave ended with exit status {done.returncode}: {said}")
-    return done.stdout
+    command = [path, *FLAGS, str(PROGRAMS / program), *arguments]
+    ended = run_confined(
+        command, "Octave", TIMEOUT_S * functions, results=results, place=folder, more=_variables(folder),
+    )  # fmt: skip
+    if ended.reason:
+        said = " ".join((ended.complaint or ended.printed).split())[:LONGEST]
+        raise RequirementError(f"Octave ended with {ended.reason}: {said}")
+    return ended.printed
 
 
-def _environment(folder: Path) -> Mapping[str, str]:
-    """Return an environment in which Octave finds no settings and no other functions of the user's."""
-    own = {name for name in os.environ if name.startswith("OCTAVE_")} - {"OCTAVE_HOME"}
-    kept = {name: value for name, value in os.environ.items() if name not in own}
+def _variables(folder: Path) -> Mapping[str, str]:
+    """Return variables by which Octave finds no settings and no other functions of the user's."""
+    own = {"OCTAVE_HOME": os.environ["OCTAVE_HOME"]} if "OCTAVE_HOME" in os.environ else {}
     # It does little linear algebra, and a thread of a library for each core would only wait.
-    return {**kept, "HOME": str(folder), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return {**own, "HOME": str(folder), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}

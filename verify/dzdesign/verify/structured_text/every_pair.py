@@ -1,20 +1,21 @@
 """Every input of a function block, tried with its text turned into C, and a sample of them read by NumPy."""
 
-import ctypes
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 
 import numpy as np
 
+from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.structured_text.evaluator import Evaluator
 from dzdesign.verify.structured_text.exact_block import ExactBlock, Sensor
 from dzdesign.verify.structured_text.syntax import RANGES, FunctionBlock, Kind, Place
 from dzdesign.verify.structured_text.to_c import HEADER, block_in_c, place_of
-from dzdesign.verify.toolchain.host_compiler import load_library
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function, Given
 
 PROGRAM = Path(__file__).parent / "programs" / "every_pair.c"
 #: Pressures of a PLC, 0.1 bar, whose differences are tried with every command, and those tried at zero command.
@@ -23,6 +24,8 @@ PLC_PRESSURES, PLC_AROUND = (0, 4000), (-300, 4300)
 SAMPLE, SEED = 20_000, 61131
 #: A piece of the work, in pressure drops or pressures.
 PIECE = 64
+SIDE_BY_SIDE = min(os.cpu_count() or 1, 4)
+NO_MEMORY = "the function block as C found no memory for the check; run it on a machine with more"
 SIDE_FIELDS = (
     "sign", "along", "span", "zero_band", "has_rest", "leave_zero", "limit", "turn", "reverse", "tested_to",
     "first_drop", "drops",
@@ -30,34 +33,28 @@ SIDE_FIELDS = (
 RESULT_FIELDS = ("pairs", "calls", "wrong", "wrong_status", "wrong_state")
 
 
-def _integers(*names: str) -> list[tuple[str, type]]:
-    return [(name, ctypes.c_int64) for name in names]
+def _integers(*names: str) -> np.dtype:
+    return np.dtype([(name, "<i8") for name in names])
 
 
-class _Side(ctypes.Structure):
-    _fields_ = [*_integers(*SIDE_FIELDS), ("parts", ctypes.c_void_p)]
-
-
-class _Sensor(ctypes.Structure):
-    _fields_ = _integers("low", "high", "zero", "weight")
-
-
-class _Setup(ctypes.Structure):
-    _fields_ = [
-        *_integers("sides", "command_zero", "command_low", "command_high", "unit"),
-        ("a", _Sensor), ("b", _Sensor), ("side", _Side * 2),
-    ]  # fmt: skip
-
-
-class _Faults(ctypes.Structure):
-    _fields_ = _integers("count", "first")
-
-
-class _Result(ctypes.Structure):
-    _fields_ = [
-        *_integers(*RESULT_FIELDS), ("faults", _Faults),
-        *_integers("command", "pressure_a", "pressure_b", "found", "expected", "hash"),
-    ]  # fmt: skip
+#: Structures of programs/every_pair.c; of a law that of its sides is its end, and of a result the faults its middle.
+SIDE, SENSOR = _integers(*SIDE_FIELDS), _integers("low", "high", "zero", "weight")
+SETUP = np.dtype([
+    *((name, "<i8") for name in ("sides", "command_zero", "command_low", "command_high", "unit")),
+    ("a", SENSOR), ("b", SENSOR), ("side", SIDE, (2,)),
+])  # fmt: skip
+FAULTS = _integers("count", "first")
+RESULT = np.dtype([
+    *((name, "<i8") for name in RESULT_FIELDS), ("faults", FAULTS),
+    *((name, "<i8") for name in ("command", "pressure_a", "pressure_b", "found", "expected", "hash")),
+])  # fmt: skip
+FUNCTIONS = (
+    Function("prepare", ("in", "in", "int64_t", "in", "int64_t"), "int32_t"),
+    Function("every_command", (*["int64_t"] * 5, "both"), "int32_t"),
+    Function("every_pressure", (*["int64_t"] * 4, "both")),
+    Function("any_inputs", ("in", "int64_t", "both")),
+    Function("as_it_is", ("in", "both", "both", "int64_t", "both")),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,26 +80,24 @@ class ExactTables:
     def __init__(self, compensator: Compensator, interface: str) -> None:
         self.of_codes = interface == "codes"
         self.exact = [ExactBlock(compensator, sign, interface) for sign in compensator.signals.signs]
-        self._held: list[np.ndarray] = []
-        self.setup = self._setup()
+        #: The law, and the numbers of its parts over all pressure drops, of each side.
+        self.setup, self.parts = np.zeros(1, dtype=SETUP), [np.zeros(0, dtype=np.int64)] * 2
+        self._fill()
 
-    def _setup(self) -> _Setup:
-        first = self.exact[0]
-        setup = _Setup(
-            sides=len(self.exact), command_zero=first.command_zero, command_low=first.commands[0],
-            command_high=first.commands[1], unit=first.unit, a=_sensor(first.sensors[0]), b=_sensor(first.sensors[1]),
-        )  # fmt: skip
+    def _fill(self) -> None:
+        first, setup = self.exact[0], self.setup[0]
+        a, b = first.sensors
+        sensors = [(each.low, each.high, each.zero, each.weight) for each in (a, b)]
+        head = (len(self.exact), first.command_zero, *first.commands, first.unit)
+        for name, value in zip(SETUP.names or (), (*head, *sensors), strict=False):
+            setup[name] = value
         for place, exact in enumerate(self.exact):
             drops = range(-exact.reverse, self._largest_drop(exact) + 1)
-            table = exact.table(drops)
-            self._held.append(table)
-            setup.side[place] = _Side(
-                sign=exact.sign, along=exact.along, span=exact.span, zero_band=exact.zero_band,
-                has_rest=int(exact.transition_end > 0), leave_zero=exact.leave_zero, limit=exact.compare_limit,
-                turn=exact.turn, reverse=exact.reverse, tested_to=exact.tested_to, first_drop=drops[0],
-                drops=len(drops), parts=table.ctypes.data,
+            self.parts[place] = np.ascontiguousarray(exact.table(drops), dtype=np.int64)
+            setup["side"][place] = (
+                exact.sign, exact.along, exact.span, exact.zero_band, int(exact.transition_end > 0), exact.leave_zero,
+                exact.compare_limit, exact.turn, exact.reverse, exact.tested_to, drops[0], len(drops),
             )  # fmt: skip
-        return setup
 
     def _largest_drop(self, exact: ExactBlock) -> int:
         """Return the largest pressure drop of valid pressures."""
@@ -112,15 +107,18 @@ class ExactTables:
 
 
 class TriedBlock:
-    """A function block that is ready to be tried."""
+    """A function block that is ready to be tried, in as many processes as try it side by side."""
 
     def __init__(
         self, block: FunctionBlock, kinds: dict[int, Kind], tables: ExactTables, options: Sequence[str] = ()
     ) -> None:
         self.block, self.kinds, self.of_codes = block, kinds, tables.of_codes
-        self.tables, self.exact, self.setup = tables, tables.exact, tables.setup
+        self.tables, self.exact = tables, tables.exact
         sources = {HEADER: block_in_c(block, kinds), PROGRAM.name: PROGRAM.read_text(encoding="utf-8")}
-        self.library = load_library(sources, "the function block as C", options)
+        self._libraries: SimpleQueue[ConfinedLibrary] = SimpleQueue()
+        for _ in range(SIDE_BY_SIDE):
+            self._libraries.put(ConfinedLibrary(sources, FUNCTIONS, "the function block as C", options))
+        self._prepared: set[ConfinedLibrary] = set()
 
     @property
     def pressures(self) -> tuple[int, int]:
@@ -132,10 +130,8 @@ class TriedBlock:
         low, high = self.pressures
         reach = self._reach(low, high) if drops is None else drops
 
-        def of_side(place: int) -> Callable[[int, int, _Result], None]:
-            return lambda first, end, result: self.library.every_command(
-                ctypes.byref(self.setup), *map(ctypes.c_int64, (place, first, end, low, high)), ctypes.byref(result)
-            )
+        def of_side(place: int) -> Callable[[int, int, np.ndarray], int]:
+            return lambda first, end, result: self._call("every_command", place, first, end, low, high, result)
 
         return [self._tried(of_side(place), reach) for place in range(len(self.exact))]
 
@@ -152,10 +148,8 @@ class TriedBlock:
         """Try every pair of pressures, valid or not, at zero command; or those of some pressures A."""
         low, high = self.pressures if self.of_codes else PLC_AROUND
 
-        def work(first: int, end: int, result: _Result) -> None:
-            self.library.every_pressure(
-                ctypes.byref(self.setup), *map(ctypes.c_int64, (first, end, low, high)), ctypes.byref(result)
-            )
+        def work(first: int, end: int, result: np.ndarray) -> int:
+            return self._call("every_pressure", first, end, low, high, result)
 
         return self._tried(work, range(low, high + 1) if of_a is None else of_a)
 
@@ -173,27 +167,39 @@ class TriedBlock:
         ]
         grid = np.array(np.meshgrid(commands, *pressures), dtype=np.int64).reshape(3, -1).T.copy()
 
-        def work(begin: int, end: int, result: _Result) -> None:
-            pointer = grid[begin:end].ctypes.data_as(ctypes.c_void_p)
-            self.library.any_inputs(
-                ctypes.byref(self.setup), pointer, ctypes.c_int64(end - begin), ctypes.byref(result)
-            )
+        def work(begin: int, end: int, result: np.ndarray) -> int:
+            return self._call("any_inputs", grid[begin:end], end - begin, result)
 
         return self._tried(work, range(len(grid)))
 
-    def _tried(self, work: Callable[[int, int, _Result], None], reach: range) -> Tried:
+    def _call(self, name: str, *given: Given) -> int:
+        """Call a function in a process that is free; a first call of it is told the law before."""
+        library = self._libraries.get()
+        try:
+            if library not in self._prepared:
+                parts = [word for each in self.tables.parts for word in (each, each.size)]
+                if library.call("prepare", self.tables.setup, *parts):
+                    raise RequirementError(NO_MEMORY)
+                self._prepared.add(library)
+            return library.call(name, *given)
+        finally:
+            self._libraries.put(library)
+
+    def _tried(self, work: Callable[[int, int, np.ndarray], int], reach: range) -> Tried:
         """Do pieces of some work side by side, and add up what they found."""
         if reach.step != 1:
             pieces = [(first, first + 1) for first in reach]
         else:
             pieces = [(first, min(first + PIECE, reach.stop)) for first in range(reach.start, reach.stop, PIECE)]
 
-        def one(piece: tuple[int, int]) -> _Result:
-            result = _Result(hash=piece[0])
-            work(*piece, result)
-            return result
+        def one(piece: tuple[int, int]) -> dict[str, int]:
+            result = np.zeros(1, dtype=RESULT)
+            result["hash"] = piece[0]
+            if work(*piece, result):
+                raise RequirementError(NO_MEMORY)
+            return _as_numbers(result)
 
-        with ThreadPoolExecutor(min(os.cpu_count() or 1, 4)) as pool:
+        with ThreadPoolExecutor(SIDE_BY_SIDE) as pool:
             found = list(pool.map(one, pieces))
         return _sum(found, self.exact[0].sensors)
 
@@ -225,39 +231,40 @@ class TriedBlock:
         """Return outputs and states after some inputs, (N, 3), from some states, and how many operations overflow."""
         inputs, states = (np.ascontiguousarray(each, dtype=np.int64).copy() for each in (inputs, states))
         outputs = np.zeros((len(inputs), len(self.block.of_section("VAR_OUTPUT"))), dtype=np.int64)
-        faults = _Faults()
-        pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (inputs, states, outputs)]
-        self.library.as_it_is(*pointers, ctypes.c_int64(len(inputs)), ctypes.byref(faults))
-        return outputs, states, int(faults.count)
+        faults = np.zeros(1, dtype=FAULTS)
+        self._call("as_it_is", inputs, states, outputs, len(inputs), faults)
+        return outputs, states, int(faults["count"][0])
 
 
-def _sensor(sensor: Sensor) -> _Sensor:
-    return _Sensor(low=sensor.low, high=sensor.high, zero=sensor.zero, weight=sensor.weight)
+def _as_numbers(result: np.ndarray) -> dict[str, int]:
+    """Return the numbers of a result by name, those of its faults as `faults` and `first_fault`."""
+    found = {name: int(result[name][0]) for name in RESULT.names or () if name != "faults"}
+    return found | {"faults": int(result["faults"]["count"][0]), "first_fault": int(result["faults"]["first"][0])}
 
 
 def _within(value: int, ends: Sequence[int]) -> bool:
     return ends[0] <= value <= ends[1]
 
 
-def _sum(found: Sequence[_Result], sensors: Sequence[Sensor]) -> Tried:
+def _sum(found: Sequence[dict[str, int]], sensors: Sequence[Sensor]) -> Tried:
     """Return what several pieces found together; the first of what is wrong is that of the first piece."""
-    sums = {name: sum(getattr(each, name) for each in found) for name in RESULT_FIELDS}
-    faulty = [each for each in found if each.faults.count]
-    wrong = [each for each in found if each.wrong]
+    sums = {name: sum(each[name] for each in found) for name in RESULT_FIELDS}
+    faulty = [each for each in found if each["faults"]]
+    wrong = [each for each in found if each["wrong"]]
     words = ""
     if wrong:
         one = wrong[0]
         words = (
-            f"command {one.command}, pressures {one.pressure_a} and {one.pressure_b}: {one.found}, "
-            f"expected {one.expected}"
+            f"command {one['command']}, pressures {one['pressure_a']} and {one['pressure_b']}: {one['found']}, "
+            f"expected {one['expected']}"
         )
     total = 0
     for each in found:
-        total = (total * 1099511628211 + each.hash) % 2**64
+        total = (total * 1099511628211 + each["hash"]) % 2**64
     return Tried(
         **sums,
-        faults=sum(each.faults.count for each in faulty),
-        first_fault=place_of(faulty[0].faults.first) if faulty else None,
+        faults=sum(each["faults"] for each in faulty),
+        first_fault=place_of(faulty[0]["first_fault"]) if faulty else None,
         first_wrong=words,
         outputs_hash=f"{total:016x}",
     )

@@ -1,10 +1,8 @@
 """The generated core as a black box: compiled by itself for a machine, and every input tried there."""
 
 import copy
-import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +10,8 @@ import numpy as np
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
-from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of
-from dzdesign.verify.toolchain.host_compiler import load_library
+from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of, bound_files
+from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
 #: Source of each sign of command, and what its functions' names end with.
@@ -25,6 +23,9 @@ BLOCK_SOURCE, BOUND = "dz_comp.c", "bound_block.c"
 CALLED = ("comp", "status", "beta")
 #: The check in C, of programs/.
 CHECK = ("every_input.c", "other_codes.c", "every_input.h", "march.h")
+
+#: Of programs/core_answers.c: codes, how many, answers.
+ANSWERS = Function("core_answers", ("in", "uint32_t", "out"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,14 +113,16 @@ class CompiledCore:
         return machine.compile(BOUND, sources, flags, "the adapter of the block")
 
 
-def loaded_core(folder: Path, sign: int) -> tuple[Callable[..., int], Callable[..., int]]:
-    """Return dz_comp() and dz_status() of one side, loaded; of a core in block form bound to its block."""
+def core_answers(folder: Path, sign: int, codes: np.ndarray) -> np.ndarray:
+    """Return compare value and status word of one side, (N, 2), at codes of command and sensors A and B, (N, 3)."""
     core, (_, ending) = CompiledCore(folder, sign), SOURCES[sign]
-    texts = {name: text.decode(errors="surrogateescape") for name, text in core.sources.items()}
-    library = load_library(texts, f"the core {core.name}")
-    block = () if core.block is None else (ctypes.create_string_buffer(core.block, len(core.block)),)
-    comp, status = (partial(getattr(library, f"dz_{what}{ending}"), *block) for what in ("comp", "status"))
-    return comp, status
+    sources = {**core.sources, f"{ANSWERS.name}.c": _read(PROGRAMS / f"{ANSWERS.name}.c")}
+    texts = {name: text.decode(errors="surrogateescape") for name, text in sources.items()} | bound_files(folder)
+    called = _defines(held=False, macros=("DZ_COMP", "DZ_STATUS"), names=[f"dz_{name}{ending}" for name in CALLED[:2]])
+    library = ConfinedLibrary(texts, [ANSWERS], f"the core {core.name}", called)
+    given, found = np.ascontiguousarray(codes, dtype=np.uint16), np.zeros((len(codes), 2), dtype=np.uint16)
+    library.call(ANSWERS.name, given, len(given), found)
+    return found
 
 
 def _defines(held: bool, macros: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:

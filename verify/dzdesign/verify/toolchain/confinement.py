@@ -24,6 +24,7 @@ from threading import Event, Timer
 from typing import IO
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.programs import program_environment, with_full_name
 from dzdesign.core.processes.running import ended_with_this_process
 from dzdesign.verify.toolchain.host_compiler import build_folder, built, host_compiler, words_of
 
@@ -56,23 +57,29 @@ def run_confined(
     *,
     memory: int = MOST_MEMORY,
     results: Path | None = None,
+    place: Path | None = None,
     confined: bool = True,
+    more: Mapping[str, str] | None = None,
 ) -> Ended:
     """Run a program and return how it ended; one that does not start or end is a `RequirementError`.
 
-    `memory` is its address space, bytes, 0 for any; `results` is the one folder in which it may write. One that is not
-    `confined` has the time limit alone, and the environment of `dzdesign`.
+    `memory` is its address space, bytes, 0 for any; `results` is the one folder in which it may write. It works in
+    `place`, by default in `results`. One that is not `confined` has the time limit alone, and the environment of
+    `dzdesign`. `more` are further variables of its environment.
     """
-    confined = confined and sys.platform != "win32"
-    limited = _launcher(timeout_s, memory, results) if confined else ()
-    environment = {name: value for name, value in os.environ.items() if name in KEPT or not confined}
+    try:
+        named = with_full_name(command)
+    except OSError as error:
+        raise RequirementError(f"{what} did not start: {error}") from error
+    limited = limits(timeout_s, memory, results) if confined else ()
+    environment = {**(limited_environment() if confined else program_environment()), **(more or {})}
     with tempfile.TemporaryDirectory(dir=build_folder(), ignore_cleanup_errors=True) as folder:
         outputs, empty = (Path(folder) / "out", Path(folder) / "err"), Path(folder) / "empty"
         empty.mkdir()
         with outputs[0].open("wb") as out, outputs[1].open("wb") as err:
-            status = _status([*limited, *command], environment, what, timeout_s, (out, err), results or empty)
-        printed, complaint = map(_text, outputs)
-    return Ended(reason=_reason(status), printed=printed, complaint=complaint)
+            status = _status([*limited, *named], environment, what, timeout_s, (out, err), place or results or empty)
+        printed, complaint = map(text_of, outputs)
+    return Ended(reason=reason_of(status), printed=printed, complaint=complaint)
 
 
 def _status(
@@ -105,13 +112,13 @@ def _status(
             status = process.wait()
     finally:
         timer.cancel()
-        _end(process)
+        end_program(process)
     if late.is_set():
         raise RequirementError(f"{what} did not end within {timeout_s:g} s")
     return status
 
 
-def _end(process: "subprocess.Popen[bytes]") -> None:
+def end_program(process: "subprocess.Popen[bytes]") -> None:
     """End a program, and what it has started."""
     if sys.platform != "win32":
         with contextlib.suppress(ProcessLookupError, PermissionError):
@@ -129,8 +136,10 @@ def _compiled() -> Path:
     return built(LAUNCHER, [*words_of(host_compiler()), "-std=gnu99", "-O1", name], {name: source}, "the limits")
 
 
-def _launcher(timeout_s: float, memory: int, results: Path | None) -> tuple[str, ...]:
-    """Return how the command of a program with limits begins."""
+def limits(timeout_s: float, memory: int, results: Path | None) -> tuple[str, ...]:
+    """Return how the command of a program with limits begins; nothing on Windows."""
+    if sys.platform == "win32":
+        return ()
     program = _compiled()
     # Of all its threads together.
     seconds = ceil(timeout_s * (os.cpu_count() or 1))
@@ -138,14 +147,21 @@ def _launcher(timeout_s: float, memory: int, results: Path | None) -> tuple[str,
     return (str(program), str(seconds), str(most), str(memory), folder)
 
 
-def _reason(status: int) -> str:
+def limited_environment() -> dict[str, str]:
+    """Return the environment of a program with limits; on Windows that of `dzdesign`."""
+    found = program_environment()
+    return {name: value for name, value in found.items() if name in KEPT or sys.platform == "win32"}
+
+
+def reason_of(status: int) -> str:
+    """Return why an exit status is not that of a good end, in words; empty where it is."""
     if status >= 0:
         return f"exit status {status}" if status else ""
     name = signal.Signals(-status).name if -status in {*signal.Signals} else ""
     return f"signal {-status}" + (f": it reached {OF_LIMITS[name]}" if name in OF_LIMITS else "")
 
 
-def _text(path: Path) -> str:
+def text_of(path: Path) -> str:
     """Return what was printed; a program that has put something else in the place has printed nothing."""
     if path.is_symlink() or not path.is_file():
         return ""

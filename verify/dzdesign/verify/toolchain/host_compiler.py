@@ -1,16 +1,13 @@
-"""The host's C compiler: C in, a loaded shared library out, named by its content so that no stale code can run.
+"""The host's C compiler: C in, programs out, named by their content so that no stale code can run.
 
 Where a machine has no compiler, Zig's serves: a clang with its own headers and linker, in the wheel `ziglang`.
 """
 
-import ctypes
 import importlib.util
 import logging
 import os
 import shlex
-import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,6 +17,7 @@ import platformdirs
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.processes.programs import find_program
 from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import process_folder
 
@@ -57,20 +55,20 @@ def find_compilers() -> tuple[str, ...]:
 
 def _found(name: str) -> str | None:
     """Return the path of a program, or several words as they are if the first one is a program."""
-    path = shutil.which(name)
+    path = find_program(name)
     try:
         words = [] if path else shlex.split(name, posix=os.name != "nt")
     except ValueError as error:
         raise InputError(f"$CC is {name!r}, which is no compiler's command ({error}); correct or unset it") from error
-    return path or (name if len(words) > 1 and shutil.which(words[0]) else None)
+    return path or (name if len(words) > 1 and find_program(words[0]) else None)
 
 
 def find_zig() -> str | None:
     """Return Zig's program, of the path or of the package `ziglang`, or None."""
-    path = shutil.which("zig")
+    path = find_program("zig")
     spec = None if path else importlib.util.find_spec("ziglang")
     for folder in (spec.submodule_search_locations or ()) if spec else ():
-        path = path or shutil.which("zig", path=folder)
+        path = path or find_program("zig", [folder])
     return path
 
 
@@ -82,7 +80,7 @@ def words_of(compiler: str) -> tuple[str, ...]:
     >>> words_of("/opt/zig/zig")
     ('/opt/zig/zig', 'cc', '-g0', '-mcpu=baseline', '-fno-sanitize=undefined')
     """
-    words = (compiler,) if shutil.which(compiler) else tuple(shlex.split(compiler, posix=os.name != "nt"))
+    words = (compiler,) if find_program(compiler) else tuple(shlex.split(compiler, posix=os.name != "nt"))
     if Path(words[-1]).stem == "zig":
         return (*words, "cc", *LIKE_OTHERS)
     return (*words, *LIKE_OTHERS) if [Path(word).stem for word in words[-2:]] == ["zig", "cc"] else words
@@ -157,7 +155,7 @@ def keeps_warnings(compiler: str) -> bool:
 
 def name_of(compiler: str) -> str:
     """Return a compiler as a person calls it: without its folder, but with the words that $CC adds."""
-    return Path(compiler).name if shutil.which(compiler) else compiler
+    return Path(compiler).name if find_program(compiler) else compiler
 
 
 def check_strictly(source: Path, compiler: str, options: Sequence[str] = ()) -> None:
@@ -197,17 +195,3 @@ def built(name: str, command: Sequence[str], sources: Mapping[str, bytes], what:
                 )
             (folder / f"new-{name}").replace(folder / name)
     return folder / name
-
-
-def load_library(sources: Mapping[str, str], what: str, options: Sequence[str] = ()) -> ctypes.CDLL:
-    """Compile C files, with the headers among them, together and load them."""
-    on_windows = sys.platform == "win32"
-    units = [name for name in sources if name.endswith(".c")]
-    position = [] if on_windows else ["-fPIC"]
-    command = [*words_of(host_compiler()), "-std=c99", "-O2", *options, *position, "-shared", *units, "-lm"]
-    texts = {name: text.encode(errors="surrogateescape") for name, text in sources.items()}
-    library = built(f"library{'.dll' if on_windows else '.so'}", command, texts, what)
-    try:
-        return ctypes.CDLL(str(library))
-    except OSError as error:
-        raise RequirementError(f"{what} does not link: {str(error).rpartition(': ')[2]}") from error

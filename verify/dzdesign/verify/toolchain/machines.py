@@ -6,7 +6,6 @@ The core's C is compiled by itself, with nothing of the check in sight, and only
 import logging
 import re
 import shlex
-import shutil
 import sys
 import time
 from collections.abc import Mapping
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.processes.programs import find_program
 from dzdesign.verify.toolchain.confinement import MOST_MEMORY, numbers_in, run_confined
 from dzdesign.verify.toolchain.host_compiler import alone, build_folder, built, host_compiler, words_of
 
@@ -64,7 +64,7 @@ class Machine:
 
     def missing(self) -> str:
         """Return what was not found, with what to install, or an empty text."""
-        absent = [program for program in self.needs if not shutil.which(program)]
+        absent = [program for program in self.needs if not find_program(program)]
         packages = sorted({self.needs[program] for program in absent})
         return f"{' and '.join(absent)} not found; apt install {' '.join(packages)}" if absent else ""
 

@@ -11,12 +11,6 @@
 
 #define RECORDED 8
 
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT
-#endif
-
 /* One channel of the converter: code of zero, codes a unit of what it measures, its largest code; and its errors. */
 struct channel
 {
@@ -178,11 +172,10 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
  * of a drive by current, or null.
  * record[n][8]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m; the
  * last codes of sensors A and B. */
-EXPORT void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *back_MPa,
-                    const double *bias_V, const int32_t *shown, const int32_t *zeros, const int32_t *fulls,
-                    const double *spans, const double *errors, const double *p, const double *coarse,
-                    const double *fine, const double *curve, const struct coil *coil, const struct sensor *sensor,
-                    double *record)
+void dz_loop(const int32_t *choices, const double *command, const double *supply_MPa, const double *back_MPa,
+             const double *bias_V, const int32_t *shown, const int32_t *zeros, const int32_t *fulls,
+             const double *spans, const double *errors, const double *p, const double *coarse, const double *fine,
+             const double *curve, const struct coil *coil, const struct sensor *sensor, double *record)
 {
     struct plant plant;
     struct task task = {choices[0], choices[1], choices[2], choices[3], choices[4], choices[5],

@@ -17,7 +17,6 @@ enum { PARTS = 3, NUMBERS = 7, SIDES = 2, STATES = 6 };
 struct side
 {
     int64_t sign, along, span, zero_band, has_rest, leave_zero, limit, turn, reverse, tested_to, first_drop, drops;
-    const int64_t *parts;
 };
 
 struct sensor
@@ -38,6 +37,10 @@ struct result
     struct faults faults;
     int64_t command, pressure_a, pressure_b, found, expected, hash;
 };
+
+/* The law, kept from prepare() on, and the numbers of its parts. */
+static struct setup kept;
+static const int64_t *kept_parts[SIDES];
 
 /* What is remembered, as its description has it. */
 struct memory
@@ -71,11 +74,16 @@ static int valid(const struct sensor *sensor, int64_t x)
     return x >= sensor->low && x <= sensor->high;
 }
 
+static const int64_t *parts_of(const struct side *side, int64_t row)
+{
+    return kept_parts[side - kept.side] + row * PARTS * NUMBERS;
+}
+
 /* Outputs of one row, of every command from zero to full. */
 static void fill(const struct side *side, int64_t row, int64_t *outputs)
 {
     for (int part = 0; part < PARTS; part++) {
-        const int64_t *p = side->parts + (row * PARTS + part) * NUMBERS;
+        const int64_t *p = parts_of(side, row) + part * NUMBERS;
         int64_t whole = p[2], rest = p[3];
         for (int64_t command = p[0]; command <= p[1]; command++) {
             outputs[command] = whole < 0 ? 0 : whole > side->limit ? side->limit : whole;
@@ -92,7 +100,7 @@ static void fill(const struct side *side, int64_t row, int64_t *outputs)
 /* Output at zero command of a row. */
 static int64_t at_zero(const struct side *side, int64_t row)
 {
-    const int64_t whole = side->parts[row * PARTS * NUMBERS + 2];
+    const int64_t whole = parts_of(side, row)[2];
     return whole < 0 ? 0 : whole > side->limit ? side->limit : whole;
 }
 
@@ -230,10 +238,28 @@ static int64_t pairs_of(const struct setup *setup, const struct side *side, int6
     return count;
 }
 
-/* Try every command of one side at some of its pressure drops, from `first` to before `end`. */
-int every_command(const struct setup *setup, int64_t which, int64_t first, int64_t end, int64_t low, int64_t high,
-                  struct result *result)
+static const int64_t *copied(const int64_t *numbers, int64_t count)
 {
+    int64_t *copy = malloc((size_t)count * sizeof *copy + 1u);
+    if (copy != NULL) {
+        memcpy(copy, numbers, (size_t)count * sizeof *copy);
+    }
+    return copy;
+}
+
+/* Keep the law and the numbers of its parts, of each side; not 0: there is no memory. */
+int32_t prepare(const struct setup *setup, const int64_t *first, int64_t firsts, const int64_t *second, int64_t seconds)
+{
+    kept = *setup;
+    kept_parts[0] = copied(first, firsts);
+    kept_parts[1] = copied(second, seconds);
+    return kept_parts[0] == NULL || kept_parts[1] == NULL;
+}
+
+/* Try every command of one side at some of its pressure drops, from `first` to before `end`. */
+int32_t every_command(int64_t which, int64_t first, int64_t end, int64_t low, int64_t high, struct result *result)
+{
+    const struct setup *setup = &kept;
     const struct side *side = &setup->side[which];
     const int64_t size = high - low + 1 + setup->b.high - setup->b.low;
     int64_t *known = calloc((size_t)side->span + 1, sizeof *known);
@@ -274,9 +300,9 @@ int every_command(const struct setup *setup, int64_t which, int64_t first, int64
 }
 
 /* Try every pair of pressures from `low` to `high` at zero command, from every state; A runs from `first`. */
-void every_pressure(const struct setup *setup, int64_t first, int64_t end, int64_t low, int64_t high,
-                    struct result *result)
+void every_pressure(int64_t first, int64_t end, int64_t low, int64_t high, struct result *result)
 {
+    const struct setup *setup = &kept;
     struct memory states[STATES];
     const int count = states_of(setup, states);
     for (int64_t a = first; a < end; a++) {
@@ -290,8 +316,9 @@ void every_pressure(const struct setup *setup, int64_t first, int64_t end, int64
 }
 
 /* Try some inputs of any size, three numbers each; none may ask for more than zero command. */
-void any_inputs(const struct setup *setup, const int64_t *inputs, int64_t number, struct result *result)
+void any_inputs(const int64_t *inputs, int64_t number, struct result *result)
 {
+    const struct setup *setup = &kept;
     struct memory states[STATES];
     const int count = states_of(setup, states);
     for (int64_t each = 0; each < number; each++, inputs += 3) {
