@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: hash.
 LONGEST_WORD, LONGEST_OF_LETTERS = 18, 30
 #: An option of the command line, and a command between backticks.
-OPTION, COMMAND = r"(?<![\w-])--[a-z][\w-]*", r"`([^`<>]+)`"
+OPTION, COMMAND = r"(?<![\w-])--[a-z][\w-]*", r"`([^`<>\s][^`<>]*)`"
 #: Kinds of cells whose words are the report's own.
 TRANSLATED = ("good", "bad", "open", "number")
 #: Kind of a verdict -> the sign before it.
