@@ -66,7 +66,8 @@ def residual(example: Example) -> "Figure":
         )  # fmt: skip
     opens, closes = (share[np.argmax(drive > height)] for height in (test.u_knee_rising_V, test.u_knee_falling_V))
     axes.vlines((opens, closes), 5.05, (test.u_knee_rising_V, test.u_knee_falling_V), color=GREY, ls=":", lw=1)
-    span(axes, 0, opens, 5.075, f"residual on opening: {opens:.1f} %")
+    span(axes, 0, opens, 5.075, "")
+    note(axes, f"residual on opening: {opens:.1f} %", (opens + 0.12, 5.075), ha="left")
     span(axes, 0, closes, 5.115, "")
     note(axes, f"residual on closing: {closes:.1f} %", (closes + 0.12, 5.115), ha="left")
     note(axes, "offset at zero command", (5.2, 5.152), (0.05, drive[0]), ha="left")

@@ -22,8 +22,8 @@ def dead_zone(example: Example) -> "Figure":
     figure, (axes,) = panels(3.5)
     direct, driven = (example.ramp(1.0, mode) for mode in ("direct", "compensated"))
     for run, colour, line, name in (
-        (direct, ORANGE, "-", "without the compensator"),
-        (driven, BLUE, "--", "with the compensator"),
+        (direct, ORANGE, "--", "without the compensator"),  # the dashes of the report
+        (driven, BLUE, "-", "with the compensator"),
     ):
         axes.plot(100 * run.command, run.q_mean_L_min, line, color=colour, lw=1.8, label=name)
     opens = 100 * direct.command[np.argmax(direct.q_mean_L_min > 0.01)]

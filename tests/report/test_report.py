@@ -77,13 +77,15 @@ def change_evidence(folder: Path, change) -> None:
 @pytest.mark.slow
 def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo):
     evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
-    loops = evidence["closed_loop"]["pressures"]
+    loops, identified = evidence["closed_loop"]["pressures"], json.loads((reported_demo / "valve.json").read_bytes())
     head = html[: html.index('<section id="characteristic">')]
     tried = f"all {len(evidence['checks'])} that were tried"
     assert f"Every requirement holds, {tried}; the certificate is of the recording; {AS_STATED}<" in head
     assert "no machine was declared" in head and "Certificate of the recording<" in head
-    before, after = (100 * max(each[key] for each in loops) for key in ("dead_zone_opening", "residual_opening"))
-    assert f"{before:.1f} % → {after:.1f} %" in head
+    # Recorded, not simulated, without the compensator: as in the table of the characteristic.
+    before = 10 * max(each["u_onset_rising_V"] for each in identified["sides"]["positive"]["tests"])
+    after = 100 * max(each["residual_opening"] for each in loops)
+    assert f"{before:.1f} % → {after:.1f} %" in head and "without (simulated recordings) → with (simulated" in head
     assert whole(evidence["inputs"][0]["inputs"]) in head and "99 %" in head and "Flow at zero command" in head
 
 
@@ -92,8 +94,8 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     assert re.findall(r'<section id="(\w+)">', html) == [
-        "characteristic", "conditions", "acceptance", "loop", "thresholds", "beta", "checks", "warnings", "data",
-        "budget", "law", "integers", "inputs", "provenance",
+        "characteristic", "conditions", "acceptance", "loop", "thresholds", "beta", "remaining", "checks", "warnings",
+        "data", "budget", "law", "integers", "inputs", "provenance",
     ]  # fmt: skip
     figures = ("dead-zone", "loop", "thresholds", "beta", "fit", "budget", "law", "map", "zero")
     of_sections = [f"figure-{name}-positive" for name in figures]
@@ -341,7 +343,8 @@ def test_what_was_not_tried_is_said(copied):
     report = report_of_folder(copied)
     assert report.kind == "good"
     said = report.html[report.html.index('class="verdict good"') : report.html.index('<dl class="numbers">')]
-    assert "closed loop with a plant of the machine&#39;s own: <code>verify --plant</code>" in said
+    command = '<code>verify <span class="tied">--plant</span></code>'
+    assert f"closed loop with a plant of the machine&#39;s own: {command}" in said
     assert "load steps" not in said  # of recordings at several pressure drops
     assert "machine code of other processors" in said
 
@@ -622,8 +625,8 @@ def test_figures_of_two_sides_say_which_they_are_of(reports):
     [
         ({"positive": 1}, "at 1.00 MPa, the one pressure drop tested"),
         ({"positive": 6}, "the worst of 6 pressure drops"),
-        ({"positive": 2, "negative": 2}, "the worst of 2 pressure drops positive and 2 pressure drops negative"),
-        ({"positive": 1, "negative": 1}, "the worst of 1 pressure drop positive and 1 pressure drop negative"),
+        ({"positive": 2, "negative": 2}, "the worst of 2 pressure drops on each side"),
+        ({"positive": 1, "negative": 1}, "the worst of 1 pressure drop on each side"),
         ({"positive": 3, "negative": 1}, "the worst of 3 pressure drops positive and 1 pressure drop negative"),
     ],
 )

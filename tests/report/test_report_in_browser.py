@@ -4,19 +4,22 @@ import contextlib
 import json
 import os
 import shutil
+import struct
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.report.logo import logo_uri
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from tests.support.synthetic import needs_compiler
 from tests.support.synthetic_lots import lot_rows, with_figures, write_lot_folder
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-VIEWS = [(width, scheme) for width in (1280, 400) for scheme in ("light", "dark")]
+VIEWS = [*((width, scheme) for width in (1280, 400) for scheme in ("light", "dark")), (320, "light")]
 #: Of WCAG 2 AA; large or bold text may have less, but has as much here.
 CONTRAST = 4.5
 
@@ -45,7 +48,7 @@ CONTRASTS = """() => {
   }
   return found.sort((x, y) => x[0] - y[0]);
 }"""
-SIZES = """() => [...document.querySelectorAll('svg, img')].map(e => {
+SIZES = """() => [...document.querySelectorAll('svg, img:not(.logo)')].filter(e => e.checkVisibility()).map(e => {
   const box = e.getBoundingClientRect(); return [box.width, box.height]; })"""
 IMAGES = """async () => Promise.all([...document.querySelectorAll('svg image')].map(async e => {
   const image = new Image(); image.src = e.getAttribute('xlink:href') || e.getAttribute('href');
@@ -97,38 +100,59 @@ def browser():
             yield started
 
 
+def with_checks(demo: Path, folder: Path, changes) -> None:
+    """Copy a demo with other outcomes of some requirements: place -> holds, text."""
+    shutil.copytree(demo, folder)
+    evidence = json.loads((folder / "evidence" / "verification.json").read_bytes())
+    evidence["holds"] = False
+    for place, (holds, text) in changes.items():
+        evidence["checks"][place].update(holds=holds, text=text)
+    content = to_json(evidence).encode()
+    (folder / "evidence" / "verification.json").write_bytes(content)
+    manifest = json.loads((folder / "evidence" / MANIFEST_NAME).read_bytes())
+    manifest["files"]["verification.json"] = sha256_of(content)
+    (folder / "evidence" / MANIFEST_NAME).write_text(to_json(manifest))
+
+
+def logo_png(width: int, height: int) -> bytes:
+    """Return a black image."""
+    def chunk(kind: bytes, content: bytes) -> bytes:
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    lines = zlib.compress(bytes((width + 1) * height))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", lines) + chunk(b"IEND", b"")
+
+
 @pytest.fixture(scope="module")
 def pages(reported_demo, tmp_path_factory):
     """The report of the demo; of one that fails with long names; of a valve alone; of a lot with hostile names."""
     folder = tmp_path_factory.mktemp("pages")
     failing = folder / "failing"
-    shutil.copytree(reported_demo, failing)
-    evidence = json.loads((failing / "evidence" / "verification.json").read_bytes())
-    evidence["holds"] = False
-    evidence["checks"][1].update(holds=False, text="unbroken" * 60)
-    evidence["checks"][2].update(holds=None, text="<b>was not</b> tried")
-    content = to_json(evidence).encode()
-    (failing / "evidence" / "verification.json").write_bytes(content)
-    manifest = json.loads((failing / "evidence" / MANIFEST_NAME).read_bytes())
-    manifest["files"]["verification.json"] = sha256_of(content)
-    (failing / "evidence" / MANIFEST_NAME).write_text(to_json(manifest))
+    missed = folder / "missed"
+    long = "4.19 % ± 0.155 %, 0.188 % more than the limit of 4 % at positive commands and 1.00 MPa"
+    with_checks(reported_demo, failing, {1: (False, "unbroken" * 60), 2: (None, "<b>was not</b> tried")})
+    with_checks(reported_demo, missed, {place: (False, long) for place in range(1, 6)})
     alone = folder / "alone"
     alone.mkdir()
     valve = json.loads((reported_demo / "valve.json").read_bytes())
     valve["record"] = {"serial": "4711", "n" * 60: "unbroken" * 25, "oil": "HLP 46, 40 °C"}
     (alone / "valve.json").write_text(to_json(valve))
-    for place in (failing, alone):
+    for place in (failing, missed, alone):
         (place / REPORT_NAME).write_text(report_of_folder(place).html, encoding="utf-8")
     rows = lot_rows(80, failed=(3, 4, 50))
     rows[7] = replace(with_figures(rows[7], offset_V=4.2, knee_opening_V=4.4), name="unbroken" * 12)
     rows[8] = replace(with_figures(rows[8], offset_V=4.25), name="\u5f01 <b>7</b>")
     rows[3] = replace(rows[3], name="no-blank-in-it-" * 6, reason="unbroken" * 60)
     write_lot_folder(folder / "lot", rows)
-    (folder / "lot" / REPORT_NAME).write_text(report_of_lot(folder / "lot").html, encoding="utf-8")
+    (folder / "logo.png").write_bytes(logo_png(300, 100))
+    of_lot = report_of_lot(folder / "lot", logo_uri(folder / "logo.png"))
+    (folder / "lot" / REPORT_NAME).write_text(of_lot.html, encoding="utf-8")
     return {
         "lot": folder / "lot" / REPORT_NAME,
         "demo": reported_demo / "evidence" / REPORT_NAME,
         "failing": failing / REPORT_NAME,
+        "missed": missed / REPORT_NAME,
         "valve alone": alone / REPORT_NAME,
     }
 
@@ -158,7 +182,7 @@ def test_a_page_is_quiet_whole_and_readable(browser, pages, name, width, scheme)
         assert page.evaluate(BEYOND) == [] and page.evaluate(SPLIT) == []
         sizes = page.evaluate(SIZES)
         assert len(sizes) == {"demo": 10, "failing": 10, "valve alone": 4, "lot": 3}[name]
-        assert all(wide > 300 and high > 100 for wide, high in sizes)
+        assert all(wide > min(300, 0.9 * width) and high > 100 for wide, high in sizes)
         poor = [found for found in page.evaluate(CONTRASTS) if found[0] < CONTRAST]
         assert poor == []
         assert page.evaluate(LOST_LINKS) == []
@@ -167,12 +191,49 @@ def test_a_page_is_quiet_whole_and_readable(browser, pages, name, width, scheme)
         assert heard == []
 
 
-@pytest.mark.parametrize("name", ["demo", "valve alone"])
+#: Of the drawing that is seen: its lower end, and the size of its smallest words in pixels.
+LEAD = """() => {
+  const svg = [...document.querySelectorAll('#figure-characteristic svg')].find(e => e.checkVisibility());
+  const words = [...svg.querySelectorAll('text')].map(e =>
+    parseFloat(getComputedStyle(e).fontSize) * svg.getBoundingClientRect().width / svg.viewBox.baseVal.width);
+  return [svg.getBoundingClientRect().bottom, Math.min(...words)]; }"""
+
+
+@pytest.mark.parametrize("name", ["demo", "missed", "valve alone"])
 @pytest.mark.parametrize("width", [1280, 400])
 def test_the_characteristic_is_seen_without_scrolling(browser, pages, name, width):
     with opened(browser, pages[name], width) as (page, _):
-        bottom = "document.querySelector('#figure-characteristic svg').getBoundingClientRect().bottom"
-        assert page.evaluate(bottom) < 900
+        assert page.evaluate(LEAD)[0] < 900
+
+
+@pytest.mark.parametrize("width", [1280, 400, 320])
+def test_the_words_of_the_characteristic_can_be_read_at_any_width(browser, pages, width):
+    """Seeded: the wide drawing, shrunk to 400 px, had words of 4 px."""
+    with opened(browser, pages["demo"], width) as (page, _):
+        assert page.evaluate(LEAD)[1] >= 8
+
+
+def test_a_logo_covers_nothing(browser, pages):
+    """Seeded: without a subtitle the verdict began beside the logo, and it covered the verdict's edge."""
+    box = "s => { const b = document.querySelector(s).getBoundingClientRect(); return [b.top, b.bottom]; }"
+    for width in (1280, 400):
+        with opened(browser, pages["lot"], width) as (page, _):
+            (top, bottom), (verdict, _) = page.evaluate(box, ".logo"), page.evaluate(box, ".verdict")
+            assert bottom - top > 30 and bottom <= verdict
+
+
+@pytest.mark.parametrize("name", ["demo", "missed"])
+def test_the_first_sheet_holds_verdict_figure_and_all_cards(browser, pages, name):
+    """Seeded: the last card stood alone on the second sheet, and cards left a part of their row empty."""
+    boxes = """() => [...document.querySelectorAll('.numbers > div')].map(e => {
+        const b = e.getBoundingClientRect(); return [Math.round(b.top), b.right]; })"""
+    with opened(browser, pages[name], width=PAPER) as (page, _):
+        page.emulate_media(media="print")
+        assert page.evaluate("document.querySelector('#summary').getBoundingClientRect().bottom") < PAPER_HEIGHT
+        edges = {}
+        for top, right in page.evaluate(boxes):
+            edges[top] = max(right, edges.get(top, 0))
+        assert len(edges) == 2 and max(edges.values()) - min(edges.values()) < 1
 
 
 def test_the_appendices_are_folded_on_a_screen_and_open_on_paper_and_for_a_link(browser, pages):

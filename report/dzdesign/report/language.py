@@ -20,8 +20,9 @@ from dzdesign.core.errors import InputError, nearest
 LANGUAGES = ("en", "de")
 #: What parts the sentences of a text, and the clauses of a sentence; each may stand in the table on its own.
 PARTED = (re.compile(r"((?<!\bEq)(?<!\bs\.[ed])\. )"), re.compile(r"(; )"))
-#: An English word, no name of a file or an option: what stands in a place of a phrase and in no table has none.
-ENGLISH = re.compile(r"(?<![\w.`/-])[a-z]{3,}(?![\w./])")
+#: An English word, no unit and no name of a file or an option: what stands in a place of a phrase and in no table has
+#: none. A full stop ends a word, but not where a name goes on behind it.
+ENGLISH = re.compile(r"(?<![\w.`/-])(?!(?:bar|psi|gpm)\b)[a-z]{3,}(?!\w|[./]\w|/)")
 #: Characters of a text that is looked up: a longer one is no phrase.
 LONGEST = 2000
 #: Words that a sentence has, at least; a shorter text is a name, a number or a unit.

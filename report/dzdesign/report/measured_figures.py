@@ -1,10 +1,11 @@
 """Head cards of an assessment: measured dead zones and flow at zero command, before what a simulation shows."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.options import Set
-from dzdesign.report.characteristic.curves import origin_of
+from dzdesign.report.characteristic.curves import BRANCHES, origin_of
 from dzdesign.report.language import word
 from dzdesign.report.page import Figure
 from dzdesign.report.sections.cells import counted
@@ -16,8 +17,14 @@ def measured_figures(assessment: Assessment | None) -> tuple[Figure, ...]:
     if not after or assessment is None:
         return ()
     of = "measured" if origin_of(assessment) == "recorded" else "simulated recordings"
-    found = [_dead_zone(after, branch, of) for branch in ("opening", "closing")]
+    found = [_dead_zone(after, branch, of) for branch in BRANCHES]
     return (*(each for each in found if each), *_at_zero(after, assessment, of))
+
+
+def with_span(driven: Sequence[float]) -> str:
+    """Return from where to where the values with the compensator run, where the ends read differently; %."""
+    ends = dict.fromkeys(f"{end:.1f}" for end in (min(driven), max(driven)))
+    return f". With: {' to '.join(ends)} %" if len(ends) > 1 else ""
 
 
 def _dead_zone(items: Sequence[PressureAssessment], branch: str, of: str) -> Figure | None:
@@ -27,33 +34,41 @@ def _dead_zone(items: Sequence[PressureAssessment], branch: str, of: str) -> Fig
         if len(driven) == len(items):
             bare = _values(items, key, "before")
             both = f"{max(bare):.1f} % → {max(driven):.1f} %" if bare else f"{max(driven):.1f} %"
+            sets = "without → with" if bare else "with the compensator"
             return Figure(
                 label=word(f"Dead zone on {branch}, {of}"),
                 value=both,
-                note=f"of command {where}, without → with; the worst of {_places(items)}"
-                + (f". With: {min(driven):.1f} to {max(driven):.1f} %" if len(driven) > 1 else ""),
+                note=f"of command {where}, {sets}; the worst of {_places(items)}{with_span(driven)}",
             )
     return None
 
 
 def _at_zero(items: Sequence[PressureAssessment], assessment: Assessment, of: str) -> Sequence[Figure]:
-    flows = _values(items, "flow_at_zero", "after")
-    if not flows:
+    """Return the largest flow at zero command, or its bound where the meter shows none."""
+    found = [reading for item in items if (reading := item.readings("after").get("flow_at_zero"))]
+    flows = [each.value for each in found if each.value is not None]
+    bounds = [each.at_most for each in found if each.value is None and each.at_most is not None]
+    if not flows and not bounds:
         return ()
-    units, worst = assessment.recorded_units, max(flows, key=abs)
+    units, worst, unseen = assessment.recorded_units, max(flows, key=abs, default=0.0), max(bounds, default=0.0)
+    hidden = unseen > abs(worst)
     limited = [limit for limit in assessment.limits if limit.quantity == "flow_at_zero"]
     return (
         Figure(
             label=word(f"Flow at zero command, {of}"),
-            value=units.text(worst, ".2g L/min"),
-            note=f"with the compensator, after closing; the largest of {_places(items)}",
+            value=f"≤ {units.text(unseen, '.2f L/min')}" if hidden else units.text(worst, ".2g L/min"),
+            note=("with the compensator, after closing: the meter shows none, and nothing below that" if hidden
+                  else "with the compensator, after closing") + f"; the largest of {_places(items)}",
             kind="bad" if any(limit.holds is False for limit in limited) else "text",
         ),
     )
 
 
 def _places(items: Sequence[PressureAssessment]) -> str:
-    return counted(len(items), "pressure drop") + (" and sides" if len({item.side for item in items}) > 1 else "")
+    counts = Counter(item.side for item in items)
+    if len(counts) > 1 and len(set(counts.values())) == 1:
+        return f"{counted(len(items) // len(counts), 'pressure drop')} on each side"
+    return counted(len(items), "pressure drop") + (" and sides" if len(counts) > 1 else "")
 
 
 def _values(items: Sequence[PressureAssessment], key: str, name: Set) -> list[float]:

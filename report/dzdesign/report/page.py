@@ -5,7 +5,7 @@ engine; only figures and formulas, made here, are markup.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
@@ -22,8 +22,11 @@ if TYPE_CHECKING:
 
     from dzdesign.report.sections.law import LawAccount
 
-#: Characters of a word of the language; what is longer is a name or a hash.
-LONGEST_WORD = 18
+#: Characters of a word of the language, and of one of letters alone, as German has them; what is longer is a name or a
+#: hash.
+LONGEST_WORD, LONGEST_OF_LETTERS = 18, 30
+#: An option of the command line, and a command between backticks.
+OPTION, COMMAND = r"(?<![\w-])--[a-z][\w-]*", r"`([^`<>\s][^`<>]*)`"
 #: Kinds of cells whose words are the report's own.
 TRANSLATED = ("good", "bad", "open", "number")
 #: Kind of a verdict -> the sign before it.
@@ -162,6 +165,7 @@ def render(page: Page) -> str:
     environment = strict_templates("dzdesign.report", lstrip_blocks=True, autoescape=True)
     environment.filters.update(
         data_uri=data_uri, anchor=anchor, words=_words, cell=_cell, translated=word, css_text=_css_text, lang=_lang,
+        tied=_tied, finding=_finding,
         in_words=_in_words, has_english=_has_english,
     )
     content = {each.name: getattr(page, each.name) for each in fields(page)}
@@ -200,11 +204,26 @@ def _css_text(text: str) -> "markupsafe.Markup":
     )
 
 
-def _words(text: str) -> "markupsafe.Markup":
-    """Return a sentence for the page: what stands between backticks is a command."""
+def _tied(text: str) -> "markupsafe.Markup":
+    """Return a text for the page; the name of an option stays on one line."""
     from markupsafe import Markup, escape
 
-    return Markup(re.sub(r"`([^`<>]+)`", r"<code>\1</code>", str(escape(text))))
+    return Markup(re.sub(OPTION, r'<span class="tied">\g<0></span>', str(escape(text))))
+
+
+def _words(text: str, plain: "Callable[[str], markupsafe.Markup]" = _tied) -> "markupsafe.Markup":
+    """Return a sentence for the page: what stands between backticks is a command."""
+    from markupsafe import Markup
+
+    parts = re.split(COMMAND, text)
+    return Markup("").join(
+        Markup("<code>{}</code>").format(_tied(part)) if place % 2 else plain(part) for place, part in enumerate(parts)
+    )
+
+
+def _finding(text: str) -> "markupsafe.Markup":
+    """Return a sentence for a cell: as `_words`, and a word too long for a column may be broken."""
+    return _words(text, _cell)
 
 
 def _cell(text: str) -> "markupsafe.Markup":
@@ -214,7 +233,10 @@ def _cell(text: str) -> "markupsafe.Markup":
     def broken(word: str) -> Markup:
         return Markup("<wbr>").join(escape(part) for part in re.findall(r"[^/._,=]*[/._,=]*", word) if part)
 
+    def is_name(word: str) -> bool:
+        return len(word) > (LONGEST_OF_LETTERS if word.strip(",.;:()").isalpha() else LONGEST_WORD)
+
     return Markup("").join(
-        Markup('<span class="breaks">{}</span>').format(broken(word)) if len(word) > LONGEST_WORD else escape(word)
+        Markup('<span class="breaks">{}</span>').format(broken(word)) if is_name(word) else escape(word)
         for word in re.split(r"(\s+)", text)
     )

@@ -11,8 +11,10 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import Chain
+from dzdesign.report.characteristic.curves import BRANCHES, ORIGIN_WORDS
+from dzdesign.report.characteristic.quantities import CharacteristicQuantities
 from dzdesign.report.compensator_sides import laws_of
-from dzdesign.report.measured_figures import measured_figures
+from dzdesign.report.measured_figures import measured_figures, with_span
 from dzdesign.report.page import Figure, Headline, misfit
 from dzdesign.report.sections.cells import counted, whole
 from dzdesign.verify.contradictions import contradictions
@@ -95,8 +97,11 @@ def _limits(chain: Chain) -> list[Check]:
     ]
 
 
-def key_figures(chain: Chain) -> tuple[Figure, ...]:
-    """Return the numbers that matter; what they are read from decides which of them there are."""
+def key_figures(chain: Chain, found: CharacteristicQuantities) -> tuple[Figure, ...]:
+    """Return the numbers that matter; what they are read from decides which of them there are.
+
+    `found` is what the table of the characteristic shows, so that a card says the same.
+    """
     evidence, units = chain.evidence, chain.recorded_units
     inputs = evidence.inputs if evidence else ()
     loops = evidence.closed_loop.pressures if evidence else ()
@@ -104,7 +109,7 @@ def key_figures(chain: Chain) -> tuple[Figure, ...]:
     if loops and figures:
         figures += [_simulated(loops, units)]
     elif loops:
-        figures += [_dead_zone(loops, "opening", units), _dead_zone(loops, "closing", units), _at_zero(loops, units)]
+        figures += [*(_dead_zone(loops, branch, units, found) for branch in BRANCHES), _at_zero(loops, units)]
     elif chain.valve and not figures:
         figures.append(_threshold(chain.valve))
     if chain.compensator:
@@ -116,7 +121,7 @@ def key_figures(chain: Chain) -> tuple[Figure, ...]:
 
 def _simulated(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
     """Return in one card what the simulated loop shows, where measured figures lead."""
-    each = [_dead_zone(loops, branch, units) for branch in ("opening", "closing")]
+    each = [_dead_zone(loops, branch, units) for branch in BRANCHES]
     return Figure(
         label="Simulated closed loop",
         value=" · ".join(figure.value for figure in each),
@@ -125,15 +130,22 @@ def _simulated(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
     )
 
 
-def _dead_zone(loops: Sequence[PressureResult], branch: str, units: RecordedUnits) -> Figure:
-    before = 100 * max(getattr(each, f"dead_zone_{branch}") for each in loops)
-    residual = [100 * getattr(each, f"residual_{branch}") for each in loops]
-    after, least = max(residual), min(residual)
+def _dead_zone(
+    loops: Sequence[PressureResult], branch: str, units: RecordedUnits, found: CharacteristicQuantities | None = None
+) -> Figure:
+    """Return the dead zone in the loop; without the compensator that of the recordings, where they show it."""
+    bare, sources = [100 * getattr(each, f"dead_zone_{branch}") for each in loops], "without → with"
+    recorded = [each.before.get(f"onset_{branch}") for each in found.pressures] if found else []
+    known = [each.value for each in recorded if each is not None and each.value is not None]
+    if found and found.before and found.after and known and len(known) == len(recorded):
+        bare = known
+        sources = f"without ({ORIGIN_WORDS[found.before]}) → with ({ORIGIN_WORDS[found.after]})"
+    driven = [100 * getattr(each, f"residual_{branch}") for each in loops]
     return Figure(
         label=f"Dead zone on {branch}",
-        value=f"{before:.1f} % → {after:.1f} %",
-        note=f"of command at the onset of flow, without → with; {worst_of(loops, units)}"
-        + (f". With: {least:.1f} to {after:.1f} %" if len(loops) > 1 else "")
+        value=f"{max(bare):.1f} % → {max(driven):.1f} %",
+        note=f"of command at the onset of flow, {sources}; {worst_of(loops, units)}"
+        + with_span(driven)
         + _read(loops, branch, units),
     )
 
@@ -152,6 +164,8 @@ def worst_of(loops: Sequence[PressureResult], units: RecordedUnits) -> str:
     counts = Counter(each.side for each in loops)
     if len(counts) == 1:
         return f"the worst of {len(loops)} pressure drops"
+    if len(set(counts.values())) == 1:
+        return f"the worst of {counted(len(loops) // len(counts), 'pressure drop')} on each side"
     return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {side}" for side, n in counts.items())
 
 

@@ -30,13 +30,14 @@ from dzdesign.report.sections.evidence import checks_section, inputs_section, lo
 from dzdesign.report.sections.law import account_of
 from dzdesign.report.sections.lot_setting import carrier_of, lot_figures, lot_section
 from dzdesign.report.sections.provenance import provenance_section, warnings_section
+from dzdesign.report.sections.remaining import remaining_section
 from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import headline, key_figures
 from dzdesign.report.valve_name import valve_name
 
 REPORT_NAME = "report.html"
 #: Of a lot setting, these are of the one valve that its file holds.
-OF_A_VALVE = ("characteristic", "conditions", "data", "thresholds", "beta", "budget", "loop")
+OF_A_VALVE = ("characteristic", "conditions", "data", "thresholds", "beta", "remaining", "budget", "loop")
 
 
 def report_of_folder(folder: Path, logo: str = "") -> Report:
@@ -85,12 +86,12 @@ def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "")
     `logo` is a data: address.
     """
     compensator = chain.compensator
-    lot, figures = lot_figures(chain), key_figures(chain)
-    if lot and chain.evidence:  # the last of them, the inputs, is of the C and not of a valve
-        lot, figures = (*lot, figures[-1]), figures[:-1]
     curves = characteristic_curves(chain.valve, chain.assessment, chain.curves)
     loops = chain.evidence.closed_loop.pressures if chain.evidence else ()
     found = characteristic_quantities(chain.valve, chain.assessment, loops, curves)
+    lot, figures = lot_figures(chain), key_figures(chain, found)
+    if lot and chain.evidence:  # the last of them, the inputs, is of the C and not of a valve
+        lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
         sections = {
             **_sections(chain),
@@ -136,6 +137,8 @@ def _sections(chain: Chain) -> dict[str, Section]:
         "warnings": warnings_section(chain.valve, compensator),
         "provenance": provenance_section(chain),
     }
+    if compensator:
+        sections["remaining"] = remaining_section(compensator)
     if compensator and compensator.lot:
         sections["lot"] = lot_section(compensator)
     return sections

@@ -263,6 +263,21 @@ class TestReadability:
         assert plot_files(found)["flow_1_MPa.png"].startswith(b"\x89PNG")
 
 
+    def test_a_title_names_the_side_of_a_valve_with_two(self):
+        """On either side the axis runs from zero up, so nothing else tells them apart."""
+        tests = [ramp_of(dp) for dp in (1.0, 4.0)]
+        tests += [
+            dataclasses.replace(each, u=-each.u, q=-each.q, source=f"other_{each.source}", sha256="1" * 64)
+            for each in tests
+        ]
+        figures = figures_of(identify_sides(tests))
+        assert len(figures) == 8
+        for name, figure in figures.items():
+            assert f", {name.partition('_')[0]} commands: " in figure._suptitle.get_text().replace("\n", " ")
+        one = figures_of(identify_sides(tests[:2]))
+        assert not any("commands" in figure._suptitle.get_text() for figure in one.values())
+
+
 class TestFiles:
     @pytest.mark.slow
     def test_files_are_small_and_say_neither_day_nor_version(self, found):

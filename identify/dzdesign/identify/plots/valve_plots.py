@@ -52,20 +52,26 @@ def draw_figures(found: Identification) -> Iterator[tuple[str, "Figure"]]:
     for name, side in found.sides.items():
         units = found.model.recorded_units.of_side(name)
         prefix, dp = f"{name}_" if len(found.sides) > 1 else "", [test.dp_MPa for test in side.model.tests]
+        of = f", {name} commands" if prefix else ""
         for row, flow in enumerate(pressure_names([f"{prefix}flow"] * len(dp), dp)):
-            yield flow, _flow_figure(found.model, side, row, units)
-        yield f"{prefix}thresholds", _thresholds_figure(side.model, units)
+            yield flow, _flow_figure(found.model, side, row, units, of)
+        yield f"{prefix}thresholds", _thresholds_figure(side.model, units, of)
         if len(side.model.beta.beta) > 1:
-            yield f"{prefix}beta", _beta_figure(side.model, units)
+            yield f"{prefix}beta", _beta_figure(side.model, units, of)
 
 
 # Flow over command ---------------------------------------------------------------------------------------------------
 
 
-def _flow_figure(valve: ValveModel, side: SideIdentification, row: int, units: RecordedUnits) -> "Figure":
-    """Draw one ramp test: the whole range, its edge enlarged, and the residuals about the straight lines."""
+def _flow_figure(
+    valve: ValveModel, side: SideIdentification, row: int, units: RecordedUnits, of: str
+) -> "Figure":
+    """Draw one ramp test: the whole range, its edge enlarged, and the residuals about the straight lines.
+
+    `of` names the side, of a valve with two.
+    """
     item, test = side.described.tests[row], side.model.tests[row]
-    figure = new_figure(6.6, *_flow_title(side.model, test, units))
+    figure = new_figure(6.6, *_flow_title(side.model, test, units, of))
     panels: dict[str, Axes] = figure.subplot_mosaic(
         [["flow", "edge"], ["residual", "edge"]], height_ratios=(2, 1), width_ratios=(3, 2)
     )
@@ -110,7 +116,7 @@ def _flow_figure(valve: ValveModel, side: SideIdentification, row: int, units: R
     return finish(figure, 2)
 
 
-def _flow_title(side: SideModel, test: TestResult, units: RecordedUnits) -> tuple[str, str, str]:
+def _flow_title(side: SideModel, test: TestResult, units: RecordedUnits, of: str) -> tuple[str, str, str]:
     """Return the lines that say which test it is and what was found in it."""
 
     def pair(values: tuple[float | None, float | None]) -> str:
@@ -121,7 +127,7 @@ def _flow_title(side: SideModel, test: TestResult, units: RecordedUnits) -> tupl
     error = units.text(1e3 * test.u_knee_se_V, ".1f mV")
     threshold, bound = (units.text(u, ".3f V") for u in (test.u_guard_V, test.u_guard_lower_V))
     return (
-        f"{at}: {test.source}",
+        f"{at}{of}: {test.source}",
         f"knee {pair(_knees(test))} (s.e. {error}); onset {pair(_onsets(test))}",
         f"{side.certificate.guard} threshold {threshold}, certified above {bound} "
         f"({_percent(side)} for all tests together); {test.outliers} outliers left out",
@@ -204,7 +210,7 @@ def _draw_residuals(
 # Over the pressure drop ----------------------------------------------------------------------------------------------
 
 
-def _thresholds_figure(side: SideModel, units: RecordedUnits) -> "Figure":
+def _thresholds_figure(side: SideModel, units: RecordedUnits, of: str) -> "Figure":
     """Draw the thresholds of all tests, the guarded one with its bound, and the law's offset."""
     tests, curve = side.tests, side.curve
     change, error = (1e3 * (value or 0) for value in (side.trend_change_V, side.trend_change_se_V))
@@ -212,7 +218,7 @@ def _thresholds_figure(side: SideModel, units: RecordedUnits) -> "Figure":
     trend = f"; {side.trend}: {over}" if side.trend else ""
     figure = new_figure(
         5.4,
-        f"Thresholds of {len(tests)} pressure drop{'s' if len(tests) > 1 else ''}: {_sources(side)}",
+        f"Thresholds of {len(tests)} pressure drop{'s' if len(tests) > 1 else ''}{of}: {_sources(side)}",
         f"{side.certificate.guard} threshold guarded ({_percent(side)} for all tests together){trend}",
         f"identified u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
         f"{units.text(side.reference.u_min_se_V, '.4f dV')}, certified offset {units.text(curve.u_min0_V, '.4f V')}"
@@ -227,13 +233,13 @@ def _thresholds_figure(side: SideModel, units: RecordedUnits) -> "Figure":
     return finish(figure, 3)
 
 
-def _beta_figure(side: SideModel, units: RecordedUnits) -> "Figure":
+def _beta_figure(side: SideModel, units: RecordedUnits, of: str) -> "Figure":
     """Draw the identified beta, what the bounds allow, and dP0."""
     dp, beta, u_min0 = tested_pressures(side), side.beta.beta, side.reference.u_min_V
     dp0 = side.reference.dp_MPa or 0.0
     figure = new_figure(
         5.0,
-        f"β over {units.number(dp[0], '.3f MPa')} to {units.text(dp[-1], '.3f MPa')}: {_sources(side)}",
+        f"β over {units.number(dp[0], '.3f MPa')} to {units.text(dp[-1], '.3f MPa')}{of}: {_sources(side)}",
         f"β = {beta[0]:.4f} to {beta[-1]:.4f}, 1 at dP0 = {units.text(dp0, '.3f MPa')} "
         f"(identified u_min0 = {units.text(u_min0, '.4f V')}); bounds: {_percent(side)} for all tests together",
     )

@@ -54,7 +54,7 @@ class ReportFigure:
     """A figure as the page shows it: markup in which every text is escaped, and the numbers that were drawn.
 
     The caption says what it shows and how to read it, the description what is found there, for who can't see it. The
-    name is that of its anchor and of the CSV file.
+    name is that of its anchor and of the CSV file. `narrow_svg` is the same for a narrow page, where there is one.
     """
 
     name: str
@@ -62,6 +62,7 @@ class ReportFigure:
     description: str
     svg: str
     csv: str
+    narrow_svg: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,8 +107,10 @@ def figure_style() -> Iterator[None]:
         yield
 
 
-def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: float = 0.12) -> "Figure":
-    """Return an empty figure, `WIDTH` wide, sizes in inches.
+def new_figure(
+    height: float, *, legend_rows: int = 0, right: float = 0.2, top: float = 0.12, width: float = WIDTH
+) -> "Figure":
+    """Return an empty figure; sizes in inches.
 
     Its margins are stated, because laying it out by itself takes as long as drawing it: room for the rows of a legend
     below the axes, at the right for labels at the lines' ends, at the top for titles.
@@ -115,11 +118,11 @@ def new_figure(height: float, *, legend_rows: int = 0, right: float = 0.2, top: 
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), facecolor="none")
+    figure = Figure(figsize=(width, height), facecolor="none")
     FigureCanvasSVG(figure)
     bottom = 0.5 + (0.1 + 0.2 * legend_rows if legend_rows else 0.0)
     figure.subplots_adjust(
-        left=LEFT / WIDTH, right=1 - right / WIDTH, bottom=bottom / height, top=1 - top / height
+        left=LEFT / width, right=1 - right / width, bottom=bottom / height, top=1 - top / height
     )
     return figure
 
@@ -184,14 +187,23 @@ def apart(places: Sequence[float], room: float) -> list[float]:
     return [base + room * index for index, base in enumerate(kept)]
 
 
-def to_report_figure(figure: "Figure", name: str, caption: str, description: str, csv: str) -> ReportFigure:
+def to_report_figure(
+    figure: "Figure", name: str, caption: str, description: str, csv: str, narrow: "Figure | None" = None
+) -> ReportFigure:
     """Return a figure as the page shows it; see `ReportFigure`."""
-    _translate(figure)
-    _make_room_for_ticks(figure)
-    _make_room_for_legend(figure)
     caption, description = word(caption), word(description)
+    for each in (figure, narrow):
+        if each is not None:
+            _translate(each)
+            _make_room_for_ticks(each)
+            _make_room_for_legend(each)
     return ReportFigure(
-        name=name, caption=caption, description=description, svg=_svg_of(figure, name, description), csv=csv
+        name=name,
+        caption=caption,
+        description=description,
+        svg=_svg_of(figure, name, description),
+        csv=csv,
+        narrow_svg=_svg_of(narrow, f"{name}-narrow", description, "drawing narrow") if narrow else "",
     )
 
 
@@ -214,7 +226,7 @@ def _make_room_for_ticks(figure: "Figure") -> None:
     em = max((sum(0.32 if sign in ".," else 0.64 for sign in label) for label in labels), default=0.0)
     surplus = TICK_SIZE * em / 72 - TICKS_IN_MARGIN
     if surplus > 0:
-        figure.subplots_adjust(left=(LEFT + surplus + 0.04) / WIDTH)
+        figure.subplots_adjust(left=(LEFT + surplus + 0.04) / figure.get_figwidth())
 
 
 def _make_room_for_legend(figure: "Figure") -> None:
@@ -227,7 +239,7 @@ def _make_room_for_legend(figure: "Figure") -> None:
                 text.set_fontsize(LEGEND_SIZE * 0.93**step)
 
 
-def _svg_of(figure: "Figure", name: str, description: str) -> str:
+def _svg_of(figure: "Figure", name: str, description: str, kind: str = "drawing") -> str:
     """Return a figure, drawn in the colours of `LIGHT`, as markup; all ids begin with its name, unlike any other's."""
     from markupsafe import escape
 
@@ -244,7 +256,7 @@ def _svg_of(figure: "Figure", name: str, description: str) -> str:
     box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)
     width, height = map(float, box.groups()) if box else (1.0, 1.0)
     head = (
-        f'<svg class="drawing" role="img" aria-label="{escape(description)}" viewBox="0 0 {width:g} {height:g}" '
+        f'<svg class="{kind}" role="img" aria-label="{escape(description)}" viewBox="0 0 {width:g} {height:g}" '
         f'width="{width:g}" height="{height:g}" xmlns="http://www.w3.org/2000/svg" '
         'xmlns:xlink="http://www.w3.org/1999/xlink">'
     )

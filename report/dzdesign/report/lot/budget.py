@@ -100,7 +100,7 @@ def lot_budget_table(budget: LotBudget | None, units: RecordedUnits) -> Table | 
     return table_of(
         "Uncertainty budgets of the valves: what each component takes at most, and what it costs",
         budget.lines,
-        ("component", lambda line: Cell(text=word(line.component), more=", ".join(line.origin))),
+        ("component", lambda line: Cell(text=word(line.component), more=", ".join(map(word, line.origin)))),
         *((("commands", lambda line: word(line.side)),) if both else ()),
         (f"largest contribution ({units.label('mV')})", lambda line: recorded(line.contribution_mV, ".2f mV", units)),
         *((f"price, {which} (% of command)", price(place)) for place, which in enumerate(ENDS)),

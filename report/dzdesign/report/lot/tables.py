@@ -14,7 +14,7 @@ from dzdesign.report.lot.spread import EXTRA, QUANTITIES, Quantity, Spread
 from dzdesign.report.lot.summary import LotSettingSummary, Quantiles
 from dzdesign.report.lot.table import TABLE, TableRow, safe_cell
 from dzdesign.report.lot.valve_names import short
-from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, recorded, table_of, whole
+from dzdesign.report.sections.cells import Cell, Table, finding, in_number_font, number, recorded, table_of, whole
 
 #: Valves that a cell names, and rows that a table has in the page; all of them stand in the CSV.
 NAMED, ROWS = 40, 100
@@ -36,8 +36,8 @@ def failed_table(groups: Sequence[ReasonGroup], failed: Sequence[TableRow]) -> T
         groups,
         ("status", lambda group: _failed(group.status)),
         ("valves", lambda group: in_number_font(whole(len(group.valves)))),
-        ("what is wrong", lambda group: group.what),
-        ("what is expected, or to be done", lambda group: group.advice or "–"),
+        ("what is wrong", lambda group: finding(group.what)),
+        ("what is expected, or to be done", lambda group: finding(group.advice or "–")),
         ("names", names),
         csv=csv_text(
             ("name", "status", "reason"),

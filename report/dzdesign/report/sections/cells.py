@@ -16,7 +16,8 @@ Item = TypeVar("Item")
 class Cell:
     """One cell, `more` on a second line, smaller.
 
-    Its kind is text, number, code, symbol (code on one line), hash (on two), or the verdict good, bad or open.
+    Its kind is text, finding (a sentence, in which backticks stand about commands), number, code, symbol (code on one
+    line), hash (on two), or the verdict good, bad or open.
     """
 
     text: str
@@ -87,6 +88,11 @@ def recorded(value: float | None, form: str, units: RecordedUnits) -> Cell:
         return in_number_font("–")
     text = units.number(value, form)
     return in_number_font(text.replace("-", "−") if text.strip("-0.") else text.removeprefix("-"))
+
+
+def finding(text: str) -> Cell:
+    """Return a sentence that states a finding: what stands between backticks is a command."""
+    return Cell(text=text, kind="finding")
 
 
 def in_number_font(text: str) -> Cell:

@@ -98,17 +98,18 @@ def _row(
     unit = (LIMITED | QUANTITIES)[key].unit
     shown = units.label(unit) if unit in IN_RECORDED_UNITS else unit
     cells = [Cell(text=word(NAMES[key])), in_number_font(shown)]
-    cells += [_pair(key, each, unit, units) for each in pressures]
+    driven = any(each.after for each in pressures)
+    cells += [_pair(key, each, unit, units, driven=driven) for each in pressures]
     if with_limits:
         limits = [each.limits[key] for each in pressures if key in each.limits]
         cells += [_limit(limits, units), _verdict(limits)]
     return tuple(cells)
 
 
-def _pair(key: str, of: PressureQuantities, unit: str, units: RecordedUnits) -> Cell:
-    """Return a quantity before and after; marked where it misses its limit."""
+def _pair(key: str, of: PressureQuantities, unit: str, units: RecordedUnits, *, driven: bool) -> Cell:
+    """Return a quantity before and after, as far as either was recorded anywhere; marked where it misses its limit."""
     before, after = (_text(found.get(key), unit, units) for found in (of.before, of.after))
-    text = after if key == LOSS else before if not of.after else f"{before} → {after}"
+    text = after if key == LOSS else before if not driven else f"{before} → {after}"
     missed = key in of.limits and of.limits[key].holds is False
     return Cell(text=f"{text} ✗", kind="bad") if missed else in_number_font("–" if text == "– → –" else text)
 

@@ -17,6 +17,7 @@ from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import (
     Cell,
     Table,
+    finding,
     in_number_font,
     number,
     recorded,
@@ -239,13 +240,13 @@ def checks_section(evidence: Evidence | None) -> Section:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
     tried = [(verdict(check.holds), word(check.name), check.text) for check in evidence.checks]
     untried = untried_requirements(evidence)
-    how = [word(f"to try it: {each.how}").replace("`", "") for each in untried]
+    how = [word(f"to try it: {each.how}") for each in untried]
     rows = [*tried, *((verdict(None), word(each.title), text) for each, text in zip(untried, how, strict=True))]
     table = table_of(
         f"{len(tried)} requirements tried, {len(untried)} not",
         rows,
         ("verdict", lambda row: row[0]),
         ("requirement", lambda row: row[1]),
-        ("figures", lambda row: row[2]),
+        ("figures", lambda row: finding(row[2])),
     )
     return Section(tables=(table,))

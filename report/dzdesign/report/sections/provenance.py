@@ -8,6 +8,7 @@ from dzdesign.report.chain import KINDS, Chain
 from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, counted, table_of, whole
+from dzdesign.report.sections.remaining import other_costs
 
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
@@ -27,7 +28,7 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
     return Section(
         groups=(
             ("Warnings of the recordings", tuple(warnings) or (("None.",) if valve else ())),
-            ("What the design costs", compensator.costs if compensator else ()),
+            ("What the design costs", other_costs(compensator) if compensator else ()),
             ("What the codes stand for", tuple(signals)),
         )
     )

@@ -1,0 +1,178 @@
+"""What a report says in two places is the same in both: card and table, verdict and fold, table and design."""
+
+import re
+from dataclasses import replace
+
+import pytest
+from markupsafe import Markup
+
+from dzdesign.assess.assessing import assess
+from dzdesign.assess.options import AssessOptions
+from dzdesign.codegen.project import target_named
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.design.costs import lines_of_tests
+from dzdesign.design.costs_at_tests import costs_at_tests
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.identify.options import IdentifyOptions
+from dzdesign.report.characteristic.curves import characteristic_curves
+from dzdesign.report.characteristic.quantities import characteristic_quantities
+from dzdesign.report.figures.characteristic import characteristic_figure
+from dzdesign.report.figures.figure import figure_style
+from dzdesign.report.language import in_language, word
+from dzdesign.report.measured_figures import measured_figures, with_span
+from dzdesign.report.page import Headline, Page, _cell, _finding, _tied, render
+from dzdesign.report.sections.characteristic import characteristic_section
+from dzdesign.report.sections.remaining import other_costs, remaining_section
+from tests.support.bench_recordings import AFTER, BEFORE, L_MIN, record
+
+
+def assessed(*, sides=(1,), floor=0.0, before_dp=(1.0, 4.0), after_dp=(1.0, 4.0)):
+    """Return an assessment of a valve that is recorded at these pressure drops of these sides."""
+    options = AssessOptions(reading=IdentifyOptions(meter_lag=0.0), reading_flow=1.0 * L_MIN)
+    sets = [
+        [record(replace(valve, floor=floor), dp, seed=seed, sign=sign) for sign in sides for dp in dps]
+        for seed, valve, dps in ((1, BEFORE, before_dp), (2, AFTER, after_dp))
+    ]
+    return assess(*sets, options)
+
+
+@pytest.fixture(scope="module")
+def two_sides():
+    return assessed(sides=(1, -1), floor=0.6)
+
+
+def rows_of(assessment):
+    """Return the rows of the characteristic's tables: (side, quantity) -> cells at the pressure drops."""
+    found = characteristic_quantities(None, assessment, (), ())
+    return {
+        (table.caption.split()[0].lower(), row[0].text): [cell.text for cell in row[2:]]
+        for table in characteristic_section(found, AS_COMPUTED).tables
+        for row in table.rows
+    }
+
+
+def test_a_measured_card_says_the_worst_that_its_table_shows(two_sides):
+    rows = rows_of(two_sides)
+    for branch, figure in zip(("opening", "closing"), measured_figures(two_sides), strict=False):
+        cells = [text for (_, name), row in rows.items() if name == f"Dead zone at the reading flow, {branch}"
+                 for text in row]  # fmt: skip
+        before, after = (max(float(text.split(" → ")[place]) for text in cells) for place in (0, 1))
+        assert figure.value == f"{before:.1f} % → {after:.1f} %" and "at the reading flow" in figure.note
+        assert "the worst of 2 pressure drops on each side" in figure.note
+
+
+def test_a_flow_that_the_meter_hides_has_a_card_with_its_bound(two_sides):
+    """Seeded: a card of values alone left out the flow at zero command of every meter with a floor."""
+    (card,) = [each for each in measured_figures(two_sides) if each.label.startswith("Flow at zero")]
+    cells = [text for (_, name), row in rows_of(two_sides).items() if name == "Flow at zero command" for text in row]
+    bounds = [text.partition(" → ≤ ")[2] for text in cells]
+    assert len(bounds) == 4 and all(bounds) and card.value == f"≤ {max(bounds, key=float)} L/min"
+    assert "the meter shows none" in card.note
+
+
+def test_what_was_recorded_without_the_compensator_alone_has_a_dash_for_with():
+    rows = rows_of(assessed(after_dp=(1.0,)))
+    one, other = rows["positive", "Hysteresis"][:2]
+    assert " → " in one and not one.endswith("–") and other.endswith(" → –")
+
+
+@pytest.mark.parametrize(("values", "text"), [((1.81, 1.83), ""), ((1.8, 2.0), ". With: 1.8 to 2.0 %"), ((2.0,), "")])
+def test_a_range_whose_ends_read_alike_is_none(values, text):
+    assert with_span(values) == text
+
+
+@pytest.fixture(scope="module")
+def compensator(example_valve):
+    return design(example_valve, options_of({}, target_named("f28335").inputs()))
+
+
+def test_what_a_design_leaves_stands_in_a_table_and_nowhere_twice(compensator):
+    (table,) = remaining_section(compensator).tables
+    costs = costs_at_tests(compensator, 1)
+    assert len(table.rows) == len(costs) == len(lines_of_tests(compensator, 1))
+    for row, cost in zip(table.rows, costs, strict=True):
+        shown = dict(zip(table.columns, (cell.text for cell in row), strict=True))
+        assert float(shown["onset, opening (%)"]) == pytest.approx(100 * cost.onset["opening"], abs=0.006)
+        assert float(shown["read, closing (%)"]) == pytest.approx(100 * cost.read["closing"], abs=0.006)
+        assert float(shown["drive at full command (%)"]) == pytest.approx(100 * cost.full, abs=0.006)
+    others = other_costs(compensator)
+    assert {*others, *lines_of_tests(compensator, 1)} == set(compensator.costs)
+    assert not any("dead zone that remains on opening" in line for line in others)
+
+
+def page_with(verdict):
+    return render(
+        Page(title="V", verdict=verdict, figures=(), template="valve.html.jinja", sections={}, missing=())
+    )
+
+
+REASONS, CAUTIONS = tuple(f"reason {i}" for i in range(5)), tuple(f"caution {i}" for i in range(4))
+
+
+@pytest.mark.parametrize(
+    ("kind", "reasons", "seen"),
+    [
+        ("good", (), CAUTIONS),
+        ("bad", REASONS, REASONS[:2]),
+        ("bad", REASONS[:1], (REASONS[0], CAUTIONS[0])),
+        ("open", REASONS, (*REASONS[:2], CAUTIONS[0])),
+    ],
+)  # fmt: skip
+def test_few_lines_of_a_verdict_stand_open_and_none_is_lost(kind, reasons, seen):
+    """All that qualifies a good verdict stands open; nothing pushes the figure off the first screen."""
+    html = page_with(Headline(kind=kind, text="It.", reasons=reasons, cautions=CAUTIONS))
+    verdict = html[html.index('<div class="verdict') :]
+    verdict = verdict[: verdict.index("</div>")]
+    opened, _, folded = verdict.partition("<details>")
+    items = [re.findall("<li[^>]*>(.*?)</li>", part) for part in (opened, folded)]
+    assert tuple(items[0]) == seen
+    assert sorted(items[0] + items[1]) == sorted((*reasons, *CAUTIONS))
+    assert not items[1] or f"<summary>{len(items[1])} more</summary>" in verdict
+
+
+def test_options_are_not_broken_and_commands_in_a_cell_are_commands():
+    assert _tied("Declare --coil-temperature & go") == Markup(
+        'Declare <span class="tied">--coil-temperature</span> &amp; go'
+    )
+    assert _finding("as `identify` writes it <b>") == Markup("as <code>identify</code> writes it &lt;b&gt;")
+    assert "<code>" not in _finding("`<i>` `x")
+    assert _cell("Volumenstromverstärkungen") == "Volumenstromverstärkungen"
+    assert "breaks" in _cell("x" * 31) and "breaks" in _cell("ramp_dP1_1.csv.gz_and_more")
+
+
+@pytest.mark.parametrize("unit", ["MPa", "bar", "psi"])
+def test_a_unit_is_no_word_of_english(unit):
+    """Seeded: with pressures in bar a caption stayed English, as if 'bar' were a word without a translation."""
+    with in_language("de"):
+        caption = word(f"Positive commands, at pressure drops in {unit}")
+        assert caption == f"Positive Ansteuerung, bei Druckdifferenzen in {unit}"
+        assert word(f"positive commands, 10.0 {unit}") == f"positive Ansteuerung, 10.0 {unit}"
+
+
+def test_a_word_before_a_full_stop_is_a_word():
+    """Seeded: 'sides.' passed for the name of a file, and half of the sentence stayed English."""
+    with in_language("de"):
+        text = "the worst of somethings and sides. With: 2.5 to 4.2 %"
+        assert word(text) == text
+        assert word("the worst of 4 pressure drops and sides. With: 2.5 to 4.2 %") == (
+            "der größte Wert von 4 Druckdifferenzen und Seiten. Mit: 2.5 bis 4.2 %"
+        )
+
+
+def label_places(svg):
+    """Return where the pressure drops stand: x of each text ``4.00``, and of the tick ``−100``."""
+    texts = re.findall(r'<text[^>]*?(?:x="(-?[\d.]+)"|translate\((-?[\d.]+)[^>]*)[^>]*>([^<]*)<', svg)
+    return [(float(x or t), text) for x, t, text in texts]
+
+
+def test_the_pressure_drops_of_negative_commands_stand_outside_the_curves(two_sides):
+    """Left of the tick of -100 %, where every curve ends; and the drawing for a narrow page has them too."""
+    with figure_style():
+        figure = characteristic_figure(characteristic_curves(None, two_sides, {}), AS_COMPUTED)
+    for svg in (figure.svg, figure.narrow_svg):
+        places = label_places(svg)
+        end = next(x for x, text in places if text == "−100")
+        labels = [x for x, text in places if text == "4.00"]
+        assert len(labels) == 2 and min(labels) < end < max(labels)
+    assert figure.narrow_svg.count("characteristic-narrow-") > 10 and "characteristic-narrow" not in figure.svg
