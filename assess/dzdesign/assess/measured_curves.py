@@ -29,13 +29,19 @@ class MeasuredBranch:
     On the negative side commands and flows count from zero down, as in valve.json.
     """
 
-    command_percent: Annotated[Percents, quantity("%", "Commands of the points, rising, over full command.")]
-    q_L_min: Annotated[Flows, quantity("L/min", "Flow there, brought to the pressure drop at no flow.")]
+    command_percent: Annotated[
+        Percents, quantity("%", "Commands of the points in ascending order, as a percentage of full command.")
+    ]
+    q_L_min: Annotated[Flows, quantity("L/min", "Flow at each point, scaled to the pressure drop at zero flow.")]
     sample_command_percent: Annotated[
         Percents,
-        quantity("%", "Commands of single samples: of equal steps over the branch the sample nearest to each."),
+        quantity(
+            "%",
+            "Commands of single samples. The branch is divided into equal steps; the sample nearest to each "
+            "step is kept.",
+        ),
     ]
-    sample_q_L_min: Annotated[Flows, quantity("L/min", "Flow of each, brought to the same pressure drop.")]
+    sample_q_L_min: Annotated[Flows, quantity("L/min", "Flow of each single sample, scaled to the same pressure drop.")]
 
     def __post_init__(self) -> None:
         for commands, flows in (
@@ -51,9 +57,9 @@ class MeasuredBranch:
 class MeasuredCurve:
     """The curve of one set at one pressure drop; a branch that was not recorded is null."""
 
-    rising: Annotated[MeasuredBranch | None, Meta(description="On opening.")]
-    falling: Annotated[MeasuredBranch | None, Meta(description="On closing.")]
-    conditions: Annotated[RampConditions, Meta(description="How the ramps were recorded.")]
+    rising: Annotated[MeasuredBranch | None, Meta(description="Opening branch.")]
+    falling: Annotated[MeasuredBranch | None, Meta(description="Closing branch.")]
+    conditions: Annotated[RampConditions, Meta(description="Conditions under which the ramps were recorded.")]
 
     @property
     def branches(self) -> tuple[MeasuredBranch, ...]:

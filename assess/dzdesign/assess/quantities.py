@@ -22,9 +22,9 @@ LARGEST = 1e12
 class Quantity:
     """One quantity: what it is called, its unit, its formula."""
 
-    name: Annotated[str, Meta(description="For people.")]
-    unit: Annotated[str, Meta(description="Of its values.")]
-    formula: Annotated[str, Meta(description="How it is computed.")]
+    name: Annotated[str, Meta(description="Display name.")]
+    unit: Annotated[str, Meta(description="Unit of the values.")]
+    formula: Annotated[str, Meta(description="Formula of the quantity.")]
 
 
 QUANTITIES: dict[str, Quantity] = {
@@ -72,12 +72,14 @@ StandardError = Annotated[float, Meta(ge=0, le=LARGEST)]
 class Reading:
     """A quantity as read from a recording, in the unit of the quantity."""
 
-    value: Annotated[Value | None, Meta(description="The value; null where it can't be observed.")]
-    se: Annotated[StandardError | None, Meta(description="Its standard error, where one can be had.")]
-    at_most: Annotated[Value | None, Meta(description="A bound, where only that is known.")]
-    not_observable: Annotated[str | None, Meta(description="Why there is no value.")]
-    note: Annotated[str | None, Meta(description="What must be known beside the value.")]
-    where: Annotated[str | None, Meta(description="Flow or command at which it was found, of what is largest there.")]
+    value: Annotated[Value | None, Meta(description="Value of the quantity; null if it can't be observed.")]
+    se: Annotated[StandardError | None, Meta(description="Standard error of the value, if it can be estimated.")]
+    at_most: Annotated[Value | None, Meta(description="Upper bound, if no value but only a bound is known.")]
+    not_observable: Annotated[str | None, Meta(description="Reason why there is no value.")]
+    note: Annotated[str | None, Meta(description="Remark that is needed to interpret the value.")]
+    where: Annotated[
+        str | None, Meta(description="Flow or command at which the value was found, relative to the largest one.")
+    ]
 
     def __post_init__(self) -> None:
         if (self.value is None) == (self.not_observable is None):
@@ -88,8 +90,8 @@ class Reading:
 class Change:
     """AFTER less BEFORE, in the unit of the quantity."""
 
-    value: Annotated[Value, Meta(description="In the quantity's unit.")]
-    se: Annotated[StandardError | None, Meta(description="Its standard error.")]
+    value: Annotated[Value, Meta(description="Change, in the unit of the quantity.")]
+    se: Annotated[StandardError | None, Meta(description="Standard error of the change.")]
 
 
 def observed(value: float, se: float | None = None, note: str | None = None, where: str | None = None) -> Reading:

@@ -25,14 +25,14 @@ class OutputManifest(Artefact):
     schema: Annotated[Literal["dzdesign.output/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.output/1"
     )
-    target: Annotated[Text, Meta(description="Kind of output, as `codegen --list-targets` names it.")]
+    target: Annotated[Text, Meta(description="Kind of output, as listed by `codegen --list-targets`.")]
     settings: Annotated[
         Mapping[Text, str],
         Meta(description="Option of `codegen` that is of this target alone, without hyphens, to its value."),
     ]
-    law: Annotated[Text, Meta(description="Name of the law, as compensator.json has it.")]
-    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of everything it was made from.")]
-    files: Annotated[Mapping[Text, Sha256], Meta(description="File to the SHA-256 of its bytes, as generated.")]
+    law: Annotated[Text, Meta(description="Name of the law, as in compensator.json.")]
+    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of all files from which the output was made.")]
+    files: Annotated[Mapping[Text, Sha256], Meta(description="SHA-256 of each generated file, by file name.")]
 
     @property
     def settings_in_words(self) -> str:

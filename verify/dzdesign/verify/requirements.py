@@ -12,12 +12,14 @@ from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
 class Check:
     """One requirement that was tried."""
 
-    id: Annotated[str, Meta(description="Short name of the requirement, the same in every version.")]
-    name: Annotated[str, Meta(description="What is required, with the sign of command or the processor it is of.")]
+    id: Annotated[str, Meta(description="Short name of the requirement, stable across versions.")]
+    name: Annotated[
+        str, Meta(description="Requirement, with the sign of the command or the processor to which it applies.")
+    ]
     holds: Annotated[
         bool | None, Meta(description=f"True: {HOLDS}; false: {DOES_NOT_HOLD}; null: {NOT_CHECKED}, it could not be.")
     ]
-    text: Annotated[str, Meta(description="What was found, with its figures.")]
+    text: Annotated[str, Meta(description="Finding, with its figures.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,43 +34,49 @@ class AboveTests:
     certified: Annotated[
         bool,
         Meta(
-            description="Whether the bound holds, above the tests too, with the side's confidence if the premise does. "
-            "False: the premise bounds nothing there, or the tests contradict it."
+            description="Whether the bound above the tests holds with the side's confidence, provided that its premise "
+            "holds. False: the premise gives no bound there, or the tests contradict it."
         ),
     ]
     slope_from_MPa: Annotated[
         PressureDrop | None,
-        Meta(description="Of smooth: the test whose chord to the last one gives the slope; null for another premise."),
+        Meta(
+            description="For the premise smooth, the test whose chord to the last test gives the slope; null for "
+            "another premise."
+        ),
     ]
     curvature_V_MPa2: Annotated[
         SecondDifference,
-        quantity("V/MPa2", "M above the tests: how much the threshold may bend, downwards too; 0 but for smooth."),
+        quantity(
+            "V/MPa2", "Bound M of the curvature above the tests, in both directions; 0 unless the premise is smooth."
+        ),
     ]
     lack_of_fit_p: Annotated[
         Probability | None,
         Meta(
-            description="Probability of tests that bend downwards as much as these if M were true; below 0.01 nothing "
-            "is certified. null: M was estimated from them, or another premise."
+            description="Probability that the tests bend downwards at least as much as these if M were true; nothing "
+            "is certified below 0.01. Null: M was estimated from the tests, or the premise is another."
         ),
     ]
     dp_MPa: Annotated[
         tuple[PressureDrop, ...],
-        quantity("MPa", "Nodes, from the last tested pressure drop on, up to where the bound comes to zero."),
+        quantity("MPa", "Nodes from the last tested pressure drop to the point at which the bound reaches zero."),
     ]
     band_V: Annotated[
         tuple[VoltageError, ...],
         quantity(
             "V",
-            "What errors take off the continued threshold at each node: noise, scatter and systematic errors, with the "
-            "leverage of the tests.",
+            "Amount that errors take off the continued threshold at each node. It covers noise, scatter and "
+            "systematic errors, with the leverage of the tests.",
         ),
     ]
     u_lower_V: Annotated[
         tuple[Voltage, ...],
         quantity(
             "V",
-            "Lower bounds at the nodes: the continued threshold less the band and M/2 (dP - last) (dP - slope_from). "
-            "Between nodes their chord, in the first interval less M/2 (dP - a) (b - dP).",
+            "Lower bounds at the nodes: the continued threshold minus the band and M/2 (dP - last) (dP - "
+            "slope_from). Between nodes the bound is their chord, minus M/2 (dP - a) (b - dP) in the first "
+            "interval.",
         ),
     ]
 
