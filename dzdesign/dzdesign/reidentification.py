@@ -87,7 +87,7 @@ def identified_again(
         one, other = _words(first.stated), _words(first.follows)
         text = f"'{first.place}' of valve.json is {one}, but {other} follows {text}{more}"
         return _check(holds=False, text=f"{text}; make it again with `dzdesign identify`")
-    text = f"identified {'again' if identified is None else 'in this run'} {text}: every number the same"
+    text = f"identified {'again' if identified is None else 'in this run'} {text}: every number is the same"
     if others := len(compensator.lot) - 1 if compensator.lot else 0:
         text += f"; of the lot's other {others} valves {AS_STATED}"
     return _check(holds=True, text=text)

@@ -27,7 +27,7 @@ Voltage = Annotated[float, Meta(gt=0, le=1e9, extra_json_schema={"unit": "V"})]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording(SourceFile):
-    """A recording, and its set."""
+    """A recording and its set."""
 
     set: Annotated[
         Set, Meta(description="Whether the recording was taken without the compensator (before) or with it (after).")
@@ -36,7 +36,7 @@ class Recording(SourceFile):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What was asked for."""
+    """Options of the comparison."""
 
     u_max_V: Annotated[Voltage, Meta(description="Full command of the recordings without the compensator.")]
     after_u_max_V: Annotated[Voltage, Meta(description="Full command of the recordings with the compensator.")]
@@ -62,7 +62,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeterTaken:
-    """What was taken of the flow meter."""
+    """Properties of the flow meter as assumed."""
 
     floor_L_min: Annotated[Flow, Meta(description="Flow below which the meter reads zero.")]
     lag_s: Annotated[float, quantity("s", "First-order lag of the meter.", ge=0, le=1e6)]
@@ -139,7 +139,7 @@ class PressureAssessment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assessment(Artefact):
-    """Ramps recorded without and with the compensator, side by side, as `dzdesign assess` writes them."""
+    """Ramps recorded without and with the compensator, compared, as `dzdesign assess` writes them."""
 
     FILE_NAME: ClassVar[str] = "assessment.json"
     schema: Annotated[Literal["dzdesign.assessment/1"], Meta(description="Name and version of this schema.")] = (

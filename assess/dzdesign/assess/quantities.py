@@ -20,7 +20,7 @@ LARGEST = 1e12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """One quantity: what it is called, its unit, its formula."""
+    """One quantity: its name, unit and formula."""
 
     name: Annotated[str, Meta(description="Display name.")]
     unit: Annotated[str, Meta(description="Unit of the values.")]
@@ -88,7 +88,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """AFTER less BEFORE, in the unit of the quantity."""
+    """Change of a quantity from without to with the compensator, in its unit."""
 
     value: Annotated[Value, Meta(description="Change, in the unit of the quantity.")]
     se: Annotated[StandardError | None, Meta(description="Standard error of the change.")]

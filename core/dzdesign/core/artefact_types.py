@@ -52,7 +52,7 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceFile:
-    """A file that something was made from."""
+    """A file from which an artefact was made."""
 
     source: Annotated[str, Meta(description="File name.")]
     sha256: Annotated[Sha256, Meta(description="SHA-256 of the file's content.")]

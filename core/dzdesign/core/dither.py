@@ -21,7 +21,7 @@ SAME_FREQUENCY = Fraction(5, 100)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dither:
-    """A square wave about the drive."""
+    """A square wave around the drive."""
 
     frequency_Hz: Annotated[float, quantity("Hz", "Frequency of the square wave.", ge=LOWEST_HZ, le=HIGHEST_HZ)]
     peak: Annotated[

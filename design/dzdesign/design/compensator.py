@@ -33,7 +33,7 @@ Codes = Annotated[int, Meta(ge=0, le=65535)]
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Compensator(ShownInNotebooks, Artefact):
-    """The law u_O = g(dP) u_i + o(dP) on codes, every coefficient exact, as `dzdesign design` writes it."""
+    """The law u_O = g(dP) u_i + o(dP) on converter codes with exact coefficients, as `dzdesign design` writes it."""
 
     FILE_NAME: ClassVar[str] = "compensator.json"
     REMEDY: ClassVar[str] = "make it again with `dzdesign design`, a lot's with `dzdesign batch`"
@@ -203,12 +203,12 @@ class Compensator(ShownInNotebooks, Artefact):
 
     @property
     def certified_of(self) -> str:
-        """What the certificate is of: the recording, or the recording and the declared machine."""
+        """What the certificate covers: the recording alone, or the recording and the declared machine."""
         return "the recording" if self.machine is None else "the recording and the declared machine"
 
     @property
     def valve_json_sha256(self) -> str:
-        """SHA-256 of the valve.json that it was designed from."""
+        """SHA-256 of the valve.json from which it was designed."""
         return self.made_from[0].sha256
 
     def side(self, sign: int = 1) -> SideLaw:
@@ -220,29 +220,29 @@ class Compensator(ShownInNotebooks, Artefact):
 
     @property
     def dither_reserve_counts(self) -> int:
-        """Counts by which the offset stays lower for the dither; next to none where the ramps were recorded with it."""
+        """Counts by which the dither lowers the offset; almost none if the ramps were recorded with it."""
         driven = self.drive_functions.dither(self.signals)
         return dither_reserve(driven, self.valve.dither, self.machine, self.current_drive)
 
     def allowance(self, sign: int) -> Allowance:
-        """Return what the offset of a side leaves free under the certified curve."""
+        """Return the margin that the offset of a side keeps below the certified curve."""
         return allowance_of(self.signals, self.machine, sign=sign, dither_counts=self.dither_reserve_counts)
 
     @property
     def transition_end(self) -> int:
-        """Codes of command at which zero band and transition are over."""
+        """Command code at which zero band and transition end."""
         return self.zero_band_codes + self.transition_codes
 
     def nodes(self, sign: int = 1) -> int:
-        """Return how many nodes beta needs for every difference of pressure codes."""
+        """Return the number of nodes that beta needs to cover every pressure-code difference."""
         return self.signals.largest_difference(sign) // self.beta_step_codes + 2
 
     def beta(self, dp_code: int, sign: int = 1) -> Fraction:
-        """Return the certified beta at a difference of pressure codes, exactly."""
+        """Return the exact certified beta at a pressure-code difference."""
         return self._interpolate(self.side(sign).beta, dp_code)
 
     def law_beta(self, dp_code: int, sign: int = 1) -> Fraction:
-        """Return the beta that the law follows beyond the transition; the certified one without a transition."""
+        """Return the beta that the law follows after the transition; without a transition, the certified one."""
         return self._interpolate(self.side(sign).law_beta, dp_code)
 
     def _interpolate(self, numerators: tuple[int, ...], dp_code: int) -> Fraction:
@@ -256,7 +256,7 @@ class Compensator(ShownInNotebooks, Artefact):
         )
 
     def counts(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
-        """Return the compare value of the law at a code pair, exactly: not rounded, not limited."""
+        """Return the exact compare value of the law at a code pair, before rounding and limiting."""
         side, signals, beta = self.side(sign), self.signals, self.law_beta(dp_code, sign)
         from_zero = signals.command.from_zero(command_code, sign)
         span, u_min0 = signals.command.span(sign), side.u_min0_over_u_max
@@ -274,11 +274,11 @@ class Compensator(ShownInNotebooks, Artefact):
         return Fraction(line.counts(evaluate_law_command(from_zero, **ends), beta) - lowered)
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
-        """Return u_O/u_max of the law at a code pair, exactly and before it is limited to 0...1."""
+        """Return the exact u_O/u_max of the law at a code pair, before limiting to 0...1."""
         return Fraction(drive(self.counts(command_code, dp_code, sign), self.signals.compare_max))
 
     def compare(self, command_code: int, dp_code: int, sign: int = 1) -> int:
-        """Return the PWM compare value: the law rounded to the nearest count (a half goes up), limited to the range."""
+        """Return the PWM compare value: the law rounded to the nearest count (half up) and limited to the range."""
         counts = self.counts(command_code, dp_code, sign)
         rounded = (2 * counts.numerator + counts.denominator) // (2 * counts.denominator)
         return min(max(rounded, 0), self.drive_functions.compare_limit)

@@ -95,7 +95,7 @@ DEFAULTS = {argument.name: argument.option.default for argument in arguments_of(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignRequest:
-    """The target that was designed for, and name and text of every option, a default where none was given."""
+    """The target of the design, and name and text of every option; a default if none was given."""
 
     target: "TargetInputs"
     options: Mapping[str, str]

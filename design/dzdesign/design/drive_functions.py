@@ -24,7 +24,7 @@ Counts = Annotated[int, Meta(ge=0, le=65535)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveFunctions:
-    """What the drive does around the law, as the integers that the firmware uses."""
+    """Functions of the drive around the law, as the integers of the firmware."""
 
     leave_zero_codes: Annotated[
         int,

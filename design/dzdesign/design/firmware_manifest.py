@@ -40,7 +40,7 @@ def form_named(name: str | None) -> Calibration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareOrigin:
-    """Hashes of everything the firmware was made from."""
+    """Hashes of all files from which the firmware was made."""
 
     compensator_json: Annotated[Sha256, Meta(description="SHA-256 of compensator.json.")]
     valve_json: Annotated[Sha256, Meta(description="SHA-256 of valve.json.")]
@@ -72,7 +72,7 @@ class FirmwareConstant:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareManifest(Artefact):
-    """Which files a firmware has, and where every number in its core came from, as `dzdesign codegen` writes it."""
+    """Files of a firmware and the origin of every number in its core, as `dzdesign codegen` writes it."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
     schema: Annotated[Literal["dzdesign.firmware/1"], Meta(description="Name and version of this schema.")] = (
@@ -82,8 +82,8 @@ class FirmwareManifest(Artefact):
     calibration: Annotated[
         Calibration,
         Meta(
-            description="fixed: the numbers of the valve stand in the core; block: in a calibration block, which the "
-            f"core is handed, {BLOCK_FILE}."
+            description="Place of the valve's numbers. fixed: constants in the core. block: a calibration block that "
+            f"the core receives, {BLOCK_FILE}."
         ),
     ]
     law: Annotated[Text, Meta(description="Name of the law, as in compensator.json.")]

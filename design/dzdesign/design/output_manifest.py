@@ -19,7 +19,7 @@ LONGEST_SETTING = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputManifest(Artefact):
-    """Which files an output has, and what they were made from, as `dzdesign codegen` writes it."""
+    """Files of an output and their origin, as `dzdesign codegen` writes it."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
     schema: Annotated[Literal["dzdesign.output/1"], Meta(description="Name and version of this schema.")] = (

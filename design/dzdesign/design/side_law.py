@@ -15,7 +15,7 @@ Node = Annotated[int, Meta(ge=1, le=2**31)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
-    """What is proved about the offset of one side, on the integers, at every pressure code of the interval."""
+    """Proved statements about the offset of one side, on the integers, at every pressure code of the interval."""
 
     confidence: Annotated[
         float, quantity("1", "Joint confidence level of the threshold's lower bounds.", ge=0.5, le=1)
@@ -79,22 +79,22 @@ class Certificate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideLaw:
-    """The law of one sign of command."""
+    """The law for one sign of the command."""
 
     drive_range_over_u_max: Annotated[
         Fraction,
         quantity(
             "1",
-            "k x_max / u_max of the law: command range from its u_min0 to full flow, over full command. In "
-            "valve.json the range starts at the knee.",
+            "Ratio k x_max / u_max of the law: command range from its u_min0 to full flow, over full "
+            "command. In valve.json the range starts at the knee.",
         ),
     ]
     u_min0_over_u_max: Annotated[
         Fraction,
         quantity(
             "1",
-            "u_min0 of the law at dP0, over full command. It is the offset. With a transition it is the "
-            "opening threshold plus its error, where the law's line after the transition starts.",
+            "Threshold u_min0 of the law at dP0, over full command. It is the offset. With a transition it "
+            "is the opening threshold plus its error, where the law's line after the transition starts.",
         ),
     ]
     beta: Annotated[
@@ -120,7 +120,7 @@ class SideLaw:
 
     @property
     def start(self) -> str:
-        """What `u_min0` is, in words; with a transition the certified offset lies lower."""
+        """Meaning of `u_min0` in words; with a transition the certified offset lies below it."""
         return "the certified offset" if self.transition_beta is None else "the opening threshold"
 
     def __post_init__(self) -> None:
@@ -138,7 +138,7 @@ class SideLaw:
 
     @property
     def law_beta(self) -> tuple[int, ...]:
-        """Nodes of the beta that the law follows beyond the transition; without one the certified beta itself."""
+        """Nodes of the beta that the law follows after the transition; without a transition, the certified beta."""
         return self.beta if self.transition_beta is None else self.transition_beta
 
 

@@ -68,13 +68,26 @@ class GenerateArguments(OutputChoices, DesignChoices):
 
 
 def generate(arguments: GenerateArguments) -> "Firmware | Output":
-    """Generate the C project of a compensator, or another output; its numbers are derived again first.
+    """Generate the C project of a compensator, or another output, after its numbers were derived again.
+
+    Returns
+    -------
+    Firmware or Output
+        The files by path, with the manifest that states their origin.
 
     Raises
     ------
     InputError
-        If the file can't be read, a number in it does not follow, the target counts otherwise, the vectors are too few,
-        an option is of another target, or the folder holds what was made of another design.
+        If the file can't be read, a number in it can't be derived, or the target's converter or timer differs from the
+        design. Also if there are too few vectors, an option belongs to another target, or the folder holds the output
+        of another design.
+
+    Examples
+    --------
+    >>> from dzdesign import api
+    >>> firmware = api.generate("compensator.json")                    # doctest: +SKIP
+    >>> "core/dz_comp.c" in firmware.files                             # doctest: +SKIP
+    True
     """
     from dzdesign.codegen.other_targets import OTHER_TARGETS, check_target_name
     from dzdesign.codegen.project import DEFAULT_TARGET

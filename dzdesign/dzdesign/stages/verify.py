@@ -71,16 +71,22 @@ class VerifyArguments:
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
-    """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
+    """Verify a firmware: compare every input with the exact law, then run the closed loop. A C compiler is required.
 
-    Of an output that is no C firmware, such as Structured Text, every input too.
+    For another output, such as Structured Text, every input is compared, too.
+
+    Returns
+    -------
+    Verification or OutputEvidence
+        Result of every requirement; ``holds`` is true only if each was checked and holds.
 
     Raises
     ------
     InputError
-        If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
+        If a file can't be read, or there is no C compiler. A requirement that does not hold is not an error: see
+        ``holds``.
     RequirementError
-        If the folder's code is not what this version generates from its compensator.json: it is not run.
+        If the folder's code differs from what this version generates from its compensator.json. It is then not run.
     """
     from dzdesign.verify.outputs.folder import holds_output
 

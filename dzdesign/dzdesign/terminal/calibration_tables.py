@@ -40,7 +40,7 @@ def print_calibration(found: "ReadCalibration", console: "Console | None" = None
     put_line(
         console,
         f"For a firmware of: {kind}; codes 0 to {reading.code_max}, {reading.compare_max} counts at full drive, "
-        f"{reading.sample_Hz} samples and {reading.tick_Hz} PWM periods a second",
+        f"{reading.sample_Hz} samples and {reading.tick_Hz} PWM periods per second",
     )
     _put_signals(console, reading, units)
     _put_drive(console, reading.drive, units)

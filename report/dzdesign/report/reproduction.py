@@ -25,7 +25,7 @@ Range = tuple[Number, Number]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """Our number for one of the paper's, one way."""
+    """One value of dzdesign for a number of the paper."""
 
     by: Annotated[
         Driver, Meta(description="Source of the value: the bare valve, the paper's law, or the whole product.")
@@ -67,7 +67,7 @@ def _within(value: float | None, limits: Range | None) -> bool | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperNumber:
-    """One number of the paper, and ours."""
+    """One number of the paper, beside the values of dzdesign."""
 
     valve: Annotated[str, Meta(description="Valve of the paper to which the number belongs.")]
     quantity: Annotated[str, Meta(description='Quantity; "without" and "with" refer to the compensator.')]
@@ -125,7 +125,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedFigure:
-    """A printed figure that went into a fit."""
+    """A printed figure that was used in a fit."""
 
     name: Annotated[str, Meta(description="Name of the figure.")]
     unit: Annotated[str, Meta(description="Unit of the figure.")]
@@ -136,7 +136,7 @@ class FittedFigure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hashes:
-    """SHA-256 of what was made of the valve."""
+    """SHA-256 of the files made from the valve."""
 
     ramp_tests: Annotated[Mapping[str, Hash], Meta(description="SHA-256 of each simulated ramp test, by file name.")]
     valve_json: Annotated[Hash, Meta(description="SHA-256 of valve.json.")]
@@ -146,7 +146,7 @@ class Hashes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReproducedValve:
-    """A valve of the paper: its recovered plant, and what the product made of it."""
+    """A valve of the paper: its recovered plant, and the files made from it."""
 
     valve: Annotated[str, Meta(description="Name of the valve.")]
     hysteresis_V: Annotated[float, quantity("V", "Assumed hysteresis of the valve.", ge=0, le=1e6)]
@@ -160,7 +160,7 @@ class ReproducedValve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reproduction(Artefact):
-    """Every number of the paper beside ours, as `dzdesign reproduce` writes it."""
+    """Every number of the paper beside that of dzdesign, as `dzdesign reproduce` writes it."""
 
     FILE_NAME: ClassVar[str] = "reproduction.json"
     schema: Annotated[Literal["dzdesign.reproduction/1"], Meta(description="Name and version of this schema.")] = (

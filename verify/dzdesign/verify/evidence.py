@@ -24,7 +24,7 @@ MOST_V = 1e4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotCheck:
-    """What one sign of command of a lot setting leaves to the bounds of every valve of its lot."""
+    """Check of a lot setting, for one sign of the command, against the bounds of every valve of its lot."""
 
     valves: Annotated[Count, about("Number of valves that were compared.")]
     over_compensated: Annotated[
@@ -42,7 +42,7 @@ class LotCheck:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AboveCheck:
-    """What one sign of command drives at zero command above the tested pressure drops; every count must be zero."""
+    """Check of the drive at zero command above the tested pressure drops; every count must be zero."""
 
     choice: Annotated[Above, about("Choice of `design --above`.")]
     certified_to_MPa: (
@@ -82,7 +82,7 @@ class AboveCheck:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputCounts:
-    """What a machine counts that is given every input of one side, or a sample of them."""
+    """Counts of a machine that tries every input of one side, or a sample of them."""
 
     inputs: Annotated[
         Count, about("Number of pairs of command code and pressure-difference code, each compared with the exact law.")
@@ -115,7 +115,7 @@ class InputCounts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputCheck(InputCounts):
-    """The check of every input of one side; every count that ends in a fault must be zero."""
+    """Check of every input of one side; every count of faults must be zero."""
 
     sign: Annotated[Sign, about("Sign of the command.")]
     over_compensated: Annotated[
@@ -156,7 +156,7 @@ class InputCheck(InputCounts):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MutantOutcome:
-    """What became of one mutant."""
+    """Result of one mutant."""
 
     file: Annotated[str, about("Name of the changed file.")]
     line: Annotated[int, Meta(description="Line number.", ge=1, le=10**6)]
@@ -167,7 +167,7 @@ class MutantOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MutationScore:
-    """Wrong versions of the C, and how many of them the checks caught."""
+    """Wrong versions of the C, and the number of them that the checks caught."""
 
     mutants: Annotated[Count, about("Number of mutants.")]
     killed: Annotated[Count, about("Number of mutants that a check caught.")]
@@ -228,7 +228,7 @@ class Evidence(Artefact):
 
     @property
     def all_checks(self) -> tuple[Check, ...]:
-        """The checks, and as not checked what every `verify` checks and is not here, unless a failure is the reason."""
+        """All checks. A standard check that is absent here counts as not checked, unless a failure explains it."""
         if any(check.holds is False for check in self.checks):
             return self.checks
         tried = {check.id for check in self.checks}
@@ -238,7 +238,7 @@ class Evidence(Artefact):
 
     @property
     def verdict(self) -> str:
-        """One sentence: what does not hold stands before what could not be checked."""
+        """The verdict in one sentence: what does not hold, then what could not be checked."""
         missed = [check.name for check in self.checks if check.holds is False]
         unknown = [check.name for check in self.all_checks if check.holds is None]
         parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
@@ -247,9 +247,9 @@ class Evidence(Artefact):
 
     @property
     def reservation(self) -> str:
-        """What a good verdict is not about: thresholds that no ramp test was compared with; empty where all were.
+        """What a good verdict does not cover: thresholds not compared with ramp tests. Empty if all were compared.
 
-        Of a lot setting the recordings are those of one of its valves.
+        For a lot setting, the recordings belong to one of its valves.
         """
         if not any(check.id == RAMPS.id and check.holds for check in self.checks):
             return AS_STATED

@@ -102,7 +102,7 @@ WindowKind = Literal["ramp", "step", "load step", "disturbances"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlantComparison:
-    """The closed loop's plant beside CasADi's integrator, over one window of time."""
+    """Comparison of the closed loop's plant with CasADi's integrator over one time window."""
 
     kind: Annotated[
         WindowKind,
@@ -181,7 +181,7 @@ class ClosedLoopResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioResult:
-    """One scenario beside the ramps, at one pressure drop."""
+    """Result of one scenario other than ramps, at one pressure drop."""
 
     name: Annotated[str, about("Name of the scenario.")]
     side: Side
@@ -235,7 +235,7 @@ class ScenarioResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """Quantiles of one quantity over a series of plants, and the plant at its bad end."""
+    """Quantiles of one quantity over a series of plants, and the least favourable plant."""
 
     p01: Annotated[float, about("1 % quantile.")]
     p05: Annotated[float, about("5 % quantile.")]
@@ -248,7 +248,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scatter:
-    """What a series of plants does on one side at one pressure drop."""
+    """Results of a series of plants on one side at one pressure drop."""
 
     side: Side
     dp_MPa: PressureDrop
@@ -264,7 +264,7 @@ class Scatter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Population:
-    """Machines drawn from the declared one, each at zero command at every tested pressure drop and between."""
+    """Machines drawn from the declared budget, each tried at zero command at and between the tested pressure drops."""
 
     machines: Annotated[int, Meta(description="Number of machines.", ge=1, le=10**6)]
     seed: Annotated[int, Meta(description="Random seed of the draw.", ge=0, le=2**60)]
@@ -296,7 +296,7 @@ class Population:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MonteCarlo:
-    """A series of plants about the one that was given."""
+    """A series of plants around the given one."""
 
     plants: Annotated[int, Meta(description="Number of plants.", ge=1, le=10**6)]
     seed: Annotated[int, Meta(description="Random seed of the draw.", ge=0, le=2**60)]

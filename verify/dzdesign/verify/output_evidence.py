@@ -15,7 +15,7 @@ from dzdesign.verify.requirements import AS_STATED, RAMPS, Check
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TriedInputs:
-    """A set of inputs, each of which was given to the output and compared with the exact law."""
+    """A set of inputs, each given to the output and compared with the exact law."""
 
     name: Annotated[str, about("Units of the inputs and sign of the command.")]
     inputs: Annotated[Count, about("Number of inputs.")]

@@ -16,7 +16,7 @@ Numbers = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A sentence, and the formula that it leads to, if any."""
+    """A sentence, and the formula to which it leads, if any."""
 
     words: Annotated[Words, Meta(description="Sentence of the step.")]
     formula: Annotated[Formula, Meta(description="Formula that the sentence leads to.")] | None = None
@@ -24,7 +24,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Premise:
-    """A statement that another one rests on."""
+    """A statement on which another one rests."""
 
     number: Annotated[str, Meta(description="Number of the statement that is the premise.")]
     at: Annotated[tuple[Formula, ...], Meta(description="Substitutions for its symbols.")]
@@ -48,7 +48,7 @@ class Derivation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """A number of ours beside the paper's."""
+    """A number of dzdesign beside that of the paper."""
 
     label: Annotated[Words, Meta(description="Quantity that is compared.")]
     exact: Annotated[Formula, Meta(description="Exact value of dzdesign.")]

@@ -102,7 +102,7 @@ def _with_middle(ends: tuple[float, float]) -> tuple[float, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentSampling:
-    """When the current is sampled and the interrupt comes, in a period of the PWM that begins with the pulse.
+    """Times of the current samples and the interrupt within a PWM period, which begins with the pulse.
 
     The codes are taken at the middles of `samples` equal parts of the period; the interrupt comes after `before` of
     them, and what it computes acts from the next period on.

@@ -29,7 +29,7 @@ from dzdesign.design.target_inputs import Converter
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentDrive:
-    """The law's output is the set point of a current: full drive is the rated one."""
+    """Current control of a drive: the law's output is the set point, and full drive is the rated current."""
 
     circuit: Annotated[CoilCircuit, Meta(description="Declared coil and supply.")]
     sensor: Annotated[CurrentSensor, Meta(description="Voltages at the pins of the converter.")]

@@ -21,7 +21,7 @@ from dzdesign.identify.valve.staircase import Direction
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotSide:
-    """One sign of command of a valve: lower bounds of the guarded threshold."""
+    """Lower bounds of a valve's guarded threshold for one sign of the command."""
 
     trend: Annotated[
         Direction | None,

@@ -46,7 +46,7 @@ DIGITS_mV = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BudgetLine:
-    """One component."""
+    """One component of an uncertainty budget."""
 
     component: Annotated[Component, Meta(description="Source of the uncertainty.")]
     origin: Annotated[

@@ -45,7 +45,7 @@ Supply = Annotated[float, Meta(ge=SUPPLY_V[0], le=SUPPLY_V[1])]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Machine:
-    """By how much the machine may differ from the bench; every error is a half-width, and systematic."""
+    """Declared differences between the machine and the bench; every error is a systematic half-width."""
 
     drive: Annotated[
         DriveKind,

@@ -136,7 +136,7 @@ def above_in_words(choice: Above, certificate: Certificate, side: SideModel, uni
     """Return what the law does above the tests, up to where that is certified, and on what premise."""
     curve, last = side.certified[certificate.guard], units.text(float(certificate.dp_MPa[1]), ".2f MPa")
     if choice == "hold" or (choice == "lower" and curve.above is None):
-        why = "" if choice == "hold" else " (one test shows no slope to lower it by)"
+        why = "" if choice == "hold" else " (a single test gives no slope for lowering it)"
         return (
             f"above {last} the offset of the highest test is held{why} and nothing is certified: where the threshold "
             "falls, flow at zero command is possible"
@@ -144,13 +144,13 @@ def above_in_words(choice: Above, certificate: Certificate, side: SideModel, uni
     released = certificate.released_from_MPa
     text = f"above {last} the offset is lowered with the continued bound"
     if choice == "release":
-        text = f"above {last} the offset is let go"
+        text = f"above {last} the offset is released"
     if released is not None:
         at = units.text(float(released), ".3g MPa")
-        text += f", and none is left from {at} on: the dead zone is back, and the command drives the valve on"
+        text += f", which reaches zero at {at}; beyond, the dead zone is back and the command alone drives the valve"
     holds_to = certificate.holds_to_MPa
     if curve.above is None:
-        return f"{text}; not certified: one test shows no slope"
+        return f"{text}; not certified: a single test gives no slope"
     rests = curve.above.in_words(curve.premise, side.trend or "flat", units)
     return f"{text}; {rests}" + (
         f", up to {units.text(float(holds_to), '.3g MPa')}" if holds_to > certificate.dp_MPa[1] else ""
@@ -164,5 +164,5 @@ def below_in_words(certificate: Certificate, side: SideModel, units: RecordedUni
     if side.trend == "increasing":
         return f"{text}: the threshold grows with the pressure drop, so flow at zero command is possible there"
     if side.trend == "decreasing":
-        return f"{text}; a threshold that goes on growing towards no pressure drop stays above it"
+        return f"{text}; a threshold that keeps growing towards zero pressure drop stays above it"
     return text

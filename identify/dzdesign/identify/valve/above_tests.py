@@ -29,7 +29,7 @@ LOWEST_V = -1e3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AboveTests:
-    """The bound above the last tested pressure drop; beyond its last node nothing is known."""
+    """The bound above the last tested pressure drop; nothing is known beyond its last node."""
 
     certified: Annotated[
         bool,
@@ -143,16 +143,16 @@ class AboveTests:
     def in_words(self, premise: Premise, trend: Direction, units: RecordedUnits) -> str:
         """Return what the continued bound rests on, and whether it is certified."""
         if premise == "line":
-            rests = "the threshold goes on straight, with the line's band"
+            rests = "the threshold continues as a straight line, with the line's band"
         elif premise == "smooth":
             bend = units.text(1e3 * self.curvature_V_MPa2, ".3g mV/MPa²")
-            rests = f"the threshold goes on from the last tests' value and slope, and bends by at most M = {bend}"
+            rests = f"the threshold continues from the last tests' value and slope, with curvature at most M = {bend}"
             if not self.certified:
                 rests += f", which the tests contradict (p = {self.lack_of_fit_p or 0.0:.2g})"
         elif trend == "increasing":
-            rests = "the threshold goes on rising, or stays"
+            rests = "the threshold keeps rising or stays constant"
         else:
-            rests = "the threshold goes on with the steepest slope between two tests: nothing bounds it there"
+            rests = "the threshold continues with the steepest slope between two tests: nothing bounds it there"
         return f"{'certified if' if self.certified else 'not certified:'} {rests}"
 
 

@@ -45,7 +45,7 @@ ANYWHERE = (1.0,)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PremiseCheck:
-    """One premise about the threshold between the tests: how it fits them, and what it would leave."""
+    """One premise about the threshold between the tests: how it fits them, and the dead zone that it would leave."""
 
     premise: Annotated[
         Premise,

@@ -21,7 +21,7 @@ BETA_ROUNDING = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IdentifiedCurve:
-    """Thresholds of one branch (their knees) by the joint fit, and Eq. (5)'s ratio of them; one entry a test."""
+    """Thresholds (knees) of one branch by the joint fit, and their ratio of Eq. (5); one entry for each test."""
 
     dp_MPa: Annotated[
         tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty if the pressure drop is unknown.")

@@ -22,7 +22,7 @@ AnyPressure = Annotated[float, quantity("MPa", ge=-1e3, le=1e3)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeftOut:
-    """A stretch of a recording that belongs to no ramp."""
+    """A part of a recording that belongs to no ramp."""
 
     recording: Annotated[str, Meta(description="Name of the recording.")]
     from_s: Annotated[Time, Meta(description="Time of the first sample left out, on the recording's own clock.")]
@@ -30,10 +30,10 @@ class LeftOut:
     reason: Annotated[
         Literal["option", "pressure", "no-pressure", "partial", "no-ramp"],
         Meta(
-            description="Reason. 'option': --from or --to. 'pressure': a rest or part of a ramp at another pressure "
-            "drop, such as before the pump started. 'no-pressure': a sweep without pressure or flow. "
-            "'partial': a sweep that stays below half of the largest command. 'no-ramp': a fragment without "
-            "a ramp."
+            description="Reason why it was left out. option: --from or --to. pressure: a rest or part of a ramp at "
+            "another pressure drop, such as before the pump started. no-pressure: a sweep without pressure "
+            "or flow. partial: a sweep that stays below half of the largest command. no-ramp: a fragment "
+            "without a ramp."
         ),
     ]
     dp_MPa: Annotated[

@@ -19,7 +19,7 @@ SmallFlow = Annotated[float, quantity("L/min", ge=0, le=1e6)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LowFlow:
-    """One reading: command and pressure drop held, flow by volume and time, or by the speed and area of a piston."""
+    """One reading by hand at a constant command and pressure drop, by volume and time or by piston speed and area."""
 
     source: Annotated[str, Meta(description="Table and row of the reading.")]
     branch: Annotated[

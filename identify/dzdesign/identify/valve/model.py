@@ -27,7 +27,7 @@ DECIMALS = 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Meter:
-    """What was taken of the flow meter."""
+    """Properties of the flow meter as assumed."""
 
     floor_L_min: Annotated[Flow, Meta(description="Flow below which the meter reads zero, declared or found.")]
     lag_s: Annotated[float, quantity("s", "First-order lag of the meter.", ge=0, le=1e6)]
@@ -71,7 +71,7 @@ def lag_in_words(seconds: float, origin: LagOrigin, *, longer: float = 0.0, shor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Warning_:
-    """Something a person should know."""
+    """A warning about the data or the result."""
 
     code: Annotated[str, Meta(description="Machine-readable code; the documentation explains each.")]
     text: Annotated[str, Meta(description="Warning with its figures and what to do.")]

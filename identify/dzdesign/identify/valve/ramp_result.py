@@ -24,7 +24,7 @@ LinearRange = tuple[Ratio, Ratio]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TestResult:
-    """One pressure drop: all ramps within 2 % of it. A threshold is null where its branch was not recorded."""
+    """Result at one pressure drop: all ramps within 2 % of it. A threshold is null if its branch was not recorded."""
 
     __test__ = False  # not a test case, whatever its name
 

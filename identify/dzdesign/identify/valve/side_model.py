@@ -34,7 +34,7 @@ DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """The law's reference point."""
+    """The reference point of the law."""
 
     dp_MPa: Annotated[
         PressureDrop | None, Meta(description="Reference pressure drop dP0; null if the ramp test has no pressure.")
@@ -47,7 +47,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BetaNodes:
-    """beta(dP) of Eq. (5), identified on the branch that is guarded by default; without nodes where dP is unknown."""
+    """Identified beta(dP) of Eq. (5), on the branch that is guarded by default; without nodes if dP is unknown."""
 
     dp_MPa: Annotated[
         tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the nodes, which are those of the tests.")
@@ -61,7 +61,7 @@ class BetaNodes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundsBasis:
-    """What the lower bounds rest on."""
+    """Basis of the lower bounds."""
 
     confidence: Annotated[
         float, quantity("1", "Joint confidence level of all bounds of a guard.", ge=0.5, le=1)
@@ -96,7 +96,7 @@ class BoundsBasis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideModel:
-    """One side of the valve, identified on its own; on the negative side commands and flows count from zero down."""
+    """One side of the valve, identified separately. The negative side counts commands and flows from zero downwards."""
 
     tests: Annotated[
         tuple[TestResult, ...], Meta(description="Ramp tests in ascending order of pressure drop.", min_length=1)
@@ -112,7 +112,7 @@ class SideModel:
         ),
     ]
     k_x_max_over_u_max_se: Annotated[float, quantity("1", "Standard error of k_x_max_over_u_max.", ge=0, le=1e3)]
-    k_V_mm: Annotated[float, quantity("V/mm", "k of Eq. (11), if --x-max was given.", ge=0, le=1e9)] | None
+    k_V_mm: Annotated[float, quantity("V/mm", "Constant k of Eq. (11), if --x-max was given.", ge=0, le=1e9)] | None
     k_V_mm_se: Annotated[float, quantity("V/mm", "Standard error of k_V_mm.", ge=0, le=1e9)] | None
     trend: Annotated[
         Direction | None,

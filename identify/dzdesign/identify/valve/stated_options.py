@@ -14,7 +14,7 @@ Words = Annotated[str, Meta(max_length=LONGEST)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedOptions:
-    """Options of `identify` as written, those that were not given by their default; without one they are left out."""
+    """Options of `identify` as entered, defaults included; an option without a value is omitted."""
 
     texts: Annotated[Mapping[Name, Words], Meta(description="Options with one text value, such as meter_lag.")] = field(
         default_factory=dict

@@ -39,7 +39,7 @@ class LotBudgetLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotBudget:
-    """What the certificates of a lot are of, and the components of their budgets."""
+    """What the certificates of a lot cover, and the components of their budgets."""
 
     certified_of: Annotated[
         tuple[str, ...],

@@ -15,12 +15,14 @@ DOES_NOT_HOLD: Final = "does not hold"
 NOT_VERIFIED: Final = "not verified"
 NOT_MADE: Final = "not made"
 #: A folder stands beside what it belongs to: no path.
-FolderName = Annotated[str, Meta(description="Its folder, in the folder of a valve.", pattern=r"^\w{1,40}$")]
+FolderName = Annotated[
+    str, Meta(description="Folder of the output, within the folder of a valve.", pattern=r"^\w{1,40}$")
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveOutput:
-    """What came of one output of one valve."""
+    """Result of one output of one valve."""
 
     target: Annotated[str, Meta(description="Kind of output, as listed by `codegen --list-targets`.", max_length=100)]
     folder: FolderName
@@ -31,7 +33,7 @@ class ValveOutput:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotOutput:
-    """One kind of output, made of each valve of a lot."""
+    """One kind of output that was requested for each valve of a lot."""
 
     folder: FolderName
     settings: Annotated[

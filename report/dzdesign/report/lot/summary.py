@@ -61,7 +61,7 @@ class FailedValve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntestedPressures:
-    """Pressure drops at which half of the lot or more was tested, and one side of one valve was not."""
+    """Pressure drops at which at least half of the lot was tested, but one side of this valve was not."""
 
     name: Annotated[str, Meta(description="Name of the valve.")]
     side: Annotated[Literal["positive", "negative"], Meta(description="Sign of the command.")]
@@ -83,7 +83,7 @@ class UntestedPressures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SmallestMargin:
-    """That the lot setting lies under the bounds of every valve: proved at every code of its own tested interval."""
+    """Proof that the lot setting lies below the bounds of every valve, at every code of the valve's tested interval."""
 
     valves: Annotated[int, Meta(description="Number of valves compared.", ge=2, le=10**9)]
     worst: Annotated[str, Meta(description="Name of the valve with the smallest margin.")]
@@ -100,7 +100,7 @@ class SmallestMargin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SettingOfOthers:
-    """The lot setting of the others, if the valves that hold it down kept settings of their own."""
+    """The lot setting of the remaining valves, if those that limit it kept their own settings."""
 
     left_out: Annotated[Names, Meta(description="Valves that keep their own settings.")]
     quantiles: Annotated[
@@ -117,7 +117,7 @@ class SettingOfOthers:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotSettingSummary:
-    """One setting that is safe for each calibrated valve."""
+    """Setting that is safe for each calibrated valve."""
 
     file: Annotated[
         str, Meta(description="Name of the compensator's file.", pattern=r"^\w[\w.-]{0,99}$", max_length=100)
@@ -159,7 +159,7 @@ class LotSettingSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotFirmware:
-    """The one firmware of a lot whose valves have calibration blocks."""
+    """The common firmware of a lot whose valves have calibration blocks."""
 
     folder: Annotated[
         str, Meta(description="Folder of the firmware, beside this file.", pattern=r"^\w+/\w+$", max_length=100)
@@ -169,8 +169,8 @@ class LotFirmware:
     block_of: Annotated[
         str,
         Meta(
-            description="Source of the calibration block until another is loaded: the lot setting, or the valve of this "
-            "name."
+            description="Source of the calibration block until another is loaded: the lot setting, or the valve of "
+            "this name."
         ),
     ]
     blocks: Annotated[Names, Meta(description="Files with a valve's own block, in the valve's folder.")]
@@ -178,7 +178,7 @@ class LotFirmware:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotSummary(Artefact):
-    """What a lot of valves came to, as `dzdesign batch` writes it."""
+    """The result of a lot of valves, as `dzdesign batch` writes it."""
 
     FILE_NAME: ClassVar[str] = SUMMARY_NAME
     schema: Annotated[Literal["dzdesign.batch/1"], Meta(description="Name and version of this schema.")] = (

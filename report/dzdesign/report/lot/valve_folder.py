@@ -23,7 +23,7 @@ FIRMWARE = "firmware"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveManifest(Artefact):
-    """What came of one valve of a lot."""
+    """Result of one valve of a lot."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
     schema: Annotated[Literal["dzdesign.batch-valve/1"], Meta(description="Name and version of this schema.")] = (

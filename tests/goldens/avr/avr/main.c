@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 47abb31b0c1b7d805630753d73d4e39f771c487f472f2340c65859753f162778 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 
-/* Prints hashes of what dz_comp() and dz_drive_tick() answer (dz_selftest.h) on UART0, then sleeps for good. */
+/* Prints hashes of the results of dz_comp() and dz_drive_tick() (dz_selftest.h) on UART0, then sleeps forever. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>
@@ -23,7 +23,7 @@ static void print(const char *text)
         while ((UCSR0A & (1u << UDRE0)) == 0u)
         {
         }
-        UCSR0A = (uint8_t)(1u << TXC0); /* clears it: it shall tell of the last character */
+        UCSR0A = (uint8_t)(1u << TXC0); /* clears it, so that it signals the last character */
         UDR0 = (uint8_t)*text;
         text++;
     }

@@ -5,7 +5,7 @@
  * The compensation law, an integer function of three converter codes.
  * No division, no floating point, no state, and no branch: every input takes the same instructions.
  * Every constant has a comment: what it is, its engineering value, and in brackets how it was rounded.
- * manifest.json says under "constants" where each came from, down to the ramp tests.
+ * manifest.json lists the origin of each under "constants", down to the ramp tests.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
@@ -16,7 +16,7 @@
  *     u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)
  *     k x_max/u_max = 475/1024 = 0.463867, rounded to nearest
  *     u_min0/u_max  = 8783/16384 = 0.536072, rounded down with half a count to spare
- *     beta(dP): straight over 52 segments of 64 codes of the pressure difference (0.4186 MPa) each
+ *     beta(dP): linear in 52 segments of 64 codes of the pressure difference (0.4186 MPa)
  * Zero band: up to u_z, 19 codes of command, u_O is the certified offset beta_zero * u_min0, below the
  * closing threshold. Transition: over the next 32 codes (0.78%), to u_t, it runs straight to the law above,
  *     u_O(u) - (beta - beta_zero) * u_min0 * (1 - r),  r = (u_i - u_z)/(u_t - u_z), u = r * u_t.
@@ -24,7 +24,7 @@
  * In counts of the PWM this is sum / (273 * 2^35) with the 64-bit integer
  *     sum = B * (-14640 * c + 1918207200) + 125 * 2^35 * c + 4690104287232
  *           - (B - B_zero) * 59943975 * (32 - t)
- * c: command that the law is given, in codes from zero on times 32: of k codes past the zero band
+ * c: command that enters the law, in codes from zero times 32: of k codes past the zero band
  *    32 k + 19 t, t being those of k in the transition.
  * B: the table's value at dP, beta * 157286400; B_zero: the same of the certified beta.
  * Nothing is rounded before the one shift and the one division.
@@ -124,13 +124,13 @@ static uint16_t below_zero(uint16_t x)
     return (uint16_t)(0u - (uint16_t)(x >> WORD_TOP));
 }
 
-/* All ones if the command is outside its valid range: no working signal gives it. */
+/* All ones if the command is outside its valid range: no working signal produces it. */
 static uint16_t invalid_command(uint16_t u)
 {
     return below_zero((uint16_t)((uint16_t)(u - COMMAND_LOW) | (uint16_t)(COMMAND_HIGH - u)));
 }
 
-/* Difference of the pressures; below zero it stands 2^16 higher. */
+/* Difference of the pressures; a negative one is stored 2^16 higher. */
 static uint16_t pressure_difference(uint16_t p_a, uint16_t p_b)
 {
     const uint16_t a = (uint16_t)(p_a - PRESSURE_A_ZERO);
@@ -139,7 +139,7 @@ static uint16_t pressure_difference(uint16_t p_a, uint16_t p_b)
     return (uint16_t)(a - b);
 }
 
-/* All ones if the pressures can't be right: one is outside its valid range, or the drop is below -REVERSE. */
+/* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -REVERSE. */
 static uint16_t failed_pressures(uint16_t p_a, uint16_t p_b, uint16_t difference)
 {
     return below_zero(
@@ -148,7 +148,7 @@ static uint16_t failed_pressures(uint16_t p_a, uint16_t p_b, uint16_t difference
                    (uint16_t)(difference + REVERSE)));
 }
 
-/* Pressure drop in codes of sensor A; 0 below zero, and where the pressures can't be right. */
+/* Pressure drop in codes of sensor A; 0 below zero, and if the pressures are implausible. */
 static uint16_t pressure_drop(uint16_t difference, uint16_t failed)
 {
     return (uint16_t)((difference & (uint16_t)~(below_zero(difference) | failed)));
@@ -156,19 +156,19 @@ static uint16_t pressure_drop(uint16_t difference, uint16_t failed)
 
 /* ---- beta ---- */
 
-/* Row of the tables: one more than the segment's number, 0 where the pressures can't be right. */
+/* Row of the tables: one more than the segment's number, 0 if the pressures are implausible. */
 static uint16_t row_of(uint16_t dp, uint16_t failed)
 {
     return (uint16_t)(((uint16_t)(dp + STEP_CODES) >> STEP_SHIFT) & (uint16_t)~failed);
 }
 
-/* 16 by 16 to 32 bits: no longer product than this is needed. */
+/* 16 by 16 to 32 bits: no wider product is needed. */
 static uint32_t short_product(uint16_t left, uint16_t right)
 {
     return (uint32_t)left * right;
 }
 
-/* A straight piece of beta over dP: start - change * dP. */
+/* A linear segment of beta over dP: start - change * dP. */
 struct segment
 {
     uint32_t start;
@@ -253,7 +253,7 @@ static uint32_t zero_beta(uint16_t row, uint16_t dp)
 
 /* ---- the law ---- */
 
-/* An integer of 64 bits in two halves; no carry from one to the other needs a branch. */
+/* An integer of 64 bits in two halves; a carry between them needs no branch. */
 struct wide
 {
     uint32_t high;
@@ -276,12 +276,12 @@ static struct wide product(uint32_t left, uint32_t right)
     return result;
 }
 
-/* The law of a command, codes past the zero band; `failed` is all ones for pressures that are
- * not to be used, else 0. */
+/* The law of a command, codes past the zero band; `failed` is all ones for pressures that must
+ * not be used, else 0. */
 static inline uint16_t law_of(uint16_t towards, uint16_t difference, uint16_t failed)
 {
     const uint16_t past = towards;
-    /* What of that lies in the transition, and the command that the law is given. */
+    /* Its part within the transition, and the command that enters the law. */
     const uint16_t from_end = (uint16_t)(past - TRANSITION_CODES);
     const uint16_t reached = (uint16_t)(TRANSITION_CODES + (from_end & below_zero(from_end)));
     const uint32_t command = ((uint32_t)past << TRANSITION_SHIFT) + ((uint32_t)ZERO_BAND * reached);
@@ -292,7 +292,7 @@ static inline uint16_t law_of(uint16_t towards, uint16_t difference, uint16_t fa
     const uint32_t beta = law_beta(row, dp);
     const uint32_t factor = FACTOR_OFFSET - (FACTOR_SLOPE * command);
     const struct wide law = product(beta, factor);
-    /* A factor below zero stands 2^32 too high; all modulo 2^64, and the whole sum is never negative (proved). */
+    /* A negative factor is stored 2^32 too high. All is modulo 2^64, and the whole sum is never negative (proved). */
     uint32_t high = law.high - (beta & (0u - (factor >> 31))) + HALF_HIGH;
     const uint32_t low = law.low;
     const uint32_t gap = beta - zero_beta(row, dp);
@@ -306,7 +306,7 @@ static inline uint16_t law_of(uint16_t towards, uint16_t difference, uint16_t fa
 
     const uint32_t unlimited = high >> HIGH_SHIFT;
     const uint32_t quotient = unlimited; /* never above the one of DZ_COMPARE_LIMIT (proved) */
-    /* quotient / 273: an estimate that is never too large, then what its remainder says is missing. */
+    /* quotient / 273: an estimate that is never too large, corrected by its remainder. */
     const uint16_t estimate = (uint16_t)(short_product((uint16_t)(quotient >> ESTIMATE_SHIFT), ESTIMATE_FACTOR) >> 16);
     const uint16_t rest = (uint16_t)((uint16_t)quotient - (uint16_t)(estimate * DIVISOR));
     const uint16_t compare = (uint16_t)(estimate + CORRECTIONS -
@@ -321,10 +321,10 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint16_t u = u_adc;
     const uint16_t p_a = p_a_adc;
     const uint16_t p_b = p_b_adc;
-    /* The command, in codes from zero on; 0 where it is not valid. */
+    /* The command, in codes from zero; 0 if it is not valid. */
     const uint16_t let_go = invalid_command(u);
     const uint16_t from_zero = (uint16_t)((uint16_t)(u - COMMAND_ZERO) & (uint16_t)~let_go);
-    /* What of it lies past the zero band; 0 within. */
+    /* Its part past the zero band; 0 within. */
     const uint16_t from_band = (uint16_t)(from_zero - ZERO_BAND);
     const uint16_t towards = (uint16_t)(from_band & (uint16_t)~below_zero(from_band));
     const uint16_t difference = pressure_difference(p_a, p_b);
@@ -343,7 +343,7 @@ uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint16_t u = u_adc;
     const uint16_t p_a = p_a_adc;
     const uint16_t p_b = p_b_adc;
-    /* The top bit is set where a code is outside its valid range, and where the difference is beyond its limits. */
+    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
     const uint16_t command = (uint16_t)((uint16_t)(u - COMMAND_LOW) | (uint16_t)(COMMAND_HIGH - u));
     const uint16_t a = (uint16_t)((uint16_t)(p_a - PRESSURE_A_LOW) | (uint16_t)(PRESSURE_A_HIGH - p_a));
     const uint16_t b = (uint16_t)((uint16_t)(p_b - PRESSURE_B_LOW) | (uint16_t)(PRESSURE_B_HIGH - p_b));
@@ -353,7 +353,7 @@ uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint16_t of_drop = (uint16_t)((below >> WORD_TOP) |
                                     ((above >> WORD_TOP) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE)));
 
-    /* Of a pressure outside its valid range the difference says nothing. */
+    /* The difference has no meaning if a pressure is outside its valid range. */
     return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |
                       ((b >> WORD_TOP) * DZ_STATUS_PRESSURE_B) |
                       ((of_drop & (uint16_t)~below_zero((uint16_t)(a | b))) * DZ_STATUS_DIFFERENCE));

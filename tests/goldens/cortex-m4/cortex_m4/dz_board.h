@@ -2,20 +2,20 @@
 /* Compensator SHA-256: 47abb31b0c1b7d805630753d73d4e39f771c487f472f2340c65859753f162778 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 
-/* The functions that stand between the compensator and your hardware; dz_board.c has them to fill in. */
+/* The functions between the compensator and your hardware, for you to complete in dz_board.c. */
 #ifndef DZ_BOARD_H
 #define DZ_BOARD_H
 
 #include <stdint.h>
 
-/* Return this instead of a code when there is no valid reading: dz_comp() lets the valve go for such a command, and takes
- * the smallest beta for such a pressure. */
+/* Return this instead of a code when there is no valid reading: dz_comp() then de-energises the valve
+ * (command), or takes the smallest beta (pressure). */
 #define DZ_NO_CODE UINT16_C(0xFFFF)
 
-/* Converter code of the command, right-justified; called once a sample. */
+/* Converter code of the command, right-justified; called once per sample. */
 uint16_t dz_board_read_command(void);
 
-/* Converter codes of the pressures ahead of and behind the metering edge; each called once a sample. */
+/* Converter codes of the pressures upstream and downstream of the metering edge; each called once per sample. */
 uint16_t dz_board_read_pressure_a(void);
 uint16_t dz_board_read_pressure_b(void);
 

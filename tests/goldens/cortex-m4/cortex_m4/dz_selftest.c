@@ -32,7 +32,7 @@ static uint16_t next_code(uint16_t code, uint16_t step)
     }
     else if (code == DZ_ADC_CODE_MAX)
     {
-        next = (uint16_t)(DZ_ADC_CODE_MAX + 1u); /* no converter says that */
+        next = (uint16_t)(DZ_ADC_CODE_MAX + 1u); /* no converter gives that code */
     }
     else
     {
@@ -128,7 +128,7 @@ static char *put_decimal(char *end, uint32_t value)
     return end;
 }
 
-/* The walk of dz_selftest.h: where it stands, where it goes, and the state of its random numbers. */
+/* The walk of dz_selftest.h: its position, its aim, and the state of its random numbers. */
 struct walk
 {
     uint32_t random;

@@ -17,7 +17,7 @@
 
 volatile struct dz_state dz_state;
 
-/* The interrupt's own; what others may look at is copied to dz_state. */
+/* Private to the interrupt; what others may read is copied to dz_state. */
 static struct dz_drive drive;
 static uint16_t ticks_to_sample;
 

@@ -2,11 +2,11 @@
 /* Compensator SHA-256: 1de33cfc335ef9c7d550ea3f1f6a4252a57a7fbbb950a0780fac2f2cb83a25f6 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The compensation law of a proportional valve's dead zone: what to call, and what goes in and comes out.
+ * The compensation law of a proportional valve's dead zone: its functions, inputs and outputs.
  *
  *     u_i      command, 0 to u_max; full command is 10 V
- *     u_O      what the valve is driven with, 0 to u_max; the PWM's duty is u_O/u_max
- *     dP       pressure drop over the metering edge
+ *     u_O      drive of the valve, 0 to u_max; the PWM's duty is u_O/u_max
+ *     dP       pressure drop across the metering edge
  *     u_min0   offset at the reference pressure drop, near where the valve opens; zero command gives less (transition)
  *     beta     how that offset changes with dP, 1 at the reference; read from a table
  *     k x_max  span of u_O from that offset to full opening
@@ -30,7 +30,7 @@
 /* Largest code of the converter: the top of its range, right-justified (exact). */
 #define DZ_ADC_CODE_MAX 4095u
 
-/* What dz_status() says of the inputs, one bit each. DZ_STATUS_ABOVE is no fault: the recordings end there. */
+/* Status bits of dz_status(). DZ_STATUS_ABOVE is not a fault: the recordings end there. */
 /* Bit 0 of the status word: command outside its valid codes, so the valve is let go (a convention). */
 #define DZ_STATUS_COMMAND 1u
 /* Bit 1 of the status word: pressure A outside its valid codes, so the smallest beta is used (a convention). */
@@ -51,19 +51,19 @@
  * u_adc    code of the command
  *              0: zero command, as are the 19 codes next to it (zero band)
  *              4095: full command, 10 V
- *              0 to 4095: valid; any other lets the valve go (returns 0)
- * p_a_adc  code of the pressure ahead of the metering edge
- *              764: none
+ *              0 to 4095: valid; any other de-energises the valve (returns 0)
+ * p_a_adc  code of the pressure upstream of the metering edge
+ *              764: zero pressure
  *              3822: 20 MPa
  *              688 to 4014: valid; any other gives the smallest beta, the safe one
- * p_b_adc  code of the pressure behind it
- *              764: none
+ * p_b_adc  code of the pressure downstream of it
+ *              764: zero pressure
  *              3822: 20 MPa
  *              688 to 4014: valid; any other gives the smallest beta
  *
- * A pressure drop, A less B, below -0.196 MPa means a failed sensor and gives the smallest beta too.
+ * A pressure drop, A minus B, below -0.196 MPa means a failed sensor and gives the smallest beta too.
  *
- * At zero command it is 14636 to 20628, by the pressure drop.
+ * At zero command it is 14636 to 20628, depending on the pressure drop.
  * Certificate of the recording: from 1.00 to 5.00 MPa, between the tests too, that lies below the 99% lower bound of
  * the closing threshold, by 0.0182 mV at the least beyond the rounding of readings to codes and of the drive to counts,
  * so that less than 0.13 L/min flows: what the recordings can't show. Above 5.00 MPa the offset is lowered with the
@@ -74,11 +74,11 @@
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
-/* For dz_drive.c, which has checked the inputs itself: the same for a command of so many codes past the zero band, 0
- * below; `failed` is all ones for pressures that are not to be used, else 0. */
+/* For dz_drive.c, which checks the inputs itself: the law for a command in codes past the zero band, 0
+ * below; `failed` is all ones for pressures that must not be used, else 0. */
 uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
 
-/* Returns what there is to say of the inputs, DZ_STATUS_... together, or 0: valid, a tested pressure drop or less. */
+/* Returns the status of the inputs, an OR of DZ_STATUS_..., or 0: all valid, and no pressure drop above the tested ones. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* Returns the beta that dz_comp() uses at these pressures, times 2^15, rounded down: for a display, not for control. */

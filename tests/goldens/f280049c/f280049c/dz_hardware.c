@@ -33,7 +33,7 @@ uint16_t dz_start_faults(void)
     {
         faults |= DZ_FAULT_WATCHDOG;
     }
-    /* Without its crystal the device limps on an internal clock: PWM and sample rate would be wrong. */
+    /* Without its crystal the device runs on an internal clock: PWM and sample rate would be wrong. */
     if (SysCtl_isMCDClockFailureDetected() || (SysCtl_getClock(DEVICE_OSCSRC_FREQ) != DEVICE_SYSCLK_FREQ))
     {
         faults |= DZ_FAULT_CLOCK;
@@ -106,7 +106,7 @@ static void init_pins(void)
 
 void dz_hardware_init(void)
 {
-    SysCtl_disablePeripheral(SYSCTL_PERIPH_CLK_TBCLKSYNC); /* ePWM counters stand still while they are set up */
+    SysCtl_disablePeripheral(SYSCTL_PERIPH_CLK_TBCLKSYNC); /* the ePWM counters stop while they are set up */
     init_adc();
     init_pwm();
     init_pins();

@@ -30,7 +30,7 @@
 #define DZ_PWM_PIN 0u   /* GPIO0: EPWM1A, to the valve's driver */
 #define DZ_TRIP_PIN 12u /* GPIO12: low = output off */
 
-/* Faults, one bit each. A fault stays until the next reset; the output is low as long as any bit stands. */
+/* Faults, one bit each. A fault is kept until the next reset; the output is low while any bit is set. */
 #define DZ_FAULT_NO_SAMPLE 0x0001u  /* the converter gave no usable sample in time */
 #define DZ_FAULT_TRIP_INPUT 0x0002u /* the trip pin went low while the output was in use */
 #define DZ_FAULT_WATCHDOG 0x0004u   /* the last reset came from the watchdog: power-cycle to clear */
@@ -39,7 +39,7 @@
 /* Trip zone set up and tripped: EPWM1A is low, whatever the other registers say. Call it first. */
 void dz_output_hold_low(void);
 
-/* Faults that are known before the first sample; 0 if there is none. */
+/* Faults that are known before the first sample, or 0. */
 uint16_t dz_start_faults(void);
 
 /* ADC A, ePWM1 and pins, in this order. Call it with interrupts off. */

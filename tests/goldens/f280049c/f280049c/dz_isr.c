@@ -12,7 +12,7 @@
 
 volatile struct dz_state dz_state;
 
-/* The interrupt's own; what others may look at is copied to dz_state. */
+/* Private to the interrupt; what others may read is copied to dz_state. */
 static struct dz_drive drive;
 
 static uint16_t take_sample(void);
@@ -102,7 +102,7 @@ static void force_output_low(void)
     write_compare_a(0u);
 }
 
-/* Only from here on the drive runs: its ramps start from rest. */
+/* The drive runs only from here: its ramps start from rest. */
 static void release_output(void)
 {
     dz_drive_init(&drive);
@@ -143,7 +143,7 @@ __interrupt void dz_isr(void)
     }
     else
     {
-        /* Until the trip input is high the start waits: that is not a fault. */
+        /* The start waits until the trip input is high: that is not a fault. */
         if ((dz_state.released == 0u) && (fresh != 0u) && (GPIO_readPin(DZ_TRIP_PIN) != 0u))
         {
             release_output();
@@ -154,7 +154,7 @@ __interrupt void dz_isr(void)
             {
                 dz_drive_sample(&drive, dz_state.u_adc, dz_state.p_a_adc, dz_state.p_b_adc);
             }
-            /* Each tick, for the dither's sake; between two samples the law's value holds. */
+            /* Each tick, for the dither; between two samples the law's value is held. */
             dz_drive_tick(&drive);
             show_drive();
             write_compare_a(drive.compare_a);

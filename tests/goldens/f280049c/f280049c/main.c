@@ -8,7 +8,7 @@
 #include "dz_hardware.h"
 #include "dz_isr.h"
 
-/* The watchdog watches the interrupt, not this loop: no tick since the last look, no service. */
+/* The watchdog monitors the interrupt, not this loop: it is serviced only after a new tick. */
 static void service_watchdog_if_isr_ran(void)
 {
     static uint16_t ticks_seen = 0u;
@@ -25,7 +25,7 @@ int main(void)
 {
     Device_init(); /* 100 MHz, peripheral clocks on, watchdog off; in the FLASH build also copies .TI.ramfunc */
     DINT;
-    dz_output_hold_low(); /* as early as ePWM1 has its clock */
+    dz_output_hold_low(); /* as soon as ePWM1 has its clock */
     dz_isr_init(dz_start_faults());
 
     Device_initGPIO();

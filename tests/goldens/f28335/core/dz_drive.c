@@ -35,13 +35,13 @@ static uint32_t valid_samples(uint32_t valid, uint32_t fault)
     return (valid + ((valid - FAULT_SAMPLES) >> 31)) & ~fault;
 }
 
-/* All ones as long as there have not been FAULT_SAMPLES of them. */
+/* All ones until there have been FAULT_SAMPLES of them. */
 static uint32_t too_few(uint32_t valid)
 {
     return 0u - ((valid - FAULT_SAMPLES) >> 31);
 }
 
-/* All ones as long as the pressures are not to be used, for the status of a new sample. */
+/* All ones while the pressures must not be used, from the status of a new sample. */
 static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
 {
     const uint32_t wrong = status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE);
@@ -53,7 +53,7 @@ static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
     return held;
 }
 
-/* 1 if the command counts as zero, `towards` being its codes from zero on. Between the band's two ends the drive stays
+/* 1 if the command counts as zero, `towards` being its codes from zero. Between the band's two ends the drive stays
  * as it was; without a command it is at rest. */
 static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
 {
@@ -63,7 +63,7 @@ static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
     return ((at_rest | in_band) & stays) | (gone & 1u);
 }
 
-/* The command that the law is given: codes past the zero band, none at rest. */
+/* The command that enters the law: codes past the zero band, 0 at rest. */
 static uint32_t past_band(uint32_t at_rest, int32_t towards)
 {
     return (uint32_t)(towards - ZERO_BAND) & (at_rest - 1u);
@@ -96,7 +96,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     const uint32_t early = too_few(drive->valid_commands) &
                            (0u - ((uint32_t)(INTERLOCK - asked) >> 31));
     const uint32_t valid = valid_samples(drive->valid_commands, invalid | early);
-    /* All ones without a command to be followed: let go at once, and start from rest when it comes back. */
+    /* All ones without a command to follow: de-energise at once, and start from rest when it returns. */
     const uint32_t gone = too_few(valid);
     const int32_t command = asked;
     const uint32_t at_rest = rest(drive->at_rest, command, gone);

@@ -41,7 +41,7 @@ struct dz_frame
     uint16_t status; /* bits of the status word */
 };
 
-/* Writes the frame, one octet (0 to 255) an element: a byte of the C28x has 16 bits. */
+/* Writes the frame, one octet (0 to 255) per element: a byte of the C28x has 16 bits. */
 void dz_frame_pack(const struct dz_frame *frame, uint16_t octets[DZ_FRAME_OCTETS]);
 
 #endif

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 47abb31b0c1b7d805630753d73d4e39f771c487f472f2340c65859753f162778 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The drive functions around the law: call dz_drive_sample() with new codes, dz_drive_tick() once a PWM period, and
+ * The drive functions around the law: call dz_drive_sample() with new codes, dz_drive_tick() once per PWM period, and
  * write compare_a and compare_b to the PWM. Inputs are those of dz_comp(), see dz_comp.h.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file but for
@@ -29,10 +29,10 @@
 /* Bit 7 of the drive's status word: a fault that stays until dz_drive_init() (a convention). */
 #define DZ_STATUS_LATCHED 128u
 
-/* All the memory that the compensator has: one for each valve, set by dz_drive_init().
+/* State of the compensator: one for each valve, set by dz_drive_init().
  * Options of this firmware: Zero band. Interlock.
- * A fault acts at once: without a valid command the valve is let go, and of pressures that can't be right the smallest
- * beta is used. It is over after 5 valid samples in a row; a command must be zero in these.
+ * A fault acts at once: without a valid command the valve is de-energised, and implausible pressures select the smallest
+ * beta. It ends after 5 valid samples in a row; a command must be zero in these.
  */
 struct dz_drive
 {
@@ -41,24 +41,24 @@ struct dz_drive
     uint16_t status;    /* DZ_STATUS_..., 0: all inputs valid, and used */
     uint16_t law;       /* compare value of the law at the last sample */
     int16_t side;       /* 1: solenoid A is driven, -1: B, 0: neither yet */
-    uint16_t ticks;     /* place in the dither's wave, in PWM periods */
+    uint16_t ticks;     /* position in the dither's period, in PWM periods */
     uint16_t at_rest;   /* 1: the command counts as zero, 0: it does not; 0 without a zero band */
     uint16_t rising;    /* how far the command counts as rising, codes of travel; 0 without a play */
-    int16_t played;     /* command without its noise, codes from zero on; 0 without a play */
-    int32_t ramped;     /* command after the ramps, codes from zero on times 65536; positive ones above zero */
+    int16_t played;     /* command without its noise, codes from zero; 0 without a play */
+    int32_t ramped;     /* command after the ramps, codes from zero times 65536; positive ones above zero */
     uint16_t valid_commands;   /* valid commands in a row, of zero until the drive follows; from 5 on it follows them */
-    uint16_t valid_pressures;  /* pressures in a row that can be right; from 5 on they are used */
+    uint16_t valid_pressures;  /* plausible pressures in a row; from 5 on they are used */
     uint16_t faulty_commands;  /* invalid commands since the drive last followed one; 0 without a latch */
-    uint16_t faulty_pressures; /* pressures that can't be right since they were last used; 0 without a latch */
+    uint16_t faulty_pressures; /* implausible pressures since they were last used; 0 without a latch */
 };
 
 /* Nothing driven, until zero command has been seen: 5 samples in a row. */
 void dz_drive_init(struct dz_drive *drive);
 
-/* A new sample: takes effect with the next dz_drive_tick(). Call it 1250 times a second. */
+/* A new sample: takes effect with the next dz_drive_tick(). Call it 1250 times per second. */
 void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
-/* Once a PWM period: sets compare_a and compare_b. */
+/* Once per PWM period: sets compare_a and compare_b. */
 void dz_drive_tick(struct dz_drive *drive);
 
 #endif

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 47abb31b0c1b7d805630753d73d4e39f771c487f472f2340c65859753f162778 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 
-/* What the library shows besides dz_comp() and dz_drive_tick(): for a caller that can't read the macros of dz_comp.h. */
+/* Exported in addition to dz_comp() and dz_drive_tick(), for a caller that can't read the macros of dz_comp.h. */
 #ifndef DZ_HOST_H
 #define DZ_HOST_H
 
@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#include "dz_drive.h" /* within, because C++ would look for another name */
+#include "dz_drive.h" /* inside, because C++ would mangle the names */
 
 /* Largest compare value: full drive. */
 uint16_t dz_compare_max(void);

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 262d5f0ed80806437184eb187df2e1e4fbd0da235fe8da2b3cc958d8748d51a6 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* What dz_load.c asks of this firmware. */
+/* The functions that dz_load.c requires of this firmware. */
 #include <stddef.h>
 
 #include "DSP28x_Project.h"
@@ -14,7 +14,7 @@
 const struct dz_calibration *volatile dz_active;
 volatile uint16_t dz_hold_wanted;
 
-/* Codes about zero command that count as it: what the drive waits for after a start, else where it stays at rest. */
+/* Codes around zero command that count as zero: what the drive waits for after a start, or where it stays at rest. */
 static uint16_t zero_codes(const struct dz_calibration *block)
 {
     return (block->interlock != 65535u) ? block->interlock : block->leave_zero;
@@ -50,7 +50,7 @@ uint16_t dz_load_refusal(const struct dz_calibration *block)
     }
     else
     {
-        /* Without a block nothing is driven, and none says what zero command is. */
+        /* Without a block nothing is driven, and zero command is not defined. */
     }
     return reason;
 }

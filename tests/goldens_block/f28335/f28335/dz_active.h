@@ -6,7 +6,7 @@
  *
  * The main loop asks the interrupt to hold the output; while it does, it reads no block and calls nothing that lies in
  * flash. So one pointer changes between two interrupts that do not look at it, and what it points to may be written.
- * Once the hold is over the interrupt begins as after a reset: it waits for a sample, and for zero command where the
+ * After the hold the interrupt starts as after a reset: it waits for a sample, and for zero command where the
  * block says so. */
 #ifndef DZ_ACTIVE_H
 #define DZ_ACTIVE_H

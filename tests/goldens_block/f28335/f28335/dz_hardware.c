@@ -35,12 +35,12 @@ uint16_t dz_start_faults(void)
 {
     uint16_t faults = 0u;
 
-    /* Neither the boot code nor DisableDog() writes 1 to WDFLAG, so it still tells why we are here. */
+    /* Neither the boot code nor DisableDog() writes 1 to WDFLAG, so it still shows the cause of the reset. */
     if ((SysCtrlRegs.WDCR & DZ_WDFLAG) != 0u)
     {
         faults |= DZ_FAULT_WATCHDOG;
     }
-    /* Without its crystal the device limps on an internal clock: PWM and sample rate would be wrong. */
+    /* Without its crystal the device runs on an internal clock: PWM and sample rate would be wrong. */
     if ((SysCtrlRegs.PLLSTS.bit.MCLKSTS != 0u) || (SysCtrlRegs.PLLCR.bit.DIV != DZ_PLL_DIV)
         || (SysCtrlRegs.PLLSTS.bit.DIVSEL != DZ_PLL_DIVSEL))
     {
@@ -58,8 +58,8 @@ static void clear_leftovers(void)
     EPwm1Regs.TBPHS.all = 0u;
     EPwm1Regs.CMPA.all = 0u;    /* with its high-resolution half */
     EALLOW;
-    EPwm1Regs.HRCNFG.all = 0u;  /* no edge is placed finer than a count */
-    EPwm1Regs.TZEINT.all = 0u;  /* a trip is looked at in dz_isr(), it interrupts nothing */
+    EPwm1Regs.HRCNFG.all = 0u;  /* no edge is finer than a count */
+    EPwm1Regs.TZEINT.all = 0u;  /* dz_isr() polls for a trip; it does not interrupt */
     EDIS;
     EPwm2Regs.DBCTL.all = 0u;   /* no dead band: it would delay the pin's edges, or take the other output's */
     EPwm2Regs.PCCTL.all = 0u;   /* no chopper */
@@ -69,8 +69,8 @@ static void clear_leftovers(void)
     EPwm2Regs.CMPB = 0u;
     EPwm2Regs.ETPS.all = 0u;
     EALLOW;
-    EPwm2Regs.HRCNFG.all = 0u;  /* no edge is placed finer than a count */
-    EPwm2Regs.TZEINT.all = 0u;  /* a trip is looked at in dz_isr(), it interrupts nothing */
+    EPwm2Regs.HRCNFG.all = 0u;  /* no edge is finer than a count */
+    EPwm2Regs.TZEINT.all = 0u;  /* dz_isr() polls for a trip; it does not interrupt */
     EDIS;
 }
 
@@ -86,7 +86,7 @@ static void init_pwm(void)
     EPwm1Regs.TBCTR = 0u;
 
     EPwm1Regs.CMPCTL.all = 0u;
-    EPwm1Regs.CMPCTL.bit.SHDWAMODE = CC_SHADOW; /* a compare value acts from the next period on */
+    EPwm1Regs.CMPCTL.bit.SHDWAMODE = CC_SHADOW; /* a compare value takes effect in the next period */
     EPwm1Regs.CMPCTL.bit.LOADAMODE = CC_CTR_ZERO;
     EPwm1Regs.CMPA.half.CMPA = 0u;
     EPwm1Regs.CMPB = DZ_ISR_CMPB;
@@ -106,7 +106,7 @@ static void init_pwm(void)
     EPwm2Regs.TBCTR = 0u;
 
     EPwm2Regs.CMPCTL.all = 0u;
-    EPwm2Regs.CMPCTL.bit.SHDWAMODE = CC_SHADOW; /* a compare value acts from the next period on */
+    EPwm2Regs.CMPCTL.bit.SHDWAMODE = CC_SHADOW; /* a compare value takes effect in the next period */
     EPwm2Regs.CMPCTL.bit.LOADAMODE = CC_CTR_ZERO;
     EPwm2Regs.CMPA.half.CMPA = 0u;
 
@@ -117,7 +117,7 @@ static void init_pwm(void)
     EPwm2Regs.AQCSFRC.all = 0u;
     EPwm2Regs.AQCSFRC.bit.CSFA = DZ_FORCE_LOW;
 
-    /* ePWM1 keeps ePWM2 in step: whatever stops one of the counters, both periods begin together again. */
+    /* ePWM1 synchronises ePWM2: whatever stops one of the counters, both periods start together again. */
     EPwm1Regs.TBCTL.bit.SYNCOSEL = TB_CTR_ZERO;
     EPwm2Regs.TBPHS.half.TBPHS = 0u;
     EPwm2Regs.TBCTL.bit.PHSEN = TB_ENABLE;
@@ -148,7 +148,7 @@ static void init_adc(void)
     AdcRegs.ADCCHSELSEQ1.bit.CONV02 = 2u; /* ADCINA2: pressure B */
     AdcRegs.ADCST.bit.INT_SEQ1_CLR = 1u;
     AdcRegs.ADCTRL2.all = 0u;
-    AdcRegs.ADCTRL2.bit.EPWM_SOCA_SEQ1 = 1u; /* INT_ENA_SEQ1 = 0: dz_isr() looks at the flag */
+    AdcRegs.ADCTRL2.bit.EPWM_SOCA_SEQ1 = 1u; /* INT_ENA_SEQ1 = 0: dz_isr() polls the flag */
     AdcRegs.ADCTRL2.bit.RST_SEQ1 = 1u;
 }
 
@@ -170,7 +170,7 @@ void dz_hardware_init(void)
 {
     EALLOW;
     SysCtrlRegs.HISPCP.all = DZ_ADC_HISPCP;
-    SysCtrlRegs.PCLKCR0.bit.TBCLKSYNC = 0u; /* ePWM counters stand still while they are set up */
+    SysCtrlRegs.PCLKCR0.bit.TBCLKSYNC = 0u; /* the ePWM counters stop while they are set up */
     EDIS;
 
     clear_leftovers();

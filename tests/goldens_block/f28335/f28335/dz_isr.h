@@ -13,7 +13,7 @@ struct dz_state
 {
     uint16_t ticks;                /* interrupts so far, modulo 65536 */
     uint16_t ticks_without_sample; /* since the last usable sample */
-    uint16_t released;             /* 1 from the first sample on, 0 after a fault */
+    uint16_t released;             /* 1 from the first sample, 0 after a fault */
     uint16_t fault;                /* DZ_FAULT_..., 0: none */
     uint16_t held;                 /* 1: the output is held low and no block is read */
     uint16_t ramped;               /* how far from zero the command is after the ramps, codes; 0 without ramps */

@@ -16,7 +16,7 @@
 #define SCI_TRANSMITS 0x0003u  /* SCICTL1: RXENA and TXENA, held in software reset */
 #define SCI_RUNS 0x0023u       /* SCICTL1: RXENA and TXENA, out of software reset */
 #define RECEIVES 0x2000u       /* SCIFFRX: receive FIFO works, no interrupt */
-#define OCTET 0x00FFu          /* SCIRXBUF: what came; the bits above it tell of errors, which the CRC finds */
+#define OCTET 0x00FFu          /* SCIRXBUF: the octet received; the bits above it signal errors, which the CRC finds */
 #define FIFO_CLEARED 0xC000u   /* SCIFFTX: FIFOs on, transmit FIFO held empty, no interrupt */
 #define FIFO_RUNS 0xE000u      /* SCIFFTX: FIFOs on, transmit FIFO works, no interrupt */
 #define READINGS_OF_STATE 2u
@@ -40,7 +40,7 @@ void dz_telemetry_init(void)
 
     SciaRegs.SCICTL1.all = SCI_TRANSMITS;
     SciaRegs.SCICCR.all = SCI_EIGHT_BITS;
-    SciaRegs.SCICTL2.all = 0u; /* no interrupts: the main loop looks at the FIFO */
+    SciaRegs.SCICTL2.all = 0u; /* no interrupts: the main loop polls the FIFO */
     SciaRegs.SCIHBAUD = DZ_SCI_BRR >> 8;
     SciaRegs.SCILBAUD = DZ_SCI_BRR & 0xFFu;
     SciaRegs.SCIFFTX.all = FIFO_CLEARED;
@@ -51,11 +51,11 @@ void dz_telemetry_init(void)
     SciaRegs.SCIFFRX.all = RECEIVES;
 
     EALLOW;
-    GpioCtrlRegs.GPAPUD.bit.GPIO28 = 0u; /* pull-up: an open line rests high */
+    GpioCtrlRegs.GPAPUD.bit.GPIO28 = 0u; /* pull-up: an open line is high */
     GpioCtrlRegs.GPAPUD.bit.GPIO29 = 0u;
     GpioCtrlRegs.GPAQSEL2.bit.GPIO28 = 3u; /* asynchronous */
     GpioCtrlRegs.GPAMUX2.bit.GPIO28 = 1u;  /* SCIRXDA */
-    GpioCtrlRegs.GPAMUX2.bit.GPIO29 = 1u;  /* SCITXDA, resting high by now */
+    GpioCtrlRegs.GPAMUX2.bit.GPIO29 = 1u;  /* SCITXDA, already high */
     EDIS;
 }
 
@@ -108,7 +108,7 @@ static uint16_t status_of(const struct dz_state *state)
     return status;
 }
 
-/* Packs the frame that is due; it is dropped if the last one is still on its way, or the state was not to be had. */
+/* Packs the frame that is due; it is dropped if the last one is still being sent, or no consistent state could be read. */
 static void start_frame(void)
 {
     struct dz_state state;
@@ -140,7 +140,7 @@ static void start_frame(void)
     }
 }
 
-/* A reply goes out whole, between two frames. */
+/* A reply is sent whole, between two frames. */
 static void feed_reply(void)
 {
     while ((dz_telemetry.reply_at < dz_load.reply_octets) && (SciaRegs.SCIFFTX.bit.TXFFST < DZ_SCI_FIFO_OCTETS))
@@ -155,7 +155,7 @@ static void feed_reply(void)
     }
 }
 
-/* All that came since the last pass, 16 octets at most. After a break or a wrong stop bit the receiver stands still
+/* All octets received since the last pass, 16 octets at most. After a break or a wrong stop bit the receiver stops
  * until it is set up again; the transmitter is set up with it, so it must be at rest. */
 static void receive(uint16_t ticks)
 {

@@ -2,8 +2,8 @@
 /* Compensator SHA-256: 262d5f0ed80806437184eb187df2e1e4fbd0da235fe8da2b3cc958d8748d51a6 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* Telemetry over SCI-A: 100 frames a second, sent by the main loop and by nothing else.
- * Requests about the calibration block come in between, and are answered (dz_load.h). */
+/* Telemetry over SCI-A: 100 frames per second, sent by the main loop only.
+ * Requests about the calibration block are answered in between (dz_load.h). */
 #ifndef DZ_TELEMETRY_H
 #define DZ_TELEMETRY_H
 
@@ -21,7 +21,7 @@
 /* A frame is due every 25 PWM periods. */
 #define DZ_FRAME_TICKS 25u
 
-/* Bit of a frame's status word beside the DZ_FAULT_...: the output is in use. */
+/* Bit of a frame's status word, in addition to DZ_FAULT_...: the output is in use. */
 #define DZ_STATUS_RELEASED 0x0080u
 
 /* Likewise: there is no valid calibration block, and the output stays off until one is loaded. */
@@ -32,24 +32,24 @@ struct dz_telemetry
 {
     uint32_t ticks;                   /* PWM periods since the start, modulo 2^32 */
     uint16_t due;                     /* ticks, modulo 65536, at which the last frame was due */
-    uint16_t octets[DZ_FRAME_OCTETS]; /* the frame on its way */
-    uint16_t at;                      /* its first octet that the transmitter has not got yet */
+    uint16_t octets[DZ_FRAME_OCTETS]; /* the frame being sent */
+    uint16_t at;                      /* index of the next octet for the transmitter */
     uint16_t sent;                    /* frames, modulo 65536 */
     uint16_t dropped;                 /* frames that were due and not sent, modulo 65536 */
-    uint16_t reply_at;                /* of dz_load.reply, its first octet that the transmitter has not got yet */
+    uint16_t reply_at;                /* of dz_load.reply, index of the next octet for the transmitter */
     uint16_t line_errors;             /* times that the receiver was set up again, modulo 65536 */
 };
 
 extern struct dz_telemetry dz_telemetry;
 
-/* The load under way and the block in use; the main loop's. */
+/* The load under way and the block in use; owned by the main loop. */
 extern struct dz_load dz_load;
 
 /* SCI-A and its pins GPIO28 and GPIO29. Call it after InitSysCtrl(), which gives SCI-A its clock. */
 void dz_telemetry_init(void);
 
-/* One pass: takes what came, goes on with a load, hands over what the transmitter has room for, and packs the next frame
- * if it is due. Never waits, but for what dz_store.c does. Call it from the main loop: the receiver holds
+/* One pass: receives octets, continues a load, fills the transmitter, and packs the next frame
+ * if it is due. Never waits, except in dz_store.c. Call it from the main loop: the receiver holds
  * 1.38 ms of octets. */
 void dz_telemetry_poll(void);
 

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 262d5f0ed80806437184eb187df2e1e4fbd0da235fe8da2b3cc958d8748d51a6 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* Prints hashes of what dz_comp() and dz_drive_tick() answer (dz_selftest.h) on UART0, then sleeps for good. */
+/* Prints hashes of the results of dz_comp() and dz_drive_tick() (dz_selftest.h) on UART0, then sleeps forever. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>
@@ -23,7 +23,7 @@ static void print(const char *text)
         while ((UCSR0A & (1u << UDRE0)) == 0u)
         {
         }
-        UCSR0A = (uint8_t)(1u << TXC0); /* clears it: it shall tell of the last character */
+        UCSR0A = (uint8_t)(1u << TXC0); /* clears it, so that it signals the last character */
         UDR0 = (uint8_t)*text;
         text++;
     }

@@ -5,7 +5,7 @@
  * The compensation law for positive commands, an integer function of three converter codes.
  * No division, no floating point, no state, and no branch: every input takes the same instructions.
  * Every constant has a comment: what it is, its engineering value, and in brackets how it was rounded.
- * manifest.json says under "constants" where each came from, down to the ramp tests.
+ * manifest.json lists the origin of each under "constants", down to the ramp tests.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
@@ -16,7 +16,7 @@
  *     u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)
  *     k x_max/u_max = 7447/16384 = 0.454529, rounded to nearest
  *     u_min0/u_max  = 8937/16384 = 0.545471, rounded down with half a count to spare
- *     beta(dP): straight over 52 segments of 64 codes of the pressure difference (0.5270 MPa) each
+ *     beta(dP): linear in 52 segments of 64 codes of the pressure difference (0.5270 MPa)
  * Zero band: up to u_z, 34 codes of command, u_O is the certified offset beta_zero * u_min0, below the
  * closing threshold. Transition: over the next 16 codes (0.78%), to u_t, it runs straight to the law above,
  *     u_O(u) - (beta - beta_zero) * u_min0 * (1 - r),  r = (u_i - u_z)/(u_t - u_z), u = r * u_t.
@@ -24,7 +24,7 @@
  * In counts of the PWM this is sum / (2047 * 2^32) with the 64-bit integer
  *     sum = B * (-50625 * c + 1658070000) + 1875 * 2^33 * c + 4395899027456
  *           - (B - B_zero) * 103629375 * (16 - t)
- * c: command that the law is given, in codes from zero on times 16: of k codes past the zero band
+ * c: command that enters the law, in codes from zero times 16: of k codes past the zero band
  *    16 k + 34 t, t being those of k in the transition.
  * B: the table's value at dP, beta * 173539328; B_zero: the same of the certified beta.
  * Nothing is rounded before the one shift and the one division.
@@ -137,13 +137,13 @@ static uint32_t below_zero(uint32_t x)
     return (uint32_t)(0u - (uint32_t)(x >> WORD_TOP));
 }
 
-/* All ones if the command is outside its valid range: no working signal gives it. */
+/* All ones if the command is outside its valid range: no working signal produces it. */
 static uint32_t invalid_command(uint32_t u)
 {
     return below_zero((uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u)));
 }
 
-/* Difference of the pressures in codes of sensor A times 4096; below zero it stands 2^32 higher. */
+/* Difference of the pressures in codes of sensor A times 4096; a negative one is stored 2^32 higher. */
 static uint32_t pressure_difference(uint32_t p_a, uint32_t p_b)
 {
     const uint32_t a = (uint32_t)((p_a - PRESSURE_A_ZERO) * PRESSURE_A_WEIGHT);
@@ -152,7 +152,7 @@ static uint32_t pressure_difference(uint32_t p_a, uint32_t p_b)
     return (uint32_t)(a - b);
 }
 
-/* All ones if the pressures can't be right: one is outside its valid range, or the drop is below -REVERSE. */
+/* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -REVERSE. */
 static uint32_t failed_pressures(uint32_t p_a, uint32_t p_b, uint32_t difference)
 {
     return below_zero(
@@ -161,7 +161,7 @@ static uint32_t failed_pressures(uint32_t p_a, uint32_t p_b, uint32_t difference
                    (uint32_t)(difference + REVERSE)));
 }
 
-/* Pressure drop in codes of sensor A; 0 below zero, and where the pressures can't be right. */
+/* Pressure drop in codes of sensor A; 0 below zero, and if the pressures are implausible. */
 static uint32_t pressure_drop(uint32_t difference, uint32_t failed)
 {
     return (uint32_t)((difference & (uint32_t)~(below_zero(difference) | failed)) >> WEIGHT_SHIFT);
@@ -169,19 +169,19 @@ static uint32_t pressure_drop(uint32_t difference, uint32_t failed)
 
 /* ---- beta ---- */
 
-/* Row of the tables: one more than the segment's number, 0 where the pressures can't be right. */
+/* Row of the tables: one more than the segment's number, 0 if the pressures are implausible. */
 static uint32_t row_of(uint32_t dp, uint32_t failed)
 {
     return (uint32_t)(((uint32_t)(dp + STEP_CODES) >> STEP_SHIFT) & (uint32_t)~failed);
 }
 
-/* 16 by 16 to 32 bits: no longer product than this is needed. */
+/* 16 by 16 to 32 bits: no wider product is needed. */
 static uint32_t short_product(uint16_t left, uint16_t right)
 {
     return (uint32_t)left * right;
 }
 
-/* A straight piece of beta over dP: start - change * dP. */
+/* A linear segment of beta over dP: start - change * dP. */
 struct segment
 {
     uint32_t start;
@@ -266,7 +266,7 @@ static uint32_t zero_beta(uint32_t row, uint32_t dp)
 
 /* ---- the law ---- */
 
-/* An integer of 64 bits in two halves; no carry from one to the other needs a branch. */
+/* An integer of 64 bits in two halves; a carry between them needs no branch. */
 struct wide
 {
     uint32_t high;
@@ -289,12 +289,12 @@ static struct wide product(uint32_t left, uint32_t right)
     return result;
 }
 
-/* The law of a command, codes past the zero band; `failed` is all ones for pressures that are
- * not to be used, else 0. */
+/* The law of a command, codes past the zero band; `failed` is all ones for pressures that must
+ * not be used, else 0. */
 static inline uint32_t law_of(uint32_t towards, uint32_t difference, uint32_t failed)
 {
     const uint32_t past = towards;
-    /* What of that lies in the transition, and the command that the law is given. */
+    /* Its part within the transition, and the command that enters the law. */
     const uint32_t from_end = (uint32_t)(past - TRANSITION_CODES);
     const uint32_t reached = (uint32_t)(TRANSITION_CODES + (from_end & below_zero(from_end)));
     const uint32_t command = ((uint32_t)past << TRANSITION_SHIFT) + ((uint32_t)ZERO_BAND * reached);
@@ -305,7 +305,7 @@ static inline uint32_t law_of(uint32_t towards, uint32_t difference, uint32_t fa
     const uint32_t beta = law_beta(row, dp);
     const uint32_t factor = FACTOR_OFFSET - (FACTOR_SLOPE * command);
     const struct wide law = product(beta, factor);
-    /* A factor below zero stands 2^32 too high; all modulo 2^64, and the whole sum is never negative (proved). */
+    /* A negative factor is stored 2^32 too high. All is modulo 2^64, and the whole sum is never negative (proved). */
     uint32_t high = law.high - (beta & (0u - (factor >> 31))) + HALF_HIGH;
     const uint32_t low = law.low + HALF_LOW;
     const uint32_t gap = beta - zero_beta(row, dp);
@@ -313,7 +313,7 @@ static inline uint32_t law_of(uint32_t towards, uint32_t difference, uint32_t fa
     const struct wide lowered = product(gap, TRANSITION_FACTOR * missing);
     uint32_t left;
 
-    high += law.low >> 31; /* of the half the low word is 2^31: it carries where the product has that bit too */
+    high += law.low >> 31; /* the low word of the half is 2^31: it carries if the product has that bit too */
     high += COMMAND_HIGH_WORD * command;
     left = low - lowered.low;
     high -= lowered.high + (((~low & lowered.low) | ((~low | lowered.low) & left)) >> 31);
@@ -322,7 +322,7 @@ static inline uint32_t law_of(uint32_t towards, uint32_t difference, uint32_t fa
     /* Limited to the output's largest; both are below 2^31. */
     const uint32_t excess = unlimited - QUOTIENT_LIMIT;
     const uint32_t quotient = unlimited - (excess & ((excess >> 31) - 1u));
-    /* quotient / 2047: an estimate that is never too large, then what its remainder says is missing. */
+    /* quotient / 2047: an estimate that is never too large, corrected by its remainder. */
     const uint16_t estimate = (uint16_t)(((quotient >> ESTIMATE_SHIFT) * ESTIMATE_FACTOR) >> 16);
     const uint16_t rest = (uint16_t)((uint16_t)quotient - (uint16_t)(estimate * DIVISOR));
     const uint16_t compare = (uint16_t)(estimate + CORRECTIONS -
@@ -338,10 +338,10 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
-    /* The command, in codes from zero on; 0 where it is not valid. */
+    /* The command, in codes from zero; 0 if it is not valid. */
     const uint32_t let_go = invalid_command(u);
     const uint32_t from_zero = (uint32_t)((uint32_t)(u - COMMAND_ZERO) & (uint32_t)~let_go);
-    /* What of it lies past the zero band; 0 within. */
+    /* Its part past the zero band; 0 within. */
     const uint32_t from_band = (uint32_t)(from_zero - ZERO_BAND);
     const uint32_t towards = (uint32_t)(from_band & (uint32_t)~below_zero(from_band));
     const uint32_t difference = pressure_difference(p_a, p_b);
@@ -360,7 +360,7 @@ uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
-    /* The top bit is set where a code is outside its valid range, and where the difference is beyond its limits. */
+    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
     const uint32_t command = (uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u));
     const uint32_t a = (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a));
     const uint32_t b = (uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b));
@@ -370,7 +370,7 @@ uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t of_drop = (uint32_t)((below >> WORD_TOP) |
                                     ((above >> WORD_TOP) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE)));
 
-    /* Of a pressure outside its valid range the difference says nothing. */
+    /* The difference has no meaning if a pressure is outside its valid range. */
     return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |
                       ((b >> WORD_TOP) * DZ_STATUS_PRESSURE_B) |
                       ((of_drop & (uint32_t)~below_zero((uint32_t)(a | b))) * DZ_STATUS_DIFFERENCE));

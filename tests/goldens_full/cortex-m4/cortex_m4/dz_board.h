@@ -2,20 +2,20 @@
 /* Compensator SHA-256: 262d5f0ed80806437184eb187df2e1e4fbd0da235fe8da2b3cc958d8748d51a6 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* The functions that stand between the compensator and your hardware; dz_board.c has them to fill in. */
+/* The functions between the compensator and your hardware, for you to complete in dz_board.c. */
 #ifndef DZ_BOARD_H
 #define DZ_BOARD_H
 
 #include <stdint.h>
 
-/* Return this instead of a code when there is no valid reading: dz_comp() lets the valve go for such a command, and takes
- * the smallest beta for such a pressure. */
+/* Return this instead of a code when there is no valid reading: dz_comp() then de-energises the valve
+ * (command), or takes the smallest beta (pressure). */
 #define DZ_NO_CODE UINT16_C(0xFFFF)
 
-/* Converter code of the command, right-justified; called once a sample. */
+/* Converter code of the command, right-justified; called once per sample. */
 uint16_t dz_board_read_command(void);
 
-/* Converter codes of the pressures ahead of and behind the metering edge; each called once a sample. */
+/* Converter codes of the pressures upstream and downstream of the metering edge; each called once per sample. */
 uint16_t dz_board_read_pressure_a(void);
 uint16_t dz_board_read_pressure_b(void);
 

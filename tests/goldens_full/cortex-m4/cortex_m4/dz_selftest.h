@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 262d5f0ed80806437184eb187df2e1e4fbd0da235fe8da2b3cc958d8748d51a6 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* One number for what dz_comp() answers over a grid of inputs: two machines that print the same number agree.
+/* One number for the results of dz_comp() over a grid of inputs: two machines that print the same number agree.
  *
  * A grid with steps s and t takes, in this order and the last fastest,
  *     u_adc    0, 1, s, 2 s, ... below DZ_ADC_CODE_MAX, then DZ_ADC_CODE_MAX, DZ_ADC_CODE_MAX + 1, 65535

@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 262d5f0ed80806437184eb187df2e1e4fbd0da235fe8da2b3cc958d8748d51a6 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* In QEMU, in the place of main.c and dz_board.c: hashes of what the core answers (dz_selftest.h), then 25 and more real
+/* In QEMU, in place of main.c and dz_board.c: hashes of the core's results (dz_selftest.h), then 25 and more real
  * interrupts on a board in memory. Output and exit by semihosting (ARM IHI 0100: SYS_WRITE0, SYS_EXIT); on a chip without a
  * debugger its breakpoint instruction is a fault. */
 #include "dz_selftest.h"
@@ -96,7 +96,7 @@ static uint32_t interrupts_answer(void)
     while (dz_state.ticks < TICKS)
     {
     }
-    /* The valve is let go before the first sample, and each tick writes once. */
+    /* The valve is de-energised before the first sample, and each tick writes once. */
     same = ((writes > TICKS) && (written_a[0] == 0u) && (written_b[0] == 0u)) ? 1u : 0u;
     dz_drive_init(&drive);
     for (tick = 0u; tick < TICKS; tick++)

@@ -5,7 +5,7 @@
  * The compensation law for negative commands, an integer function of three converter codes.
  * No division, no floating point, no state, and no branch: every input takes the same instructions.
  * Every constant has a comment: what it is, its engineering value, and in brackets how it was rounded.
- * manifest.json says under "constants" where each came from, down to the ramp tests.
+ * manifest.json lists the origin of each under "constants", down to the ramp tests.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
@@ -16,7 +16,7 @@
  *     u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)
  *     k x_max/u_max = 22797/32768 = 0.695709, rounded to nearest
  *     u_min0/u_max  = 4985/16384 = 0.304260, rounded down with half a count to spare
- *     beta(dP): straight over 34 segments of 64 codes of the pressure difference (0.5270 MPa) each
+ *     beta(dP): linear in 34 segments of 64 codes of the pressure difference (0.5270 MPa)
  * Zero band: up to u_z, 34 codes of command, u_O is the certified offset beta_zero * u_min0, below the
  * closing threshold. Transition: over the next 16 codes (0.78%), to u_t, it runs straight to the law above,
  *     u_O(u) - (beta - beta_zero) * u_min0 * (1 - r),  r = (u_i - u_z)/(u_t - u_z), u = r * u_t.
@@ -24,7 +24,7 @@
  * In counts of the PWM this is sum / (1 * 2^44) with the 64-bit integer
  *     sum = B * (-49855 * c + 1633484800) + 1875 * 2^34 * c + 8796093022208
  *           - (B - B_zero) * 102092800 * (16 - t)
- * c: command that the law is given, in codes from zero on times 16: of k codes past the zero band
+ * c: command that enters the law, in codes from zero times 16: of k codes past the zero band
  *    16 k + 34 t, t being those of k in the transition.
  * B: the table's value at dP, beta * 196608000; B_zero: the same of the certified beta.
  * Nothing is rounded before the one shift and the one division.
@@ -121,13 +121,13 @@ static uint32_t below_zero_negative(uint32_t x)
     return (uint32_t)(0u - (uint32_t)(x >> WORD_TOP));
 }
 
-/* All ones if the command is outside its valid range: no working signal gives it. */
+/* All ones if the command is outside its valid range: no working signal produces it. */
 static uint32_t invalid_command_negative(uint32_t u)
 {
     return below_zero_negative((uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u)));
 }
 
-/* Difference of the pressures in codes of sensor A times 4096; below zero it stands 2^32 higher. */
+/* Difference of the pressures in codes of sensor A times 4096; a negative one is stored 2^32 higher. */
 static uint32_t pressure_difference_negative(uint32_t p_a, uint32_t p_b)
 {
     const uint32_t a = (uint32_t)((p_a - PRESSURE_A_ZERO) * PRESSURE_A_WEIGHT);
@@ -136,7 +136,7 @@ static uint32_t pressure_difference_negative(uint32_t p_a, uint32_t p_b)
     return (uint32_t)(b - a);
 }
 
-/* All ones if the pressures can't be right: one is outside its valid range, or the drop is below -REVERSE. */
+/* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -REVERSE. */
 static uint32_t failed_pressures_negative(uint32_t p_a, uint32_t p_b, uint32_t difference)
 {
     return below_zero_negative(
@@ -145,7 +145,7 @@ static uint32_t failed_pressures_negative(uint32_t p_a, uint32_t p_b, uint32_t d
                    (uint32_t)(difference + REVERSE)));
 }
 
-/* Pressure drop in codes of sensor A; 0 below zero, and where the pressures can't be right. */
+/* Pressure drop in codes of sensor A; 0 below zero, and if the pressures are implausible. */
 static uint32_t pressure_drop_negative(uint32_t difference, uint32_t failed)
 {
     return (uint32_t)((difference & (uint32_t)~(below_zero_negative(difference) | failed)) >> WEIGHT_SHIFT);
@@ -153,13 +153,13 @@ static uint32_t pressure_drop_negative(uint32_t difference, uint32_t failed)
 
 /* ---- beta ---- */
 
-/* Row of the tables: one more than the segment's number, 0 where the pressures can't be right. */
+/* Row of the tables: one more than the segment's number, 0 if the pressures are implausible. */
 static uint32_t row_of_negative(uint32_t dp, uint32_t failed)
 {
     return (uint32_t)(((uint32_t)(dp + STEP_CODES) >> STEP_SHIFT) & (uint32_t)~failed);
 }
 
-/* A straight piece of beta over dP: start + change * dP. */
+/* A linear segment of beta over dP: start + change * dP. */
 struct segment_negative
 {
     uint32_t start;
@@ -226,12 +226,12 @@ static uint32_t zero_beta_negative(uint32_t row, uint32_t dp)
 
 /* ---- the law ---- */
 
-/* The law of a command, codes past the zero band; `failed` is all ones for pressures that are
- * not to be used, else 0. */
+/* The law of a command, codes past the zero band; `failed` is all ones for pressures that must
+ * not be used, else 0. */
 static inline uint32_t law_of_negative(uint32_t towards, uint32_t difference, uint32_t failed)
 {
     const uint32_t past = towards;
-    /* What of that lies in the transition, and the command that the law is given. */
+    /* Its part within the transition, and the command that enters the law. */
     const uint32_t from_end = (uint32_t)(past - TRANSITION_CODES);
     const uint32_t reached = (uint32_t)(TRANSITION_CODES + (from_end & below_zero_negative(from_end)));
     const uint32_t command = ((uint32_t)past << TRANSITION_SHIFT) + ((uint32_t)ZERO_BAND * reached);
@@ -264,10 +264,10 @@ uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
-    /* The command, in codes from zero on; 0 where it is not valid. */
+    /* The command, in codes from zero; 0 if it is not valid. */
     const uint32_t let_go = invalid_command_negative(u);
     const uint32_t from_zero = (uint32_t)((uint32_t)(COMMAND_ZERO - u) & (uint32_t)~let_go);
-    /* What of it lies past the zero band; 0 within. */
+    /* Its part past the zero band; 0 within. */
     const uint32_t from_band = (uint32_t)(from_zero - ZERO_BAND);
     const uint32_t towards = (uint32_t)(from_band & (uint32_t)~below_zero_negative(from_band));
     const uint32_t difference = pressure_difference_negative(p_a, p_b);
@@ -286,7 +286,7 @@ uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
-    /* The top bit is set where a code is outside its valid range, and where the difference is beyond its limits. */
+    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
     const uint32_t command = (uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u));
     const uint32_t a = (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a));
     const uint32_t b = (uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b));
@@ -296,7 +296,7 @@ uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     const uint32_t of_drop = (uint32_t)((below >> WORD_TOP) |
                                     ((above >> WORD_TOP) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE)));
 
-    /* Of a pressure outside its valid range the difference says nothing. */
+    /* The difference has no meaning if a pressure is outside its valid range. */
     return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |
                       ((b >> WORD_TOP) * DZ_STATUS_PRESSURE_B) |
                       ((of_drop & (uint32_t)~below_zero_negative((uint32_t)(a | b))) * DZ_STATUS_DIFFERENCE));

@@ -80,13 +80,13 @@ static uint32_t valid_samples(uint32_t valid, uint32_t fault)
     return (valid + ((valid - FAULT_SAMPLES) >> 31)) & ~fault;
 }
 
-/* All ones as long as there have not been FAULT_SAMPLES of them. */
+/* All ones until there have been FAULT_SAMPLES of them. */
 static uint32_t too_few(uint32_t valid)
 {
     return 0u - ((valid - FAULT_SAMPLES) >> 31);
 }
 
-/* Faults since the last one was over, up to FAULT_SAMPLES. */
+/* Faults since the last one ended, up to FAULT_SAMPLES. */
 static uint32_t faulty_samples(uint32_t faulty, uint32_t fault)
 {
     return faulty + (fault & ((faulty - FAULT_SAMPLES) >> 31));
@@ -98,7 +98,7 @@ static uint32_t latched(uint32_t faulty)
     return 0u - (((FAULT_SAMPLES - 1u) - faulty) >> 31);
 }
 
-/* All ones as long as the pressures are not to be used, for the status of a new sample. */
+/* All ones while the pressures must not be used, from the status of a new sample. */
 static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
 {
     const uint32_t wrong = status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE);
@@ -112,7 +112,7 @@ static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
     return held;
 }
 
-/* 1 if the command counts as zero, `towards` being its codes from zero on. Between the band's two ends the drive stays
+/* 1 if the command counts as zero, `towards` being its codes from zero. Between the band's two ends the drive stays
  * as it was; without a command it is at rest. */
 static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
 {
@@ -122,7 +122,7 @@ static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
     return ((at_rest | in_band) & stays) | (gone & 1u);
 }
 
-/* The command that the law is given: codes past the zero band, none at rest. */
+/* The command that enters the law: codes past the zero band, 0 at rest. */
 static uint32_t past_band(uint32_t at_rest, int32_t towards)
 {
     return (uint32_t)(towards - ZERO_BAND) & (at_rest - 1u);
@@ -156,7 +156,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
                            (0u - (((uint32_t)(INTERLOCK - asked) | (uint32_t)(INTERLOCK + asked)) >> 31));
     const uint32_t faulty = faulty_samples(drive->faulty_commands, invalid);
     const uint32_t valid = valid_samples(drive->valid_commands, invalid | early | latched(faulty));
-    /* All ones without a command to be followed: let go at once, and start from rest when it comes back. */
+    /* All ones without a command to follow: de-energise at once, and start from rest when it returns. */
     const uint32_t gone = too_few(valid);
     const int32_t ramped = (gone != 0u) ? 0 : ramp(drive->ramped, asked * RAMP_UNIT);
     const int32_t command = ramped / RAMP_UNIT;
@@ -175,7 +175,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     } else if (command < -LEAVE_ZERO) {
         drive->side = -1;
     } else {
-        /* about zero: the side stays, so that noise does not throw the spool to and fro */
+        /* near zero: the side stays, so that noise does not move the spool back and forth */
     }
     away = (drive->side < 0) ? -command : command;
     at_rest = rest(drive->at_rest, away, gone);
@@ -206,7 +206,7 @@ void dz_drive_tick(struct dz_drive *drive)
         drive->ticks = 0u;
     }
     if (compare == 0u) {
-        /* let go: nothing to dither */
+        /* de-energised: nothing to dither */
     } else if (drive->ticks < DITHER_TICKS) {
         compare += DITHER_COUNTS;
     } else if (compare > DITHER_COUNTS) {

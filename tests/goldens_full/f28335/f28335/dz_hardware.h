@@ -39,7 +39,7 @@
 /* TBCTL.FREE_SOFT: at an emulation stop the counter runs to the end of its period first. */
 #define DZ_STOP_AT_PERIOD 1u
 
-/* Faults, one bit each. A fault stays until the next reset; the output is low as long as any bit stands. */
+/* Faults, one bit each. A fault is kept until the next reset; the output is low while any bit is set. */
 #define DZ_FAULT_NO_SAMPLE 0x0001u  /* the converter gave no usable sample in time */
 #define DZ_FAULT_TRIP_INPUT 0x0002u /* TZ1 (GPIO12) went low while the output was in use */
 #define DZ_FAULT_WATCHDOG 0x0004u   /* the last reset came from the watchdog: power-cycle to clear */
@@ -48,7 +48,7 @@
 /* Trip zone set up and tripped: EPWM1A is low, and EPWM2A, whatever the other registers say. Call it first. */
 void dz_output_hold_low(void);
 
-/* Faults that are known before the first sample; 0 if there is none. */
+/* Faults that are known before the first sample, or 0. */
 uint16_t dz_start_faults(void);
 
 /* All registers of clock, ePWM1, pins and ADC. Call it after InitAdc(), with interrupts off. */
@@ -57,7 +57,7 @@ void dz_hardware_init(void);
 /* EPWM1_INT to dz_isr(), PIE group 3. The caller enables interrupts with EINT. */
 void dz_interrupt_init(void);
 
-/* From here on ServiceDog() must come within 4.37 ms. */
+/* From here on ServiceDog() must be called within 4.37 ms. */
 void dz_watchdog_start(void);
 
 #endif

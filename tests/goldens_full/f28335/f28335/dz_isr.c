@@ -11,7 +11,7 @@
 
 volatile struct dz_state dz_state;
 
-/* The interrupt's own; what others may look at is copied to dz_state. */
+/* Private to the interrupt; what others may read is copied to dz_state. */
 static struct dz_drive drive;
 
 static uint16_t take_sample(void);
@@ -68,7 +68,7 @@ static uint16_t take_sample(void)
     p_a_adc = AdcMirror.ADCRESULT1;
     p_b_adc = AdcMirror.ADCRESULT2;
 
-    /* The sequencer goes on where it stopped unless it is reset; a reset while it is busy would spoil the
+    /* The sequencer continues where it stopped unless it is reset; a reset while it is busy would spoil the
      * sequence, hence only here, 20 us after CTR = 0 with the next start at least a period away. */
     AdcRegs.ADCST.bit.INT_SEQ1_CLR = 1u;
     AdcRegs.ADCTRL2.bit.RST_SEQ1 = 1u;
@@ -111,11 +111,11 @@ static void force_output_low(void)
     EDIS;
 }
 
-/* Only from here on the drive runs: its ramps start from rest, and it waits for zero command. */
+/* The drive runs only from here: its ramps start from rest, and it waits for zero command. */
 static void release_output(void)
 {
     dz_drive_init(&drive);
-    /* A halt of the debugger stops the counter at the end of its period, where the pin has gone low (README). */
+    /* A debugger halt stops the counter at the end of its period, where the pin has gone low (README). */
     EPwm1Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;
     EPwm2Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;
     EALLOW;
@@ -154,7 +154,7 @@ interrupt void dz_isr(void)
     }
     else
     {
-        /* Until the trip input is high the start waits: that is not a fault. */
+        /* The start waits until the trip input is high: that is not a fault. */
         if ((dz_state.released == 0u) && (fresh != 0u) && (GpioDataRegs.GPADAT.bit.GPIO12 != 0u))
         {
             release_output();
@@ -165,7 +165,7 @@ interrupt void dz_isr(void)
             {
                 dz_drive_sample(&drive, dz_state.u_adc, dz_state.p_a_adc, dz_state.p_b_adc);
             }
-            /* Each tick, for the dither's sake; between two samples the law's value holds. */
+            /* Each tick, for the dither; between two samples the law's value is held. */
             dz_drive_tick(&drive);
             show_drive();
             write_compare_a(drive.compare_a);

@@ -31,7 +31,7 @@ void dz_telemetry_init(void)
 
     SciaRegs.SCICTL1.all = SCI_TRANSMITS;
     SciaRegs.SCICCR.all = SCI_EIGHT_BITS;
-    SciaRegs.SCICTL2.all = 0u; /* no interrupts: the main loop looks at the FIFO */
+    SciaRegs.SCICTL2.all = 0u; /* no interrupts: the main loop polls the FIFO */
     SciaRegs.SCIHBAUD = DZ_SCI_BRR >> 8;
     SciaRegs.SCILBAUD = DZ_SCI_BRR & 0xFFu;
     SciaRegs.SCIFFTX.all = FIFO_CLEARED;
@@ -41,11 +41,11 @@ void dz_telemetry_init(void)
     SciaRegs.SCIFFTX.all = FIFO_RUNS;
 
     EALLOW;
-    GpioCtrlRegs.GPAPUD.bit.GPIO28 = 0u; /* pull-up: an open line rests high */
+    GpioCtrlRegs.GPAPUD.bit.GPIO28 = 0u; /* pull-up: an open line is high */
     GpioCtrlRegs.GPAPUD.bit.GPIO29 = 0u;
     GpioCtrlRegs.GPAQSEL2.bit.GPIO28 = 3u; /* asynchronous */
     GpioCtrlRegs.GPAMUX2.bit.GPIO28 = 1u;  /* SCIRXDA, not read */
-    GpioCtrlRegs.GPAMUX2.bit.GPIO29 = 1u;  /* SCITXDA, resting high by now */
+    GpioCtrlRegs.GPAMUX2.bit.GPIO29 = 1u;  /* SCITXDA, already high */
     EDIS;
 }
 
@@ -90,7 +90,7 @@ static uint16_t status_of(const struct dz_state *state)
     return status;
 }
 
-/* Packs the frame that is due; it is dropped if the last one is still on its way, or the state was not to be had. */
+/* Packs the frame that is due; it is dropped if the last one is still being sent, or no consistent state could be read. */
 static void start_frame(void)
 {
     struct dz_state state;

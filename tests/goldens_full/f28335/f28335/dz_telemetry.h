@@ -2,7 +2,7 @@
 /* Compensator SHA-256: 262d5f0ed80806437184eb187df2e1e4fbd0da235fe8da2b3cc958d8748d51a6 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 
-/* Telemetry over SCI-A: 100 frames a second, sent by the main loop and by nothing else. Nothing is received. */
+/* Telemetry over SCI-A: 100 frames per second, sent by the main loop only. Nothing is received. */
 #ifndef DZ_TELEMETRY_H
 #define DZ_TELEMETRY_H
 
@@ -19,10 +19,10 @@
 /* A frame is due every 25 PWM periods. */
 #define DZ_FRAME_TICKS 25u
 
-/* Bit of a frame's status word beside the DZ_FAULT_...: the output is in use. */
+/* Bit of a frame's status word, in addition to DZ_FAULT_...: the output is in use. */
 #define DZ_STATUS_RELEASED 0x0080u
 
-/* First 16 bits of the SHA-256 of compensator.json: the monitor knows by it whose scalings to use. */
+/* First 16 bits of the SHA-256 of compensator.json: it tells the monitor which scalings to use. */
 #define DZ_FIRMWARE_ORIGIN 0x262Du
 
 /* Written by the main loop only. */
@@ -30,8 +30,8 @@ struct dz_telemetry
 {
     uint32_t ticks;                   /* PWM periods since the start, modulo 2^32 */
     uint16_t due;                     /* ticks, modulo 65536, at which the last frame was due */
-    uint16_t octets[DZ_FRAME_OCTETS]; /* the frame on its way */
-    uint16_t at;                      /* its first octet that the transmitter has not got yet */
+    uint16_t octets[DZ_FRAME_OCTETS]; /* the frame being sent */
+    uint16_t at;                      /* index of the next octet for the transmitter */
     uint16_t sent;                    /* frames, modulo 65536 */
     uint16_t dropped;                 /* frames that were due and not sent, modulo 65536 */
 };
@@ -41,7 +41,7 @@ extern struct dz_telemetry dz_telemetry;
 /* SCI-A and its pins GPIO28 and GPIO29. Call it after InitSysCtrl(), which gives SCI-A its clock. */
 void dz_telemetry_init(void);
 
-/* One pass: hands over what the transmitter has room for, and packs the next frame if it is due. Never waits. Call it
+/* One pass: fills the transmitter, and packs the next frame if it is due. Never waits. Call it
  * from the main loop, at least once in 65535 PWM periods. */
 void dz_telemetry_poll(void);
 

@@ -8,7 +8,7 @@
 #include "dz_isr.h"
 #include "dz_telemetry.h"
 
-/* The watchdog watches the interrupt, not this loop: no tick since the last look, no service. */
+/* The watchdog monitors the interrupt, not this loop: it is serviced only after a new tick. */
 static void service_watchdog_if_isr_ran(void)
 {
     static uint16_t ticks_seen = 0u;
@@ -25,7 +25,7 @@ int main(void)
 {
     InitSysCtrl();        /* 150 MHz, peripheral clocks on, watchdog off */
     DINT;
-    dz_output_hold_low(); /* as early as ePWM1 has its clock */
+    dz_output_hold_low(); /* as soon as ePWM1 has its clock */
     dz_isr_init(dz_start_faults());
 
 #ifdef _FLASH
@@ -48,7 +48,7 @@ int main(void)
 
     for (;;)
     {
-        /* Neither waits for anything, so neither keeps the other from its turn. */
+        /* Neither waits for anything, so neither blocks the other. */
         service_watchdog_if_isr_ran();
         dz_telemetry_poll();
     }

@@ -24,7 +24,7 @@ SETTLE_S, RAMP_S = 0.4, 2.0
 Ends = tuple[float, float]
 NO_FIGURES: Mapping[str, float] = MappingProxyType({})
 #: Why a scenario is not required, in words of the report.
-NO_CORE_CAN_KNOW = "no core can know"
+NO_CORE_CAN_KNOW = "the firmware cannot detect it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

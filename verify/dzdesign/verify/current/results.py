@@ -8,8 +8,8 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import quantity
 
 Number = Annotated[int, Meta(ge=0, le=2**60)]
-Share = Annotated[float, quantity("1", "Of the rated current.", ge=0, le=1)]
-Codes = Annotated[float, quantity("codes", "Of the converter.", ge=-65536, le=65536)]
+Share = Annotated[float, quantity("1", "Share of the rated current.", ge=0, le=1)]
+Codes = Annotated[float, quantity("codes", "Codes of the converter.", ge=-65536, le=65536)]
 #: Names of the bits of dz_current.h.
 FaultName = Literal["NO_OFFSET", "SENSOR", "OPEN", "SHORT", "OVER"]
 
@@ -21,7 +21,7 @@ def about(description: str) -> Meta:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerStates:
-    """The C of the controller against its exact model."""
+    """Comparison of the controller's C with its exact model."""
 
     states: Annotated[Number, about("Number of states and calibrations that were compared.")]
     seed: Annotated[Number, about("Random seed of the first block of states; each further block uses the next seed.")]
@@ -31,7 +31,7 @@ class ControllerStates:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentCorner:
-    """One coil at one supply: margins of its equations, and what the C does with it."""
+    """One coil at one supply: margins of the loop by its equations, and the behaviour of the C."""
 
     resistance_ohm: Annotated[float, quantity("ohm", "Resistance of the whole circuit.", ge=0, le=1e6)]
     inductance_H: Annotated[float, quantity("H", "Inductance of the coil.", ge=0, le=1e6)]
@@ -73,7 +73,7 @@ class CurrentCorner:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultRun:
-    """One fault of the circuit in motion, taken away again."""
+    """One fault injected into the running circuit and removed again."""
 
     name: Annotated[str, about("Fault that is injected.")]
     expected: Annotated[FaultName, about("Fault bit that must be set.")]
@@ -95,7 +95,7 @@ OpeningShare = Annotated[float, quantity("1", "Of full command.", ge=0, le=1)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveAtCorners:
-    """The valve in closed loop at one pressure drop, its current made by every coil at every supply."""
+    """The valve in closed loop at one pressure drop, with the current of every coil at every supply."""
 
     dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=0, le=1000)]
     runs: Annotated[Number, about(
@@ -125,7 +125,7 @@ class ValveAtCorners:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentLoopResult:
-    """What was found of the current loop: the C by itself, and with the coil at every corner of the declared ranges."""
+    """Result of the current loop: the C alone, and with the coil at every corner of the declared ranges."""
 
     states: Annotated[ControllerStates, about("Comparison of the controller with its exact model, state by state.")]
     seconds: Annotated[float, quantity("s", "Time for which each set point was held after settling.", ge=0, le=1e6)]

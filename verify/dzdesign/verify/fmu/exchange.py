@@ -32,7 +32,7 @@ def starts_check(fmu: FmuFile, binary: bytes) -> Check:
     except RequirementError as error:
         return FMU_STARTS.check(holds=False, text=str(error), name=title)
     others = [
-        f"{name} begins at {value:g}, described as {fmu.variables[name].start}"
+        f"{name} starts at {value:g}, described as {fmu.variables[name].start}"
         for name, (value,) in zip(names, found, strict=True)
         if value != float(fmu.variables[name].start or 0.0)
     ]

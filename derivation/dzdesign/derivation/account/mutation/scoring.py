@@ -34,7 +34,7 @@ WAYS = ("formulas", "scopes", "grounds", "kinds", "published numbers")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatementMutants:
-    """Mutants of one statement in one way."""
+    """Changes of one statement of one kind, and how many were detected."""
 
     number: Annotated[str, Meta(description="Number of the statement, or name of a number printed in the paper.")]
     changed: Annotated[str, Meta(description="Part of the statement that was changed.")]
@@ -48,7 +48,7 @@ class StatementMutants:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AccountMutants(Artefact):
-    """How many wrong statements the account catches."""
+    """Number of wrong statements that the account detects."""
 
     FILE_NAME: ClassVar[str] = "mutants.json"
     schema: Annotated[Literal["dzdesign.mutation/1"], Meta(description="Name and version of this schema.")] = (
