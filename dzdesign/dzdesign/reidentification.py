@@ -1,4 +1,4 @@
-"""A firmware's valve against what `identify` makes of its ramp tests now: also what no check of a file can tell.
+"""Comparison of a firmware's valve with a new identification of its ramp tests, which also reveals edited files.
 
 Thresholds, bounds and hashes that were edited together fit one another; the recordings do not fit them. Stands here and
 not in verify, which shares no code with what it checks: this one check asks `identify` itself.

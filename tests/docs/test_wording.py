@@ -72,7 +72,7 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, capsys):
     travel = r"drive range of the law k x_max/u_max = \d+/\d+ = 0\.\d{5} \(from the opening threshold to"
     assert re.search(travel, design)
     nodes = len(example_compensator.positive.beta)
-    assert f"beta(dP): straight between {nodes} nodes, each a whole number of 1/32768" in design
+    assert f"beta(dP): linear between {nodes} nodes, each a whole number of 1/32768" in design
     assert "both as shares of full command" in design
     assert re.search(r"drive range of the valve k x_max/u_max = 0\.\d{4} ± 0\.\d{4}: command", html_of(example_valve))
 

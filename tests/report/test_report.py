@@ -80,7 +80,7 @@ def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo)
     loops = evidence["closed_loop"]["pressures"]
     head = html[: html.index('<section id="characteristic">')]
     tried = f"all {len(evidence['checks'])} that were tried"
-    assert f"Every requirement holds, {tried}; the certificate is of the recording; {AS_STATED}<" in head
+    assert f"Every requirement holds, {tried}; the certificate covers the recording; {AS_STATED}<" in head
     assert "no machine was declared" in head and "Certificate of the recording<" in head
     before, after = (100 * max(each[key] for each in loops) for key in ("dead_zone_opening", "residual_opening"))
     assert f"{before:.1f} % → {after:.1f} %" in head

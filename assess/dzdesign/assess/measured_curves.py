@@ -13,7 +13,7 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.curve_thinning import TOLERANCE, decimals_of, evenly_spaced, fewest_points
 from dzdesign.identify.valve.ramp_conditions import RampConditions
 
-#: Largest command in per cent of full command, and largest flow, that a file may state.
+#: Largest command in percent of full command, and largest flow, that a file may state.
 LARGEST_PERCENT, LARGEST_FLOW = 1e4, 1e6
 #: Most points of a line, and most samples beside it.
 MOST_POINTS, MOST_SAMPLES = 104, 24
@@ -24,7 +24,7 @@ Flows = tuple[Annotated[float, Meta(ge=-LARGEST_FLOW, le=LARGEST_FLOW)], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredBranch:
-    """One branch: flow over command, straight between the points, and a few of its samples.
+    """One branch: flow over command, linear between the points, and a few of its samples.
 
     On the negative side commands and flows count from zero down, as in valve.json.
     """

@@ -38,7 +38,7 @@ QUANTITIES: dict[str, Quantity] = {
          "Q_L / largest flow: what a straight line from zero command to the largest flow would read"),
         ("onset_opening", "onset, opening", "%",
          "command at which the rising branch's first flow stands out of the meter's noise, over u_max"),
-        ("onset_closing", "onset, closing", "%", "the same of the falling branch's last flow"),
+        ("onset_closing", "onset, closing", "%", "the same for the falling branch's last flow"),
         ("knee_opening", "knee, opening", "%",
          "zero of the line through the straight part of Q/sqrt(dP) on the rising branch, over u_max"),
         ("knee_closing", "knee, closing", "%", "the same on the falling branch"),
@@ -46,7 +46,7 @@ QUANTITIES: dict[str, Quantity] = {
          "largest |u_r(Q) - u_f(Q)| / u_max at Q = 5, 10, ... 90 % of the largest flow"),
         ("linearity", "linearity", "%",
          "largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, each averaged over "
-         "cells of 1 % of u_max (of single readings the noise would add to the largest), a + b u its least-squares "
+         "cells of 1 % of u_max (the noise of single readings would add to the largest), a + b u its least-squares "
          "line there, Q_rated the largest flow BEFORE at this pressure drop"),
         ("gain", "gain", "L/min/V", "slope of the lines through the straight part, mean of both branches"),
         ("flow_at_zero", "flow at zero", "L/min",
@@ -117,7 +117,7 @@ def in_units(readings: Mapping[str, Reading]) -> dict[str, Reading]:
 
 
 def symmetry(positive: Reading | None, negative: Reading | None) -> Reading:
-    """Return by how much one side is steeper than the other, in per cent, from the gains of both."""
+    """Return by how much one side is steeper than the other, in percent, from the gains of both."""
     known: list[tuple[float, float]] = []
     for gain, side in ((positive, "positive"), (negative, "negative")):
         if gain is None:
@@ -131,7 +131,7 @@ def symmetry(positive: Reading | None, negative: Reading | None) -> Reading:
 
 
 def change(before: Reading | None, after: Reading | None) -> Change | None:
-    """Return AFTER less BEFORE and its standard error; None where one of them shows no value."""
+    """Return AFTER minus BEFORE and its standard error; None where one of them shows no value."""
     if before is None or after is None or before.value is None or after.value is None:
         return None
     se = None if before.se is None or after.se is None else math.hypot(before.se, after.se)

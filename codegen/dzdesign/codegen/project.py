@@ -52,7 +52,7 @@ def _found_targets() -> tuple[str, ...]:
     return tuple(sorted(entry.name.replace("_", "-") for entry in folders if (entry / "target.py").is_file()))
 
 
-#: One folder a target; each has `target.py` with a `TARGET` and its templates.
+#: One folder per target; each has `target.py` with a `TARGET` and its templates.
 TARGET_NAMES = _found_targets()
 
 

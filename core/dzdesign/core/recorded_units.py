@@ -261,7 +261,7 @@ _NAMES: dict[str, str] = {
 
 
 def name_of_unit(written: str) -> str:
-    """Return the name of a unit as it is written somewhere; empty if that is no text for people."""
+    """Return the name of a unit as written somewhere; empty if that is no text for people."""
     return _NAMES.get(written.lower(), plain_unit(written))
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
 BelowDp0 = Literal["hold", "extend"]
 BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
-#: What to do above the last tested pressure drop: hold its offset, lower it with the continued bound, or let it go.
+#: What to do above the last tested pressure drop: hold its offset, lower it with the continued bound, or release it.
 Above = Literal["hold", "lower", "release"]
 ABOVE: tuple[Above, ...] = get_args(Above)
 POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")

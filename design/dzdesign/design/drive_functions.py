@@ -12,7 +12,7 @@ from dzdesign.design.signals import Signals
 
 #: Ramps count in codes of command over this, a sample.
 RAMP_UNIT = 1 << 16
-#: Codes of command from zero on that a ramp counts in 32 bits.
+#: Codes of command from zero that a ramp counts in 32 bits.
 RAMPED_CODES = (1 << 31) // RAMP_UNIT - 1
 
 #: Samples that the firmware counts up to.

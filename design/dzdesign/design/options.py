@@ -241,7 +241,7 @@ class DesignOptions:
         return min(max(round(half / self.dither_Hz), fastest), slowest)
 
     def _ramp(self, seconds: tuple[float, float], spans: tuple[int, ...]) -> tuple[int, int]:
-        """Return the steps a sample; at least one unit, so that a ramp never stands still."""
+        """Return the steps per sample; at least one unit, so that a ramp never stands still."""
         positive, negative = (
             max(1, round(RAMP_UNIT * span / (time * self.signals.sample_Hz))) if time and span else 0
             for time, span in zip(seconds, spans, strict=True)

@@ -1,4 +1,4 @@
-"""manifest.json of an output that is no C firmware, as a type: Structured Text, an FMU, a MATLAB function.
+"""manifest.json of an output other than a C firmware, as a type: Structured Text, an FMU, a MATLAB function.
 
 `codegen` writes it and `verify` compares it with the folder. These share no code, so what both read stands before them.
 """

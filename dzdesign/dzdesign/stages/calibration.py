@@ -206,7 +206,7 @@ def _format_of(output: Path | None, given: str | None) -> str:
 
 
 def _check_output(output: Path, form: str) -> None:
-    """Refuse to write over what is no calibration block: a recording may end with .txt too."""
+    """Refuse to write over what is not a calibration block: a recording may end with .txt too."""
     from dzdesign.codegen.calibration.a2l import HEAD
     from dzdesign.codegen.calibration.block_files import octets_in_file
     from dzdesign.codegen.calibration.layout import MAGIC

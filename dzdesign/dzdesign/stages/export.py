@@ -127,7 +127,7 @@ def _read_back(
 
 
 def _check_output(output: Path, device: "Device") -> None:
-    """Refuse to write over what is no file of dzdesign for this device: a recording may end with .csv too."""
+    """Refuse to write over what is not a file of dzdesign for this device: a recording may end with .csv too."""
     from dzdesign.codegen.amplifier.files import is_file_of
 
     check_file_may_be_written(output)

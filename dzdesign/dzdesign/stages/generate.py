@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputChoices:
-    """What can be chosen of an output that is no C firmware: the same in `codegen` and in `batch`."""
+    """What can be chosen of an output other than a C firmware: the same in `codegen` and in `batch`."""
 
     dialect: Annotated[Text, Option("NAME", OUTPUTS)] = None
     """Dialect of the PLC's tool, for iec61131: codesys or twincat (default: codesys)."""
@@ -121,7 +121,7 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
 
 
 def _other_output(arguments: GenerateArguments, target: str) -> "Output":
-    """Generate an output that is no C firmware, and write it where that is asked for."""
+    """Generate an output other than a C firmware, and write it where that is asked for."""
     from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of, write_output
     from dzdesign.codegen.project import DEFAULT_TARGET
 
@@ -137,7 +137,7 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
 
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
-    """Return the options that are of one output that is no C firmware alone, as they were given; a plant is read."""
+    """Return the options that are of one output other than a C firmware alone, as they were given; a plant is read."""
     from dzdesign.codegen.amplifier.given import given_dp_MPa, given_threshold
     from dzdesign.codegen.other_targets import OTHER_TARGETS
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.stated_options import StatedOptions
 
-#: Arguments that are no option of the identification itself: what is read and written, and what nothing is made of.
+#: Arguments that are not an option of the identification itself: what is read and written, and what nothing is made of.
 NOT_STATED = ("ramps", "output", "plots", "record")
 #: Options that name files: stated by the names that these have in made_from.
 FILES = ("order", "low_flow")

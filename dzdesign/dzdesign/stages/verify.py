@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
 
-#: Options that make no sense for an output that is no C firmware, unless its kind takes one.
+#: Options that make no sense for an output other than a C firmware, unless its kind takes one.
 OF_FIRMWARE = (
     "blocks", "plant", "back_pressure", "tolerances", "include", "c2000ware", "mutate", "machine_code", "proof",
 )  # fmt: skip
@@ -107,7 +107,7 @@ def verify_firmware(
 def verify_output_folder(
     folder: Path, arguments: VerifyArguments, identified: "ValveModel | None" = None
 ) -> "OutputVerification":
-    """Verify an output that is no C firmware; `identified` is as in `verify_firmware`."""
+    """Verify an output other than a C firmware; `identified` is as in `verify_firmware`."""
     from dzdesign.changed_code import code_of_output
     from dzdesign.regeneration import output_again, output_regenerated
     from dzdesign.reidentification import GivenFiles, identified_again
@@ -201,7 +201,7 @@ def _verify_code(
 
 
 def _back_pressures_MPa(texts: list[str]) -> list[float] | None:
-    """Return the pressures behind the edge; None where none were given."""
+    """Return the pressures downstream of the edge; None where none were given."""
     if not texts:
         return None
     values = [parse_quantity(text, "pressure", "--back-pressure") / 1e6 for text in texts]

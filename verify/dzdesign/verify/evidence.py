@@ -1,4 +1,4 @@
-"""Evidence: what was found of one firmware, declared once; ``verification.json`` is how it is stored.
+"""Evidence about one firmware, declared once; it is stored as ``verification.json``.
 
 The checks, the exhaustive comparison and the closed loop fill these classes; the report and the terminal read them.
 """

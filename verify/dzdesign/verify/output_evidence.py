@@ -1,4 +1,4 @@
-"""Evidence about an output that is no C firmware, declared once; ``evidence.json`` is how it is stored."""
+"""Evidence about an output other than a C firmware, declared once; ``evidence.json`` is how it is stored."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

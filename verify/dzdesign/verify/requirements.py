@@ -1,4 +1,4 @@
-"""Every requirement on a firmware, declared once: id, title and how to have it checked; and what is found of one."""
+"""Every requirement on a firmware or another output: id, title and how to have it checked; and its result."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -34,13 +34,13 @@ class Requirement:
     how: str = "`verify`"
 
     def check(self, *, holds: bool | None, text: str, name: str = "") -> Check:
-        """Return what was found; `name` says what of it was tried, such as one processor's machine code."""
+        """Return the result of a check; `name` says which part was tried, such as one processor's machine code."""
         return Check(id=self.id, name=name or self.title, holds=holds, text=text)
 
 
 FILES = Requirement(id="files-as-generated", title="files as generated")
 MANIFEST = Requirement(id="manifest", title="the manifest describes the firmware")
-#: Of an output that is no C firmware.
+#: Of an output other than a C firmware.
 OUTPUT_MANIFEST = Requirement(id="output-manifest", title="the manifest states what the output was made from")
 #: Of Structured Text.
 SUBSET = Requirement(id="st-subset", title="the text uses only the verified subset")

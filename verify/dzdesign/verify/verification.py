@@ -64,7 +64,7 @@ class Verification(ShownInNotebooks):
         words = self.evidence.verdict
         if not self.holds or self.derived is None:
             return words
-        parts = [words.removesuffix("."), f"the certificate is of {self.derived.certified_of}"]
+        parts = [words.removesuffix("."), f"the certificate covers {self.derived.certified_of}"]
         return "; ".join([*parts, *filter(None, [self.evidence.reservation])]) + "."
 
     def with_checks(self, *checks: Check) -> "Verification":

@@ -19,7 +19,7 @@ Gain = Annotated[int, Meta(ge=0, le=LARGEST_GAIN)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SupplyCorrection:
-    """Nominal supply voltage over the measured one, straight between nodes over the converter's codes."""
+    """Nominal supply voltage over the measured one, linear between nodes over the converter's codes."""
 
     valid_codes: Annotated[
         tuple[Count, Count],

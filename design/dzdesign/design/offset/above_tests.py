@@ -1,4 +1,4 @@
-"""The offset above the last tested pressure drop: held, lowered with the continued bound, or let go.
+"""The offset above the last tested pressure drop: held, lowered with the continued bound, or released.
 
 Let go means a beta of one unit: the compensation ends, and the command drives the valve on. A drive of zero would shut
 a valve that a pressure spike reaches at full command, which is a motion of its own; without an offset the dead zone is
@@ -20,8 +20,8 @@ from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
 from dzdesign.identify.valve.side_model import SideModel
 
-#: Segments of the table in which an offset that is let go comes down, beside that in which the tests end: a table is
-#: straight between its nodes, and the tests keep their offset.
+#: Segments of the table in which an offset that is released comes down, beside that in which the tests end: a table is
+#: linear between its nodes, and the tests keep their offset.
 RELEASE_SEGMENTS = 1
 #: Beyond the span of any sensor.
 FURTHEST_MPa = 1000
@@ -100,7 +100,7 @@ class AboveChoice:
         return OffsetAbove.under(CertifiedBound(pieces=(held,)), last_V, certified=False)
 
     def released_from(self, tested: range) -> int | None:
-        """Return the code from which on an offset is let go that was tested at codes in a range; None: it is not.
+        """Return the code from which an offset is released that was tested at codes in a range; None: it is not.
 
         It is that of a node of the table: the offset comes down in the segment before it, under the continued bound.
         """

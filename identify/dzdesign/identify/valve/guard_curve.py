@@ -214,7 +214,7 @@ class CertifiedCurve:
             return f"Premise line: the threshold is straight over the pressure drop ({tested})"
         if self.premise == "smooth":
             if self.curvature_is == "estimated":
-                tested = "from these very tests, so no test of it"
+                tested = "from the same tests, so they do not test it"
             bends = [1e3 * value for value in self.curvature_V_MPa2]
             inner, ends = min(bends), (bends[0], bends[-1])
             first, last = (units.number(end, ".3g mV/MPa²") for end in ends)

@@ -12,7 +12,7 @@ from dzdesign.identify.valve.quantity_types import Flow, FlowGain, PressureDrop,
 from dzdesign.identify.valve.ramp_conditions import RampConditions
 from dzdesign.identify.valve.recorded_curve import RecordedCurve
 
-#: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has next to none.
+#: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has almost none.
 ORDER_SIGNIFICANCE, ORDER_LEAST_V = 5.0, 1e-3
 #: Of a branch: the thresholds, each with its standard error.
 THRESHOLDS = ("knee", "level", "onset")

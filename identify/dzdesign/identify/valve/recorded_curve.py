@@ -52,7 +52,7 @@ class RecordedSamples:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedBranch:
-    """One branch of a test: flow over command, straight between the points."""
+    """One branch of a test: flow over command, linear between the points."""
 
     u_V: Annotated[
         tuple[Voltage, ...],

@@ -20,13 +20,13 @@
 #define DZ_COMPARE_MAX 60000u
 /* Largest code of the converter: the top of its range (exact). */
 #define DZ_ADC_CODE_MAX 4095u
-/* Samples a second: of the firmware's timer (exact). */
+/* Samples per second: of the firmware's timer (exact). */
 #define DZ_SAMPLE_HZ 1250u
-/* PWM periods a second: of the firmware's timer (exact). */
+/* PWM periods per second: of the firmware's timer (exact). */
 #define DZ_TICK_HZ 2500u
 /* Codes of pressure drop between two nodes of beta: a power of two (exact). */
 #define DZ_BETA_STEP 64u
-/* Codes of the current in a sum: 0 without current control (exact). */
+/* Samples of the current in a sum: 0 without current control (exact). */
 #define DZ_CURRENT_SAMPLES 0u
 /* What this firmware is compiled for: two solenoids: a command of both signs, the pressure drop of negative commands
  * is B less A (exact). */
@@ -39,31 +39,32 @@
 #define DZ_CALIBRATION_WORDS 1330u
 /* Room for nodes of beta: the fallback and those of the table (exact). */
 #define DZ_CALIBRATION_NODES 129u
-/* Largest number of a node that has a next one: all ones (exact). */
+/* Largest index of a node that has a successor: all ones (exact). */
 #define DZ_CALIBRATION_NODE_MASK 127u
 /* Room for nodes of the play's width: each side (exact). */
 #define DZ_CALIBRATION_PLAY_NODES 17u
-/* Largest number of a node that has a next one: all ones (exact). */
+/* Largest index of a node that has a successor: all ones (exact). */
 #define DZ_CALIBRATION_PLAY_MASK 15u
 /* Room for nodes of the supply's correction: one table (exact). */
 #define DZ_CALIBRATION_SUPPLY_NODES 66u
-/* Largest number of a node that has a next one: all ones (exact). */
+/* Largest index of a node that has a successor: all ones (exact). */
 #define DZ_CALIBRATION_SUPPLY_MASK 63u
-/* Bit 0 of dz_calibration_check(): no calibration block, or of another layout or length (a convention). */
+/* Bit 0 of dz_calibration_check(): not a calibration block, or one of another layout or length (a convention). */
 #define DZ_CALIBRATION_FORMAT 1u
 /* Bit 1 of dz_calibration_check(): damaged: the CRC-32 is not that of the block (a convention). */
 #define DZ_CALIBRATION_CRC 2u
-/* Bit 2 of dz_calibration_check(): of a firmware that was compiled for other wiring, converter or rates (a
- * convention). */
+/* Bit 2 of dz_calibration_check(): for a firmware with other wiring, converter or rates (a convention). */
 #define DZ_CALIBRATION_FIRMWARE 4u
-/* Bit 3 of dz_calibration_check(): a code of command or pressures outside what the arithmetic bears (a convention). */
+/* Bit 3 of dz_calibration_check(): a code of command or pressures outside the range of the arithmetic (a
+ * convention). */
 #define DZ_CALIBRATION_SIGNALS 8u
-/* Bit 4 of dz_calibration_check(): a number of the law outside what the arithmetic bears, or a law that falls with
+/* Bit 4 of dz_calibration_check(): a number of the law outside the range of the arithmetic, or a law that falls with
  * the command (a convention). */
 #define DZ_CALIBRATION_LAW 16u
-/* Bit 5 of dz_calibration_check(): a number of the drive functions outside what the arithmetic bears (a convention). */
+/* Bit 5 of dz_calibration_check(): a number of the drive functions outside the range of the arithmetic (a
+ * convention). */
 #define DZ_CALIBRATION_DRIVE 32u
-/* Bit 6 of dz_calibration_check(): a number of the current controller outside what the arithmetic bears (a
+/* Bit 6 of dz_calibration_check(): a number of the current controller outside the range of the arithmetic (a
  * convention). */
 #define DZ_CALIBRATION_CURRENT 64u
 
@@ -80,7 +81,7 @@ struct dz_calibration_side
     uint32_t offset;
     /* Coefficient of beta times command in the sum, two's complement. */
     uint32_t slope;
-    /* Coefficient of (beta - beta at zero command) for each code missing to the transition's end. */
+    /* Coefficient of (beta - beta at zero command) for each code short of the transition's end. */
     uint32_t transition;
     /* Coefficient of the command alone in the sum; low word first. */
     uint32_t linear[2];
@@ -92,13 +93,13 @@ struct dz_calibration_side
     uint32_t reciprocal;
     /* Largest tested pressure drop (1/4096 code of A). */
     uint32_t tested_to;
-    /* What stands for beta = 1 in a node, for display. */
+    /* Value of beta = 1 in a node, for display. */
     uint32_t beta_unit;
     /* Factor from interpolated nodes to beta times 2^15, over 2^beta_shift. */
     uint32_t beta_factor;
-    /* Largest change of the command a sample, away from zero (1/65536 code). */
+    /* Largest change of the command per sample, away from zero (1/65536 code). */
     uint32_t ramp_up;
-    /* The same, back to zero (1/65536 code). */
+    /* Largest change of the command per sample, towards zero (1/65536 code). */
     uint32_t ramp_down;
     /* For each node beta that the law follows, then the certified beta at zero command; a node every beta_step codes
      * from no pressure drop on, and the last two the smallest of all, used where the pressures can't be right
@@ -106,9 +107,9 @@ struct dz_calibration_side
     struct dz_calibration_node nodes[129];
     /* Nodes of the table in use. */
     uint16_t node_count;
-    /* Shift to the right behind the product with reciprocal, beyond 32. */
+    /* Right shift after the product with reciprocal, beyond 32. */
     uint16_t reciprocal_shift;
-    /* Shift to the right behind the product with beta_factor. */
+    /* Right shift after the product with beta_factor. */
     uint16_t beta_shift;
     /* Codes from zero to full command (codes). */
     uint16_t span;
@@ -124,51 +125,51 @@ struct dz_calibration_side
 
 struct dz_calibration_current
 {
-    /* Largest integral to either side (counts / 2^gain_shift). */
+    /* Largest magnitude of the integral (counts / 2^gain_shift). */
     uint32_t integral_limit;
-    /* How far the output is below the integral (counts / 2^gain_shift). */
+    /* Output below the integral by (counts / 2^gain_shift). */
     uint32_t release;
     /* Largest compare value (counts). */
     uint16_t compare_limit;
-    /* Largest change of the set point a PWM period (counts). */
+    /* Largest change of the set point per PWM period (counts). */
     uint16_t rate;
-    /* Codes of the current in a sum. */
+    /* Samples of the current in a sum. */
     uint16_t samples;
-    /* Counts of current for a code of the sum, over 2^current_shift. */
+    /* Counts of current per code of the sum, times 2^current_shift. */
     uint16_t current_gain;
-    /* Binary places of current_gain. */
+    /* Fractional bits of current_gain. */
     uint16_t current_shift;
-    /* Binary places of the three gains. */
+    /* Fractional bits of the three gains. */
     uint16_t gain_shift;
-    /* PWM counts for a count of error. */
+    /* PWM counts per count of error, times 2^gain_shift. */
     uint16_t proportional;
-    /* The same in each PWM period. */
+    /* PWM counts per count of error and PWM period, times 2^gain_shift. */
     uint16_t integral;
-    /* PWM counts for a count of set point. */
+    /* PWM counts per count of set point, times 2^gain_shift. */
     uint16_t feed_forward;
     /* Sum without current, as designed (codes). */
     uint16_t offset_nominal;
-    /* Least plausible sum without current (codes). */
+    /* Lowest plausible sum without current (codes). */
     uint16_t offset_low;
-    /* Largest plausible sum without current (codes). */
+    /* Highest plausible sum without current (codes). */
     uint16_t offset_high;
     /* The offset is the mean of 2^offset_shift sums. */
     uint16_t offset_shift;
-    /* Sum from which the load is shorted (codes). */
+    /* Sum from which the load counts as shorted (codes). */
     uint16_t short_sum;
-    /* Sum less offset from which the current is too high (codes). */
+    /* Sum minus offset from which the current is too high (codes). */
     uint16_t over_sum;
-    /* PWM periods of it in a row. */
+    /* Such PWM periods in a row that are a fault. */
     uint16_t over_ticks;
-    /* Sum less offset below which no current flows (codes). */
+    /* Sum minus offset below which no current flows (codes). */
     uint16_t open_sum;
-    /* Compare value from which one must flow (counts). */
+    /* Compare value from which current must flow (counts). */
     uint16_t open_compare;
-    /* PWM periods of it in a row. */
+    /* Such PWM periods in a row that are a fault. */
     uint16_t open_ticks;
-    /* Least code of the supply (codes). */
+    /* Lowest code of the supply (codes). */
     uint16_t supply_low;
-    /* Largest code of the supply (codes). */
+    /* Highest code of the supply (codes). */
     uint16_t supply_high;
     /* Codes between two nodes of the correction, a power of two. */
     uint16_t supply_shift;
@@ -190,9 +191,9 @@ struct dz_calibration
     uint16_t code_max;
     /* PWM compare value of full drive (counts). */
     uint16_t compare_max;
-    /* Samples a second (Hz). */
+    /* Sampling rate (Hz). */
     uint16_t sample_Hz;
-    /* PWM periods a second (Hz). */
+    /* PWM frequency (Hz). */
     uint16_t tick_Hz;
     /* 0. */
     uint16_t reserved;
@@ -212,28 +213,28 @@ struct dz_calibration
     uint16_t a_full;
     /* Code of sensor B at its span, for display (codes). */
     uint16_t b_full;
-    /* What the difference of the codes is without pressures: a_zero times 4096 less b_zero times weight_b, modulo 2^32
-     * (1/4096 code of A). */
+    /* Difference of the codes at zero pressure: a_zero times 4096 minus b_zero times weight_b, modulo 2^32 (1/4096 code
+     * of A). */
     uint32_t balance;
     /* A pressure drop less than minus this is a failed sensor (1/4096 code of A). */
     uint32_t reverse;
     /* Code of zero command (codes). */
     uint16_t command_zero;
-    /* Least valid code of the command (codes). */
+    /* Lowest valid code of the command (codes). */
     uint16_t command_low;
-    /* Largest valid code of the command (codes). */
+    /* Highest valid code of the command (codes). */
     uint16_t command_high;
-    /* Code of no pressure, sensor A (codes). */
+    /* Code at zero pressure, sensor A (codes). */
     uint16_t a_zero;
-    /* Least valid code of sensor A (codes). */
+    /* Lowest valid code of sensor A (codes). */
     uint16_t a_low;
-    /* Largest valid code of sensor A (codes). */
+    /* Highest valid code of sensor A (codes). */
     uint16_t a_high;
-    /* Code of no pressure, sensor B (codes). */
+    /* Code at zero pressure, sensor B (codes). */
     uint16_t b_zero;
-    /* Least valid code of sensor B (codes). */
+    /* Lowest valid code of sensor B (codes). */
     uint16_t b_low;
-    /* Largest valid code of sensor B (codes). */
+    /* Highest valid code of sensor B (codes). */
     uint16_t b_high;
     /* Weight of a code of sensor B (1/4096 code of A). */
     uint16_t weight_b;
@@ -247,7 +248,7 @@ struct dz_calibration
     uint16_t compare_limit;
     /* Codes beyond which the drive leaves its rest or its side (codes). */
     uint16_t leave_zero;
-    /* Valid samples in a row after which a fault is over (samples). */
+    /* Valid samples in a row that end a fault (samples). */
     uint16_t fault_samples;
     /* 1: a fault of as many faulty samples stays until a reset. */
     uint16_t fault_latch;
@@ -259,9 +260,9 @@ struct dz_calibration
     uint16_t dither_counts;
     /* Half the dither's period (PWM periods). */
     uint16_t dither_ticks;
-    /* Codes of travel from the one branch to the other; 0: no inverse play (codes). */
+    /* Codes of travel from one branch to the other; 0: no inverse play (codes). */
     uint16_t play_codes;
-    /* Codes that the command strays without turning (codes). */
+    /* Codes of fluctuation that do not count as a reversal (codes). */
     uint16_t play_noise;
     /* Codes between two nodes of the play's width, a power of two. */
     uint16_t play_step_shift;

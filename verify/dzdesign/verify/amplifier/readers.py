@@ -148,7 +148,7 @@ def _csv(text: str) -> Mapping[int, FileLaw]:
 
 
 def _count(text: str) -> int:
-    """Return a whole number as it is written in digits; another form, which a device may read otherwise, is none."""
+    """Return a whole number as written in digits; another form, which a device may read otherwise, is none."""
     if not COUNT.fullmatch(text):
         raise ValueError(f"{text[:20]!r} is not a whole number")
     return int(text)
@@ -162,7 +162,7 @@ def _number(text: str) -> Fraction:
 
 
 def _table(points: Sequence[tuple[Fraction, Fraction]]) -> Mapping[int, FileLaw]:
-    """Return the law of points over both directions: a side whose drive is next to none has no solenoid."""
+    """Return the law of points over both directions: a side whose drive is almost none has no solenoid."""
     if any(left[0] >= right[0] or left[1] >= right[1] for left, right in pairwise(points)):
         raise ValueError("the points do not increase")
     if (ZERO, ZERO) not in points or points[-1][0] != 1:

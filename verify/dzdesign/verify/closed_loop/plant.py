@@ -26,7 +26,7 @@ MPA, L_MIN = 1e6, 1e-3 / 60
 LARGEST_PARAMETER = 1e12
 #: Characters of a key to which the nearest known one is looked for.
 LONGEST_KEY = 80
-#: Faster than this is no valve's spool, and would take the integrator a thousand steps a phase.
+#: Faster than this is not a valve's spool, and would take the integrator a thousand steps a phase.
 FASTEST_RAD_S = 1e6
 #: Of a hydraulic system, for the flow force.
 LARGEST_DP_MPA = 40.0

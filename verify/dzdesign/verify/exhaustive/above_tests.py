@@ -1,6 +1,6 @@
 """What the zero-command drive does above the tested pressure drops, against what the certificate says of it there.
 
-Argued from valve.json anew: the nodes of the continued bound, straight between them but for the first interval, where a
+Argued from valve.json again: the nodes of the continued bound, linear between them but for the first interval, where a
 threshold that bends by at most M may sag below their chord. Nothing is taken of how the table was made.
 """
 

@@ -145,7 +145,7 @@ def _plant_faults(fmu: FmuFile, binary: bytes, plant: Plant, compare_max: int) -
 
 
 def _stop_faults(fmu: FmuFile, binary: bytes, plant: Plant) -> Iterator[str]:
-    """Yield what is wrong as the spool meets a stop, is held there, and is let go: each an event."""
+    """Yield what is wrong as the spool meets a stop, is held there, and is released: each an event."""
     stroke, loop_ohm = 1e-3 * plant.stroke_mm, plant.K_a * plant.K_fi_V_A + plant.R_c_ohm + plant.r_p_ohm
     strong = 2 * (plant.K_et_N_m * stroke + plant.preload_N + 1) / plant.K_i_N_A  # A, and half the play
     strong += plant.K_a * plant.hysteresis_V / loop_ohm
