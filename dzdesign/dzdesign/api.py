@@ -1,10 +1,12 @@
-"""The stages for notebooks and scripts: `identify`, `design`, `generate`, `verify`, and what stands around them.
+"""The stages as functions for notebooks and scripts: `identify`, `design`, `generate`, `verify` and their companions.
 
-Each takes paths or the result of the stage before it, options in the words of the command line ("1 MPa", "0.1 s"), and
-returns a frozen result, which `print` sums up and a notebook shows as a table. With ``output`` it also writes the file
-or folder that the command of the same stage writes, byte for byte. Nothing is printed. What is heavy is imported when a
-stage is called. `plan`, `init`, `simulate`, `assess`, `report`, `batch`, `calibration` and `export` are the
-commands of those names, `read_calibration` is `calibration --read`.
+Each function takes paths or the result of the previous stage. Options are written as on the command line, such as
+"1 MPa" or "0.1 s". The result is a frozen dataclass, which `print` summarises and a notebook shows as a table. With
+``output`` a function also writes the file or folder of the command of the same stage, byte for byte. Nothing is
+printed, and heavy packages are imported when a stage is called.
+
+`plan`, `init`, `simulate`, `assess`, `report`, `batch`, `calibration` and `export` correspond to the commands of
+the same names; `read_calibration` corresponds to `calibration --read`.
 
 >>> from dzdesign import api
 >>> valve = api.identify("ramps/*.csv", meter_lag="0.1 s")         # doctest: +SKIP
@@ -40,7 +42,7 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """Return the names of the API alone, for an editor or a notebook that completes them."""
+    """Return the public names only, for the completion of an editor or a notebook."""
     return sorted(__all__)
 
 

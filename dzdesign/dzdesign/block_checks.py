@@ -1,6 +1,6 @@
 """`verify --blocks`: a firmware in block form with the calibration blocks of other valves, each on every input.
 
-Stands here and not in verify, which shares no code with what it checks: that a block is the one that follows from its
+This is here and not in verify, which shares no code with what it checks: that a block is the one that follows from its
 compensator.json is asked of the generator itself.
 """
 

@@ -1,4 +1,4 @@
-"""Whose a calibration block is: what no number of the law tells, and what puts one valve's block into another valve.
+"""Identity of a calibration block by serial number and hash, since the numbers of the law do not name the valve.
 
 A block says its serial number and the hash of its compensator.json. That holds the entry `serial` of the test record;
 the folder of a batch's valve says the hash of the block that belongs there.

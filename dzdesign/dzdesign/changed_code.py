@@ -1,4 +1,4 @@
-"""Code of a folder is compiled and run only if it is, byte for byte, what `codegen` makes of its compensator.json.
+"""Code of a folder is compiled and run only if it equals, byte for byte, what `codegen` makes of its compensator.json.
 
 The manifest has no say in that: whoever changes a file can change its hash. What is then compiled and run is not read
 from the folder again but written from the generated text into a private one, so a file that is replaced meanwhile, a
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 #: What else to do, where a command has the option.
 RUN_CHANGED = ", or give --run-changed to run code that you trust all the same"
-#: Endings of code in an output that is no C firmware.
+#: Endings of code in an output other than a C firmware.
 OF_OUTPUTS = (".c", ".h", ".m", ".mex", ".fmu")
 #: Files that a sentence names.
 MOST_NAMED = 3
@@ -44,7 +44,7 @@ def code_of_firmware(folder: Path, *, run_changed: bool = False, otherwise: str 
 
 @contextmanager
 def code_of_output(folder: Path, again: "OutputAgain | None", *, run_changed: bool = False) -> Iterator[Path]:
-    """Do the same for an output that is no C firmware, of which `again` is what is generated now.
+    """Do the same for an output other than a C firmware, of which `again` is what is generated now.
 
     It is None of an output of which nothing is run as it is: that is read from its own folder.
     """
@@ -81,7 +81,7 @@ def refuse_changed_firmware(folder: Path, otherwise: str = RUN_CHANGED) -> dict[
 
 
 def refuse_changed_output(folder: Path, again: "OutputAgain", otherwise: str = RUN_CHANGED) -> dict[str, bytes]:
-    """Return the code of an output that is no C firmware, and its compensator.json; of changed code an error."""
+    """Return the code of an output other than a C firmware, and its compensator.json; of changed code an error."""
     if again.output is None:
         raise _refusal(folder, again.reason, otherwise)
     contents = again.output.contents

@@ -1,6 +1,6 @@
-"""A firmware against what `codegen` makes of its compensator.json now: also what no hash of its own manifest can tell.
+"""Comparison of a firmware with a new generation from its compensator.json, which also reveals an edited manifest.
 
-Stands here and not in verify, which shares no code with what it checks: this one check asks the generator itself.
+This is here and not in verify, which shares no code with what it checks: this one check asks the generator itself.
 """
 
 from collections.abc import Collection, Sequence
@@ -112,7 +112,7 @@ def output_again(folder: Path) -> OutputAgain:
 
 
 def output_regenerated(folder: Path, again: OutputAgain | None = None) -> "Check":
-    """Tell whether every file of an output that is no C firmware is what `codegen` makes of compensator.json now.
+    """Tell whether every file of an output other than a C firmware is what `codegen` makes of compensator.json now.
 
     It is not checked where the output was compiled, and the compiler is missing here or another one. `again` is the
     output where it was generated before.

@@ -1,4 +1,4 @@
-"""A firmware's valve against what `identify` makes of its ramp tests now: also what no check of a file can tell.
+"""Comparison of a firmware's valve with a new identification of its ramp tests, which also reveals edited files.
 
 Thresholds, bounds and hashes that were edited together fit one another; the recordings do not fit them. Stands here and
 not in verify, which shares no code with what it checks: this one check asks `identify` itself.
@@ -87,7 +87,7 @@ def identified_again(
         one, other = _words(first.stated), _words(first.follows)
         text = f"'{first.place}' of valve.json is {one}, but {other} follows {text}{more}"
         return _check(holds=False, text=f"{text}; make it again with `dzdesign identify`")
-    text = f"identified {'again' if identified is None else 'in this run'} {text}: every number the same"
+    text = f"identified {'again' if identified is None else 'in this run'} {text}: every number is the same"
     if others := len(compensator.lot) - 1 if compensator.lot else 0:
         text += f"; of the lot's other {others} valves {AS_STATED}"
     return _check(holds=True, text=text)

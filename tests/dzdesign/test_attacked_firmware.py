@@ -111,7 +111,7 @@ def test_a_changed_test_vector_is_named_however_it_is_hidden(verify, hidden):
             seal(folder, lambda manifest: hidden == "by a version" and manifest["tool"].update(version="0.0.9"))
 
     status, said = verify("host", attack)
-    assert status == 1 and "DOES NOT HOLD  the test vectors are the exactly rounded law's: vectors.csv: line" in said
+    assert status == 1 and "DOES NOT HOLD  the test vectors equal the exactly rounded law: vectors.csv: line" in said
     elsewhere = {"": "missing: vectors.csv", "by its hash": "otherwise than generated now: vectors.csv"}
     assert elsewhere.get(hidden, "dzdesign 0.0.9") in said
 

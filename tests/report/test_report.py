@@ -80,7 +80,7 @@ def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo)
     loops, identified = evidence["closed_loop"]["pressures"], json.loads((reported_demo / "valve.json").read_bytes())
     head = html[: html.index('<section id="characteristic">')]
     tried = f"all {len(evidence['checks'])} that were tried"
-    assert f"Every requirement holds, {tried}; the certificate is of the recording; {AS_STATED}<" in head
+    assert f"Every requirement holds, {tried}; the certificate covers the recording; {AS_STATED}<" in head
     assert "no machine was declared" in head and "Certificate of the recording<" in head
     # Recorded, not simulated, without the compensator: as in the table of the characteristic.
     before = 10 * max(each["u_onset_rising_V"] for each in identified["sides"]["positive"]["tests"])

@@ -27,52 +27,61 @@ Voltage = Annotated[float, Meta(gt=0, le=1e9, extra_json_schema={"unit": "V"})]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording(SourceFile):
-    """A recording, and its set."""
+    """A recording and its set."""
 
-    set: Annotated[Set, Meta(description="Which set it belongs to: without the compensator, or with it.")]
+    set: Annotated[
+        Set, Meta(description="Whether the recording was taken without the compensator (before) or with it (after).")
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What was asked for."""
+    """Options of the comparison."""
 
-    u_max_V: Annotated[Voltage, Meta(description="Full command BEFORE.")]
-    after_u_max_V: Annotated[Voltage, Meta(description="Full command AFTER.")]
+    u_max_V: Annotated[Voltage, Meta(description="Full command of the recordings without the compensator.")]
+    after_u_max_V: Annotated[Voltage, Meta(description="Full command of the recordings with the compensator.")]
     knee_window: Annotated[
         tuple[Share, Share],
-        quantity("1", "Shares of the largest flow between which the characteristic was taken as straight."),
+        quantity("1", "Range in which the characteristic was taken as straight, as shares of the largest flow."),
     ]
     linearity_window: Annotated[
-        tuple[Share, Share], quantity("1", "Shares of full command between which linearity was judged.")
+        tuple[Share, Share], quantity("1", "Range in which linearity was assessed, as shares of full command.")
     ]
-    reading_flow_L_min: Annotated[Flow | None, Meta(description="--reading-flow as a flow.")]
+    reading_flow_L_min: Annotated[Flow | None, Meta(description="Reading flow of --reading-flow, if given as a flow.")]
     reading_share: Annotated[
         Share | None,
-        Meta(description="--reading-flow as a share of the largest flow.", extra_json_schema={"unit": "1"}),
+        Meta(
+            description="Reading flow of --reading-flow, if given as a share of the largest flow.",
+            extra_json_schema={"unit": "1"},
+        ),
     ]
     same_pressure_within: Annotated[
-        Share, quantity("1", "Pressure drops that differ by less, as a share, are compared.")
+        Share, quantity("1", "Largest relative difference of two pressure drops that are compared with each other.")
     ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeterTaken:
-    """What was taken of the flow meter."""
+    """Properties of the flow meter as assumed."""
 
-    floor_L_min: Annotated[Flow, Meta(description="Flow below which it reads zero.")]
-    lag_s: Annotated[float, quantity("s", "Its lag.", ge=0, le=1e6)]
-    lag_is: Annotated[Literal["declared", "identified", "unknown"], Meta(description="Where the lag is from.")]
+    floor_L_min: Annotated[Flow, Meta(description="Flow below which the meter reads zero.")]
+    lag_s: Annotated[float, quantity("s", "First-order lag of the meter.", ge=0, le=1e6)]
+    lag_is: Annotated[
+        Literal["declared", "identified", "unknown"],
+        Meta(description="Whether the lag was declared, identified or unknown."),
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RampSet:
     """The ramps of one set at one pressure drop."""
 
-    source: Annotated[str, Meta(description="Names of the files.")]
-    ramps: Annotated[tuple[str, ...], Meta(description="File and number of each ramp.", min_length=1)]
-    dp_MPa: Annotated[PressureDrop | None, Meta(description="Pressure drop at no flow.")]
+    source: Annotated[str, Meta(description="Names of the recordings.")]
+    ramps: Annotated[tuple[str, ...], Meta(description="Recording and number of each ramp.", min_length=1)]
+    dp_MPa: Annotated[PressureDrop | None, Meta(description="Pressure drop at zero flow.")]
     curve: Annotated[
-        MeasuredCurve | UnsetType, Meta(description="Flow over command, thinned. Left out where nobody kept it.")
+        MeasuredCurve | UnsetType,
+        Meta(description="Flow over command, reduced to few points. Omitted if it was not kept."),
     ] = UNSET
 
 
@@ -80,9 +89,11 @@ class RampSet:
 class BeforeAfter:
     """One quantity without and with the compensator."""
 
-    before: Annotated[Reading | None, Meta(description="Without the compensator; null: not recorded.")]
-    after: Annotated[Reading | None, Meta(description="With it; null: not recorded.")]
-    change: Annotated[Change | None, Meta(description="AFTER less BEFORE, where both have a value.")]
+    before: Annotated[Reading | None, Meta(description="Reading without the compensator; null if not recorded.")]
+    after: Annotated[Reading | None, Meta(description="Reading with the compensator; null if not recorded.")]
+    change: Annotated[
+        Change | None, Meta(description="Value with the compensator minus the value without it, if both exist.")
+    ]
 
     def of_set(self, name: Set) -> Reading | None:
         """Return the reading of a set."""
@@ -94,12 +105,23 @@ class PressureAssessment:
     """One side at one pressure drop, without and with the compensator."""
 
     side: Annotated[Side, Meta(description="Side of the valve.")]
-    dp_MPa: Annotated[PressureDrop | None, Meta(description="Pressure drop: of BEFORE where there is one.")]
-    reading_flow_L_min: Annotated[Flow, Meta(description="Reading flow: that at which the dead zones are read.")]
-    rated_flow_L_min: Annotated[Flow, Meta(description="Largest flow BEFORE, brought to this pressure drop.")]
-    before: Annotated[RampSet | None, Meta(description="Recordings without the compensator; null: none here.")]
-    after: Annotated[RampSet | None, Meta(description="Recordings with it; null: none here.")]
-    quantities: Annotated[Mapping[str, BeforeAfter], Meta(description="Key of a quantity -> its readings.")]
+    dp_MPa: Annotated[
+        PressureDrop | None,
+        Meta(description="Pressure drop of the recordings without the compensator, or with it if only those exist."),
+    ]
+    reading_flow_L_min: Annotated[Flow, Meta(description="Reading flow: the flow at which the dead zones are read.")]
+    rated_flow_L_min: Annotated[
+        Flow, Meta(description="Largest flow without the compensator, scaled to this pressure drop.")
+    ]
+    before: Annotated[
+        RampSet | None, Meta(description="Ramps without the compensator; null if there are none at this pressure drop.")
+    ]
+    after: Annotated[
+        RampSet | None, Meta(description="Ramps with the compensator; null if there are none at this pressure drop.")
+    ]
+    quantities: Annotated[
+        Mapping[str, BeforeAfter], Meta(description="Readings of each quantity, by the quantity's key.")
+    ]
 
     def __post_init__(self) -> None:
         if self.before is None and self.after is None:
@@ -117,27 +139,29 @@ class PressureAssessment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assessment(Artefact):
-    """Ramps recorded without and with the compensator, side by side, as `dzdesign assess` writes them."""
+    """Ramps recorded without and with the compensator, compared, as `dzdesign assess` writes them."""
 
     FILE_NAME: ClassVar[str] = "assessment.json"
     schema: Annotated[Literal["dzdesign.assessment/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.assessment/1"
     )
-    made_from: Annotated[tuple[Recording, ...], Meta(description="The recordings.")]
-    holds: Annotated[bool, Meta(description="Whether every limit holds; one that could not be checked does not.")] = (
-        field(init=False)
-    )
-    options: Annotated[Request, Meta(description="What was asked for.")]
-    meter: Annotated[MeterTaken, Meta(description="What was taken of the flow meter.")]
-    terms: Annotated[str, Meta(description="Whose terms and whose formulas these are.")] = TERMS
-    quantities: Annotated[Mapping[str, Quantity], Meta(description="Key of a quantity -> name, unit and formula.")]
-    pressures: Annotated[
-        tuple[PressureAssessment, ...], Meta(description="Side by side, in the order of rising pressure drop.")
+    made_from: Annotated[tuple[Recording, ...], Meta(description="Recordings that were compared.")]
+    holds: Annotated[
+        bool, Meta(description="Whether every limit holds. A limit that could not be checked does not hold.")
+    ] = field(init=False)
+    options: Annotated[Request, Meta(description="Options of the comparison.")]
+    meter: Annotated[MeterTaken, Meta(description="Properties of the flow meter as assumed.")]
+    terms: Annotated[str, Meta(description="Source of the terms and formulas.")] = TERMS
+    quantities: Annotated[
+        Mapping[str, Quantity], Meta(description="Name, unit and formula of each quantity, by its key.")
     ]
-    limits: Annotated[tuple[LimitResult, ...], Meta(description="Every limit that was asked for.")]
-    notes: Annotated[tuple[Warning_, ...], Meta(description="What must be known to read it.")]
+    pressures: Annotated[
+        tuple[PressureAssessment, ...], Meta(description="Results by side, in ascending order of pressure drop.")
+    ]
+    limits: Annotated[tuple[LimitResult, ...], Meta(description="Result of every requested limit.")]
+    notes: Annotated[tuple[Warning_, ...], Meta(description="Remarks that are needed to interpret the results.")]
     recorded_units: Annotated[
-        RecordedUnits, Meta(description="Units of the recordings, in which a person sees what stands here.")
+        RecordedUnits, Meta(description="Units of the recordings, in which the results are displayed.")
     ] = AS_COMPUTED
 
     def __post_init__(self) -> None:

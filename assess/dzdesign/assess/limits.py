@@ -40,11 +40,11 @@ class LimitResult:
     """Whether the recordings at one pressure drop meet one limit."""
 
     quantity: Annotated[str, Meta(description="Key of the quantity.")]
-    place: Annotated[str, Meta(description="Side and pressure drop, in words.")]
-    limit: Annotated[Value, Meta(description="Largest value, in `unit`.")]
-    unit: Annotated[str, Meta(description="Of the limit.")]
-    holds: Annotated[bool | None, Meta(description="Whether it holds; null: could not be checked.")]
-    text: Annotated[str, Meta(description="What was found, and by how much a limit is missed.")]
+    place: Annotated[str, Meta(description="Side and pressure drop, as text.")]
+    limit: Annotated[Value, Meta(description="Largest permitted value, in `unit`.")]
+    unit: Annotated[str, Meta(description="Unit of the limit.")]
+    holds: Annotated[bool | None, Meta(description="Whether the limit holds; null if it could not be checked.")]
+    text: Annotated[str, Meta(description="Value that was found and, if the limit is exceeded, by how much.")]
 
 
 def parse_limits(text: str | Mapping[str, str], u_max: float) -> dict[str, float]:

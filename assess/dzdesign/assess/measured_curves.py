@@ -13,7 +13,7 @@ from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.knees.curve_thinning import TOLERANCE, decimals_of, evenly_spaced, fewest_points
 from dzdesign.identify.valve.ramp_conditions import RampConditions
 
-#: Largest command in per cent of full command, and largest flow, that a file may state.
+#: Largest command in percent of full command, and largest flow, that a file may state.
 LARGEST_PERCENT, LARGEST_FLOW = 1e4, 1e6
 #: Most points of a line, and most samples beside it.
 MOST_POINTS, MOST_SAMPLES = 104, 24
@@ -24,18 +24,24 @@ Flows = tuple[Annotated[float, Meta(ge=-LARGEST_FLOW, le=LARGEST_FLOW)], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredBranch:
-    """One branch: flow over command, straight between the points, and a few of its samples.
+    """One branch: flow over command, linear between the points, and a few of its samples.
 
     On the negative side commands and flows count from zero down, as in valve.json.
     """
 
-    command_percent: Annotated[Percents, quantity("%", "Commands of the points, rising, over full command.")]
-    q_L_min: Annotated[Flows, quantity("L/min", "Flow there, brought to the pressure drop at no flow.")]
+    command_percent: Annotated[
+        Percents, quantity("%", "Commands of the points in ascending order, as a percentage of full command.")
+    ]
+    q_L_min: Annotated[Flows, quantity("L/min", "Flow at each point, scaled to the pressure drop at zero flow.")]
     sample_command_percent: Annotated[
         Percents,
-        quantity("%", "Commands of single samples: of equal steps over the branch the sample nearest to each."),
+        quantity(
+            "%",
+            "Commands of single samples. The branch is divided into equal steps; the sample nearest to each "
+            "step is kept.",
+        ),
     ]
-    sample_q_L_min: Annotated[Flows, quantity("L/min", "Flow of each, brought to the same pressure drop.")]
+    sample_q_L_min: Annotated[Flows, quantity("L/min", "Flow of each single sample, scaled to the same pressure drop.")]
 
     def __post_init__(self) -> None:
         for commands, flows in (
@@ -51,9 +57,9 @@ class MeasuredBranch:
 class MeasuredCurve:
     """The curve of one set at one pressure drop; a branch that was not recorded is null."""
 
-    rising: Annotated[MeasuredBranch | None, Meta(description="On opening.")]
-    falling: Annotated[MeasuredBranch | None, Meta(description="On closing.")]
-    conditions: Annotated[RampConditions, Meta(description="How the ramps were recorded.")]
+    rising: Annotated[MeasuredBranch | None, Meta(description="Opening branch.")]
+    falling: Annotated[MeasuredBranch | None, Meta(description="Closing branch.")]
+    conditions: Annotated[RampConditions, Meta(description="Conditions under which the ramps were recorded.")]
 
     @property
     def branches(self) -> tuple[MeasuredBranch, ...]:

@@ -20,11 +20,11 @@ LARGEST = 1e12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """One quantity: what it is called, its unit, its formula."""
+    """One quantity: its name, unit and formula."""
 
-    name: Annotated[str, Meta(description="For people.")]
-    unit: Annotated[str, Meta(description="Of its values.")]
-    formula: Annotated[str, Meta(description="How it is computed.")]
+    name: Annotated[str, Meta(description="Display name.")]
+    unit: Annotated[str, Meta(description="Unit of the values.")]
+    formula: Annotated[str, Meta(description="Formula of the quantity.")]
 
 
 QUANTITIES: dict[str, Quantity] = {
@@ -38,7 +38,7 @@ QUANTITIES: dict[str, Quantity] = {
          "Q_L / largest flow: what a straight line from zero command to the largest flow would read"),
         ("onset_opening", "onset, opening", "%",
          "command at which the rising branch's first flow stands out of the meter's noise, over u_max"),
-        ("onset_closing", "onset, closing", "%", "the same of the falling branch's last flow"),
+        ("onset_closing", "onset, closing", "%", "the same for the falling branch's last flow"),
         ("knee_opening", "knee, opening", "%",
          "zero of the line through the straight part of Q/sqrt(dP) on the rising branch, over u_max"),
         ("knee_closing", "knee, closing", "%", "the same on the falling branch"),
@@ -46,7 +46,7 @@ QUANTITIES: dict[str, Quantity] = {
          "largest |u_r(Q) - u_f(Q)| / u_max at Q = 5, 10, ... 90 % of the largest flow"),
         ("linearity", "linearity", "%",
          "largest |m(u) - (a + b u)| / Q_rated in the window of u; m is the mean of both branches, each averaged over "
-         "cells of 1 % of u_max (of single readings the noise would add to the largest), a + b u its least-squares "
+         "cells of 1 % of u_max (the noise of single readings would add to the largest), a + b u its least-squares "
          "line there, Q_rated the largest flow BEFORE at this pressure drop"),
         ("gain", "gain", "L/min/V", "slope of the lines through the straight part, mean of both branches"),
         ("flow_at_zero", "flow at zero", "L/min",
@@ -72,12 +72,14 @@ StandardError = Annotated[float, Meta(ge=0, le=LARGEST)]
 class Reading:
     """A quantity as read from a recording, in the unit of the quantity."""
 
-    value: Annotated[Value | None, Meta(description="The value; null where it can't be observed.")]
-    se: Annotated[StandardError | None, Meta(description="Its standard error, where one can be had.")]
-    at_most: Annotated[Value | None, Meta(description="A bound, where only that is known.")]
-    not_observable: Annotated[str | None, Meta(description="Why there is no value.")]
-    note: Annotated[str | None, Meta(description="What must be known beside the value.")]
-    where: Annotated[str | None, Meta(description="Flow or command at which it was found, of what is largest there.")]
+    value: Annotated[Value | None, Meta(description="Value of the quantity; null if it can't be observed.")]
+    se: Annotated[StandardError | None, Meta(description="Standard error of the value, if it can be estimated.")]
+    at_most: Annotated[Value | None, Meta(description="Upper bound, if no value but only a bound is known.")]
+    not_observable: Annotated[str | None, Meta(description="Reason why there is no value.")]
+    note: Annotated[str | None, Meta(description="Remark that is needed to interpret the value.")]
+    where: Annotated[
+        str | None, Meta(description="Flow or command at which the value was found, relative to the largest one.")
+    ]
 
     def __post_init__(self) -> None:
         if (self.value is None) == (self.not_observable is None):
@@ -86,10 +88,10 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """AFTER less BEFORE, in the unit of the quantity."""
+    """Change of a quantity from without to with the compensator, in its unit."""
 
-    value: Annotated[Value, Meta(description="In the quantity's unit.")]
-    se: Annotated[StandardError | None, Meta(description="Its standard error.")]
+    value: Annotated[Value, Meta(description="Change, in the unit of the quantity.")]
+    se: Annotated[StandardError | None, Meta(description="Standard error of the change.")]
 
 
 def observed(value: float, se: float | None = None, note: str | None = None, where: str | None = None) -> Reading:
@@ -115,7 +117,7 @@ def in_units(readings: Mapping[str, Reading]) -> dict[str, Reading]:
 
 
 def symmetry(positive: Reading | None, negative: Reading | None) -> Reading:
-    """Return by how much one side is steeper than the other, in per cent, from the gains of both."""
+    """Return by how much one side is steeper than the other, in percent, from the gains of both."""
     known: list[tuple[float, float]] = []
     for gain, side in ((positive, "positive"), (negative, "negative")):
         if gain is None:
@@ -129,7 +131,7 @@ def symmetry(positive: Reading | None, negative: Reading | None) -> Reading:
 
 
 def change(before: Reading | None, after: Reading | None) -> Change | None:
-    """Return AFTER less BEFORE and its standard error; None where one of them shows no value."""
+    """Return AFTER minus BEFORE and its standard error; None where one of them shows no value."""
     if before is None or after is None or before.value is None or after.value is None:
         return None
     se = None if before.se is None or after.se is None else math.hypot(before.se, after.se)

@@ -52,13 +52,13 @@ def _found_targets() -> tuple[str, ...]:
     return tuple(sorted(entry.name.replace("_", "-") for entry in folders if (entry / "target.py").is_file()))
 
 
-#: One folder a target; each has `target.py` with a `TARGET` and its templates.
+#: One folder per target; each has `target.py` with a `TARGET` and its templates.
 TARGET_NAMES = _found_targets()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Firmware(ShownInNotebooks):
-    """The files of a C project, path to text, the manifest that names their origin, and what a person should know."""
+    """The files of a C project by path, the manifest that states their origin, and notes for the user."""
 
     files: Mapping[str, str]
     manifest: FirmwareManifest
@@ -69,7 +69,7 @@ class Firmware(ShownInNotebooks):
 
     @property
     def contents(self) -> Mapping[str, str | bytes]:
-        """What is written, path to content: the files, and the calibration block."""
+        """Content of each file to write, by path, calibration block included."""
         return {**self.files, **({BLOCK_FILE: self.block} if self.block else {})}
 
 
@@ -120,13 +120,26 @@ def generate(
     calibration: Calibration = "fixed",
     vectors: int = 0,
 ) -> Firmware:
-    """Generate the C project of a compensator for the target of that name, by default the one that it was designed for.
+    """Generate the C project of a compensator for a target, by default the target of its design.
 
-    `compensator_bytes` is the file that the compensator was read from; without it the document as it would be written.
-    With `calibration` "fixed" the numbers of the valve stand in the core, with "block" in a block of data beside it.
-    With `vectors` there are so many test vectors in vectors.csv. An unknown target is an `InputError`; so is one whose
-    converter or PWM differs from those that the compensator was designed for, a compensator that says of its target
-    what is not so, and a number of vectors that can't hit every node, corner and fault.
+    Parameters
+    ----------
+    compensator : Compensator
+        The design.
+    target_name : str, optional
+        Name of the target; None selects that of the design.
+    compensator_bytes : bytes, optional
+        Content of the file from which the compensator was read. None: the file as it would be written.
+    calibration : {"fixed", "block"}, optional
+        Place of the valve's numbers: constants in the core, or a block of data beside it.
+    vectors : int, optional
+        Number of test vectors in vectors.csv.
+
+    Raises
+    ------
+    InputError
+        If the target is unknown, or its converter or PWM differs from that of the design. Also if the compensator
+        contradicts its target, or there are too few vectors for every node, corner and fault.
     """
     designed_for = compensator.target
     target = target_named(target_name or (designed_for.name if designed_for else DEFAULT_TARGET))

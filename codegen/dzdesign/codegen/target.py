@@ -155,7 +155,7 @@ class Target:
             ("largest compare value", signals.compare_max, self.compare_max, not self.takes_any_signals),
             ("largest converter code", signals.code_max, self.converter.code_max, not self.takes_any_signals),
             ("number of samples a second", signals.sample_Hz, self.sample_Hz, self.has_timer),
-            ("number of PWM periods a second", signals.tick_Hz, self.tick_Hz, self.has_timer),
+            ("number of PWM periods per second", signals.tick_Hz, self.tick_Hz, self.has_timer),
         ):
             if fixed and asked != has:
                 raise InputError(
@@ -179,7 +179,7 @@ class Target:
             ("a converter's codes", theirs.levels, ours.converter.levels),
             ("counts at full drive", designed_for.compare_max, ours.compare_max),
             ("samples a second", designed_for.sample_Hz, ours.sample_Hz),
-            ("PWM periods a second", designed_for.tick_Hz, ours.tick_Hz),
+            ("PWM periods per second", designed_for.tick_Hz, ours.tick_Hz),
         ):
             if asked != has:
                 stated = (

@@ -1,4 +1,4 @@
-"""Artefact files: written whole or not at all, and never over what is somebody's own."""
+"""Atomic artefact writes that never overwrite files dzdesign did not create."""
 
 import contextlib
 import logging
@@ -64,7 +64,7 @@ def check_place_of_files(folder: Path, option: str) -> None:
 
 
 def write_files(folder: Path, files: Mapping[str, bytes], option: str) -> None:
-    """Add files to a folder, which is made if missing; each is written whole or not at all, over one of its name."""
+    """Add files to a folder, which is created if missing. Each is written atomically and may replace a file."""
     check_place_of_files(folder, option)
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
@@ -75,9 +75,9 @@ def write_files(folder: Path, files: Mapping[str, bytes], option: str) -> None:
 
 
 def check_file_may_be_written(path: Path, schema: str | None = None, option: str = "-o") -> None:
-    """Refuse to write over what is no regular file or, where the schema is given, no earlier artefact of its kind.
+    """Refuse to overwrite anything but a regular file or, if the schema is given, an earlier artefact of the same kind.
 
-    `identify -o *.csv` names a measurement as its output; a measurement is not to be had again.
+    `identify -o *.csv` names a measurement as its output; a measurement is not available again.
     """
     path = Path(path)
     with _refusing(f"'{path}'", option):
@@ -106,7 +106,7 @@ def check_file_may_be_written(path: Path, schema: str | None = None, option: str
 
 
 def write_file(path: Path, content: str | bytes, schema: str | None = None, option: str = "-o") -> None:
-    """Write a file whole or not at all: a temporary file beside it, then one rename. Its folder must exist.
+    """Write a file atomically: a temporary file beside it, then a rename. Its folder must exist.
 
     With the `schema` of a JSON artefact, an existing file of another kind is left alone.
     """

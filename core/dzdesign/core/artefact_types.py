@@ -43,7 +43,7 @@ class Tool:
     """The program that wrote a file."""
 
     name: Annotated[str, Meta(description="Always dzdesign.")]
-    version: Annotated[str, Meta(description="Its version.")]
+    version: Annotated[str, Meta(description="Version of the program.")]
 
 
 #: A SHA-256 in hex; ``$`` alone would let a line break pass.
@@ -52,10 +52,10 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceFile:
-    """A file that something was made from."""
+    """A file from which an artefact was made."""
 
     source: Annotated[str, Meta(description="File name.")]
-    sha256: Annotated[Sha256, Meta(description="SHA-256 of its bytes.")]
+    sha256: Annotated[Sha256, Meta(description="SHA-256 of the file's content.")]
 
 
 #: What this program writes into the header of its artefacts.
@@ -71,7 +71,7 @@ class Artefact:
     REMEDY: ClassVar[str] = ""
     schema: Annotated[str, Meta(description="Name and version of this schema.")]
     tool: Annotated[Tool, Meta(description="The program that wrote the file.")]
-    made_from: Annotated[tuple[SourceFile, ...], Meta(description="The files that it was made from.")]
+    made_from: Annotated[tuple[SourceFile, ...], Meta(description="Files from which this artefact was made.")]
 
 
 class JsonText(ABC):

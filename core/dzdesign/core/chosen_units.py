@@ -84,7 +84,7 @@ def read_units(given: Texts, option: str) -> ChosenUnits:
     Raises
     ------
     InputError
-        If one is no unit, or two are of one quantity.
+        If one is not a unit, or two are of one quantity.
     """
     items = [given] if isinstance(given, str | os.PathLike) or not isinstance(given, Iterable) else list(given)
     if not all(isinstance(item, str) for item in items):

@@ -29,7 +29,7 @@ def sync_file(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Wait until the names in a folder are on the disk; a system or file system that can't is no error."""
+    """Wait until the names in a folder are on the disk; a system or file system that can't is not an error."""
     if not FOLDERS_OPEN:
         return
     with contextlib.suppress(OSError):  # no right to read the folder, or a network's file system without such a call

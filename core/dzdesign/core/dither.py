@@ -21,10 +21,13 @@ SAME_FREQUENCY = Fraction(5, 100)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dither:
-    """A square wave about the drive."""
+    """A square wave around the drive."""
 
-    frequency_Hz: Annotated[float, quantity("Hz", "Its frequency.", ge=LOWEST_HZ, le=HIGHEST_HZ)]
-    peak: Annotated[float, quantity("1", "Half its height, over full command.", gt=0, le=LARGEST_PEAK)]
+    frequency_Hz: Annotated[float, quantity("Hz", "Frequency of the square wave.", ge=LOWEST_HZ, le=HIGHEST_HZ)]
+    peak: Annotated[
+        float,
+        quantity("1", "Amplitude: half the peak-to-peak height, as a share of full command.", gt=0, le=LARGEST_PEAK),
+    ]
 
     def __post_init__(self) -> None:
         if not LOWEST_HZ <= self.frequency_Hz <= HIGHEST_HZ:

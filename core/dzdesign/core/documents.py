@@ -1,4 +1,4 @@
-"""Artefacts as documents: JSON to and fro, hash, schema."""
+"""Artefacts as documents: JSON back and forth, hash, schema."""
 
 import hashlib
 import json
@@ -73,7 +73,7 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def parse_document(content: bytes, source: str, schemas: tuple[str, ...]) -> dict[str, Any]:
     """Read a JSON artefact and check that its schema is one of `schemas`.
 
-    Refused is what is no JSON object in UTF-8, holds a key twice or what can't be written again (NaN, half a
+    Refused is what is not a JSON object in UTF-8, holds a key twice or what can't be written again (NaN, half a
     character), or has another schema.
     """
     expected = " or ".join(f"{schema}{_writer(schema)}" for schema in schemas)

@@ -9,19 +9,19 @@ MOST_NEIGHBOURS = 10_000
 
 
 class DzdesignError(Exception):
-    """Root of every error that dzdesign raises on purpose; the command line turns it into exit status 2."""
+    """Root of all deliberate errors of dzdesign; the command line exits with status 2."""
 
 
 class InputError(DzdesignError):
-    """Input or usage is bad: a file, a column, a unit, a name, an option."""
+    """Wrong input or usage, such as a file, a column, a unit, a name or an option."""
 
 
 class MissingToolError(InputError):
-    """A program or package of others that is needed is not here, is too old, or fails on this machine."""
+    """A required external program or package is missing, too old, or fails on this machine."""
 
 
 class RequirementError(DzdesignError):
-    """A requirement does not hold (a proof failed, an input is wrong): exit status 1, not a usage error."""
+    """A requirement does not hold, such as a failed proof or a wrong result; the command line exits with status 1."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -1,4 +1,4 @@
-"""Whose a folder is: by the manifest that dzdesign left in it, which files it wrote, and what a person made of them."""
+"""Ownership of a folder by its manifest: which files dzdesign wrote, and which of them the user changed."""
 
 import os
 import shutil
@@ -10,7 +10,7 @@ from dzdesign.core.documents import PIECE, family_of, sha256_of_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import json_object, reason_of
 
-#: File by which a folder is known as made by dzdesign, so that it may be made anew.
+#: File by which a folder is known as made by dzdesign, so that it may be made again.
 MANIFEST_NAME = "manifest.json"
 
 
@@ -33,7 +33,7 @@ def _is_name_inside(name: str) -> bool:
 
 
 def check_inside(folder: Path, names: Iterable[str], source: str) -> None:
-    """Refuse names of files that lie outside their folder, also by way of a link, and what is no regular file.
+    """Refuse names of files that lie outside their folder, also by way of a link, and what is not a regular file.
 
     They are as a manifest gives them, `source` is who names them; one that is missing is no concern here.
     """
@@ -79,7 +79,7 @@ def _is_erased(path: Path) -> bool:
 
 
 def refuse_to_replace_unknown(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Refuse to write over files of a folder whose manifest a power cut erased, unless they are erased or the same."""
+    """Refuse to overwrite files of a folder whose manifest a power cut erased, unless they are erased or identical."""
     for name, data in contents.items():
         path = folder / name
         if os.path.lexists(path) and not _is_erased(path) and (not path.is_file() or path.read_bytes() != data):

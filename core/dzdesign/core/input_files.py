@@ -1,4 +1,4 @@
-"""Files that somebody gives: opened or read, or one sentence why not; never a hang, never more memory than stated.
+"""Reading of user files: each is opened or read, or one sentence says why not, without hanging or unbounded memory.
 
 What is no regular file can be read only once. A pipe is held in memory, `MOST_PIPED` bytes of it; a device is refused,
 for it may have no end.

@@ -1,4 +1,4 @@
-"""What turns the text of an option into the value that a stage works with; the second argument names the option."""
+"""Readers that turn the text of an option into the value for a stage; the second argument names the option."""
 
 import contextlib
 import re

@@ -83,7 +83,7 @@ class Argument:
 
     @property
     def flag(self) -> str:
-        """The option as it is written on the command line."""
+        """The option as written on the command line."""
         return flag_of(self.name)
 
     @property
@@ -121,7 +121,7 @@ class Argument:
 
 
 def flag_of(name: str) -> str:
-    """Return an option as it is written on the command line.
+    """Return an option as written on the command line.
 
     Examples
     --------

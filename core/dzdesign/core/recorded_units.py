@@ -30,13 +30,14 @@ UnitName = Annotated[str, Meta(min_length=1, max_length=LONGEST_UNIT)]
 class CommandUnit:
     """Unit of the command: a reading is ``at_zero + factor * u`` at a command of u volts."""
 
-    unit: Annotated[UnitName, Meta(description="Its name.")] = "V"
+    unit: Annotated[UnitName, Meta(description="Name of the unit.")] = "V"
     at_zero: Annotated[
-        float, quantity("1", "Reading at a command of 0 V, such as 12 of 4..20 mA.", ge=-1e12, le=1e12)
+        float, quantity("1", "Reading at a command of 0 V, such as 12 for 4..20 mA.", ge=-1e12, le=1e12)
     ] = 0.0
-    factor: Annotated[float, quantity("1/V", "Change of the reading with the command.", ge=-1e12, le=1e12)] = 1.0
+    factor: Annotated[float, quantity("1/V", "Change of the reading per volt of command.", ge=-1e12, le=1e12)] = 1.0
     declared: Annotated[
-        str, Meta(description="Range as declared, such as '4..20 mA = -10..10 V'; empty without one.", max_length=120)
+        str,
+        Meta(description="Declared range, such as '4..20 mA = -10..10 V'; empty if none was declared.", max_length=120),
     ] = ""
 
     def __post_init__(self) -> None:
@@ -49,8 +50,8 @@ class CommandUnit:
 class PressureUnit:
     """Unit of the pressure drop."""
 
-    unit: Annotated[UnitName, Meta(description="Its name.")] = "MPa"
-    factor: Annotated[float, quantity("1/MPa", "How many of it are 1 MPa.", gt=0, le=1e12)] = 1.0
+    unit: Annotated[UnitName, Meta(description="Name of the unit.")] = "MPa"
+    factor: Annotated[float, quantity("1/MPa", "Number of these units in 1 MPa.", gt=0, le=1e12)] = 1.0
 
 
 @final
@@ -58,8 +59,8 @@ class PressureUnit:
 class FlowUnit:
     """Unit of the flow."""
 
-    unit: Annotated[UnitName, Meta(description="Its name.")] = "L/min"
-    factor: Annotated[float, quantity("min/L", "How many of it are 1 L/min.", gt=0, le=1e12)] = 1.0
+    unit: Annotated[UnitName, Meta(description="Name of the unit.")] = "L/min"
+    factor: Annotated[float, quantity("min/L", "Number of these units in 1 L/min.", gt=0, le=1e12)] = 1.0
 
 
 @final
@@ -67,8 +68,8 @@ class FlowUnit:
 class CurrentUnit:
     """Unit of a solenoid's current."""
 
-    unit: Annotated[UnitName, Meta(description="Its name.")] = "A"
-    factor: Annotated[float, quantity("1/A", "How many of it are 1 A.", gt=0, le=1e12)] = 1.0
+    unit: Annotated[UnitName, Meta(description="Name of the unit.")] = "A"
+    factor: Annotated[float, quantity("1/A", "Number of these units in 1 A.", gt=0, le=1e12)] = 1.0
 
 
 Quantity = Literal["command", "pressure", "flow"]
@@ -120,11 +121,13 @@ class RecordedUnits:
     pressure: Annotated[PressureUnit, Meta(description="Unit of the pressure drop.")] = PressureUnit()
     flow: Annotated[FlowUnit, Meta(description="Unit of the flow.")] = FlowUnit()
     current: Annotated[
-        CurrentUnit | UnsetType, Meta(description="Unit of a solenoid's current; missing: A.")
+        CurrentUnit | UnsetType, Meta(description="Unit of a solenoid's current; A if the key is absent.")
     ] = UNSET
     differ: Annotated[
         tuple[Quantity, ...],
-        Meta(description="Quantities that the recordings have in different units: shown in V, MPa or L/min."),
+        Meta(
+            description="Quantities whose units differ between the recordings. They are displayed in V, MPa or L/min."
+        ),
     ] = ()
 
     def of_side(self, side: str) -> "RecordedUnits":
@@ -258,7 +261,7 @@ _NAMES: dict[str, str] = {
 
 
 def name_of_unit(written: str) -> str:
-    """Return the name of a unit as it is written somewhere; empty if that is no text for people."""
+    """Return the name of a unit as written somewhere; empty if that is no text for people."""
     return _NAMES.get(written.lower(), plain_unit(written))
 
 

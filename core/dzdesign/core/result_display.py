@@ -1,4 +1,4 @@
-"""A result that `print` sums up and a notebook shows as a page: the room says that it may be, the front door how."""
+"""Display of results by `print` and in notebooks: a room marks its results, the front door registers how."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

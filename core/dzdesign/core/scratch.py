@@ -1,4 +1,4 @@
-"""Folders for what a process needs only while it runs; those of a process that was killed go with the next one.
+"""Temporary folders of a process; those of a killed process are removed by the next one.
 
 Each is held by a lock that ends with its process, however that ends.
 """
@@ -27,7 +27,7 @@ _held: dict[Path, Callable[[], None]] = {}
 
 @contextlib.contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Make a folder that goes at the end of the context."""
+    """Create a folder that is removed at the end of the context."""
     folder = _made()
     try:
         yield folder
@@ -37,7 +37,7 @@ def scratch_folder() -> Iterator[Path]:
 
 @cache
 def process_folder() -> Path:
-    """Return the folder of this process, which goes when the process ends."""
+    """Return the folder of this process, which is removed when the process ends."""
     folder = _made()
     atexit.register(_remove, folder)
     return folder

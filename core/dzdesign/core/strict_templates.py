@@ -1,4 +1,4 @@
-"""One way to render a template: a name without a value fails, and blocks leave no blank lines."""
+"""Rendering of templates: a name without a value fails, and blocks leave no blank lines."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""TOML files that people write: read with a bound on the depth of their keys, for which a parser takes any memory."""
+"""Reading of TOML files with a limit on the depth of keys, which bounds the memory of the parser."""
 
 import re
 import tomllib

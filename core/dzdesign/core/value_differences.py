@@ -1,4 +1,4 @@
-"""Where two values of one shape, such as two artefacts of a type, differ."""
+"""Differences between two values of the same structure, such as two artefacts of one type."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

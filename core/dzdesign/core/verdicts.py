@@ -4,7 +4,7 @@ HOLDS, DOES_NOT_HOLD, NOT_CHECKED = "HOLDS", "DOES NOT HOLD", "NOT CHECKED"
 
 
 def verdict_words(holds: bool | None) -> str:
-    """Return what a verdict is called; None was not checked.
+    """Return the words for a verdict; None means not checked.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Texts with quantities that wait for the units of the recordings: whoever warns or refuses need not know them."""
+"""Texts whose quantities are formatted later, in the units of the recordings, which their author need not know."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -93,7 +93,7 @@ def _lowered_drive() -> Callable[..., Any]:
 
 
 def pressure_drop(dp_code: Any, *, span: Any, code_max: Any) -> Any:
-    """Return the pressure drop that a difference of pressure codes, A less B, stands for, for numbers of any kind.
+    """Return the pressure drop that a difference of pressure codes, A minus B, stands for, for numbers of any kind.
 
     It is in the unit of `span`, which both sensors have; `code_max` is the code of the full span.
 

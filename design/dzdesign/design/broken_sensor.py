@@ -1,4 +1,4 @@
-"""What a failed pressure sensor does where its signal does not show it: the largest offset, and flow at zero command.
+"""Effect of a failed pressure sensor that its signal does not reveal: the largest offset, and flow at zero command.
 
 A threshold that falls with the pressure drop has its largest offset at a reading of none, one that grows has it at the
 largest reading. Codes that a sound signal never makes give the smallest beta; a failure that makes sound ones can not.

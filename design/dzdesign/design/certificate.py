@@ -1,4 +1,4 @@
-"""The certificate: that the offset, at every pressure code, stays under the lower bound of the guarded threshold.
+"""The certificate: proof that the offset lies below the lower bound of the guarded threshold at every pressure code.
 
 `design` proves it for the table that it chooses, and `codegen` and `verify` prove it again for a compensator that comes
 from a file: a file can be edited, and the firmware's header would go on promising what no longer holds.
@@ -179,10 +179,10 @@ def _smallest_margin(margins: TableMargins, certified: range, *, lets_go: bool) 
 def _above(
     curve: OffsetCurve, certified: range, signals: Signals, margins: TableMargins
 ) -> tuple[Fraction, Fraction | None]:
-    """Return up to which pressure drop the certificate holds, and from which on the offset is let go, MPa.
+    """Return up to which pressure drop the certificate holds, and from which the offset is released, MPa.
 
     Above the tests it holds as far as the continued bound does, code by code, and where the drive is zero whatever the
-    threshold. An offset that is let go is one unit of beta.
+    threshold. An offset that is released is one unit of beta.
     """
     tests_end, count = curve.dp_MPa[-1], len(margins.limit)
     if curve.above is None or certified.stop >= count:

@@ -33,84 +33,89 @@ Codes = Annotated[int, Meta(ge=0, le=65535)]
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Compensator(ShownInNotebooks, Artefact):
-    """The law u_O = g(dP) u_i + o(dP) on codes, every coefficient exact, as `dzdesign design` writes it."""
+    """The law u_O = g(dP) u_i + o(dP) on converter codes with exact coefficients, as `dzdesign design` writes it."""
 
     FILE_NAME: ClassVar[str] = "compensator.json"
     REMEDY: ClassVar[str] = "make it again with `dzdesign design`, a lot's with `dzdesign batch`"
     schema: Annotated[Literal["dzdesign.compensator/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.compensator/1"
     )
-    target: Annotated[
-        TargetInputs | None, Meta(description="Target that it was designed for; null where nobody wrote it down.")
-    ]
+    target: Annotated[TargetInputs | None, Meta(description="Target of the design; null if it was not recorded.")]
     options: Annotated[
         Mapping[str, str] | None,
-        Meta(description="Options of `design`, as written, defaults included; null where nobody wrote them down."),
+        Meta(description="Options of `design` as entered, defaults included; null if they were not recorded."),
     ]
-    law: Annotated[str, Meta(description="paper (Eq. 18), or target (meets Eq. 16).")]
-    below_dp0: Annotated[BelowDp0, Meta(description="For dP <= dP0 hold beta = 1, or follow the tests there.")] = "hold"
+    law: Annotated[str, Meta(description="Compensation law: paper (Eq. 18) or target (meets Eq. 16).")]
+    below_dp0: Annotated[
+        BelowDp0,
+        Meta(description="Behaviour at dP <= dP0. hold: beta stays at 1. Otherwise beta follows the tests there."),
+    ] = "hold"
     above: Annotated[
         Above,
         Meta(
-            description="Above the last test hold its offset, lower it with the continued bound of valve.json, or let "
-            "it go. Of one test, hold in place of lower."
+            description="Behaviour above the last test. The offset is held, lowered with the continued bound of "
+            "valve.json, or released. With a single test, `hold` replaces `lower`."
         ),
     ] = "lower"
     u_max_V: Annotated[Fraction, quantity("V", "Full command.")]
-    signals: Annotated[Signals, Meta(description="Scalings of command, pressures and compare value.")]
-    beta_denominator: Annotated[int, Meta(description="Unit of the nodes of beta, a power of two.", ge=1, le=2**30)]
+    signals: Annotated[Signals, Meta(description="Scalings of the command, the pressures and the compare value.")]
+    beta_denominator: Annotated[
+        int, Meta(description="Denominator of the nodes of beta, a power of two.", ge=1, le=2**30)
+    ]
     beta_step_codes: Annotated[
         int, Meta(description="Pressure codes between two nodes of beta, a power of two.", ge=1, le=65535)
     ]
     reverse_codes: Annotated[
         Codes,
         Meta(
-            description="Differences of pressure codes below the negative of this are taken as a failed sensor: the "
-            "smallest beta is used."
+            description="Largest negative difference of pressure codes, as a magnitude, that is accepted. Beyond it a "
+            "sensor is taken as failed and the smallest beta is used."
         ),
     ]
     transition_codes: Annotated[
         Codes,
         Meta(
-            description="Codes of command, behind the zero band, over which the drive runs from the closing to the "
-            "opening threshold, a power of two; 0: none."
+            description="Command codes of the transition from the closing to the opening threshold, which starts at "
+            "the end of the zero band. A power of two, or 0 for none."
         ),
     ] = 0
     reading_flow_L_min: Annotated[
         float,
-        quantity("L/min", "Reading flow: the flow at which dead zones are read, beside the onset.", gt=0, le=1e6),
+        quantity(
+            "L/min", "Reading flow: the flow at which dead zones are read, in addition to the onset.", gt=0, le=1e6
+        ),
     ]
     zero_band_codes: Annotated[
         Codes,
-        Meta(description="Codes of command up to which the law takes it as zero; 0, and only 0, without a transition."),
+        Meta(description="Largest command code that the law treats as zero; always 0 without a transition."),
     ] = 0
-    command_error: Annotated[CommandError, Meta(description="Error of the command's code at zero, as declared.")]
-    sides: Annotated[Sides, Meta(description="The law of each sign of command.")]
-    drive_functions: Annotated[DriveFunctions, Meta(description="Ramps, dither and the like.")] = field(
-        default_factory=DriveFunctions
-    )
+    command_error: Annotated[CommandError, Meta(description="Declared error of the command's code at zero.")]
+    sides: Annotated[Sides, Meta(description="Law for each sign of the command.")]
+    drive_functions: Annotated[
+        DriveFunctions, Meta(description="Functions around the law, such as ramps and dither.")
+    ] = field(default_factory=DriveFunctions)
     current_drive: Annotated[
         CurrentDrive | None,
-        Meta(description="Current control of the drive; null: the law's output is the PWM's duty."),
+        Meta(description="Current control of the drive; null if the law's output is the duty of the PWM."),
     ] = None
     machine: Annotated[
         Machine | None,
         Meta(
-            description="By how much the machine may differ from the bench, as declared; null: the certificate is of "
-            "the recording, and counts neither coil, supply, sensors, converter, oil nor ageing."
+            description="Declared differences between machine and bench. Null: the certificate covers the recording "
+            "only, without coil, supply, sensors, converter, oil or ageing."
         ),
     ] = None
-    costs: Annotated[tuple[str, ...], Meta(description="What the safe choices cost, in words.")]
+    costs: Annotated[tuple[str, ...], Meta(description="Cost of each safe choice, in words.")]
     valve_sha256: Annotated[
-        str, Meta(description="SHA-256 of `valve` as `identify` writes it: a change of it is seen.")
+        str, Meta(description="SHA-256 of `valve` as `identify` writes it, which reveals a change.")
     ] = field(init=False)
-    valve: Annotated[ValveModel, Meta(description="The valve that it was designed from.")]
+    valve: Annotated[ValveModel, Meta(description="Identified valve from which the compensator was designed.")]
     lot_sha256: Annotated[
-        str | None, Meta(description="SHA-256 of `lot` as it stands here; null of a valve's own setting.")
+        str | None, Meta(description="SHA-256 of `lot` as stored here; null for the setting of a single valve.")
     ] = field(init=False)
     lot: Annotated[
         tuple[LotValve, ...],
-        Meta(description="Of one setting for a lot of valves: these valves and their bounds; else empty."),
+        Meta(description="Valves of the lot that shares this setting, with their bounds; empty for a single valve."),
     ] = ()
 
     def __post_init__(self) -> None:
@@ -198,12 +203,12 @@ class Compensator(ShownInNotebooks, Artefact):
 
     @property
     def certified_of(self) -> str:
-        """What the certificate is of: the recording, or the recording and the declared machine."""
+        """What the certificate covers: the recording alone, or the recording and the declared machine."""
         return "the recording" if self.machine is None else "the recording and the declared machine"
 
     @property
     def valve_json_sha256(self) -> str:
-        """SHA-256 of the valve.json that it was designed from."""
+        """SHA-256 of the valve.json from which it was designed."""
         return self.made_from[0].sha256
 
     def side(self, sign: int = 1) -> SideLaw:
@@ -215,29 +220,29 @@ class Compensator(ShownInNotebooks, Artefact):
 
     @property
     def dither_reserve_counts(self) -> int:
-        """Counts by which the offset stays lower for the dither; next to none where the ramps were recorded with it."""
+        """Counts by which the dither lowers the offset; almost none if the ramps were recorded with it."""
         driven = self.drive_functions.dither(self.signals)
         return dither_reserve(driven, self.valve.dither, self.machine, self.current_drive)
 
     def allowance(self, sign: int) -> Allowance:
-        """Return what the offset of a side leaves free under the certified curve."""
+        """Return the margin that the offset of a side keeps below the certified curve."""
         return allowance_of(self.signals, self.machine, sign=sign, dither_counts=self.dither_reserve_counts)
 
     @property
     def transition_end(self) -> int:
-        """Codes of command at which zero band and transition are over."""
+        """Command code at which zero band and transition end."""
         return self.zero_band_codes + self.transition_codes
 
     def nodes(self, sign: int = 1) -> int:
-        """Return how many nodes beta needs for every difference of pressure codes."""
+        """Return the number of nodes that beta needs to cover every pressure-code difference."""
         return self.signals.largest_difference(sign) // self.beta_step_codes + 2
 
     def beta(self, dp_code: int, sign: int = 1) -> Fraction:
-        """Return the certified beta at a difference of pressure codes, exactly."""
+        """Return the exact certified beta at a pressure-code difference."""
         return self._interpolate(self.side(sign).beta, dp_code)
 
     def law_beta(self, dp_code: int, sign: int = 1) -> Fraction:
-        """Return the beta that the law follows beyond the transition; the certified one without a transition."""
+        """Return the beta that the law follows after the transition; without a transition, the certified one."""
         return self._interpolate(self.side(sign).law_beta, dp_code)
 
     def _interpolate(self, numerators: tuple[int, ...], dp_code: int) -> Fraction:
@@ -251,7 +256,7 @@ class Compensator(ShownInNotebooks, Artefact):
         )
 
     def counts(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
-        """Return the compare value of the law at a code pair, exactly: not rounded, not limited."""
+        """Return the exact compare value of the law at a code pair, before rounding and limiting."""
         side, signals, beta = self.side(sign), self.signals, self.law_beta(dp_code, sign)
         from_zero = signals.command.from_zero(command_code, sign)
         span, u_min0 = signals.command.span(sign), side.u_min0_over_u_max
@@ -269,11 +274,11 @@ class Compensator(ShownInNotebooks, Artefact):
         return Fraction(line.counts(evaluate_law_command(from_zero, **ends), beta) - lowered)
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
-        """Return u_O/u_max of the law at a code pair, exactly and before it is limited to 0...1."""
+        """Return the exact u_O/u_max of the law at a code pair, before limiting to 0...1."""
         return Fraction(drive(self.counts(command_code, dp_code, sign), self.signals.compare_max))
 
     def compare(self, command_code: int, dp_code: int, sign: int = 1) -> int:
-        """Return the PWM compare value: the law rounded to the nearest count (a half goes up), limited to the range."""
+        """Return the PWM compare value: the law rounded to the nearest count (half up) and limited to the range."""
         counts = self.counts(command_code, dp_code, sign)
         rounded = (2 * counts.numerator + counts.denominator) // (2 * counts.denominator)
         return min(max(rounded, 0), self.drive_functions.compare_limit)

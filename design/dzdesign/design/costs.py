@@ -1,4 +1,4 @@
-"""What a design costs, in a person's words: dead zone that remains, flow at the transition, drive at full command."""
+"""Costs of a design in words: remaining dead zone, flow at the transition, drive at full command."""
 
 from fractions import Fraction
 
@@ -25,7 +25,8 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     units = valve.recorded_units
     lines.append(
-        f"a pressure difference below -{compensator.reverse_codes} codes is taken as a failed sensor: smallest beta"
+        f"a pressure difference below -{compensator.reverse_codes} codes counts as a failed sensor and selects the "
+        "smallest beta"
         + (", which leaves no offset" if compensator.positive.certificate.released_from_MPa is not None else "")
     )
     if compensator.reading_flow_L_min < (least := default_reading_flow(valve)):
@@ -161,7 +162,7 @@ def _cost_of_dither(compensator: Compensator) -> str:
 def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     """Say which commands count as zero, or what a wrong zero does where none but zero itself does."""
     span, error = compensator.signals.command.span(1), compensator.command_error
-    declared = f"{error.offset_codes} + {error.noise_codes} codes of declared error"
+    declared = f"declared error {error.offset_codes} + {error.noise_codes} codes"
     if not compensator.transition_codes:
         return [
             f"no transition, so no zero band: a zero command that reads {error.zero_band_codes} codes too high "
@@ -170,8 +171,8 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
         ]
     leave, end = compensator.drive_functions.leave_zero_codes, compensator.transition_end
     return [
-        f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero, "
-        f"{declared}; from rest the drive leaves at more than {leave} codes ({leave / span:.2%}), and up to {end} "
+        f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero "
+        f"({declared}); the drive leaves rest above {leave} codes ({leave / span:.2%}), and up to {end} "
         f"({end / span:.2%}) it runs from the {compensator.positive.certificate.guard} to the opening threshold"
     ]
 

@@ -1,4 +1,4 @@
-"""What a design leaves at the tested pressure drops: dead zone at the onset and at the reading flow, flow, drive."""
+"""Remaining dead zone at the tested pressure drops, at the onset and at the reading flow, with flow and drive."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

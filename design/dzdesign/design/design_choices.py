@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
 BelowDp0 = Literal["hold", "extend"]
 BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
-#: What to do above the last tested pressure drop: hold its offset, lower it with the continued bound, or let it go.
+#: What to do above the last tested pressure drop: hold its offset, lower it with the continued bound, or release it.
 Above = Literal["hold", "lower", "release"]
 ABOVE: tuple[Above, ...] = get_args(Above)
 POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")
@@ -95,7 +95,7 @@ DEFAULTS = {argument.name: argument.option.default for argument in arguments_of(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignRequest:
-    """The target that was designed for, and name and text of every option, a default where none was given."""
+    """The target of the design, and name and text of every option; a default if none was given."""
 
     target: "TargetInputs"
     options: Mapping[str, str]

@@ -40,7 +40,7 @@ REVERSE_SHARE = Fraction(1, 100)
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
-    """Design the compensator of a valve, every coefficient rational and the certificate proved on them.
+    """Design the compensator of a valve with rational coefficients, and prove the certificate on them.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from dzdesign.design.signals import Signals
 
 #: Ramps count in codes of command over this, a sample.
 RAMP_UNIT = 1 << 16
-#: Codes of command from zero on that a ramp counts in 32 bits.
+#: Codes of command from zero that a ramp counts in 32 bits.
 RAMPED_CODES = (1 << 31) // RAMP_UNIT - 1
 
 #: Samples that the firmware counts up to.
@@ -24,15 +24,15 @@ Counts = Annotated[int, Meta(ge=0, le=65535)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveFunctions:
-    """What the drive does around the law, as the integers that the firmware uses."""
+    """Functions of the drive around the law, as the integers of the firmware."""
 
     leave_zero_codes: Annotated[
         int,
         Meta(
-            description="Codes of command beyond which the drive leaves its rest at zero command, where the law has a "
-            "zero band; and, of a command of both signs, by which it must pass zero before the other solenoid is "
-            "driven. Until then the one that was driven stays at its offset: noise about zero does not throw the spool "
-            "from side to side. 0: none.",
+            description="Command codes that the command must exceed to leave zero, if the law has a zero band. It must "
+            "also pass zero by as much before the drive switches to the other solenoid. Until then the last "
+            "solenoid stays at its offset, so that noise around zero does not move the spool. 0: no such "
+            "threshold.",
             ge=0,
             le=32767,
         ),
@@ -40,47 +40,61 @@ class DriveFunctions:
     ramp_up: Annotated[
         tuple[Step, Step],
         Meta(
-            description="Largest change of the command a sample, away from zero, in 1/65536 of a code: of positive, "
-            "then of negative command. 0: no limit."
+            description="Largest change of the command per sample away from zero, for positive and negative commands. "
+            "In 1/65536 of a code; 0 for no limit."
         ),
     ] = (0, 0)
-    ramp_down: Annotated[tuple[Step, Step], Meta(description="The same, back to zero.")] = (0, 0)
+    ramp_down: Annotated[
+        tuple[Step, Step],
+        Meta(
+            description="Largest change of the command per sample towards zero, for positive and negative commands. In "
+            "1/65536 of a code; 0 for no limit."
+        ),
+    ] = (0, 0)
     dither_counts: Annotated[
         int,
         Meta(
-            description="Half the height of a square wave on the compare value; the certificate counts it as offset. "
-            "0: none.",
+            description="Amplitude of the square wave on the compare value, which the certificate counts as offset. 0: "
+            "no dither.",
             ge=0,
             le=65535,
         ),
     ] = 0
-    dither_ticks: Annotated[int, Meta(description="PWM periods of half a wave.", ge=1, le=32767)] = 1
+    dither_ticks: Annotated[int, Meta(description="PWM periods in half a period of the dither.", ge=1, le=32767)] = 1
     play_counts: Annotated[
         tuple[tuple[Counts, ...], tuple[Counts, ...]],
         Meta(
-            description="Counts by which a falling command is driven lower than a rising one, the valve's hysteresis: "
-            "of positive, then of negative commands, nodes every `play_step_codes` codes of command from zero on, "
-            "straight between them. Empty: no difference is made."
+            description="Compensation of hysteresis: counts by which the drive is lower at a falling than at a rising "
+            "command. For positive and negative commands, with linear interpolation between nodes at every "
+            "`play_step_codes` codes of command from zero. Empty: no compensation."
         ),
     ] = ((), ())
-    play_step_codes: Annotated[int, Meta(description="Codes between the nodes, a power of two.", ge=1, le=4096)] = 256
+    play_step_codes: Annotated[
+        int, Meta(description="Command codes between two nodes of play_counts, a power of two.", ge=1, le=4096)
+    ] = 256
     play_codes: Annotated[
         int,
         Meta(
-            description="Codes of travel over which the drive goes from the one to the other, a power of two.",
+            description="Command travel over which the drive changes from one branch to the other, in codes. A power "
+            "of two.",
             ge=1,
             le=32,
         ),
     ] = 8
     play_noise_codes: Annotated[
-        int, Meta(description="Codes that a command may stray to either side without turning.", ge=0, le=4095)
+        int,
+        Meta(
+            description="Largest fluctuation of the command, in codes, that does not count as a reversal.",
+            ge=0,
+            le=4095,
+        ),
     ] = 0
     compare_limit: Annotated[int, Meta(description="Largest compare value.", ge=0, le=65535)] = 60000
     fault_samples: Annotated[
         int,
         Meta(
-            description="Valid samples in a row after which a fault is over. Until then, from the first faulty sample "
-            "on, the valve is let go where the command is invalid, and has the smallest beta where a pressure is.",
+            description="Consecutive valid samples that end a fault. From the first faulty sample until then, an "
+            "invalid command de-energises the valve, and an invalid pressure selects the smallest beta.",
             ge=1,
             le=MOST_FAULT_SAMPLES,
         ),
@@ -88,17 +102,17 @@ class DriveFunctions:
     fault_latch: Annotated[
         bool,
         Meta(
-            description="Whether a fault of `fault_samples` faulty samples, with fewer valid ones in a row between "
-            "them, stays until the drive is initialised again."
+            description="Whether a fault is latched until the drive is initialised again. The latch sets after "
+            "`fault_samples` faulty samples, if fewer consecutive valid samples lie between them."
         ),
     ] = False
     interlock_codes: (
         Annotated[
             int,
             Meta(
-                description="Codes of command up to which it counts as zero command, which the drive must see for "
-                "`fault_samples` samples in a row after a reset or an invalid command before it follows; null: it "
-                "follows any valid one.",
+                description="Largest command code that counts as zero for the interlock. After a reset or an invalid "
+                "command the drive must see zero for `fault_samples` consecutive samples before it follows. "
+                "Null: no interlock.",
                 ge=0,
                 le=32767,
             ),

@@ -40,7 +40,7 @@ def form_named(name: str | None) -> Calibration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareOrigin:
-    """Hashes of everything the firmware was made from."""
+    """Hashes of all files from which the firmware was made."""
 
     compensator_json: Annotated[Sha256, Meta(description="SHA-256 of compensator.json.")]
     valve_json: Annotated[Sha256, Meta(description="SHA-256 of valve.json.")]
@@ -55,24 +55,24 @@ class FirmwareConstant:
     symbol: Annotated[Text, Meta(description="Name in C.")]
     value: Annotated[
         Number | tuple[tuple[Number, Number], ...],
-        Meta(description="Its value in C; of a table the rows, start and change each."),
+        Meta(description="Value in C; for a table its rows, each with start and change."),
     ]
-    equation: Annotated[Text, Meta(description="Equation that it is from, and what it is there.")]
-    engineering: Annotated[Text, Meta(description="The same in engineering units.")]
-    rounding: Annotated[Text, Meta(description="How it was rounded.")]
+    equation: Annotated[Text, Meta(description="Source equation and the meaning of the constant in it.")]
+    engineering: Annotated[Text, Meta(description="Value in engineering units.")]
+    rounding: Annotated[Text, Meta(description="Rounding that was applied.")]
     compensator_json: Annotated[
-        tuple[Text, ...], Meta(description="Keys of compensator.json that it was computed from.")
+        tuple[Text, ...], Meta(description="Keys of compensator.json from which the value was computed.")
     ]
     valve_json: Annotated[
         tuple[Text, ...],
-        Meta(description="Keys of valve.json that it was computed from; empty: an option of `design`."),
+        Meta(description="Keys of valve.json from which the value was computed; empty if it is an option of `design`."),
     ]
-    generator: Annotated[Text, Meta(description="Source file of dzdesign that computes it.")]
+    generator: Annotated[Text, Meta(description="Source file of dzdesign that computes the value.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareManifest(Artefact):
-    """Which files a firmware has, and where every number in its core came from, as `dzdesign codegen` writes it."""
+    """Files of a firmware and the origin of every number in its core, as `dzdesign codegen` writes it."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
     schema: Annotated[Literal["dzdesign.firmware/1"], Meta(description="Name and version of this schema.")] = (
@@ -82,22 +82,29 @@ class FirmwareManifest(Artefact):
     calibration: Annotated[
         Calibration,
         Meta(
-            description="fixed: the numbers of the valve stand in the core; block: in a calibration block, which the "
-            f"core is handed, {BLOCK_FILE}."
+            description="Place of the valve's numbers. fixed: constants in the core. block: a calibration block that "
+            f"the core receives, {BLOCK_FILE}."
         ),
     ]
-    law: Annotated[Text, Meta(description="Name of the law, as compensator.json has it.")]
-    core: Annotated[tuple[Text, ...], Meta(description="Files that are free of hardware.", min_length=1)]
+    law: Annotated[Text, Meta(description="Name of the law, as in compensator.json.")]
+    core: Annotated[tuple[Text, ...], Meta(description="Files that do not depend on the hardware.", min_length=1)]
     board: Annotated[
         tuple[Text, ...],
         Meta(
-            description="Files that are the user's to fill in: `codegen` keeps them where they were changed, and "
-            "`verify` does not check them."
+            description="Files for the user to complete. `codegen` keeps them if they were changed, and `verify` does "
+            "not check them."
         ),
     ]
-    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of everything it was made from.")]
+    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of all files from which the firmware was made.")]
     vectors: Annotated[
-        int, Meta(description="Test vectors in vectors.csv: N of `codegen --vectors N`; 0: none.", ge=0, le=99999)
+        int,
+        Meta(
+            description="Number of test vectors in vectors.csv, set by `codegen --vectors`; 0 if there are none.",
+            ge=0,
+            le=99999,
+        ),
     ]
-    constants: Annotated[tuple[FirmwareConstant, ...], Meta(description="In the order of the files.")]
-    files: Annotated[Mapping[Text, Sha256], Meta(description="File to the SHA-256 of its bytes, as generated.")]
+    constants: Annotated[
+        tuple[FirmwareConstant, ...], Meta(description="Constants of the core, in the order of the files.")
+    ]
+    files: Annotated[Mapping[Text, Sha256], Meta(description="SHA-256 of each generated file, by file name.")]

@@ -1,4 +1,4 @@
-"""What each way with the valve's hysteresis leaves: the table that `dzdesign design` prints, and what it recommends."""
+"""Remaining dead zone and hysteresis of each treatment of hysteresis: the table and advice of `dzdesign design`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The law in counts as a line in beta, for the numbers of one side: of many betas faster than the law itself."""
+"""The law in counts as a linear function of beta for one side, which is faster than the law itself for many betas."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,7 +19,7 @@ class LineInBeta:
     unit: int
 
     def counts(self, code: int | Fraction, beta: Fraction) -> Fraction:
-        """Return the counts of the law at codes of command, from zero on, and a beta."""
+        """Return the counts of the law at codes of command, from zero, and a beta."""
         codes, parts = code.numerator, code.denominator
         none, more = (start * parts + codes * slope for start, slope in zip(self.start, self.slope, strict=True))
         up = none * beta.denominator + more * beta.numerator

@@ -32,7 +32,7 @@ ACCEPTABLE = ("branch-order", "broken-sensor")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignOptions:
-    """Choices of the engineer.
+    """Options of the design.
 
     Attributes
     ----------
@@ -41,44 +41,44 @@ class DesignOptions:
     signals : Signals
         Scalings of the converter and the PWM.
     guard : {"closing", "mean", "opening"}
-        The threshold that the certificate must protect. Zero command comes after closing, so a valve of which no
-        falling branch was recorded is refused unless "opening" is asked for.
+        Threshold that the certificate must protect. Zero command comes after closing. A valve without a recorded
+        falling branch is therefore refused, unless the guard is "opening".
     below_dp0 : {"hold", "extend"}
-        For dP <= dP0 hold beta = 1 (the paper, Eq. 7), or follow the tests there, beta above 1.
+        Beta at dP <= dP0: held at 1 as in the paper (Eq. 7), or following the tests there, with beta above 1.
     above : {"hold", "lower", "release"}
-        Above the highest tested pressure drop hold the offset, lower it with the continued bound, or let it go.
+        Offset above the highest tested pressure drop: held, lowered with the continued bound, or released.
     transition : Fraction or None
-        Share of full command over which, behind the zero band, the drive runs from the closing to the opening
-        threshold; 0: none, and no zero band either; None: `TRANSITION`, or as many codes as the noise wants.
+        Share of full command, after the zero band, over which the drive runs from the closing to the opening threshold.
+        0: no transition and no zero band. None: `TRANSITION`, or as many codes as the noise requires.
     command_error : CommandError or None
-        Error of the command's code at zero, which the zero band is for; None: that of the F28335's converter.
+        Error of the command's code at zero, which sets the zero band. None: that of the F28335's converter.
     ramp_up_s, ramp_down_s : tuple of float
-        Time of the command from zero to full, and back, s: positive, then negative command. 0: no limit.
+        Time of the command from zero to full and back, s, for positive and negative commands. 0: no limit.
     dither_Hz, dither_peak : float, Fraction
-        Frequency of the dither, a square wave, and its peak (half its height) over full drive; 0: none.
+        Frequency of the square-wave dither in Hz, and its peak (half its height) over full drive. 0: no dither.
     play : bool
-        Drive a falling command lower than a rising one, by the valve's hysteresis.
+        Whether a falling command is driven lower than a rising one, by the valve's hysteresis.
     output_max : Fraction
         Largest drive over full drive.
     fault_samples : int
-        Valid samples in a row after which a fault is over.
+        Consecutive valid samples that end a fault.
     fault_latch : bool
-        Whether a fault of that many samples stays until a reset.
+        Whether a fault of that many samples lasts until a reset.
     interlock : bool
-        Whether the drive, after a reset or an invalid command, waits for zero command.
+        Whether the drive waits for zero command after a reset or an invalid command.
     reading_flow_L_min : float or None
-        Flow at which dead zones are read beside the onset; None takes the meter's floor, or the noise level of a meter
-        without one.
+        Flow at which dead zones are read, in addition to the onset. None selects the meter's floor, or the noise level
+        of a meter without one.
     full_command_V : Fraction or None
         Full command that the signal states, V.
     accept : tuple of str
-        Codes of `ACCEPTABLE` for which the design is not refused.
+        Codes of `ACCEPTABLE` that do not lead to a refusal.
     current : CurrentRequest or None
-        Coil, supply and sensor of a drive that controls the current; None: the law's output is the PWM's duty.
+        Coil, supply and sensor of a current-controlled drive. None: the law's output is the PWM's duty.
     machine : Machine or None
-        By how much the machine may differ from the bench; None: the certificate is of the recording.
+        Declared differences between machine and bench. None: the certificate covers the recording only.
     request : DesignRequest or None
-        The target and the texts that these were read from, to be kept in compensator.json.
+        Target and option texts from which these options were read, to be kept in compensator.json.
     """
 
     law: str = "paper"
@@ -241,7 +241,7 @@ class DesignOptions:
         return min(max(round(half / self.dither_Hz), fastest), slowest)
 
     def _ramp(self, seconds: tuple[float, float], spans: tuple[int, ...]) -> tuple[int, int]:
-        """Return the steps a sample; at least one unit, so that a ramp never stands still."""
+        """Return the steps per sample; at least one unit, so that a ramp never stands still."""
         positive, negative = (
             max(1, round(RAMP_UNIT * span / (time * self.signals.sample_Hz))) if time and span else 0
             for time, span in zip(seconds, spans, strict=True)

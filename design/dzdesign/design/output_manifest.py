@@ -1,4 +1,4 @@
-"""manifest.json of an output that is no C firmware, as a type: Structured Text, an FMU, a MATLAB function.
+"""manifest.json of an output other than a C firmware, as a type: Structured Text, an FMU, a MATLAB function.
 
 `codegen` writes it and `verify` compares it with the folder. These share no code, so what both read stands before them.
 """
@@ -19,20 +19,20 @@ LONGEST_SETTING = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputManifest(Artefact):
-    """Which files an output has, and what they were made from, as `dzdesign codegen` writes it."""
+    """Files of an output and their origin, as `dzdesign codegen` writes it."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
     schema: Annotated[Literal["dzdesign.output/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.output/1"
     )
-    target: Annotated[Text, Meta(description="Kind of output, as `codegen --list-targets` names it.")]
+    target: Annotated[Text, Meta(description="Kind of output, as listed by `codegen --list-targets`.")]
     settings: Annotated[
         Mapping[Text, str],
         Meta(description="Option of `codegen` that is of this target alone, without hyphens, to its value."),
     ]
-    law: Annotated[Text, Meta(description="Name of the law, as compensator.json has it.")]
-    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of everything it was made from.")]
-    files: Annotated[Mapping[Text, Sha256], Meta(description="File to the SHA-256 of its bytes, as generated.")]
+    law: Annotated[Text, Meta(description="Name of the law, as in compensator.json.")]
+    origin: Annotated[FirmwareOrigin, Meta(description="Hashes of all files from which the output was made.")]
+    files: Annotated[Mapping[Text, Sha256], Meta(description="SHA-256 of each generated file, by file name.")]
 
     @property
     def settings_in_words(self) -> str:

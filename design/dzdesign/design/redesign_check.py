@@ -1,4 +1,4 @@
-"""That a compensator is what its valve and its options give: a file can be edited, and the firmware would follow it."""
+"""Check that a compensator follows from its valve and options; an edited file would otherwise change the firmware."""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -15,17 +15,17 @@ Node = Annotated[int, Meta(ge=1, le=2**31)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
-    """What is proved about the offset of one side, on the integers, at every pressure code of the interval."""
+    """Proved statements about the offset of one side, on the integers, at every pressure code of the interval."""
 
     confidence: Annotated[
-        float, quantity("1", "Confidence with which the threshold's lower bounds hold together.", ge=0.5, le=1)
+        float, quantity("1", "Joint confidence level of the threshold's lower bounds.", ge=0.5, le=1)
     ]
-    guard: Annotated[Guard, Meta(description="The threshold that they bound.")]
+    guard: Annotated[Guard, Meta(description="Threshold that the bounds protect.")]
     level_L_min: Annotated[
         float,
         quantity(
             "L/min",
-            "Flow from which on a flow at the bounds would have been seen: by the meter, or by readings by hand.",
+            "Smallest flow at the bounds that the meter, or readings by hand, would have shown.",
             ge=0,
             le=1e6,
         ),
@@ -34,88 +34,93 @@ class Certificate:
         float,
         quantity(
             "L/min",
-            "Flow at zero command, a leak included, that the bounds allow: the declared zero flow, or what leak and "
-            "noise level come to. Null: none was declared, and no flow above `level_L_min` is allowed.",
+            "Flow at zero command, leak included, that the bounds allow: the declared zero flow, or the sum "
+            "of leak and noise level. Null: none was declared, and no flow above `level_L_min` is allowed.",
             ge=0,
             le=1e6,
         ),
     ] | None
-    dp_MPa: Annotated[tuple[Fraction, Fraction], quantity("MPa", "Interval of the pressure drop on which it holds.")]
+    dp_MPa: Annotated[
+        tuple[Fraction, Fraction], quantity("MPa", "Interval of the pressure drop that the certificate covers.")
+    ]
     holds_to_MPa: Annotated[
         Fraction,
         quantity(
             "MPa",
-            "Pressure drop up to which it holds if the curve's premise holds above the tests too; the end of `dp_MPa` "
-            "where nothing is certified above.",
+            "Pressure drop up to which the certificate also holds if the curve's premise holds above the "
+            "tests. It is the end of `dp_MPa` if nothing is certified above.",
         ),
     ]
     released_from_MPa: Annotated[
         Fraction | None,
         quantity(
             "MPa",
-            "Pressure drop from which on the offset is let go: beta is one unit of the table, and the dead zone is "
-            "back. Null: nowhere in the sensors' range.",
+            "Pressure drop from which the offset is released. Beta is one unit of the table there, so the "
+            "dead zone returns. Null: nowhere in the sensors' range.",
         ),
     ]
     smallest_margin_V: Annotated[
-        Fraction, quantity("V", "Smallest distance from the offset to the lower bound, over all those codes.")
+        Fraction, quantity("V", "Smallest margin of the offset below the lower bound, over all codes of the interval.")
     ]
     mean_loss_V: Annotated[
         float,
         quantity(
             "V",
-            "By how much the table's offset stays under the certified curve on average: the price of few nodes, "
-            "rounding of pressures to codes and of the drive to counts, and the dither.",
+            "Mean distance of the table's offset below the certified curve. It comes from the few nodes, "
+            "the rounding of pressures and drive, and the dither.",
             ge=-1e6,
             le=1e6,
         ),
     ]
-    largest_loss_V: Annotated[float, quantity("V", "The same at most.", ge=-1e6, le=1e6)]
+    largest_loss_V: Annotated[
+        float, quantity("V", "Largest distance of the table's offset below the certified curve.", ge=-1e6, le=1e6)
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideLaw:
-    """The law of one sign of command."""
+    """The law for one sign of the command."""
 
     drive_range_over_u_max: Annotated[
         Fraction,
         quantity(
             "1",
-            "k x_max / u_max of the law: command from its u_min0 to full flow, over full command. In valve.json it "
-            "counts from the knee.",
+            "Ratio k x_max / u_max of the law: command range from its u_min0 to full flow, over full "
+            "command. In valve.json the range starts at the knee.",
         ),
     ]
     u_min0_over_u_max: Annotated[
         Fraction,
         quantity(
             "1",
-            "u_min0 of the law at dP0 over full command: the offset; with a transition the opening threshold and its "
-            "error, from which the law's line behind the transition starts.",
+            "Threshold u_min0 of the law at dP0, over full command. It is the offset. With a transition it "
+            "is the opening threshold plus its error, where the law's line after the transition starts.",
         ),
     ]
     beta: Annotated[
         tuple[Node, ...],
         Meta(
-            description="Nodes of beta at zero command, certified, over `beta_denominator`: at pressure codes 0, "
-            "`beta_step_codes`, twice that, ...; straight between them."
+            description="Certified nodes of beta at zero command, as numerators over `beta_denominator`. They lie at "
+            "pressure codes 0, `beta_step_codes`, 2 `beta_step_codes` and so on, with linear interpolation "
+            "between them."
         ),
     ]
     transition_beta: Annotated[
         tuple[Node, ...] | None,
         Meta(
-            description="With a transition: nodes of the opening threshold's beta, that the law follows beyond it; "
-            "none below the certified."
+            description="Nodes of the opening threshold's beta, which the law follows after the transition. None lies "
+            "below the certified node. Empty without a transition."
         ),
     ] = None
-    certificate: Annotated[Certificate, Meta(description="What is proved.")]
+    certificate: Annotated[Certificate, Meta(description="Certificate of the offset.")]
     budget: Annotated[
         Budget | None,
-        Meta(description="What keeps the offset under the identified threshold, component by component."),
+        Meta(description="Uncertainty budget: the components that keep the offset below the identified threshold."),
     ] = None
 
     @property
     def start(self) -> str:
-        """What `u_min0` is, in words; with a transition the certified offset lies lower."""
+        """Meaning of `u_min0` in words; with a transition the certified offset lies below it."""
         return "the certified offset" if self.transition_beta is None else "the opening threshold"
 
     def __post_init__(self) -> None:
@@ -133,7 +138,7 @@ class SideLaw:
 
     @property
     def law_beta(self) -> tuple[int, ...]:
-        """Nodes of the beta that the law follows beyond the transition; without one the certified beta itself."""
+        """Nodes of the beta that the law follows after the transition; without a transition, the certified beta."""
         return self.beta if self.transition_beta is None else self.transition_beta
 
 
@@ -141,7 +146,7 @@ class SideLaw:
 class Sides:
     """The law of each sign of command."""
 
-    positive: Annotated[SideLaw, Meta(description="Of positive commands.")]
+    positive: Annotated[SideLaw, Meta(description="Law for positive commands.")]
     negative: Annotated[
-        SideLaw | None, Meta(description="Of negative commands, of a valve with two solenoids; null: none.")
+        SideLaw | None, Meta(description="Law for negative commands; null for a valve with one solenoid.")
     ] = None

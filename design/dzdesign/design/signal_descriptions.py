@@ -1,4 +1,4 @@
-"""What the codes of a compensator stand for, and which failures of a wire they do not show, in a person's words."""
+"""The codes of a compensator in words, and the wire failures that they do not reveal."""
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.signals import PressureSignal, Signals
@@ -13,7 +13,7 @@ def signals_in_words(signals: Signals, u_max_V: float, units: RecordedUnits) -> 
     lines = [f"{text}; {_valid(command.valid_codes)}"]
     for name, sensor in _sensors(signals).items():
         lines.append(
-            f"pressure {name}: code {sensor.zero_code} is none, {sensor.full_code} is "
+            f"pressure {name}: code {sensor.zero_code} is zero pressure, {sensor.full_code} is "
             f"{units.text(float(sensor.span_MPa), 'g MPa')}; {_valid(sensor.valid_codes)}"
         )
     if signals.swapped:

@@ -139,7 +139,7 @@ def command_ends(signal: PinSignal) -> tuple[Fraction, Fraction]:
     Raises
     ------
     InputError
-        If that is no command.
+        If that is not a command.
     """
     if signal.meaning is None:
         return signal.low, signal.high

@@ -33,17 +33,19 @@ Code = Annotated[int, Meta(ge=0, le=CODE_LIMIT)]
 class CommandSignal:
     """Converter codes of the command (Eq. (29) with its 0-3 V taken as the attenuated 0-10 V)."""
 
-    zero_code: Annotated[Code, Meta(description="Code of zero command.")] = 0
+    zero_code: Annotated[Code, Meta(description="Code at zero command.")] = 0
     full_code: Annotated[
-        Code, Meta(description="Code of full positive command; below that of zero where the signal is reversed.")
+        Code, Meta(description="Code at full positive command; below zero_code if the signal is reversed.")
     ] = 4095
     negative_full_code: Annotated[
         Code | None,
-        Meta(description="Code of full negative command, on the other side of zero; null: a command of one sign."),
+        Meta(
+            description="Code at full negative command, on the other side of zero_code; null for a command of one sign."
+        ),
     ] = None
     valid_codes: Annotated[
         tuple[Code, Code],
-        Meta(description="First and last code of a valid signal: outside them the valve is de-energised."),
+        Meta(description="First and last code of a valid signal. A code outside de-energises the valve."),
     ] = (0, 4095)
 
     def __post_init__(self) -> None:
@@ -84,19 +86,19 @@ class CommandSignal:
 class PressureSignal:
     """Converter codes of one pressure sensor."""
 
-    span_MPa: Annotated[
-        Fraction, quantity("MPa", "Pressure at the code of full pressure; that of zero is no pressure.")
-    ] = field(default_factory=lambda: Fraction(20))
-    zero_code: Annotated[Code, Meta(description="Code of no pressure.")] = LIVE_ZERO_CODES[0]
-    full_code: Annotated[Code, Meta(description="Code of full pressure.")] = LIVE_ZERO_CODES[1]
+    span_MPa: Annotated[Fraction, quantity("MPa", "Pressure at full_code; zero_code stands for zero pressure.")] = (
+        field(default_factory=lambda: Fraction(20))
+    )
+    zero_code: Annotated[Code, Meta(description="Code at zero pressure.")] = LIVE_ZERO_CODES[0]
+    full_code: Annotated[Code, Meta(description="Code at full pressure.")] = LIVE_ZERO_CODES[1]
     valid_codes: Annotated[
         tuple[Code, Code],
-        Meta(description="First and last code of a valid signal: outside them the smallest beta is used."),
+        Meta(description="First and last code of a valid signal. A code outside selects the smallest beta."),
     ] = LIVE_ZERO_VALID
     error_MPa: Annotated[
         tuple[Fraction, Fraction],
         quantity(
-            "MPa", "Least and largest distance from the pressure that a code is taken for to one that may have made it."
+            "MPa", "Least and largest difference between the pressure that a code stands for and the actual pressure."
         ),
     ] = field(default_factory=lambda: LIVE_ZERO_ERROR_MPA)
 
@@ -123,19 +125,19 @@ class Signals:
     """Exact scalings of a compensator's inputs and output."""
 
     code_max: Annotated[Count, Meta(description="Largest code of the converter.")] = 4095
-    compare_max: Annotated[Count, Meta(description="PWM compare value of full drive, u_O = u_max.")] = 60000
-    sample_Hz: Annotated[Count, quantity("Hz", "Samples a second.")] = 1250
-    tick_Hz: Annotated[Count, quantity("Hz", "PWM periods a second.")] = 2500
-    command: Annotated[CommandSignal, Meta(description="The command.")] = field(default_factory=CommandSignal)
+    compare_max: Annotated[Count, Meta(description="PWM compare value at full drive, u_O = u_max.")] = 60000
+    sample_Hz: Annotated[Count, quantity("Hz", "Sampling rate.")] = 1250
+    tick_Hz: Annotated[Count, quantity("Hz", "PWM frequency.")] = 2500
+    command: Annotated[CommandSignal, Meta(description="Scaling of the command.")] = field(
+        default_factory=CommandSignal
+    )
     pressure_a: Annotated[
-        PressureSignal, Meta(description="Sensor ahead of the metering edge, for positive command.")
+        PressureSignal, Meta(description="Scaling of the sensor upstream of the metering edge, for positive command.")
     ] = field(default_factory=PressureSignal)
     pressure_b: Annotated[
-        PressureSignal, Meta(description="Sensor behind the metering edge, for positive command.")
+        PressureSignal, Meta(description="Scaling of the sensor downstream of the metering edge, for positive command.")
     ] = field(default_factory=PressureSignal)
-    swapped: Annotated[
-        bool, Meta(description="Whether the pressure drop of negative commands is the other way round, B less A.")
-    ] = False
+    swapped: Annotated[bool, Meta(description="Whether the pressure drop at negative commands is B minus A.")] = False
 
     def __post_init__(self) -> None:
         for name in ("code_max", "compare_max", "sample_Hz", "tick_Hz"):

@@ -36,13 +36,15 @@ F28335_OFFSET, F28335_GAIN, F28335_NOISE = 15, 30, peak_noise_codes(68.0, 4096)
 class Converter:
     """An analogue-digital converter: code = floor(levels V / full_V), limited to levels - 1."""
 
-    full_V: Annotated[Fraction, quantity("V", "Voltage at the pin that would be the code `levels`.")] = field(
+    full_V: Annotated[Fraction, quantity("V", "Voltage at the pin that corresponds to the code `levels`.")] = field(
         default_factory=lambda: Fraction(3)
     )
     levels: Annotated[int, Meta(description="Number of codes.", ge=2, le=65536)] = 4096
-    offset_codes: Annotated[Error, Meta(description="Largest offset error, codes.")] = F28335_OFFSET
-    gain_codes: Annotated[Error, Meta(description="Largest gain error at the top of the range, codes.")] = F28335_GAIN
-    noise_codes: Annotated[Error, Meta(description="Peak of the noise on a reading, codes.")] = F28335_NOISE
+    offset_codes: Annotated[Error, Meta(description="Largest offset error, in codes.")] = F28335_OFFSET
+    gain_codes: Annotated[Error, Meta(description="Largest gain error at the top of the range, in codes.")] = (
+        F28335_GAIN
+    )
+    noise_codes: Annotated[Error, Meta(description="Peak noise of a reading, in codes.")] = F28335_NOISE
 
     def __post_init__(self) -> None:
         if self.full_V <= 0:
@@ -70,17 +72,17 @@ class TargetInputs:
     name: Annotated[
         str,
         Meta(
-            description="Microcontroller, as `codegen --list-targets` names it.",
+            description="Microcontroller, as listed by `codegen --list-targets`.",
             pattern="^[a-z][a-z0-9]*(-[a-z0-9]+)*$",
             max_length=60,
         ),
     ]
-    converter: Annotated[Converter, Meta(description="Its analogue-digital converter.")]
-    compare_max: Annotated[Count, Meta(description="Counts of full drive.")]
-    sample_Hz: Annotated[Count, quantity("Hz", "Samples a second.")]
-    tick_Hz: Annotated[Count, quantity("Hz", "PWM periods a second.")]
+    converter: Annotated[Converter, Meta(description="Analogue-to-digital converter of the target.")]
+    compare_max: Annotated[Count, Meta(description="Compare value at full drive, in counts.")]
+    sample_Hz: Annotated[Count, quantity("Hz", "Sampling rate.")]
+    tick_Hz: Annotated[Count, quantity("Hz", "PWM frequency.")]
     current_sampling: Annotated[
-        CurrentSampling | None, Meta(description="When a solenoid's current is sampled, if it is.")
+        CurrentSampling | None, Meta(description="Sampling times of the solenoid's current; null if it is not sampled.")
     ] = None
 
     def __post_init__(self) -> None:

@@ -23,10 +23,10 @@ EXPECTED = "expected the offset and the noise's peak, such as '15 + 4 codes' or 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandError:
-    """By how much the code of a zero command may be off: for long, and from one sample to the next."""
+    """Error of the command's code at zero: a lasting one, and one that changes from sample to sample."""
 
-    offset_codes: Annotated[int, Meta(description="Largest lasting error at zero command.", ge=0, le=LARGEST_ERROR)]
-    noise_codes: Annotated[int, Meta(description="Peak of the noise on top of it.", ge=1, le=LARGEST_ERROR)]
+    offset_codes: Annotated[int, Meta(description="Largest static error at zero command.", ge=0, le=LARGEST_ERROR)]
+    noise_codes: Annotated[int, Meta(description="Peak noise on top of the static error.", ge=1, le=LARGEST_ERROR)]
 
     def __post_init__(self) -> None:
         if not 0 <= self.offset_codes <= LARGEST_ERROR or not 1 <= self.noise_codes <= LARGEST_ERROR:

@@ -1,4 +1,4 @@
-"""What is odd in a lot though each of its valves is in order: what two of them share, and valves of another lot."""
+"""Anomalies across a lot whose valves are individually in order: what two of them share, and valves of another lot."""
 
 import os
 from collections.abc import Collection, Sequence

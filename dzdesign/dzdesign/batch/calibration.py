@@ -34,7 +34,7 @@ SOLVER_LOCK = Lock()
 class Task:
     """All that a worker needs to calibrate one valve; it may share no file with the client.
 
-    Recordings and plant are name and content of a file; the options of `identify` and `design` are as they are written
+    Recordings and plant are name and content of a file; the options of `identify` and `design` are as written
     on the command line, what is not given is missing. `refused` says why it can't be calibrated at all: its recordings
     can't be read.
     """
@@ -136,7 +136,7 @@ def calibrate(task: Task) -> Outcome:
 
 
 def _of_the_user(reason: str, folder: Path) -> str:
-    """Return a reason without the worker's own folder, which is no place that the user knows."""
+    """Return a reason without the worker's own folder, which is not a place that the user knows."""
     for place in (folder / "recordings", folder / "out", folder):
         reason = reason.replace(f"{place}{os.sep}", "")
     return reason

@@ -1,4 +1,4 @@
-"""What is odd about the block that a lot's firmware is linked with."""
+"""Anomalies of the block that a lot's firmware is linked with."""
 
 from collections.abc import Sequence
 

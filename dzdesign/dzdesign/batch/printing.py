@@ -1,4 +1,4 @@
-"""What `dzdesign batch` prints: counts, spread, the cost of the lot setting, and why valves failed."""
+"""Printed result of `dzdesign batch`: counts, spread, the cost of the lot setting, and why valves failed."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The folder of a lot: one folder a valve, written whole; what is there and still valid is not made again."""
+"""The folder of a lot: one folder per valve, written whole; what is there and still valid is not made again."""
 
 import json
 import re

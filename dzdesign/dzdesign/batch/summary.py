@@ -1,4 +1,4 @@
-"""What a lot comes to, from its table and its lot setting: the content of batch.json."""
+"""Content of batch.json: the result of a lot, from its table and its lot setting."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Which valves a batch has: one subfolder of recordings a valve, or a CSV file with one row a valve."""
+"""Which valves a batch has: one subfolder of recordings per valve, or a CSV file with one row per valve."""
 
 import csv
 import io

@@ -1,1 +1,1 @@
-"""The command line: what can be said, how it is parsed, what an error becomes."""
+"""The command line: its commands, their parsing, and the handling of errors."""

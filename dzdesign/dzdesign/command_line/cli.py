@@ -1,4 +1,4 @@
-"""The program: what an error or a failed requirement becomes; what can be asked for stands in `command_table`.
+"""The program: exit statuses and the handling of errors; the commands are listed in `command_table`.
 
 Exit status: 0 holds, 1 a requirement does not hold (the message says which), 2 bad input or usage. Every heavy import
 happens inside the stage that needs it.
@@ -70,7 +70,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _reason_in_the_system(error: Exception) -> str | None:
-    """Return in words why the machine ended a command; None of an error that is a fault of ours."""
+    """Return in words why the machine ended a command; None for an error that is a fault of dzdesign."""
     if isinstance(error, MemoryError) or (isinstance(error, ImportError) and "failed to map" in str(error)):
         return "memory ran out; close other programs, or raise the limit (ulimit -v)"
     if isinstance(error, OSError) and error.errno in UNPRINTABLE and error.filename is None:

@@ -1,1 +1,1 @@
-"""One module a command: parsed options enter, files and printed results leave."""
+"""One module per command: parsed options enter, files and printed results leave."""

@@ -25,7 +25,7 @@ COMPILED_FOR = {
     "code_max": "the largest converter code",
     "compare_max": "the largest compare value",
     "sample_Hz": "samples a second of",
-    "tick_Hz": "PWM periods a second of",
+    "tick_Hz": "PWM periods per second of",
     "beta_step": "codes between two nodes of beta of",
 }
 EXAMPLES = (

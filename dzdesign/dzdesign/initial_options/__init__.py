@@ -1,1 +1,1 @@
-"""What `dzdesign init` proposes: recordings enter, the text of an options file leaves, every line with its reason."""
+"""Proposal of `dzdesign init`: recordings enter, the text of an options file leaves, every line with its reason."""

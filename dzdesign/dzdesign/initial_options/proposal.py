@@ -35,7 +35,7 @@ CHECK_DP = "check that it is the drop over the valve, and not the pressure of on
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """What a look at recordings proposes: the text of the file of options, and what was seen, for a person."""
+    """The proposed options file, and what was found in the recordings."""
 
     text: str
     seen: tuple[str, ...]

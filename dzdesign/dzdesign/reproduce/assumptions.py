@@ -8,7 +8,7 @@ from dzdesign.derivation.account.readings import DROP_ASSUMED
 #: Distance between the commands at which the valve opens and closes, V: that of the default plant, 1.5 % of full
 #: command. The paper shows opening branches only.
 HYSTERESIS_V = 0.15
-#: Pressures behind the edge of Figs. 20 and 21, MPa: with the pressure drop, within the sensors' 20 MPa.
+#: Pressures downstream of the edge of Figs. 20 and 21, MPa: with the pressure drop, within the sensors' 20 MPa.
 LOADS_MPA = (0.0, 15.0)
 
 

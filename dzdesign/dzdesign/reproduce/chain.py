@@ -36,7 +36,7 @@ class Chain:
 
 
 def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None) -> Chain:
-    """Run a recovered valve through the product; `say` is told each stage before it begins."""
+    """Run a recovered valve through the product; `say` is called before each stage."""
     name = valve.published.name + (" with hysteresis" if valve.plant.hysteresis_V else "")
     bench = bench_of(valve)
     with scratch_folder() as scratch:

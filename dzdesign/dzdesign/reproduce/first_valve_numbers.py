@@ -21,7 +21,7 @@ from dzdesign.reproduce.rows import ONE_RECORD_PERCENT, Subject, around, row
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, ValveRuns, paper_duty_percent
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S
 
-#: What rises at all, per cent.
+#: What rises at all, percent.
 INCREASING_PERCENT = (1e-3, 100.0)
 
 

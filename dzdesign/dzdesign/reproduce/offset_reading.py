@@ -18,7 +18,7 @@ from dzdesign.reproduce.valve_runs import PAPER, PRESSURES_MPA, ValveRuns
 
 
 def offset_percent(dead_zone0: float, residual: float) -> float:
-    """Return the offset with which Eq. (14) leaves a dead zone, all in per cent of full command."""
+    """Return the offset with which Eq. (14) leaves a dead zone, all in percent of full command."""
     return (dead_zone0 - residual) / (1 - residual / 100)
 
 

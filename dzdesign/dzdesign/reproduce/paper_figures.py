@@ -206,7 +206,7 @@ def _beside_simulation(
 
 
 def _saturation(stopped: Subject, title: str) -> "Figure":
-    """Fig. 18 with the stop that Section 4.2 tells of: the commands from which on the paper's curves are flat."""
+    """Fig. 18 with the stop that Section 4.2 tells of: the commands from which the paper's curves are flat."""
 
     def draw(axes: "Axes", panel: Panel) -> None:
         draw_both(axes, panel)

@@ -118,7 +118,7 @@ class RecoveredValve:
     figures: tuple[FittedFigure, ...]
     #: Parameters that a bound of the fit holds.
     at_bound: tuple[str, ...]
-    #: Flow from which on the paper sees flow: its meter's floor, zero in its simulation.
+    #: Flow from which the paper sees flow: its meter's floor, zero in its simulation.
     level_L_min: float
 
     def parameters(self) -> dict[str, Parameter]:
@@ -264,7 +264,7 @@ class AtRest:
     """The plant at rest at one pressure drop, Eqs. (19)-(24) with d/dt = 0, between its edge and its stop.
 
     `values` are parameters by the names of `Plant`, numbers or CasADi expressions; so are `moves_V`, `opens_V` and
-    `stops_V`, the commands from which on the spool moves, the edge is open and the stop is met, and `flow_per_volt`,
+    `stops_V`, the commands from which the spool moves, the edge is open and the stop is met, and `flow_per_volt`,
     L/min per V beyond the edge.
     """
 

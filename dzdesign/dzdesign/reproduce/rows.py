@@ -19,7 +19,7 @@ Range = tuple[float, float]
 OF_THE_LOOP = 0.01
 #: Full command in the unit of a command.
 PER_FULL: Mapping[str, float] = {"%": 100.0, "V": float(U_MAX_V), "1/1000": 1000.0, "1": 1.0}
-#: A command is read between two records of a ramp, as in the paper (section 4.1), per cent of full command.
+#: A command is read between two records of a ramp, as in the paper (section 4.1), percent of full command.
 ONE_RECORD_PERCENT = RECORD_S
 #: A flow that prints as none, L/min.
 PRINTED_NONE_L_MIN = 0.005
@@ -143,7 +143,7 @@ def around(published: str, room: float = 0.0) -> Range:
 
 
 def command_around(published_percent: str) -> Range:
-    """Return the range about a printed command, per cent of full."""
+    """Return the range about a printed command, percent of full."""
     return around(published_percent, ONE_RECORD_PERCENT)
 
 

@@ -44,31 +44,31 @@ class ValveRuns:
     steps: dict[Drive, LoopRun]
     #: Of the product at the command of Fig. 13 and dP0; None without a firmware.
     product_duty_percent: float | None = None
-    #: Commands about zero that the product takes for zero, per cent of full.
+    #: Commands about zero that the product takes for zero, percent of full.
     product_zero_band_percent: float = 0.0
     #: Commands behind these in which the product goes from the closing offset to the opening threshold.
     product_transition_percent: float = 0.0
 
     @property
     def direct_duty_percent(self) -> float:
-        """Duty cycle of the loop's PWM at the command of Fig. 12, with nobody between, per cent."""
+        """Duty cycle of the loop's PWM at the command of Fig. 12, with nobody between, percent."""
         run = self.ramps[Drive(DIRECT), PRESSURES_MPA[0]]
         at = int(np.argmax(run.command >= DUTY_COMMAND_V / U_MAX_V))
         return 100 * float(run.compare[at] / run.compare.max())
 
     def dead_zone_percent(self, drive: Drive, dp_MPa: float, level_L_min: float | None = None) -> float:
-        """Return the command, per cent of full, at which rising flow passes a level: of the paper unless given."""
+        """Return the command, percent of full, at which rising flow passes a level: of the paper unless given."""
         run = self.ramps[drive, dp_MPa]
         level = self.valve.level_L_min if level_L_min is None else level_L_min
         return 100 * dead_zone(run, level or FLOW_SHARE * float(run.q_mean_L_min.max()), rising=True)
 
     def onset_percent(self, drive: Drive, dp_MPa: float) -> float:
-        """Return the command, per cent of full, at which flow begins: no meter between."""
+        """Return the command, percent of full, at which flow begins: no meter between."""
         level = FLOW_SHARE * float(self.ramps[drive, dp_MPa].q_mean_L_min.max())
         return self.dead_zone_percent(drive, dp_MPa, level)
 
     def still_percent(self, dp_MPa: float) -> float:
-        """Return the command, per cent of full, at which the spool of the bare valve begins to move."""
+        """Return the command, percent of full, at which the spool of the bare valve begins to move."""
         run = self.ramps[Drive(DIRECT), dp_MPa]
         moved = np.flatnonzero(run.position_mm > FLOW_SHARE * run.position_mm.max())
         return 100 * float(run.command[moved[0]])
@@ -108,7 +108,7 @@ def paper_drive(valve: PublishedValve, command: np.ndarray, dp_MPa: float, with_
 
 
 def paper_duty_percent(valve: PublishedValve) -> float:
-    """Return the duty cycle that the paper's law gives at dP0 and the command of Fig. 13, per cent."""
+    """Return the duty cycle that the paper's law gives at dP0 and the command of Fig. 13, percent."""
     return 100 * float(paper_drive(valve, np.array([DUTY_COMMAND_V / U_MAX_V]), DP0_MPA)[0])
 
 

@@ -61,10 +61,15 @@ class AssessArguments(RampArguments):
 def assess(arguments: AssessArguments) -> "Assessment":
     """Compare ramp tests without and with the compensator.
 
+    Returns
+    -------
+    Assessment
+        Each quantity without and with the compensator, and the result of each limit.
+
     Raises
     ------
     InputError
-        If a file or an option can't be read. A limit that is missed is no error: see ``holds``.
+        If a file or an option can't be read. An exceeded limit is not an error: see ``holds``.
     """
     from dzdesign.assess.assessing import assess_curves
     from dzdesign.assess.assessment import Assessment
@@ -106,7 +111,7 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
 
 
 def assess_options(arguments: AssessArguments) -> "AssessOptions":
-    """Return the engineer's choices, SI."""
+    """Return the options of `assess` in SI units."""
     from dzdesign.assess.limits import parse_limits
     from dzdesign.assess.options import AssessOptions
     from dzdesign.identify.options import IdentifyOptions

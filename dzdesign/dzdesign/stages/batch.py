@@ -9,17 +9,17 @@ if TYPE_CHECKING:
 
 
 def batch(arguments: BatchArguments) -> "LotSummary":
-    """Calibrate many valves; an earlier run in the folder is continued.
+    """Calibrate many valves; an earlier run in the same folder is continued.
 
     Returns
     -------
     LotSummary
-        Content of batch.json: counts, reasons, quantiles, the lot setting.
+        Content of batch.json: counts, reasons of failures, quantiles and the lot setting.
 
     Raises
     ------
     InputError
-        If the list, the folder or an option is wrong. A valve that can't be calibrated is no error: see ``failed``.
+        If the list, the folder or an option is wrong. A valve that can't be calibrated is not an error: see ``failed``.
     """
     from dzdesign.batch.command import calibrate_lot
 

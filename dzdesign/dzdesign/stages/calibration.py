@@ -66,7 +66,7 @@ class ReadCalibrationArguments:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrationImage:
-    """A calibration block as the content of a file; `address` counts in the target's units, None where it has none."""
+    """A calibration block as the content of a file; `address` is in the target's units, None if the format has none."""
 
     content: bytes
     block: "CalibrationBlock"
@@ -77,7 +77,7 @@ class CalibrationImage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadCalibration:
-    """What a block says, and whether it is that of the compensator beside it: None where none was given."""
+    """The content of a block, and whether it belongs to the given compensator; None if none was given."""
 
     reading: "CalibrationReading"
     #: Where the file has a programmer write the block; empty of a raw file, which does not say.
@@ -93,11 +93,16 @@ class ReadCalibration:
 def calibration(arguments: CalibrationArguments) -> CalibrationImage:
     """Write the calibration block of a compensator for one valve; the same input gives the same octets.
 
+    Returns
+    -------
+    CalibrationImage
+        The content of the file, with format and address.
+
     Raises
     ------
     InputError
-        If the compensator can't be read, a number in it does not follow, a block has no room for it, or the file can't
-        be written or is somebody's own.
+        If the compensator can't be read, a number in it can't be derived, or it does not fit into a block. Also if the
+        file can't be written, or dzdesign did not create it.
     """
     from dzdesign.codegen.calibration.block import block_of
     from dzdesign.codegen.calibration.block_images import WITH_ADDRESS, image_of
@@ -132,13 +137,18 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
 
 
 def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
-    """Read a calibration block back, in engineering units, and compare it with a compensator.
+    """Read a calibration block back in engineering units and compare it with a compensator.
+
+    Returns
+    -------
+    ReadCalibration
+        The content of the block; ``belongs`` states whether it is the block of the compensator.
 
     Raises
     ------
     InputError
-        If the file is no calibration block, is damaged, or holds numbers that no firmware accepts. That it is not the
-        block of the compensator is no error: see ``belongs``.
+        If the file is not a calibration block, is damaged, or holds numbers that every firmware refuses. A block of
+        another compensator is not an error: see ``belongs``.
     """
     from dzdesign.codegen.calibration.block_files import placed_in_file
     from dzdesign.codegen.calibration.packing import unpack
@@ -196,7 +206,7 @@ def _format_of(output: Path | None, given: str | None) -> str:
 
 
 def _check_output(output: Path, form: str) -> None:
-    """Refuse to write over what is no calibration block: a recording may end with .txt too."""
+    """Refuse to write over what is not a calibration block: a recording may end with .txt too."""
     from dzdesign.codegen.calibration.a2l import HEAD
     from dzdesign.codegen.calibration.block_files import octets_in_file
     from dzdesign.codegen.calibration.layout import MAGIC

@@ -35,12 +35,12 @@ class DesignArguments(DesignChoices):
 
 
 def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
-    """Return the engineer's choices for `design`.
+    """Return the options of `design`.
 
     Raises
     ------
     InputError
-        If one can't be read, or is for negative commands and there are none.
+        If an option can't be read, or concerns negative commands of a valve that has none.
     """
     from dzdesign.codegen.project import target_named
     from dzdesign.design.option_texts import options_of
@@ -64,7 +64,12 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
 
 
 def design(arguments: DesignArguments) -> "Compensator":
-    """Design the compensator of a valve, certified.
+    """Design a compensator for a valve and prove its certificate.
+
+    Returns
+    -------
+    Compensator
+        The law with exact coefficients, its certificate and its costs.
 
     Raises
     ------
@@ -72,6 +77,13 @@ def design(arguments: DesignArguments) -> "Compensator":
         If the file or an option can't be read, or the law can't be used for this valve.
     RequirementError
         If a proof fails.
+
+    Examples
+    --------
+    >>> from dzdesign import api
+    >>> compensator = api.design("valve.json", guard="closing")        # doctest: +SKIP
+    >>> compensator.positive.certificate.guard                         # doctest: +SKIP
+    'closing'
     """
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.core.artefact_types import to_json_bytes

@@ -43,7 +43,7 @@ class ExportArguments:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AmplifierExport:
-    """What a device is told, the content of its file, and what it leaves of the dead zone."""
+    """The parameters of a device, the content of its file, and the dead zone that remains."""
 
     setting: "AmplifierSetting"
     content: bytes
@@ -62,13 +62,18 @@ def export(arguments: ExportArguments) -> AmplifierExport:
 
     The same input gives the same bytes.
 
+    Returns
+    -------
+    AmplifierExport
+        The parameters of the device, the content of its file and the remaining dead zone.
+
     Raises
     ------
     InputError
-        If the compensator can't be read, a number in it does not follow, the device is unknown or its range does not
-        hold the setting, an option is not of it, or the file can't be written or is somebody's own.
+        If the compensator can't be read, a number in it can't be derived, or the device is unknown. Also if the setting
+        exceeds the device's range, an option belongs to another device, or the file can't be written.
     RequirementError
-        If the file as it is read back is not safe, or leaves other dead zones than stated: a fault of dzdesign.
+        If the file, read back, is not safe or leaves other dead zones than stated. This is a fault of dzdesign.
     """
     from dzdesign.codegen.amplifier.device import device_named
     from dzdesign.codegen.amplifier.files import amplifier_file
@@ -122,7 +127,7 @@ def _read_back(
 
 
 def _check_output(output: Path, device: "Device") -> None:
-    """Refuse to write over what is no file of dzdesign for this device: a recording may end with .csv too."""
+    """Refuse to write over what is not a file of dzdesign for this device: a recording may end with .csv too."""
     from dzdesign.codegen.amplifier.files import is_file_of
 
     check_file_may_be_written(output)

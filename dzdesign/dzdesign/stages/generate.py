@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputChoices:
-    """What can be chosen of an output that is no C firmware: the same in `codegen` and in `batch`."""
+    """What can be chosen of an output other than a C firmware: the same in `codegen` and in `batch`."""
 
     dialect: Annotated[Text, Option("NAME", OUTPUTS)] = None
     """Dialect of the PLC's tool, for iec61131: codesys or twincat (default: codesys)."""
@@ -68,13 +68,26 @@ class GenerateArguments(OutputChoices, DesignChoices):
 
 
 def generate(arguments: GenerateArguments) -> "Firmware | Output":
-    """Generate the C project of a compensator, or another output; its numbers are derived again first.
+    """Generate the C project of a compensator, or another output, after its numbers were derived again.
+
+    Returns
+    -------
+    Firmware or Output
+        The files by path, with the manifest that states their origin.
 
     Raises
     ------
     InputError
-        If the file can't be read, a number in it does not follow, the target counts otherwise, the vectors are too few,
-        an option is of another target, or the folder holds what was made of another design.
+        If the file can't be read, a number in it can't be derived, or the target's converter or timer differs from the
+        design. Also if there are too few vectors, an option belongs to another target, or the folder holds the output
+        of another design.
+
+    Examples
+    --------
+    >>> from dzdesign import api
+    >>> firmware = api.generate("compensator.json")                    # doctest: +SKIP
+    >>> "core/dz_comp.c" in firmware.files                             # doctest: +SKIP
+    True
     """
     from dzdesign.codegen.other_targets import OTHER_TARGETS, check_target_name
     from dzdesign.codegen.project import DEFAULT_TARGET
@@ -108,7 +121,7 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
 
 
 def _other_output(arguments: GenerateArguments, target: str) -> "Output":
-    """Generate an output that is no C firmware, and write it where that is asked for."""
+    """Generate an output other than a C firmware, and write it where that is asked for."""
     from dzdesign.codegen.other_targets import OF_FIRMWARE, generate_output, settings_of, write_output
     from dzdesign.codegen.project import DEFAULT_TARGET
 
@@ -124,7 +137,7 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
 
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
-    """Return the options that are of one output that is no C firmware alone, as they were given; a plant is read."""
+    """Return the options that are of one output other than a C firmware alone, as they were given; a plant is read."""
     from dzdesign.codegen.amplifier.given import given_dp_MPa, given_threshold
     from dzdesign.codegen.other_targets import OTHER_TARGETS
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.stated_options import StatedOptions
 
-#: Arguments that are no option of the identification itself: what is read and written, and what nothing is made of.
+#: Arguments that are not an option of the identification itself: what is read and written, and what nothing is made of.
 NOT_STATED = ("ramps", "output", "plots", "record")
 #: Options that name files: stated by the names that these have in made_from.
 FILES = ("order", "low_flow")
@@ -108,7 +108,7 @@ class IdentifyArguments(IdentifyChoices):
 
 
 def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":
-    """Return the engineer's choices for `identify`, SI."""
+    """Return the options of `identify` in SI units."""
     from dzdesign.identify.options import IdentifyOptions
 
     names = [field.name for field in fields(IdentifyOptions) if field.name != "meter_lag_tolerance"]
@@ -129,10 +129,23 @@ def record_of(given: Mapping[str, object] | None) -> dict[str, str]:
 def identify(arguments: IdentifyArguments) -> "ValveModel":
     """Identify a valve from ramp tests.
 
+    Returns
+    -------
+    ValveModel
+        The identified valve with bounds, warnings and provenance.
+
     Raises
     ------
     InputError
-        If a file or an option can't be read, or no threshold can be given; the reason.
+        If a file or an option can't be read, or no threshold can be identified. The message states the reason.
+
+    Examples
+    --------
+    >>> from dzdesign import api
+    >>> from dzdesign.example import example_folder
+    >>> valve = api.identify(example_folder() / "ramps" / "ramp_dP[15]_1.csv.gz", meter_lag="0.1 s")
+    >>> valve.positive.trend, round(valve.positive.reference.u_min_V, 2)
+    ('decreasing', 5.22)
     """
     from dzdesign.identify.identification import identify_sides
     from dzdesign.identify.plots.valve_plots import plot_files

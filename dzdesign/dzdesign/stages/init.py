@@ -26,17 +26,25 @@ class InitArguments(ColumnArguments):
 
 
 def init(arguments: InitArguments) -> "Proposal":
-    """Look at recordings and propose the options file.
+    """Inspect recordings and propose an options file.
 
     Returns
     -------
     Proposal
-        Its text, what was seen, and what is open: while something is, `identify` can't run.
+        Text of the file, what was found, and what is open. `identify` can't run before every open point is settled.
 
     Raises
     ------
     InputError
         If a recording can't be read, or the file exists.
+
+    Examples
+    --------
+    >>> from dzdesign import api
+    >>> from dzdesign.example import example_folder
+    >>> proposal = api.init(example_folder() / "ramps" / "ramp_dP1_1.csv.gz")
+    >>> proposal.columns
+    {}
     """
     check_output(arguments)
     proposal = look(arguments)

@@ -84,10 +84,15 @@ class PlanArguments:
 def plan(arguments: PlanArguments) -> "SeriesPlan":
     """Plan a series of ramp tests: pressure drops, ramp times, repeats and order, with the predicted error.
 
+    Returns
+    -------
+    SeriesPlan
+        The chosen series and its order, with alternatives and premises.
+
     Raises
     ------
     InputError
-        If the file or an option can't be read, or no series with enough repeats fits in the time.
+        If the file or an option can't be read, or no series with enough repeats fits into the time.
     """
     from dzdesign.identify.planning.results import series_plan
     from dzdesign.identify.planning.search import plan_series

@@ -20,7 +20,7 @@ def in_order(tests: "Sequence[RampTest]", paths: Sequence[Path], order: Paths | 
     Raises
     ------
     InputError
-        If an item is no recording's, or a recording is missing.
+        If an item is not a recording's, or a recording is missing.
     """
     from dzdesign.identify.reading.series_order import in_stated_order
 

@@ -46,7 +46,7 @@ def _names(pattern: str, source: str) -> bool:
 
 
 def _seconds(source: str, table: Table, option: str) -> float | None:
-    """Return what an option, or its table, says of a recording, s; a name goes before a pattern."""
+    """Return what an option, or its table, says of a recording, s; a name takes precedence over a pattern."""
     if table is None:
         return None
     if isinstance(table, str):

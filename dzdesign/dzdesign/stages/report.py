@@ -37,12 +37,12 @@ def report(arguments: ReportArguments) -> "Report":
     Returns
     -------
     Report
-        ``html``, and ``holds``: None where something was not checked.
+        The page in ``html``, and its verdict in ``holds``: None if something was not checked.
 
     Raises
     ------
     InputError
-        If there is nothing to report, or an artefact is none. A requirement that does not hold is no error.
+        If there is nothing to report, or a file is not an artefact. A requirement that does not hold is not an error.
     """
     from dzdesign.report.language import in_language
     from dzdesign.report.logo import logo_uri

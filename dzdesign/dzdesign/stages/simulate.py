@@ -51,21 +51,33 @@ class SimulateArguments:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedRamps:
-    """Ramp tests of a simulated valve: name of each file to its bytes, and the manifest of their folder."""
+    """Ramp tests of a simulated valve: content of each file by name, and the manifest of their folder."""
 
     files: Mapping[str, bytes]
     manifest: "SimulationManifest"
 
 
 def simulate(arguments: SimulateArguments) -> SimulatedRamps:
-    """Simulate ramp tests of a valve, marked as simulated.
+    """Simulate ramp tests of a valve; the recordings are marked as simulated.
+
+    Returns
+    -------
+    SimulatedRamps
+        Content of each file by name, and the manifest of the folder.
 
     Raises
     ------
     InputError
         If a file or an option can't be read.
     RequirementError
-        If the firmware's code is not what this version generates from its compensator.json: it is not run.
+        If the firmware's code differs from what this version generates from its compensator.json. It is then not run.
+
+    Examples
+    --------
+    >>> from dzdesign import api
+    >>> ramps = api.simulate(dp="1 MPa", ramp_time="20 s")
+    >>> list(ramps.files), ramps.manifest.simulated
+    (['ramp_dP1.csv.gz'], True)
     """
     from dzdesign.changed_code import code_of_firmware
     from dzdesign.verify.closed_loop.plant import Plant, read_plant

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
 
-#: Options that make no sense for an output that is no C firmware, unless its kind takes one.
+#: Options that make no sense for an output other than a C firmware, unless its kind takes one.
 OF_FIRMWARE = (
     "blocks", "plant", "back_pressure", "tolerances", "include", "c2000ware", "mutate", "machine_code", "proof",
 )  # fmt: skip
@@ -71,16 +71,22 @@ class VerifyArguments:
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
-    """Verify a firmware: every input against the exact law, then the closed loop; needs a C compiler.
+    """Verify a firmware: compare every input with the exact law, then run the closed loop. A C compiler is required.
 
-    Of an output that is no C firmware, such as Structured Text, every input too.
+    For another output, such as Structured Text, every input is compared, too.
+
+    Returns
+    -------
+    Verification or OutputEvidence
+        Result of every requirement; ``holds`` is true only if each was checked and holds.
 
     Raises
     ------
     InputError
-        If a file can't be read, or there is no C compiler. A requirement that does not hold is no error: see ``holds``.
+        If a file can't be read, or there is no C compiler. A requirement that does not hold is not an error: see
+        ``holds``.
     RequirementError
-        If the folder's code is not what this version generates from its compensator.json: it is not run.
+        If the folder's code differs from what this version generates from its compensator.json. It is then not run.
     """
     from dzdesign.verify.outputs.folder import holds_output
 
@@ -101,7 +107,7 @@ def verify_firmware(
 def verify_output_folder(
     folder: Path, arguments: VerifyArguments, identified: "ValveModel | None" = None
 ) -> "OutputVerification":
-    """Verify an output that is no C firmware; `identified` is as in `verify_firmware`."""
+    """Verify an output other than a C firmware; `identified` is as in `verify_firmware`."""
     from dzdesign.changed_code import code_of_output
     from dzdesign.regeneration import output_again, output_regenerated
     from dzdesign.reidentification import GivenFiles, identified_again
@@ -195,7 +201,7 @@ def _verify_code(
 
 
 def _back_pressures_MPa(texts: list[str]) -> list[float] | None:
-    """Return the pressures behind the edge; None where none were given."""
+    """Return the pressures downstream of the edge; None where none were given."""
     if not texts:
         return None
     values = [parse_quantity(text, "pressure", "--back-pressure") / 1e6 for text in texts]

@@ -159,8 +159,8 @@ def _formulas(assessment: "Assessment") -> list[str]:
     return [
         *(f"{each.name} = {each.formula}" for each in shown),
         "u_r(Q), u_f(Q): command at which the rising, the falling branch has the flow Q; every flow but the largest "
-        "and that at zero is brought by sqrt(dP) to its set's pressure drop at no flow (of the two sets within 2 %); "
-        f"straight part: {knee} of the largest flow, wider where it goes on straight; window "
+        "and that at zero is scaled by sqrt(dP) to its set's pressure drop at zero flow (of the two sets within 2 %); "
+        f"straight part: {knee} of the largest flow, wider where the curve stays straight; window "
         f"of u: {low:.0%} to {high:.0%} of u_max",
     ]
 
@@ -176,5 +176,5 @@ def _limits(assessment: "Assessment") -> list[str]:
         for result in assessment.limits
     ]
     bad = sum(not result.holds for result in assessment.limits)
-    verdict = f"{DOES_NOT_HOLD}: {bad} of {len(lines)} limits are missed or could not be checked"
+    verdict = f"{DOES_NOT_HOLD}: {bad} of {len(lines)} limits are exceeded or could not be checked"
     return [*lines, verdict if bad else "Every limit holds."]

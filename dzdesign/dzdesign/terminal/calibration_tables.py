@@ -39,8 +39,8 @@ def print_calibration(found: "ReadCalibration", console: "Console | None" = None
     kind = "; ".join(reading.shape) or "one solenoid, duty as output"
     put_line(
         console,
-        f"For a firmware of: {kind}; codes 0 to {reading.code_max}, {reading.compare_max} counts at full drive, "
-        f"{reading.sample_Hz} samples and {reading.tick_Hz} PWM periods a second",
+        f"For firmware with: {kind}; codes 0 to {reading.code_max}, {reading.compare_max} counts at full drive, "
+        f"{reading.sample_Hz} samples and {reading.tick_Hz} PWM periods per second",
     )
     _put_signals(console, reading, units)
     _put_drive(console, reading.drive, units)
@@ -89,7 +89,7 @@ def _put_drive(console: "Console", drive: "DriveReading", units: "RecordedUnits"
         "Transition": command(drive.transition_V) if drive.transition_V else "none",
         "Leaves rest beyond": command(drive.leave_zero_V),
         "Interlock": waits,
-        "Fault": f"over after {drive.fault_samples} valid samples{', latched' if drive.fault_latch else ''}",
+        "Fault": f"ends after {drive.fault_samples} valid samples{', latched' if drive.fault_latch else ''}",
         "Dither": dither,
         "Inverse play": play if drive.play_travel_V else "none",
     }
@@ -104,7 +104,7 @@ def _put_side(console: "Console", name: str, side: "SideReading", units: "Record
         f"dP ({units.label('MPa')})": lambda node: units.number(node.dp_MPa, ".3f MPa"),
         "beta": lambda node: f"{node.beta:.4f}",
         "beta at zero command": lambda node: f"{node.beta_at_zero:.4f}",
-        f"output just past zero ({label})": lambda node: units.number(node.offset_V, ".3f dV"),
+        f"output just above zero ({label})": lambda node: units.number(node.offset_V, ".3f dV"),
         f"at full command ({label})": lambda node: units.number(node.full_V, ".3f dV"),
     }
     title = f"Law of {name} commands, at {len(places)} of {len(nodes)} nodes"

@@ -11,13 +11,14 @@ if TYPE_CHECKING:
     from dzdesign.design.hysteresis_choices import HysteresisChoice
 
 DITHER = (
-    "A dither takes the hysteresis out too, but moves the thresholds: record the ramps under it, identify them with "
+    "A dither also reduces the hysteresis, but moves the thresholds: record the ramps under it, identify them with "
     "--dithered, and give --dither here."
 )
+HEADING = "Remaining dead zone and hysteresis in command, worst of all tests (onset: also between tests)"
 #: Of the inverse play where it is recommended: the table is of the recorded sweeps.
 PLAY = (
-    "The hysteresis of a play is that of sweeps as recorded: how far the valve turns back in a small loop they can't "
-    "tell. Where it turns back less, small loops are over-compensated, up to the play's width; try them on the machine."
+    "The width of the inverse play comes from full sweeps, which do not show the hysteresis of small loops. If that is "
+    "smaller, small loops are over-compensated by up to the play's width; try them on the machine."
 )
 
 
@@ -42,7 +43,7 @@ def print_choices(
         "hysteresis, mean": lambda each: share(each.hysteresis),
         "largest": lambda each: share(each.largest),
     }
-    put_rows(console, "What is left of command, the worst of all tests (onset: between them too)", choices, columns)
+    put_rows(console, HEADING, choices, columns)
     for each in choices:
         if each.refused:
             put_line(console, f"{each.given}: {each.refused}")

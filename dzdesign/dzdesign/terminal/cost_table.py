@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def print_costs_at_tests(compensator: "Compensator", console: "Console | None" = None) -> None:
-    """Print a table for each side: dead zones in per cent of command, flow and drive."""
+    """Print a table for each side: dead zones in percent of command, flow and drive."""
     from dzdesign.design.costs_at_tests import costs_at_tests
     from dzdesign.design.signals import SIDE_NAMES
 
@@ -24,7 +24,7 @@ def print_costs_at_tests(compensator: "Compensator", console: "Console | None" =
         side = SIDE_NAMES[sign]
         units, costs = compensator.valve.recorded_units.of_side(side), costs_at_tests(compensator, sign)
         read_at = units.text(compensator.reading_flow_L_min, ".2f L/min")
-        title = f"Dead zone that remains, of command: at the onset (knee) and read at {read_at}"
+        title = f"Remaining dead zone in command: at the onset (knee) and read at {read_at}"
         title += "" if compensator.negative is None else f", {side} side"
         columns = _columns(units, transition=compensator.transition_codes > 0, machine=compensator.machine is not None)
         put_rows(console, title, costs, columns)

@@ -38,7 +38,7 @@ def print_export(made: "AmplifierExport", console: "Console | None" = None) -> N
         label = "" if len(setting.offsets) == 1 else f"{side} side: "
         put_line(console, label + _offset_line(made, offset, units.of_side(side)))
         rows = [row for row in made.dead_zones if row.side == side]
-        title = f"Dead zone that remains (knee, share of command){f', {side} side' if label else ''}"
+        title = f"Remaining dead zone (knee, share of command){f', {side} side' if label else ''}"
         title += ": with the fixed setting, and with the law, which reads the pressures"
         if any(row.law_end_L_min is not None for row in rows):
             title += f"; flow on closing at {_transition_end(made, sign):.2%} of command, the end of the transition"

@@ -30,7 +30,7 @@ class _Verbosity:
 
 @contextlib.contextmanager
 def reporting(*, quiet: bool, verbose: bool) -> Iterator[None]:
-    """Report as much as was asked for, while a command runs: quiet, nothing; verbose, also the log, with times."""
+    """Report with the requested detail while a command runs: nothing if quiet; if verbose also the log, with times."""
     before = (_Verbosity.quiet, _Verbosity.verbose, _Verbosity.begin)
     _Verbosity.quiet, _Verbosity.verbose, _Verbosity.begin = quiet, verbose, time.perf_counter()
     try:
@@ -63,7 +63,7 @@ def _logging() -> Iterator[None]:
 
 
 def say(text: str) -> None:
-    """Tell of progress, on stderr: stdout is for results."""
+    """Report progress on stderr; stdout is for results."""
     if not _Verbosity.quiet:
         since = f"{time.perf_counter() - _Verbosity.begin:8.3f} s  " if _Verbosity.verbose else ""
         print(f"dzdesign: {since}{clear_line(text)}", file=sys.stderr, flush=True)

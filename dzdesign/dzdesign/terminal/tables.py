@@ -118,12 +118,12 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         f"identified: u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
         f"{units.text(side.reference.u_min_se_V, '.4f dV')}{at}, the knee on {certificate.guard}{_betas(side, units)}",
         f"certified: an offset of {units.text(side.curve.u_min0_V, '.4f V')}{at}, the largest under the bounds; more "
-        "tests raise it",
+        "tests can raise it",
         f"premise: {side.premise_in_words(units)}",
         *_premise_lines(side),
         f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f}: "
-        "command from the knee to full stroke, as a share of full command; the law's counts from its own "
-        "u_min0"
+        "command from the knee to full stroke, as a share of full command; that of the law starts at its "
+        "own u_min0"
         + (
             f"; k = {units.number(side.k_V_mm, '.4f V/mm')} ± {units.text(side.k_V_mm_se or 0.0, '.4f V/mm')}"
             if side.k_V_mm is not None
@@ -163,7 +163,7 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
     for check in side.curve.premises:
         p_value, left = check.lack_of_fit_p, check.dead_zone_over_u_max
         estimated = check.premise == "smooth" and len(side.tests) > 2
-        untested = "M made from the tests" if estimated else "untested"
+        untested = "M estimated from the tests" if estimated else "untested"
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
@@ -193,7 +193,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         lines += [
             f"{label}drive range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} "
             f"(from {side.start} to full flow), u_min0/u_max at dP0 = {_rational(side.u_min0_over_u_max)}, "
-            f"both as shares of full command; beta(dP): straight between {len(side.beta)} nodes, each a "
+            f"both as shares of full command; beta(dP): linear between {len(side.beta)} nodes, each a "
             f"whole number of 1/{compensator.beta_denominator}",
             f"{label}certificate of {compensator.certified_of}: the offset stays below the "
             f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
@@ -231,7 +231,7 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
 
 
 def print_output(output: "Output", console: "Console | None" = None, folder: str = "") -> None:
-    """Print the files of an output that is no C firmware, and in which folder they are."""
+    """Print the files of an output other than a C firmware, and in which folder they are."""
     console = console or new_console()
     place = f", in {folder}" if folder else ""
     settings = output.manifest.settings_in_words

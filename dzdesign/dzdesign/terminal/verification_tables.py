@@ -44,7 +44,7 @@ def print_verification(verification: "Verification", console: "Console | None" =
 
 
 def print_output_verification(verification: "OutputVerification", console: "Console | None" = None) -> None:
-    """Print every check of an output that is no C firmware, and what was not tried."""
+    """Print every check of an output other than a C firmware, and what was not tried."""
     from dzdesign.verify.requirements import RAMPS
 
     console = console or new_console()
@@ -126,7 +126,7 @@ def print_scenarios(
     if shown:
         title = "Scenarios with the compensator, worst of all pressure drops and pressures behind the edge"
         put_rows(console, title, shown, columns)
-    for each in shown:  # words of many lines in a narrow column are no table
+    for each in shown:  # words of many lines in a narrow column are not a table
         if each.figures:
             put_line(console, f"{name_of(each)}: {_figures(each, units)}")
 
@@ -212,8 +212,9 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     reference = valve.positive.reference.dp_MPa
     put_line(
         console,
-        "beta: how the threshold moves with the pressure drop; the firmware moves its offset by it. Without beta the "
-        f"offset stays that of {reference:g} MPa, and where the threshold is lower flow (Q) passes at zero command.",
+        "beta: change of the threshold with the pressure drop, which the firmware applies to its offset. Without beta "
+        f"the offset stays that of {reference:g} MPa, and flow (Q) passes at zero command where "
+        "the threshold is lower.",
     )
     _put_readings(console, verification, {"dP (MPa)": columns["dP (MPa)"]}, AS_COMPUTED)
     checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))

@@ -37,12 +37,12 @@ def identify(
     Parameters
     ----------
     tests : sequence of RampTest
-        Recordings, in any order; each may hold several ramps, and ramps at one pressure drop are one test. A single
-        recording may lack the pressure drop. A bipolar valve's recordings may hold both sides or one each.
+        Recordings in any order. Each may hold several ramps, and ramps at one pressure drop form one test. A single
+        recording may lack the pressure drop. Recordings of a bipolar valve may hold both sides, or one each.
     options : IdentifyOptions, optional
-        Choices of the engineer.
+        Options of the identification.
     record : mapping of str to str, optional
-        Who and what; it is handed on as it is.
+        Test record, such as serial number and oil. It is copied to the result unchanged.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def identify(
     Raises
     ------
     InputError
-        Where no threshold can be given, with the reason.
+        If no threshold can be identified. The message states the reason.
     """
     return identify_sides(tests, options, record).model
 

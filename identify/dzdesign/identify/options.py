@@ -13,50 +13,52 @@ LARGEST_CURVATURE = 1e3 / MPA**2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IdentifyOptions:
-    """Choices of the engineer, SI.
+    """Options of the identification, in SI units.
 
     Attributes
     ----------
     u_max : float
         Full command, V.
     dp0 : float or None
-        Reference pressure drop, Pa; None takes the test nearest to 1 MPa.
+        Reference pressure drop, Pa; None selects the test nearest to 1 MPa.
     meter_floor : float or None
-        Flow below which the meter reads zero, m³/s; None finds it in the data.
+        Flow below which the meter reads zero, m³/s; None determines it from the data.
     meter_lag : float or None
-        Lag of the flow meter, s; None finds it where ramps of two rates were recorded, and takes none otherwise.
+        Lag of the flow meter, s. None determines it from ramps of two rates, and assumes 0 without them.
     meter_lag_tolerance : float or None
-        By how much a declared lag may be wrong, s; None takes 20 % of it, and at least 0.05 s.
+        Largest error of a declared lag, s; None assumes 20 % of it, and at least 0.05 s.
     noise_level : float or None
-        Flow below which there is none, m³/s, if the recordings resolve it; None takes what their averages over the
-        dead zone resolve, and at least 0.5 % of the largest flow.
+        Smallest flow that counts as flow, m³/s, if the recordings resolve it. None selects the flow that averages over
+        the dead zone resolve, and at least 0.5 % of the largest flow.
     zero_flow : float or None
-        Flow that is allowed at zero command, a leak included, m³/s: the command that passes it is guarded. None guards
+        Flow that is allowed at zero command, leak included, m³/s; the command that passes it is guarded. None guards
         the first flow seen.
     meter_zero : float
-        Bound of the meter's zero error, m³/s, against which the certificate guards.
+        Bound of the meter's zero error, m³/s, which the certificate allows for.
     x_max : float or None
-        Stroke, m; with it k comes in V/mm.
+        Stroke, m. With it k is stated in V/mm.
     confidence : float
-        Of all lower bounds together.
+        Joint confidence level of all lower bounds.
     knee_window : tuple of float
-        Shares of the largest flow between which the characteristic is taken as straight. The lower edge is 12 %: on a
-        bent characteristic the knee moves with it, on a straight one it does not matter.
+        Range in which the characteristic is taken as straight, as shares of the largest flow. The lower end is 12 %.
+        It shifts the knee of a bent characteristic, but not that of a straight one.
     flat_below : float
-        Change of the threshold over the tested range, as a share of u_max, that systematic errors may make: a smaller
-        one is no trend, however significant.
+        Change of the threshold over the tested range, as a share of u_max, that systematic errors may cause. A smaller
+        change is not a trend, however significant it is.
     repeatability : float or None
-        Standard deviation of the threshold from ramp to ramp, as a share of u_max; None measures it where ramps are
-        repeated, and takes 0.25 % elsewhere.
+        Standard deviation of the threshold from ramp to ramp, as a share of u_max. None measures it on repeated ramps,
+        and assumes 0.25 % without them.
     curve : {"line", "smooth", "monotone"} or None
-        Premise about the threshold between the tests; None takes `smooth` where its curvature is declared, and where
-        it can be told from the tests and certifies more than `monotone`, or these contradict `monotone`.
+        Premise about the threshold between the tests. None selects `smooth` if a curvature is declared. It also selects
+        `smooth` if the tests determine the curvature and either certify more with it or contradict `monotone`.
     curvature : float or None
-        M of `smooth`: the largest second divided difference of the threshold, V/Pa²; None estimates it from the tests.
+        Bound M of `smooth`: the largest second divided difference of the threshold, V/Pa². None estimates it from the
+        tests.
     dithered : DeclaredDither or None
-        Dither that the drive superimposed on the command of every recording; None: none that `design` is to make.
+        Dither that the drive superimposed on the command of every recording. None: no dither, and `design` assumes none
+        in the recordings.
     units : ChosenUnits or None
-        Units in which results are shown; None: those of the recordings.
+        Units in which results are displayed; None selects those of the recordings.
     """
 
     u_max: float = 10.0

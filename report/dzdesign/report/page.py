@@ -131,15 +131,15 @@ class Report:
     html : str
         The page.
     kind : {"good", "bad", "open"}
-        Of its verdict.
+        Kind of the verdict.
     holds : bool or None
-        None where something was not checked, or is not there.
+        Verdict; None if something was not checked, or is missing.
     verdict : str
-        In words.
+        Verdict in words.
     faults, missing : tuple of str
-        What does not fit, and what is not there.
+        What is inconsistent, and what is missing.
     outputs : MadeOutputs
-        Of a valve's report: the outputs that were made of its compensator.
+        For the report of a valve: the outputs made from its compensator.
     """
 
     html: str

@@ -25,23 +25,34 @@ Range = tuple[Number, Number]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """Our number for one of the paper's, one way."""
+    """One value of dzdesign for a number of the paper."""
 
-    by: Annotated[Driver, Meta(description="Bare valve, the paper's law, or the whole product.")]
-    hysteresis_V: Annotated[float, quantity("V", "Hysteresis that is assumed of the valve.", ge=0, le=1e6)] = 0.0
-    value: Annotated[Number | None, Meta(description="In the number's unit; null: not compared.")]
-    difference: Annotated[Number | None, Meta(description="Ours less the printed one; null: no number is printed.")]
-    allowed: Annotated[
-        Range | None, Meta(description="The printed digits and a measurement error about them; null: no digits.")
+    by: Annotated[
+        Driver, Meta(description="Source of the value: the bare valve, the paper's law, or the whole product.")
     ]
-    reason: Annotated[str, Meta(description="Why it misses; empty where it agrees, or where nobody knows.")] = ""
-    explained: Annotated[Range | None, Meta(description="How far the reason reaches; null: there is none.")] = None
-    agrees: Annotated[bool | None, Meta(description="Whether it lies in the range; null: no digits.")] = field(
-        init=False
-    )
-    accounted: Annotated[bool, Meta(description="Whether it agrees, or misses within what its reason explains.")] = (
-        field(init=False)
-    )
+    hysteresis_V: Annotated[float, quantity("V", "Assumed hysteresis of the valve.", ge=0, le=1e6)] = 0.0
+    value: Annotated[
+        Number | None, Meta(description="Value of dzdesign, in the number's unit; null if it is not compared.")
+    ]
+    difference: Annotated[
+        Number | None, Meta(description="Value of dzdesign minus the printed one; null if no number is printed.")
+    ]
+    allowed: Annotated[
+        Range | None,
+        Meta(description="Range that the printed digits and a measurement error allow; null if there are no digits."),
+    ]
+    reason: Annotated[
+        str, Meta(description="Reason for a value outside the range; empty if it agrees or the reason is unknown.")
+    ] = ""
+    explained: Annotated[
+        Range | None, Meta(description="Range that the reason explains; null if there is no reason.")
+    ] = None
+    agrees: Annotated[
+        bool | None, Meta(description="Whether the value lies in the allowed range; null if there are no digits.")
+    ] = field(init=False)
+    accounted: Annotated[
+        bool, Meta(description="Whether the value agrees, or misses by no more than its reason explains.")
+    ] = field(init=False)
 
     def __post_init__(self) -> None:
         agrees = _within(self.value, self.allowed)
@@ -56,30 +67,37 @@ def _within(value: float | None, limits: Range | None) -> bool | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperNumber:
-    """One number of the paper, and ours."""
+    """One number of the paper, beside the values of dzdesign."""
 
-    valve: Annotated[str, Meta(description="Valve of the paper.")]
-    quantity: Annotated[str, Meta(description='What it is; "without" and "with" are of the compensator.')]
-    unit: Annotated[str, Meta(description="Of all values here.")]
-    dp_MPa: Annotated[float | None, quantity("MPa", "Pressure drop.")]
-    published: Annotated[str, Meta(description="As printed.")]
+    valve: Annotated[str, Meta(description="Valve of the paper to which the number belongs.")]
+    quantity: Annotated[str, Meta(description='Quantity; "without" and "with" refer to the compensator.')]
+    unit: Annotated[str, Meta(description="Unit of all values of this number.")]
+    dp_MPa: Annotated[float | None, quantity("MPa", "Pressure drop of the number.")]
+    published: Annotated[str, Meta(description="Number as printed.")]
     kind: Annotated[
-        Kind, Meta(description="Whether it went into a fit, is predicted, is taken over, or has no digits to compare.")
+        Kind,
+        Meta(
+            description="Whether the number was used in a fit, is predicted, is taken from the paper, or has no digits "
+            "to compare."
+        ),
     ]
     outcomes: Annotated[
-        tuple[Outcome, ...], Meta(description="Of the bare valve; or of the paper's law and of the product.")
+        tuple[Outcome, ...], Meta(description="Values of the bare valve, or of the paper's law and the product.")
     ]
-    tolerance: Annotated[str, Meta(description="What the ranges are made of; empty where there are none.")]
-    why: Annotated[str, Meta(description="What is to be known of the number, whether it agrees or not.")]
+    tolerance: Annotated[str, Meta(description="Components of the allowed ranges; empty if there are none.")]
+    why: Annotated[str, Meta(description="Background of the number, whether it agrees or not.")]
     agrees: Annotated[
         bool | None,
-        Meta(description="Whether every outcome without an assumed hysteresis agrees; null: no digits, or given."),
+        Meta(
+            description="Whether every outcome without an assumed hysteresis agrees; null if the number has no digits "
+            "or is given."
+        ),
     ] = field(init=False)
     holds: Annotated[
         bool | None,
         Meta(
-            description="Whether each agrees, or misses for a reason that reaches so far; false too where what is "
-            "given or said in words is contradicted; null: as in `agrees`."
+            description="Whether each outcome agrees or misses by no more than its reason explains. It is also false "
+            "if a given number or a statement in words is contradicted. Null as for `agrees`."
         ),
     ] = field(init=False)
 
@@ -99,64 +117,62 @@ class PaperNumber:
 class Parameter:
     """A parameter of the plant."""
 
-    value: Annotated[Number, Meta(description="In the unit that its name ends in.")]
-    recovered: Annotated[bool, Meta(description="Whether the fit found it.")]
-    origin: Annotated[str, Meta(description="Where it is from.")]
-    rounding: Annotated[
-        Number | None, Meta(description="By how much it may be off for the rounding of the printed figures.")
-    ]
+    value: Annotated[Number, Meta(description="Value, in the unit at the end of the parameter's name.")]
+    recovered: Annotated[bool, Meta(description="Whether the value was found by the fit.")]
+    origin: Annotated[str, Meta(description="Origin of the value.")]
+    rounding: Annotated[Number | None, Meta(description="Uncertainty of the value by rounding of the printed figures.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedFigure:
-    """A printed figure that went into a fit."""
+    """A printed figure that was used in a fit."""
 
-    name: Annotated[str, Meta(description="What it is.")]
-    unit: Annotated[str, Meta(description="Of the figure.")]
-    published: Annotated[str, Meta(description="As printed.")]
-    fitted: Annotated[Number, Meta(description="What the fit gives.")]
-    misfit: Annotated[Number, Meta(description="Distance over half a unit of the last printed digit.")]
+    name: Annotated[str, Meta(description="Name of the figure.")]
+    unit: Annotated[str, Meta(description="Unit of the figure.")]
+    published: Annotated[str, Meta(description="Figure as printed.")]
+    fitted: Annotated[Number, Meta(description="Figure that the fit gives.")]
+    misfit: Annotated[Number, Meta(description="Deviation over half a unit of the last printed digit.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hashes:
-    """SHA-256 of what was made of the valve."""
+    """SHA-256 of the files made from the valve."""
 
-    ramp_tests: Annotated[Mapping[str, Hash], Meta(description="File name -> hash of a simulated ramp test.")]
-    valve_json: Annotated[Hash, Meta(description="Of valve.json.")]
-    compensator_json: Annotated[Hash, Meta(description="Of compensator.json.")]
-    core: Annotated[Mapping[str, Hash], Meta(description="File name -> hash of the core's C.")]
+    ramp_tests: Annotated[Mapping[str, Hash], Meta(description="SHA-256 of each simulated ramp test, by file name.")]
+    valve_json: Annotated[Hash, Meta(description="SHA-256 of valve.json.")]
+    compensator_json: Annotated[Hash, Meta(description="SHA-256 of compensator.json.")]
+    core: Annotated[Mapping[str, Hash], Meta(description="SHA-256 of each C file of the core, by file name.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReproducedValve:
-    """A valve of the paper: its recovered plant, and what the product made of it."""
+    """A valve of the paper: its recovered plant, and the files made from it."""
 
-    valve: Annotated[str, Meta(description="Its name.")]
-    hysteresis_V: Annotated[float, quantity("V", "Hysteresis that is assumed of it.", ge=0, le=1e6)]
-    parameters: Annotated[Mapping[str, Parameter], Meta(description="Name of a plant's parameter -> parameter.")]
-    fitted_to: Annotated[tuple[FittedFigure, ...], Meta(description="The printed figures that the fit used.")]
-    at_bound: Annotated[tuple[str, ...], Meta(description="Parameters that a bound of the fit holds.")]
-    level_L_min: Annotated[float, quantity("L/min", "Flow from which on the paper sees flow.", ge=0, le=1e6)]
-    bench: Annotated[Bench, Meta(description="The simulated bench.")]
-    sha256: Annotated[Hashes, Meta(description="What was made of the valve.")]
+    valve: Annotated[str, Meta(description="Name of the valve.")]
+    hysteresis_V: Annotated[float, quantity("V", "Assumed hysteresis of the valve.", ge=0, le=1e6)]
+    parameters: Annotated[Mapping[str, Parameter], Meta(description="Parameters of the plant, by name.")]
+    fitted_to: Annotated[tuple[FittedFigure, ...], Meta(description="Printed figures that the fit used.")]
+    at_bound: Annotated[tuple[str, ...], Meta(description="Parameters that lie at a bound of the fit.")]
+    level_L_min: Annotated[float, quantity("L/min", "Smallest flow that counts as flow in the paper.", ge=0, le=1e6)]
+    bench: Annotated[Bench, Meta(description="Simulated bench.")]
+    sha256: Annotated[Hashes, Meta(description="Hashes of the files made from this valve.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reproduction(Artefact):
-    """Every number of the paper beside ours, as `dzdesign reproduce` writes it."""
+    """Every number of the paper beside that of dzdesign, as `dzdesign reproduce` writes it."""
 
     FILE_NAME: ClassVar[str] = "reproduction.json"
     schema: Annotated[Literal["dzdesign.reproduction/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.reproduction/1"
     )
-    paper: Annotated[str, Meta(description="Its DOI.", pattern="^10[.]")]
+    paper: Annotated[str, Meta(description="DOI of the paper.", pattern="^10[.]")]
     holds: Annotated[
-        bool, Meta(description="Whether every number agrees, or is missed for a reason that reaches so far.")
+        bool, Meta(description="Whether every number agrees or misses by no more than its reason explains.")
     ] = field(init=False)
-    assumptions: Annotated[tuple[str, ...], Meta(description="What the paper does not say and this takes for granted.")]
-    numbers: Annotated[tuple[PaperNumber, ...], Meta(description="In the order of the paper.", min_length=1)]
-    valves: Annotated[tuple[ReproducedValve, ...], Meta(description="In the order of the paper.")]
+    assumptions: Annotated[tuple[str, ...], Meta(description="Assumptions that the paper does not state.")]
+    numbers: Annotated[tuple[PaperNumber, ...], Meta(description="Numbers in the order of the paper.", min_length=1)]
+    valves: Annotated[tuple[ReproducedValve, ...], Meta(description="Valves in the order of the paper.")]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "holds", all(number.holds is not False for number in self.numbers))

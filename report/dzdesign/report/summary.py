@@ -84,7 +84,7 @@ def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headlin
     if unknown:
         text = f"{NOT_CHECKED} in full: {len(unknown)} of {len(checks)} requirements are open"
         return Headline(kind="open", text=text, reasons=reasons)
-    of = f"; the certificate is of {compensator.certified_of}" if compensator else ""
+    of = f"; the certificate covers {compensator.certified_of}" if compensator else ""
     return Headline(kind="good", text=f"Every requirement holds, all {len(checks)} that were tried{of}")
 
 

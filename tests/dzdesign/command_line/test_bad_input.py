@@ -606,11 +606,11 @@ def test_a_folder_that_is_no_firmware(refusal, bench, name, content, words):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"int (\n", "DOES NOT HOLD  compiles without a warning"),
+        (b"int (\n", "DOES NOT HOLD  compiles without warnings"),
         (b"", "DOES NOT HOLD"),
         (b"typedef int nothing;\n", "DOES NOT HOLD"),
         (b"/* \xe9 */\n", "DOES NOT HOLD"),
-        (None, "DOES NOT HOLD  compiles without a warning"),
+        (None, "DOES NOT HOLD  compiles without warnings"),
     ],
 )
 def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):

@@ -157,7 +157,7 @@ def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, c
     monkeypatch.setattr(mutation, "all_mutants", lambda bench: [edited(bench, *JUDGED[k][:3]) for k in (0, 3)])
     assert main(["verify", str(firmware_folder), "--mutate", "-o", str(tmp_path / "evidence")]) == 0
     out = capsys.readouterr().out
-    assert "HOLDS  wrong C is caught: 1 of 2 mutants killed, 1 equivalent (1 of the same object code" in out
+    assert "HOLDS  the checks catch wrong C: 1 of 2 mutants killed, 1 equivalent (1 of the same object code" in out
     assert "same object code, dz_comp.h line 1: DZ_ADC_CODE_MAX 4095u -> DZ_ADC_CODE_MAX 4096u" in out
     document = json.loads((tmp_path / "evidence" / "verification.json").read_text())
     assert document["mutants"]["killed"] == 1 and document["holds"]

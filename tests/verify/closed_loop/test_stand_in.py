@@ -286,7 +286,7 @@ def test_it_is_no_sharper_than_the_recording(example_valve):
             assert flowing <= min(onset, knee) + 0.01 < seen
 
 
-@pytest.mark.parametrize(("by_V", "part"), [(0.06, "goes on below"), (0.4, "at most")])
+@pytest.mark.parametrize(("by_V", "part"), [(0.06, "by extrapolation"), (0.4, "at most")])
 def test_a_valve_that_closes_sooner_leaks_in_the_loop(
     example_valve, firmware, example_compensator, by_V, part, wording
 ):

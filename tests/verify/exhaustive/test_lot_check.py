@@ -217,7 +217,7 @@ def test_the_command_fails_and_names_the_valve(common, tmp_path, capsys):
     folder, _ = firmware_of(with_bound(common.compensator, "c", 1, -1.0), tmp_path / "firmware")
     assert main(["verify", str(folder), "-o", str(tmp_path / "evidence")]) == 1
     said = " ".join(capsys.readouterr().out.split())
-    assert "DOES NOT HOLD no over-compensation of any valve of the lot: 4 of 4 valves" in said
+    assert "DOES NOT HOLD no over-compensation of any valve in the lot: 4 of 4 valves" in said
     evidence = json.loads((tmp_path / "evidence" / "verification.json").read_text(encoding="utf-8"))
     assert evidence["holds"] is False and evidence["inputs"][0]["lot"]["over_compensated"] == ["c"]
     assert "1 over-compensated: c" in (tmp_path / "evidence" / "report.html").read_text(encoding="utf-8")

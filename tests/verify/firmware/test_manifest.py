@@ -120,4 +120,4 @@ def test_verify_says_so(firmware_folder):
     (firmware_folder / "manifest.json").write_text(json.dumps(manifest))
     found = verify(firmware_folder)
     missed = [check.name for check in found.evidence.checks if not check.holds]
-    assert missed == ["the manifest says what is in the firmware"]
+    assert missed == ["the manifest describes the firmware"]

@@ -1,4 +1,4 @@
-"""Evidence: what was found of one firmware, declared once; ``verification.json`` is how it is stored.
+"""Evidence about one firmware, declared once; it is stored as ``verification.json``.
 
 The checks, the exhaustive comparison and the closed loop fill these classes; the report and the terminal read them.
 """
@@ -24,59 +24,87 @@ MOST_V = 1e4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotCheck:
-    """What one sign of command of a lot setting leaves to the bounds of every valve of its lot."""
+    """Check of a lot setting, for one sign of the command, against the bounds of every valve of its lot."""
 
-    valves: Annotated[Count, about("How many were compared.")]
+    valves: Annotated[Count, about("Number of valves that were compared.")]
     over_compensated: Annotated[
-        Names, about("Names of those driven above their bound at zero command, the worst first.")
+        Names, about("Names of the valves whose drive at zero command exceeds their bound, the worst first.")
     ]
     worst: Annotated[str, about("Name of the valve with the smallest margin.")]
-    worst_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop where it has it.", ge=-1000, le=1000)]
-    smallest_margin_V: Annotated[
-        float, quantity("V", "That margin; negative if the bound is exceeded.", ge=-MOST_V, le=MOST_V)
+    worst_dp_MPa: Annotated[
+        float, quantity("MPa", "Pressure drop at which that valve has the smallest margin.", ge=-1000, le=1000)
     ]
-    confidence: Annotated[tuple[float, float], about("The least and the largest with which a valve's bounds hold.")]
+    smallest_margin_V: Annotated[
+        float, quantity("V", "Smallest margin; negative if the bound is exceeded.", ge=-MOST_V, le=MOST_V)
+    ]
+    confidence: Annotated[tuple[float, float], about("Lowest and highest joint confidence level of a valve's bounds.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AboveCheck:
-    """What one sign of command drives at zero command above the tested pressure drops; every count must be zero."""
+    """Check of the drive at zero command above the tested pressure drops; every count must be zero."""
 
-    choice: Annotated[Above, about("What `design --above` chose.")]
-    certified_to_MPa: Annotated[
-        float, quantity("MPa", "Up to where it is certified; null: nothing is.", ge=0, le=1000)
-    ] | None
-    released_from_MPa: Annotated[
-        float, quantity("MPa", "From where on the offset is let go; null: nowhere.", ge=0, le=1000)
-    ] | None
-    codes: Annotated[Count, about("Differences of pressure codes above the tests.")]
-    over_compensated: Annotated[Count, about("Those of the certified ones whose drive lies above the continued bound.")]
-    smallest_margin_V: Annotated[
-        float, quantity("V", "Smallest distance from a drive above zero to that bound.", ge=-MOST_V, le=MOST_V)
-    ] | None
-    rising: Annotated[Count, about("Those with more drive than the certified offset of the last test.")]
-    not_released: Annotated[Count, about("Those with more than one unit of beta where the offset is let go.")]
+    choice: Annotated[Above, about("Choice of `design --above`.")]
+    certified_to_MPa: (
+        Annotated[
+            float,
+            quantity(
+                "MPa",
+                "Pressure drop up to which the drive is certified; null if nothing is certified above the tests.",
+                ge=0,
+                le=1000,
+            ),
+        ]
+        | None
+    )
+    released_from_MPa: (
+        Annotated[
+            float,
+            quantity(
+                "MPa", "Pressure drop from which the offset is released; null if it is not released.", ge=0, le=1000
+            ),
+        ]
+        | None
+    )
+    codes: Annotated[Count, about("Number of pressure-difference codes above the tests.")]
+    over_compensated: Annotated[Count, about("Number of certified codes whose drive lies above the continued bound.")]
+    smallest_margin_V: (
+        Annotated[
+            float, quantity("V", "Smallest margin of a drive above zero below that bound.", ge=-MOST_V, le=MOST_V)
+        ]
+        | None
+    )
+    rising: Annotated[Count, about("Number of codes with more drive than the certified offset of the last test.")]
+    not_released: Annotated[
+        Count, about("Number of codes with more than one unit of beta where the offset is released.")
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputCounts:
-    """What a machine counts that is given every input of one side, or a sample of them."""
+    """Counts of a machine that tries every input of one side, or a sample of them."""
 
     inputs: Annotated[
-        Count, about("Pairs of command code and difference of pressure codes, each compared with the exact law.")
+        Count, about("Number of pairs of command code and pressure-difference code, each compared with the exact law.")
     ]
-    wrong: Annotated[Count, about("Pairs whose compare value is not the exactly rounded law.")]
-    largest_error: Annotated[int, quantity("compare counts", "Largest difference.", ge=0, le=2**32)]
-    out_of_range: Annotated[Count, about("Compare values above the limit.")]
-    not_monotone_in_u: Annotated[Count, about("Falls with rising command.")]
-    not_monotone_in_dp: Annotated[Count, about("Steps over the pressure difference against the law's direction.")]
-    odd_pairs: Annotated[Count, about("Pairs of pressure codes that give another value than their difference does.")]
+    wrong: Annotated[Count, about("Number of pairs whose compare value is not the exactly rounded law.")]
+    largest_error: Annotated[
+        int, quantity("compare counts", "Largest difference from the exactly rounded law.", ge=0, le=2**32)
+    ]
+    out_of_range: Annotated[Count, about("Number of compare values above the limit.")]
+    not_monotone_in_u: Annotated[Count, about("Number of decreases with rising command.")]
+    not_monotone_in_dp: Annotated[
+        Count, about("Number of steps over the pressure difference against the direction of the law.")
+    ]
+    odd_pairs: Annotated[
+        Count, about("Number of pairs of pressure codes whose result differs from that of their difference.")
+    ]
     bad_fallbacks: Annotated[
-        Count, about("Codes outside their signal's valid range that do not fall back to the safe value.")
+        Count, about("Number of codes outside their signal's valid range that do not give the safe value.")
     ]
-    bad_status: Annotated[Count, about("Status words that say something else.")]
-    bad_betas: Annotated[Count, about("Pairs of pressure codes at which dz_beta() is not the law's.")]
-    calls: Annotated[Count, about("Calls of the core in all.")]
+    bad_status: Annotated[Count, about("Number of wrong status words.")]
+    bad_betas: Annotated[Count, about("Number of pairs of pressure codes at which dz_beta() differs from the law.")]
+    calls: Annotated[Count, about("Total number of calls of the core.")]
 
     @property
     def faults(self) -> int:
@@ -87,30 +115,31 @@ class InputCounts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputCheck(InputCounts):
-    """The check of every input of one side; every count that ends in a fault must be zero."""
+    """Check of every input of one side; every count of faults must be zero."""
 
-    sign: Annotated[Sign, about("Sign of the commands.")]
+    sign: Annotated[Sign, about("Sign of the command.")]
     over_compensated: Annotated[
-        Count, about("Pressure codes of the certified interval whose drive at zero command lies above the bound.")
+        Count,
+        about("Number of pressure codes in the certified interval whose drive at zero command lies above the bound."),
     ]
     smallest_margin_V: Annotated[
-        float, quantity("V", "Smallest distance from the drive at zero command to the bound.", ge=-MOST_V, le=MOST_V)
+        float, quantity("V", "Smallest margin of the drive at zero command below the bound.", ge=-MOST_V, le=MOST_V)
     ]
-    core_sha256: Annotated[Sha256, about("Hash of the C that was compiled.")]
-    object_sha256: Annotated[Sha256, about("Hash of the object that was tried.")]
+    core_sha256: Annotated[Sha256, about("SHA-256 of the compiled C source.")]
+    object_sha256: Annotated[Sha256, about("SHA-256 of the object code that was tried.")]
     outputs_hash: Annotated[
         str,
         Meta(
-            description="Hash of all compare values, in order: the same on every processor.",
+            description="Hash of all compare values in order; it is the same on every processor.",
             pattern="^[0-9a-f]{16}$", max_length=16,
         ),
     ]  # fmt: skip
-    pressure_pairs: Annotated[Count, about("Pairs of valid pressure codes, each of which was tried.")]
-    first_wrong: Annotated[str | None, about("The first fault, in words.")]
-    above: Annotated[AboveCheck, about("The same above the tests.")]
+    pressure_pairs: Annotated[Count, about("Number of pairs of valid pressure codes, all of which were tried.")]
+    first_wrong: Annotated[str | None, about("First fault, in words.")]
+    above: Annotated[AboveCheck, about("Check above the tested pressure drops.")]
     lot: Annotated[
         LotCheck | None,
-        about("Of a lot setting: every valve of its lot against its own bounds; null of a valve's own."),
+        about("For a lot setting, the check of every valve against its own bounds; null for a single valve."),
     ]
 
     @property
@@ -127,28 +156,28 @@ class InputCheck(InputCounts):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MutantOutcome:
-    """What became of one mutant."""
+    """Result of one mutant."""
 
-    file: Annotated[str, about("File.")]
-    line: Annotated[int, Meta(description="Line.", ge=1, le=10**6)]
-    change: Annotated[str, about("What was changed.")]
-    verdict: Annotated[str, about("Killed, refused by the compiler, equivalent or survived.")]
-    killer: Annotated[str, about("What caught it; empty if nothing did.")] = ""
+    file: Annotated[str, about("Name of the changed file.")]
+    line: Annotated[int, Meta(description="Line number.", ge=1, le=10**6)]
+    change: Annotated[str, about("Change that was made.")]
+    verdict: Annotated[str, about("Result: killed, refused by the compiler, equivalent or survived.")]
+    killer: Annotated[str, about("Check that caught the mutant; empty if none did.")] = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MutationScore:
-    """Wrong versions of the C, and how many of them the checks caught."""
+    """Wrong versions of the C, and the number of them that the checks caught."""
 
-    mutants: Annotated[Count, about("How many.")]
-    killed: Annotated[Count, about("Caught by a check.")]
-    refused: Annotated[Count, about("Refused by the compiler.")]
-    same_object: Annotated[Count, about("Equivalent: the same object code.")]
-    same_outputs: Annotated[Count, about("Equivalent: the same outputs.")]
-    survived: Annotated[Count, about("Neither: must be 0.")]
-    killers: Annotated[Mapping[str, Count], about("Check to how many it caught.")]
-    equivalent_means: Annotated[str, about("What equivalence rests on.")]
-    not_killed: Annotated[tuple[MutantOutcome, ...], about("Those that no check caught, with the reason.")]
+    mutants: Annotated[Count, about("Number of mutants.")]
+    killed: Annotated[Count, about("Number of mutants that a check caught.")]
+    refused: Annotated[Count, about("Number of mutants that the compiler refused.")]
+    same_object: Annotated[Count, about("Number of equivalent mutants with the same object code.")]
+    same_outputs: Annotated[Count, about("Number of equivalent mutants with the same outputs.")]
+    survived: Annotated[Count, about("Number of mutants that no check caught and that are not equivalent; must be 0.")]
+    killers: Annotated[Mapping[str, Count], about("Number of mutants that each check caught.")]
+    equivalent_means: Annotated[str, about("Definition of equivalence.")]
+    not_killed: Annotated[tuple[MutantOutcome, ...], about("Mutants that no check caught, with the reason.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,40 +188,47 @@ class Evidence(Artefact):
     schema: Annotated[Literal["dzdesign.evidence/1"], about("Name and version of this schema.")] = "dzdesign.evidence/1"
     target: Annotated[str, about("Microcontroller of the firmware.")]
     changed_board_files: Annotated[
-        Names, about("Board files that were filled in since they were generated: not checked.")
+        Names, about("Board files that were changed since generation; they are not checked.")
     ]
-    user_files: Annotated[Names, about("Source and project files of the user's in the folder board/: not checked.")]
+    user_files: Annotated[Names, about("Source and project files in the user's folder board/; they are not checked.")]
     differing_files: Annotated[
         Mapping[str, Sha256],
-        about("SHA-256, as verified, of every file of the firmware that its manifest has otherwise, or has not."),
+        about("SHA-256, as verified, of every file that differs from the firmware's manifest or is missing from it."),
     ]
     board_not_compiled: Annotated[
-        str, about("Why the changed board files were not compiled; empty if they were, or none was changed.")
+        str, about("Reason why the changed board files were not compiled; empty if they were, or none was changed.")
     ]
     holds: Annotated[
-        bool, about("Whether every requirement holds; one that could not be checked, or has no check here, does not.")
+        bool,
+        about("Whether every requirement holds. One that could not be checked, or has no check here, does not hold."),
     ] = field(init=False)
-    checks: Annotated[tuple[Check, ...], Meta(description="Every requirement that was tried.", min_length=1)]
+    checks: Annotated[
+        tuple[Check, ...], Meta(description="Result of every requirement that was checked.", min_length=1)
+    ]
     inputs: Annotated[
-        tuple[InputCheck, ...], about("One entry a side; empty if the core did not compile or its check could not run.")
+        tuple[InputCheck, ...],
+        about("Check of all inputs of each side; empty if the core did not compile or the check could not run."),
     ]
-    closed_loop: Annotated[ClosedLoopResult, about("Ramps in closed loop with the generated C.")]
-    scenarios: Annotated[tuple[ScenarioResult, ...], about("What happens beside ramps.")]
+    closed_loop: Annotated[ClosedLoopResult, about("Result of the ramps in closed loop with the generated C.")]
+    scenarios: Annotated[
+        tuple[ScenarioResult, ...], about("Results of the scenarios in closed loop, other than ramps.")
+    ]
     population: Annotated[
-        Population | None, about("Machines drawn from the declared budget, where --tolerances asked for them.")
+        Population | None, about("Machines drawn from the declared budget, if --tolerances requested them.")
     ]
-    monte_carlo: Annotated[MonteCarlo | None, about("The series of plants, where --tolerances was given.")]
+    monte_carlo: Annotated[MonteCarlo | None, about("Series of plants, if --tolerances requested it.")]
     current_loop: Annotated[
-        CurrentLoopResult | None, about("Of a drive by current its loop; null of one by duty, or if it did not run.")
+        CurrentLoopResult | None,
+        about("Current loop of a current-controlled drive; null for a duty-controlled one, or if it did not run."),
     ]
-    mutants: Annotated[MutationScore | None, about("Wrong versions of the C, where --mutate was given.")]
+    mutants: Annotated[MutationScore | None, about("Mutation test of the C, if --mutate was given.")]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "holds", all(check.holds for check in self.all_checks))
 
     @property
     def all_checks(self) -> tuple[Check, ...]:
-        """The checks, and as not checked what every `verify` checks and is not here, unless a failure is the reason."""
+        """All checks. A standard check that is absent here counts as not checked, unless a failure explains it."""
         if any(check.holds is False for check in self.checks):
             return self.checks
         tried = {check.id for check in self.checks}
@@ -202,7 +238,7 @@ class Evidence(Artefact):
 
     @property
     def verdict(self) -> str:
-        """One sentence: what does not hold stands before what could not be checked."""
+        """The verdict in one sentence: what does not hold, then what could not be checked."""
         missed = [check.name for check in self.checks if check.holds is False]
         unknown = [check.name for check in self.all_checks if check.holds is None]
         parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
@@ -211,9 +247,9 @@ class Evidence(Artefact):
 
     @property
     def reservation(self) -> str:
-        """What a good verdict is not about: thresholds that no ramp test was compared with; empty where all were.
+        """What a good verdict does not cover: thresholds not compared with ramp tests. Empty if all were compared.
 
-        Of a lot setting the recordings are those of one of its valves.
+        For a lot setting, the recordings belong to one of its valves.
         """
         if not any(check.id == RAMPS.id and check.holds for check in self.checks):
             return AS_STATED

@@ -31,41 +31,47 @@ class PressureResult:
 
     side: Side
     dp_MPa: PressureDrop
-    dead_zone_opening: Annotated[Share, about("Dead zone on opening without compensator.")]
-    dead_zone_closing: Annotated[Share, about("The same on closing.")]
-    residual_opening: Annotated[Share, about("Dead zone on opening that the compensator leaves.")]
-    residual_closing: Annotated[Share, about("The same on closing.")]
-    reading_flow_L_min: Annotated[Flow, about("Reading flow: a stated flow at which dead zones are read too.")]
-    reading_opening_without: Annotated[Share, about("Command at which it is reached on opening, without compensator.")]
-    reading_closing_without: Annotated[Share, about("The same on closing.")]
-    reading_opening: Annotated[Share, about("Command at which it is reached on opening, with compensator.")]
-    reading_closing: Annotated[Share, about("The same on closing.")]
+    dead_zone_opening: Annotated[Share, about("Dead zone on opening without the compensator.")]
+    dead_zone_closing: Annotated[Share, about("Dead zone on closing without the compensator.")]
+    residual_opening: Annotated[Share, about("Dead zone on opening with the compensator.")]
+    residual_closing: Annotated[Share, about("Dead zone on closing with the compensator.")]
+    reading_flow_L_min: Annotated[
+        Flow, about("Reading flow: a stated flow at which dead zones are read in addition to the onset.")
+    ]
+    reading_opening_without: Annotated[Share, about("Command at the reading flow on opening without the compensator.")]
+    reading_closing_without: Annotated[Share, about("Command at the reading flow on closing without the compensator.")]
+    reading_opening: Annotated[Share, about("Command at the reading flow on opening with the compensator.")]
+    reading_closing: Annotated[Share, about("Command at the reading flow on closing with the compensator.")]
     ideal_line: Annotated[
-        Share, about("Command at which an ideal line from zero command to the largest flow reaches it.")
+        Share, about("Command at the reading flow on an ideal line from zero command to the largest flow.")
     ]
     unseen_below_L_min: Annotated[
         Flow | None,
-        about("Flow below which the recordings show none, so that the plant's is not known; null of a given plant."),
+        about(
+            "Flow below which the recordings show none, so that the plant's flow is unknown; null for a given plant."
+        ),
     ]
-    leak_L_min: Annotated[Flow, about("Flow without any drive, which no compensator can stop.")]
+    leak_L_min: Annotated[Flow, about("Flow without drive, which no compensator can stop.")]
     allowed_at_zero_L_min: Annotated[
         Flow | None,
-        about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
+        about("Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."),
     ]
-    q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing, with compensator; a leak is in it.")]
-    q_zero_without_beta_L_min: Annotated[Flow, about("The same with beta held at 1: what over-compensation would do.")]
+    q_zero_L_min: Annotated[Flow, about("Flow at zero command after closing with the compensator, leak included.")]
+    q_zero_without_beta_L_min: Annotated[
+        Flow, about("Flow at zero command after closing with beta held at 1. It shows the effect of over-compensation.")
+    ]
     flow_miss: Annotated[
         float,
         quantity(
             "1",
-            "Largest departure of the plant's mean flow per 1 % of command from the recorded one, without compensator, "
-            "over the largest recorded flow.",
+            "Largest deviation of the plant's flow without the compensator from the recorded one, over the "
+            "largest recorded flow. Both are averaged over 1 % of command.",
             ge=0,
             le=1e6,
         ),
     ]
-    q_max_direct_L_min: Annotated[Flow, about("Largest flow without compensator.")]
-    q_max_L_min: Annotated[Flow, about("Largest flow with it.")]
+    q_max_direct_L_min: Annotated[Flow, about("Largest flow without the compensator.")]
+    q_max_L_min: Annotated[Flow, about("Largest flow with the compensator.")]
 
     @property
     def q_beyond_L_min(self) -> float:
@@ -96,104 +102,121 @@ WindowKind = Literal["ramp", "step", "load step", "disturbances"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlantComparison:
-    """The closed loop's plant beside CasADi's integrator, over one window of time."""
+    """Comparison of the closed loop's plant with CasADi's integrator over one time window."""
 
     kind: Annotated[
         WindowKind,
         about(
-            "What the command, or the pressure drop, does in it; disturbances: other pressures, drive, oil and "
-            "readings, and a sensor that fails."
+            "Motion of the command or the pressure drop in the window. disturbances: other pressures, "
+            "drive, oil and readings, and a failing sensor."
         ),
     ]
     side: Side
     dp_MPa: PressureDrop
     then_MPa: Annotated[
-        float, quantity("MPa", "Pressure drop at no flow after a load step; else the same.", ge=0, le=1000)
+        float,
+        quantity("MPa", "Pressure drop at zero flow after a load step; otherwise equal to dp_MPa.", ge=0, le=1000),
     ]
     seconds: Annotated[float, quantity("s", "Length of the window.", gt=0, le=1000)]
     position_difference: Annotated[
         float,
         quantity(
-            "1", "Largest distance of the spool's positions at the ends of PWM periods, over the stroke.", ge=0, le=1e6
+            "1",
+            "Largest difference of the spool positions at the ends of PWM periods, relative to the stroke.",
+            ge=0,
+            le=1e6,
         ),
     ]
     flow_difference: Annotated[
-        float, quantity("1", "Largest difference of the flows there, over the largest one of the window.", ge=0, le=1e6)
+        float,
+        quantity(
+            "1",
+            "Largest difference of the flows at the ends of PWM periods, relative to the largest one in the window.",
+            ge=0,
+            le=1e6,
+        ),
     ]
-    q_largest_L_min: Annotated[Flow, about("That largest flow, by the integrator.")]
+    q_largest_L_min: Annotated[Flow, about("Largest flow in the window, by the integrator.")]
     unlike_compare_values: Annotated[
         Count,
         about(
-            "PWM periods in which the two loops' compare values differ, those of a direct command under the drive's "
-            "dither too, and samples of a pressure's code."
+            "PWM periods in which the compare values of the two loops differ, plus samples with a different "
+            "pressure code. Those of a direct command under the drive's dither count, too."
         ),
     ]
     codes_at_border: Annotated[
-        Count, about("Pressures so close to the border of two codes that the plant's code was taken.")
+        Count, about("Number of pressures so close to the border of two codes that the plant's code was used.")
     ]
-    impacts: Annotated[Count, about("How often the spool met a stop, by the integrator.")]
+    impacts: Annotated[Count, about("Number of times the spool hit a stop, by the integrator.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClosedLoopResult:
     """Ramps in closed loop with the generated C."""
 
-    plant: Annotated[
-        Plant | None, about("The plant that was given; null where the recorded flow stood in for the valve.")
-    ]
-    plant_source: Annotated[str, about("Where the plant came from.")]
+    plant: Annotated[Plant | None, about("Given plant; null if the recorded flow stood in for the valve.")]
+    plant_source: Annotated[str, about("Origin of the plant.")]
     plant_sha256: Annotated[
-        Sha256 | None, about("Hash of the plant's file; null where the recorded flow stood in for the valve.")
+        Sha256 | None, about("SHA-256 of the plant's file; null if the recorded flow stood in for the valve.")
     ]
     dynamics: Annotated[
         Plant | None,
         about(
-            "Coil and spool that moved the recorded flow (`recorded` in valve.json); their edge does not count. Null "
-            "where a plant was given."
+            "Coil and spool that moved the recorded flow (`recorded` in valve.json), without their metering "
+            "edge. Null if a plant was given."
         ),
     ]
     back_MPa: Annotated[
         tuple[float, ...],
-        quantity("MPa", "Pressures behind the edge: ramps at the highest of them, failing sensors at each."),
+        quantity("MPa", "Pressures downstream of the edge. The ramps use the highest, failing sensors use each."),
     ]
     pressures: Annotated[
-        tuple[PressureResult, ...], about("One entry a side and tested pressure drop; none if it did not run.")
+        tuple[PressureResult, ...],
+        about("Result for each side and tested pressure drop; empty if the closed loop did not run."),
     ]
     against_integrator: Annotated[
-        tuple[PlantComparison, ...], about("One entry a side and kind of window; none if it did not run.")
+        tuple[PlantComparison, ...], about("Comparison for each side and kind of window; empty if it did not run.")
     ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioResult:
-    """One scenario beside the ramps, at one pressure drop."""
+    """Result of one scenario other than ramps, at one pressure drop."""
 
-    name: Annotated[str, about("What happens.")]
+    name: Annotated[str, about("Name of the scenario.")]
     side: Side
     dp_MPa: PressureDrop
-    back_MPa: Annotated[float, quantity("MPa", "Pressure behind the edge, at the end.", ge=0, le=1000)]
-    leak_L_min: Annotated[Flow, about("Flow without any drive at the end, which no compensator can stop.")]
+    back_MPa: Annotated[float, quantity("MPa", "Pressure downstream of the edge at the end.", ge=0, le=1000)]
+    leak_L_min: Annotated[Flow, about("Flow without drive at the end, which no compensator can stop.")]
     allowed_at_zero_L_min: Annotated[
         Flow | None,
-        about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
+        about("Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."),
     ]
     q_zero_L_min: Annotated[
         Flow,
         about(
-            "Flow at zero command at the end, or the largest where a disturbance lasts and the scenario is judged "
-            "throughout; a leak is in it."
+            "Flow at zero command at the end, leak included. If a disturbance lasts and the whole scenario "
+            "is assessed, it is the largest flow at zero command."
         ),
     ]
     q_peak_at_zero_L_min: Annotated[
-        Flow, about("Largest flow while the command was zero and the valve had closed before.")
+        Flow, about("Largest flow while the command was zero and the valve had already closed.")
     ]
     unseen_below_L_min: Annotated[
         Flow | None,
-        about("Flow below which the recordings show none, so that the plant's is not known; null of a given plant."),
+        about(
+            "Flow below which the recordings show none, so that the plant's flow is unknown; null for a given plant."
+        ),
     ]
-    must_shut: Annotated[bool, about("Whether that flow is a failure.")]
-    not_required: Annotated[str, about("Why it is not: no core can know, or nothing was declared; else empty.")]
-    figures: Annotated[Mapping[str, float], about("What else was measured; the unit is the end of the name.")]
+    must_shut: Annotated[bool, about("Whether flow at zero command is a failure.")]
+    not_required: Annotated[
+        str,
+        about(
+            "Reason why it is not a failure: the firmware cannot detect the disturbance, or nothing was "
+            "declared. Empty if it is a failure."
+        ),
+    ]
+    figures: Annotated[Mapping[str, float], about("Other measured values; each name ends in its unit.")]
 
     @property
     def is_load_step(self) -> bool:
@@ -212,60 +235,70 @@ class ScenarioResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """Quantiles of one quantity over a series of plants, and the plant at its bad end."""
+    """Quantiles of one quantity over a series of plants, and the least favourable plant."""
 
     p01: Annotated[float, about("1 % quantile.")]
     p05: Annotated[float, about("5 % quantile.")]
     p50: Annotated[float, about("Median.")]
     p95: Annotated[float, about("95 % quantile.")]
     p99: Annotated[float, about("99 % quantile.")]
-    worst: Annotated[float, about("Value of the plant at the bad end.")]
-    worst_plant: Annotated[Mapping[str, float], about("Those of its parameters that were drawn.")]
+    worst: Annotated[float, about("Value of the least favourable plant.")]
+    worst_plant: Annotated[Mapping[str, float], about("Drawn parameters of that plant.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scatter:
-    """What a series of plants does on one side at one pressure drop."""
+    """Results of a series of plants on one side at one pressure drop."""
 
     side: Side
     dp_MPa: PressureDrop
-    plants: Annotated[int, Meta(description="How many plants.", ge=1, le=10**6)]
+    plants: Annotated[int, Meta(description="Number of plants.", ge=1, le=10**6)]
     leaking: Annotated[
-        Count, about("How many pass flow at zero command after closing, or more than was declared as allowed.")
+        Count, about("Number of plants with flow at zero command after closing, beyond any declared as allowed.")
     ]
-    residual_opening: Annotated[Spread, about("Dead zone on opening, share of full command.")]
-    residual_closing: Annotated[Spread, about("Dead zone on closing, share of full command.")]
+    residual_opening: Annotated[Spread, about("Dead zone on opening, as a share of full command.")]
+    residual_closing: Annotated[Spread, about("Dead zone on closing, as a share of full command.")]
     q_zero_L_min: Annotated[Spread, about("Flow at zero command, L/min.")]
     q_max_L_min: Annotated[Spread, about("Largest flow, L/min.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Population:
-    """Machines drawn from the declared one, each at zero command at every tested pressure drop and between."""
+    """Machines drawn from the declared budget, each tried at zero command at and between the tested pressure drops."""
 
-    machines: Annotated[int, Meta(description="How many.", ge=1, le=10**6)]
-    seed: Annotated[int, Meta(description="Of the draw.", ge=0, le=2**60)]
-    flowing: Annotated[Count, about("How many pass flow at zero command, beyond what is allowed.")]
-    never_open: Annotated[Count, about("How many did not open at some pressure drop, so that their closing is none.")]
-    confidence: Annotated[float, quantity("1", "Of the upper limit.", ge=0.5, le=1)]
+    machines: Annotated[int, Meta(description="Number of machines.", ge=1, le=10**6)]
+    seed: Annotated[int, Meta(description="Random seed of the draw.", ge=0, le=2**60)]
+    flowing: Annotated[Count, about("Number of machines with flow at zero command beyond what is allowed.")]
+    never_open: Annotated[
+        Count,
+        about("Number of machines that did not open at some pressure drop, so that they could not be seen to close."),
+    ]
+    confidence: Annotated[float, quantity("1", "Confidence level of the upper limit.", ge=0.5, le=1)]
     upper_limit: Annotated[
         float,
-        quantity("1", "Upper limit of the probability that a machine passes flow, by Clopper and Pearson.", ge=0, le=1),
+        quantity(
+            "1", "Upper limit of the probability that a machine passes flow, after Clopper and Pearson.", ge=0, le=1
+        ),
     ]
-    pressures: Annotated[int, Meta(description="Pressure drops that each machine was tried at.", ge=1, le=10**6)]
+    pressures: Annotated[
+        int, Meta(description="Number of pressure drops at which each machine was tried.", ge=1, le=10**6)
+    ]
     largest_L_min: Annotated[Flow, about("Largest flow at zero command beyond what is allowed.")]
-    largest_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop of it.", ge=0, le=1000)]
+    largest_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at which that flow occurs.", ge=0, le=1000)]
     worst: Annotated[
-        Mapping[str, float], about("That machine: place of each component in its half-width, from -1 to 1.")
+        Mapping[str, float],
+        about("Machine with that flow: position of each component within its half-width, from -1 to 1."),
     ]
-    drawn: Annotated[tuple[str, ...], about("Components that were drawn; others stood at their worst ends.")]
+    drawn: Annotated[
+        tuple[str, ...], about("Components that were drawn; the others stood at their least favourable ends.")
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MonteCarlo:
-    """A series of plants about the one that was given."""
+    """A series of plants around the given one."""
 
-    plants: Annotated[int, Meta(description="How many.", ge=1, le=10**6)]
-    seed: Annotated[int, Meta(description="Of the draw.", ge=0, le=2**60)]
-    spreads: Annotated[Mapping[str, str], about("Parameter to its spread, in words.")]
-    pressures: Annotated[tuple[Scatter, ...], about("One entry a side and pressure drop.")]
+    plants: Annotated[int, Meta(description="Number of plants.", ge=1, le=10**6)]
+    seed: Annotated[int, Meta(description="Random seed of the draw.", ge=0, le=2**60)]
+    spreads: Annotated[Mapping[str, str], about("Spread of each parameter, in words.")]
+    pressures: Annotated[tuple[Scatter, ...], about("Scatter on each side at each pressure drop.")]

@@ -1,4 +1,4 @@
-"""Evidence about an output that is no C firmware, declared once; ``evidence.json`` is how it is stored."""
+"""Evidence about an output other than a C firmware, declared once; ``evidence.json`` is how it is stored."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,12 +15,12 @@ from dzdesign.verify.requirements import AS_STATED, RAMPS, Check
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TriedInputs:
-    """A set of inputs, each of which was given to the output and compared with the exact law."""
+    """A set of inputs, each given to the output and compared with the exact law."""
 
-    name: Annotated[str, about("Which inputs: their units, and the sign of command.")]
-    inputs: Annotated[Count, about("How many.")]
-    wrong: Annotated[Count, about("Those whose answer is not the exactly rounded law's; must be 0.")]
-    outputs_hash: Annotated[str, about("Hash of all answers, in order; empty if none was made.")] = ""
+    name: Annotated[str, about("Units of the inputs and sign of the command.")]
+    inputs: Annotated[Count, about("Number of inputs.")]
+    wrong: Annotated[Count, about("Number of answers that are not the exactly rounded law; must be 0.")]
+    outputs_hash: Annotated[str, about("Hash of all answers in order; empty if there were none.")] = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,15 +41,17 @@ class OutputEvidence(Artefact):
     schema: Annotated[Literal["dzdesign.output-evidence/1"], about("Name and version of this schema.")] = (
         "dzdesign.output-evidence/1"
     )
-    target: Annotated[str, about("Kind of output, as `codegen --list-targets` names it.")]
-    settings: Annotated[Mapping[str, str], about("Settings of the output, as its manifest has them.")]
-    origin: Annotated[FirmwareOrigin, about("Hashes of everything the output was made from.")]
-    holds: Annotated[bool, about("Whether every requirement holds; one that could not be checked does not.")] = field(
-        init=False
+    target: Annotated[str, about("Kind of output, as listed by `codegen --list-targets`.")]
+    settings: Annotated[Mapping[str, str], about("Settings of the output, as in its manifest.")]
+    origin: Annotated[FirmwareOrigin, about("Hashes of all files from which the output was made.")]
+    holds: Annotated[bool, about("Whether every requirement holds. One that could not be checked does not hold.")] = (
+        field(init=False)
     )
-    checks: Annotated[tuple[Check, ...], Meta(description="Every requirement that was tried.", min_length=1)]
-    inputs: Annotated[tuple[TriedInputs, ...], about("The inputs that were tried.")]
-    versions: Annotated[Mapping[str, str], about("Tool that a check used, to its version.")]
+    checks: Annotated[
+        tuple[Check, ...], Meta(description="Result of every requirement that was checked.", min_length=1)
+    ]
+    inputs: Annotated[tuple[TriedInputs, ...], about("Inputs that were tried.")]
+    versions: Annotated[Mapping[str, str], about("Version of each tool that a check used.")]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "holds", all(check.holds for check in self.checks))

@@ -1,4 +1,4 @@
-"""Every requirement on a firmware, declared once: id, title and how to have it checked; and what is found of one."""
+"""Every requirement on a firmware or another output: id, title and how to have it checked; and its result."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -10,14 +10,16 @@ from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One requirement that was tried."""
+    """Result of one requirement."""
 
-    id: Annotated[str, Meta(description="Short name of the requirement, the same in every version.")]
-    name: Annotated[str, Meta(description="What is required, with the sign of command or the processor it is of.")]
+    id: Annotated[str, Meta(description="Short name of the requirement, stable across versions.")]
+    name: Annotated[
+        str, Meta(description="Requirement, with the sign of the command or the processor to which it applies.")
+    ]
     holds: Annotated[
         bool | None, Meta(description=f"True: {HOLDS}; false: {DOES_NOT_HOLD}; null: {NOT_CHECKED}, it could not be.")
     ]
-    text: Annotated[str, Meta(description="What was found, with its figures.")]
+    text: Annotated[str, Meta(description="Finding, with its figures.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,30 +34,32 @@ class Requirement:
     how: str = "`verify`"
 
     def check(self, *, holds: bool | None, text: str, name: str = "") -> Check:
-        """Return what was found; `name` says what of it was tried, such as one processor's machine code."""
+        """Return the result of a check; `name` says which part was tried, such as one processor's machine code."""
         return Check(id=self.id, name=name or self.title, holds=holds, text=text)
 
 
 FILES = Requirement(id="files-as-generated", title="files as generated")
-MANIFEST = Requirement(id="manifest", title="the manifest says what is in the firmware")
-#: Of an output that is no C firmware.
-OUTPUT_MANIFEST = Requirement(id="output-manifest", title="the manifest says what the output was made from")
+MANIFEST = Requirement(id="manifest", title="the manifest describes the firmware")
+#: Of an output other than a C firmware.
+OUTPUT_MANIFEST = Requirement(id="output-manifest", title="the manifest states what the output was made from")
 #: Of Structured Text.
-SUBSET = Requirement(id="st-subset", title="the text is of the subset that is verified")
+SUBSET = Requirement(id="st-subset", title="the text uses only the verified subset")
 SAME_TEXT = Requirement(id="st-same-text", title="every file holds the same text")
 TWO_READINGS = Requirement(id="st-two-readings", title="two readings of the text agree")
-OVERFLOW = Requirement(id="st-overflow", title="no operation overflows its 32 bits")
-STATES = Requirement(id="st-states", title="status, side and rest follow their description")
-COMPILES = Requirement(id="compiles", title="compiles without a warning")
+OVERFLOW = Requirement(id="st-overflow", title="no operation overflows 32 bits")
+STATES = Requirement(id="st-states", title="status, side and rest state match their description")
+COMPILES = Requirement(id="compiles", title="compiles without warnings")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
-MONOTONE = Requirement(id="monotone", title="within range, monotone")
+MONOTONE = Requirement(id="monotone", title="within range and monotone")
 ZERO_COMMAND = Requirement(id="over-compensation", title="no over-compensation on the tested interval")
-ABOVE_TESTS = Requirement(id="above-tests", title="above the tests the drive at zero is what the certificate says")
-LOT = Requirement(id="over-compensation-of-lot", title="no over-compensation of any valve of the lot")
-PRESSURE_DIFFERENCE = Requirement(id="pressure-difference", title="depends on the pressures by their difference only")
-FALLBACK = Requirement(id="fallback", title="codes outside their signal's valid range fall back")
+ABOVE_TESTS = Requirement(id="above-tests", title="the drive at zero command above the tests matches the certificate")
+LOT = Requirement(id="over-compensation-of-lot", title="no over-compensation of any valve in the lot")
+PRESSURE_DIFFERENCE = Requirement(
+    id="pressure-difference", title="depends on the pressures only through their difference"
+)
+FALLBACK = Requirement(id="fallback", title="codes outside their signal's valid range give the safe value")
 #: Of a firmware that has them.
-VECTORS = Requirement(id="vectors", title="the test vectors are the exactly rounded law's")
+VECTORS = Requirement(id="vectors", title="the test vectors equal the exactly rounded law")
 DRIVE = Requirement(id="drive", title="the drive follows its model")
 PLANT_OPENS = Requirement(id="plant-opens", title="the plant of the closed loop opens")
 PLANT_IS_THE_VALVE = Requirement(id="plant-is-the-valve", title="the plant opens where the identified valve does")
@@ -63,80 +67,82 @@ ZERO_FLOW = Requirement(id="zero-flow", title="no flow at zero command in the cl
 ZERO_FLOW_AFTER_SCENARIOS = Requirement(
     id="zero-flow-after-scenarios", title="no flow at zero command after any scenario"
 )
-NATIVE_PLANT = Requirement(id="native-plant", title="the plant of the closed loop moves as CasADi's integrator has it")
+NATIVE_PLANT = Requirement(id="native-plant", title="the plant of the closed loop agrees with CasADi's integrator")
 CERTIFICATE = Requirement(id="certificate", title="the certificate follows from the valve")
 BOUNDS = Requirement(id="bounds", title="the bounds follow from the valve's thresholds and errors")
 LAW = Requirement(id="law", title="the law follows from the valve and the options")
 #: Of a valve.json that is written as `identify` writes it the hash is known without the file.
 VALVE = Requirement(
     id="valve",
-    title="the valve is the one that compensator.json was made from",
+    title="the valve is the one from which compensator.json was made",
     how="`verify` with the valve.json that compensator.json names by its SHA-256 beside the firmware",
 )
 #: Checked by the front door, which may ask the generator; this room shares no code with it.
-REGENERATED = Requirement(id="regenerated", title="the files are those that codegen makes of compensator.json")
+REGENERATED = Requirement(id="regenerated", title="the files are what codegen generates from compensator.json")
 #: Checked by the front door, which asks `identify`. Without it thresholds are taken as stated.
 RAMPS = Requirement(
     id="identified-again",
-    title="the valve is what its ramp tests give",
+    title="the ramp tests give this valve",
     how="`verify --ramps` with the recordings that valve.json was made from",
 )
 BOARD_FILES = Requirement(id="board-files", title="your board files compile")
 #: Of a firmware in block form.
 OWN_BLOCK = Requirement(
-    id="block-accepted", title="the firmware accepts its calibration block, and refuses it damaged"
+    id="block-accepted", title="the firmware accepts its calibration block and refuses damaged ones"
 )
 #: Of a firmware in block form: blocks of other valves than the one that lies in its folder.
 CALIBRATION_BLOCK = Requirement(
-    id="calibration-block", title="every input with the calibration block", how="`verify --blocks` with its file"
+    id="calibration-block",
+    title="every input is right with the calibration block",
+    how="`verify --blocks` with its file",
 )
 MACHINE_CODE = Requirement(
-    id="machine-code", title="machine code of other processors, in simulators", how="`verify --machine-code`"
+    id="machine-code", title="machine code of other processors is right in simulators", how="`verify --machine-code`"
 )
 UNDEFINED_BEHAVIOUR = Requirement(
     id="undefined-behaviour", title="no undefined behaviour with an int of 16 bits", how="`verify --proof`"
 )
-MUTATION = Requirement(id="mutation", title="wrong C is caught", how="`verify --mutate`")
+MUTATION = Requirement(id="mutation", title="the checks catch wrong C", how="`verify --mutate`")
 C2000WARE = Requirement(id="c2000ware", title="compiles against C2000Ware", how="`verify --c2000ware`")
 #: Of FMUs.
 FMU_FILES = Requirement(id="fmu-files", title="the FMUs' files are those of their manifests")
-FMU_DESCRIPTION = Requirement(id="fmu-description", title="modelDescription.xml says what the FMU was made from")
-FMU_LIBRARIES = Requirement(id="fmu-libraries", title="the binaries need no library")
-FMU_DRIVE = Requirement(id="fmu-drive", title="Co-Simulation follows the drive's model, a step later")
+FMU_DESCRIPTION = Requirement(id="fmu-description", title="modelDescription.xml states what the FMU was made from")
+FMU_LIBRARIES = Requirement(id="fmu-libraries", title="the binaries need no other library")
+FMU_DRIVE = Requirement(id="fmu-drive", title="Co-Simulation follows the drive's model one step later")
 FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
-FMU_STARTS = Requirement(id="fmu-starts", title="variables begin as they are described")
-FMU_EXCHANGE = Requirement(id="fmu-exchange", title="Model Exchange follows the exact models, without delay")
-FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="compensator and plant, coupled, run as the closed loop")
+FMU_STARTS = Requirement(id="fmu-starts", title="variables start at their described values")
+FMU_EXCHANGE = Requirement(id="fmu-exchange", title="Model Exchange follows the exact models without delay")
+FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="the coupled FMUs behave as the closed loop")
 #: Of a function for MATLAB.
-MATLAB_SUBSET = Requirement(id="matlab-subset", title="the function is of the subset of MATLAB that is verified")
+MATLAB_SUBSET = Requirement(id="matlab-subset", title="the function uses only the verified subset of MATLAB")
 MATLAB_RANGES = Requirement(id="matlab-ranges", title="no operation leaves the range of its class")
 MATLAB_INPUTS = Requirement(
-    id="matlab-inputs", title="inputs of every class and size are taken or refused as described"
+    id="matlab-inputs", title="inputs of every class and size are accepted or refused as described"
 )
 POPULATION = Requirement(
     id="population",
-    title="no flow at zero command of any machine drawn from the budget",
+    title="no machine drawn from the budget passes flow at zero command",
     how="`verify --tolerances` with machines = 10000, of a declared machine",
 )
 OWN_PLANT = Requirement(
-    id="own-plant", title="closed loop with a plant of the machine's own", how="`verify --plant`"
+    id="own-plant", title="the closed loop holds with the machine's plant", how="`verify --plant`"
 )
 #: Of a stand-in that was recorded at one pressure drop nothing is known at another.
 LOAD_STEPS = Requirement(
-    id="load-steps", title="load steps and frozen sensors in the closed loop", how="`verify --plant`"
+    id="load-steps", title="load steps and frozen sensors were tried in the closed loop", how="`verify --plant`"
 )
 SERIES = Requirement(
-    id="series", title="a series of plants, with tolerances", how="`verify --plant` with `--tolerances`"
+    id="series", title="the closed loop holds for a series of plants", how="`verify --plant` with `--tolerances`"
 )
 CURRENT_STATES = Requirement(id="current-controller", title="the current controller equals its exact model")
 CURRENT_MARGINS = Requirement(id="current-margins", title="the current loop is stable at every corner")
 CURRENT_SETTLES = Requirement(id="current-settles", title="the current settles at every corner")
 CURRENT_STEP = Requirement(id="current-step", title="the current follows a step as fast as stated")
 CURRENT_FAULTS = Requirement(
-    id="current-faults", title="an open, a shorted and an over-driven coil switch the output off"
+    id="current-faults", title="an open, shorted or over-driven coil switches the output off"
 )
 CURRENT_VALVE = Requirement(
-    id="current-valve", title="the valve opens at the same command with every coil and supply"
+    id="current-valve", title="the valve opens at the same command with any coil and supply"
 )
 #: What follows from the figures that stand beside the checks: of every input, and of the closed loop.
 FROM_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK)

@@ -42,7 +42,7 @@ SCHEMA = schema_of(Evidence)
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Verification(ShownInNotebooks):
-    """The evidence about one firmware folder, and the runs and maps that its figures are drawn from."""
+    """The evidence about one firmware folder, with the runs and maps for its figures."""
 
     #: Every requirement that was tried, with its figures; stored as verification.json.
     evidence: Evidence
@@ -60,11 +60,11 @@ class Verification(ShownInNotebooks):
 
     @property
     def verdict(self) -> str:
-        """In words: what does not hold goes before what could not be checked, and what the certificate is of last."""
+        """The verdict in words: what does not hold, then what was not checked, then what the certificate covers."""
         words = self.evidence.verdict
         if not self.holds or self.derived is None:
             return words
-        parts = [words.removesuffix("."), f"the certificate is of {self.derived.certified_of}"]
+        parts = [words.removesuffix("."), f"the certificate covers {self.derived.certified_of}"]
         return "; ".join([*parts, *filter(None, [self.evidence.reservation])]) + "."
 
     def with_checks(self, *checks: Check) -> "Verification":
@@ -85,16 +85,23 @@ def verify(
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
 ) -> Verification:
-    """Verify a firmware folder, made by `dzdesign codegen`.
+    """Verify a firmware folder made by `dzdesign codegen`.
 
-    Without a `plant` the recorded characteristic stands in for the valve in the closed loop; `plant_source` and
-    `plant_sha256` are name and hash of its file, for the evidence, and `tolerances` those of a series of plants about
-    it. `sequence` is the command over time, by default 0-10 V in 100 s and back; `backs_MPa` are the pressures behind
-    the edge. In `include` lie headers of the user's board files. What is compiled and run is taken from `code`, by
-    default the folder itself: whoever does not trust it gives one with the same code. `say` is told each stage before
-    it begins; `watch` is handed the pieces of a long one and their number, and gives them back as they are done.
+    Without a `plant` the recorded characteristic stands in for the valve in the closed loop. `plant_source` and
+    `plant_sha256` are the name and hash of its file, for the evidence. `tolerances` define a series of plants around
+    it.
 
-    A folder that is no firmware, and a machine without a C compiler, are an `InputError`.
+    `sequence` is the command over time, by default 0-10 V in 100 s and back. `backs_MPa` are the pressures downstream
+    of the edge. `include` lists folders with headers of the user's board files.
+
+    The code to compile and run is taken from `code`, by default the folder itself. For a folder that is not trusted,
+    pass one with the same code. `say` is called before each stage. `watch` receives the pieces of a long stage and
+    their number, and yields each piece when it is done.
+
+    Raises
+    ------
+    InputError
+        If the folder is not a firmware, or the machine has no C compiler.
     """
     manifest, compensator = _read(folder, plant, tolerances, include)
     host_compiler()

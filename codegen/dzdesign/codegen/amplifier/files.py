@@ -133,7 +133,7 @@ def _structured_text(setting: AmplifierSetting, head: Sequence[str]) -> Iterable
 
 
 def _csv(setting: AmplifierSetting, head: Sequence[str]) -> Iterable[str]:
-    """Yield a table in per cent."""
+    """Yield a table in percent."""
     unit = setting.device.counts_of_full
     yield from (f"# {line}" for line in head)
     yield "command_percent,drive_percent"

@@ -48,7 +48,7 @@ def notes_of(
     notes += [f"not confirmed: {device.unconfirmed}"] if device.unconfirmed else []
     notes += [device.hint] if device.hint else []
     if device.format in WITHOUT_COMMENTS and not beside_compensator:
-        notes.append("the format has no comments, so the file does not say what it was made from; keep this output")
+        notes.append("the format has no comments, so the file does not state its origin; keep this output")
     return tuple(notes)
 
 
@@ -64,7 +64,8 @@ def _of_zero_command(setting: AmplifierSetting, compensator: Compensator) -> lis
 def _of_the_machine(compensator: Compensator) -> list[str]:
     """Return what the budget leaves out of an amplifier that controls the current."""
     if compensator.machine is None:
-        return ["certified of the recording alone: design with --amplifier to count the amplifier's error and the oil"]
+        covered = "the certificate covers the recording only"
+        return [f"{covered}: design with --amplifier to include the amplifier's error and the oil"]
     if compensator.machine.drive != "amplifier":
         drive = compensator.machine.drive
         return [f"the budget is that of a drive by {drive}: design with --amplifier for one that controls the current"]

@@ -20,7 +20,7 @@ NEAR = Fraction(1, 100)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AmplifierSetting:
-    """What a device is told, in its own counts, and what it makes of a command then."""
+    """The setting of a device in its own counts, and the drive that results from a command."""
 
     device: Device
     #: Parameter to counts of the device's unit, in the order in which they are written; empty of a table.

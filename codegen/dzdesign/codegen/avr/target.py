@@ -14,7 +14,7 @@ BAUD_ERROR_MAX = Fraction(1, 100)
 
 
 def baud_divider() -> int:
-    """Return UBRR0 for 16 samples a bit: baud = clock / (16 (UBRR0 + 1)); a receiver bears a rate 1 % off."""
+    """Return UBRR0 for 16 samples per bit: baud = clock / (16 (UBRR0 + 1)); a receiver bears a rate 1 % off."""
     divider = round(Fraction(CLOCK_HZ, 16 * BAUD)) - 1
     error = Fraction(CLOCK_HZ, 16 * (divider + 1)) / BAUD - 1
     if abs(error) > BAUD_ERROR_MAX:

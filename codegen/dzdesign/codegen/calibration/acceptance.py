@@ -1,6 +1,6 @@
 """Which blocks a firmware accepts, in integers of any length: what dz_calibration_check() must say of each.
 
-Written from what the arithmetic must bear, not from the C: that differs where 64 bits are few. Every rule is an
+Written from what the arithmetic can handle, not from the C: that differs where 64 bits are few. Every rule is an
 inequality of exact integers, so that a test can compare both on any block.
 """
 
@@ -83,7 +83,7 @@ def _signals(block: CalibrationBlock, built: BuiltFor) -> Rules:
 
 
 def _drops(block: CalibrationBlock) -> tuple[int, int]:
-    """Return the largest A less B, and the largest B less A, of valid codes."""
+    """Return the largest A minus B, and the largest B minus A, of valid codes."""
     forward = ((block.a_high - block.a_zero) << WEIGHT_SHIFT) + (block.b_zero - block.b_low) * block.weight_b
     turned = ((block.a_zero - block.a_low) << WEIGHT_SHIFT) + (block.b_high - block.b_zero) * block.weight_b
     return forward, turned

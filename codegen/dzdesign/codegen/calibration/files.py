@@ -39,13 +39,13 @@ LIMITS_FILE = "codegen/dzdesign/codegen/calibration/limits.py"
 LAYOUT_FILE = "codegen/dzdesign/codegen/calibration/layout.py"
 #: Bits of what dz_calibration_check() finds wrong.
 FINDINGS = {
-    "FORMAT": "no calibration block, or of another layout or length",
+    "FORMAT": "not a calibration block, or one of another layout or length",
     "CRC": "damaged: the CRC-32 is not that of the block",
-    "FIRMWARE": "of a firmware that was compiled for other wiring, converter or rates",
-    "SIGNALS": "a code of command or pressures outside what the arithmetic bears",
-    "LAW": "a number of the law outside what the arithmetic bears, or a law that falls with the command",
-    "DRIVE": "a number of the drive functions outside what the arithmetic bears",
-    "CURRENT": "a number of the current controller outside what the arithmetic bears",
+    "FIRMWARE": "for a firmware with other wiring, converter or rates",
+    "SIGNALS": "a code of command or pressures outside the range of the arithmetic",
+    "LAW": "a number of the law outside the range of the arithmetic, or a law that falls with the command",
+    "DRIVE": "a number of the drive functions outside the range of the arithmetic",
+    "CURRENT": "a number of the current controller outside the range of the arithmetic",
 }
 #: Of the drive's status word: the bit of a block that was refused.
 CALIBRATION_PLACE = 8
@@ -130,7 +130,7 @@ def block_current_files(built: BuiltFor) -> dict[str, CoreFile]:
     bits, inside = current_fault_bits(), [_limit("SHIFT_MASK", 15, "plain", "mask of a shift")]
     if built.has("SUPPLY"):
         inside += [
-            _limit("CORRECTION_SHIFT", CORRECTION_SHIFT, "plain", "binary places of the correction"),
+            _limit("CORRECTION_SHIFT", CORRECTION_SHIFT, "plain", "fractional bits of the correction"),
             _limit("CORRECTION_HALF", 1 << (CORRECTION_SHIFT - 1), "plain", "half a PWM count: rounds to nearest"),
         ]
     words: Values = {"supply": built.has("SUPPLY"), "samples": built.samples}
@@ -252,20 +252,20 @@ def _interface(built: BuiltFor) -> list[Define]:
     return [
         define("DZ_COMPARE_MAX", built.compare_max, "PWM compare value of u_max", "100 % duty"),
         define("DZ_ADC_CODE_MAX", built.code_max, "largest code of the converter", "the top of its range"),
-        define("DZ_SAMPLE_HZ", built.sample_Hz, "samples a second", "of the firmware's timer"),
-        define("DZ_TICK_HZ", built.tick_Hz, "PWM periods a second", "of the firmware's timer"),
+        define("DZ_SAMPLE_HZ", built.sample_Hz, "samples per second", "of the firmware's timer"),
+        define("DZ_TICK_HZ", built.tick_Hz, "PWM periods per second", "of the firmware's timer"),
         define("DZ_BETA_STEP", built.beta_step, "codes of pressure drop between two nodes of beta", "a power of two"),
-        define("DZ_CURRENT_SAMPLES", built.samples, "codes of the current in a sum", "0 without current control"),
+        define("DZ_CURRENT_SAMPLES", built.samples, "samples of the current in a sum", "0 without current control"),
         define("DZ_CALIBRATION_SHAPE", built.shape, "what this firmware is compiled for", shape),
         define("DZ_CALIBRATION_MAGIC", magic, "first 32 bits of a block", f"octets {MAGIC.decode()}", "uint32"),
         define("DZ_CALIBRATION_LAYOUT", LAYOUT, "version of the block's layout", "a convention"),
         define("DZ_CALIBRATION_WORDS", LENGTH_WORDS, "words of 16 bits in a block", f"{2 * LENGTH_WORDS} octets"),
         define("DZ_CALIBRATION_NODES", NODES, "room for nodes of beta", "the fallback and those of the table"),
-        define("DZ_CALIBRATION_NODE_MASK", NODE_MASK, "largest number of a node that has a next one", "all ones"),
+        define("DZ_CALIBRATION_NODE_MASK", NODE_MASK, "largest index of a node that has a successor", "all ones"),
         define("DZ_CALIBRATION_PLAY_NODES", PLAY_NODES, "room for nodes of the play's width", "each side"),
-        define("DZ_CALIBRATION_PLAY_MASK", PLAY_MASK, "largest number of a node that has a next one", "all ones"),
+        define("DZ_CALIBRATION_PLAY_MASK", PLAY_MASK, "largest index of a node that has a successor", "all ones"),
         define("DZ_CALIBRATION_SUPPLY_NODES", SUPPLY_NODES, "room for nodes of the supply's correction", "one table"),
-        define("DZ_CALIBRATION_SUPPLY_MASK", SUPPLY_MASK, "largest number of a node that has a next one", "all ones"),
+        define("DZ_CALIBRATION_SUPPLY_MASK", SUPPLY_MASK, "largest index of a node that has a successor", "all ones"),
     ]  # fmt: skip
 
 

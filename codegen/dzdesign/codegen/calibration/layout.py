@@ -66,7 +66,7 @@ class SideBlock:
         int, Words(bits=32, signed=True, text="coefficient of beta times command in the sum, two's complement")
     ]
     transition: Annotated[
-        int, _one("coefficient of (beta - beta at zero command) for each code missing to the transition's end", bits=32)
+        int, _one("coefficient of (beta - beta at zero command) for each code short of the transition's end", bits=32)
     ]
     linear: Annotated[
         int, _one("coefficient of the command alone in the sum", key="sides.*.drive_range_over_u_max", bits=64)
@@ -80,14 +80,15 @@ class SideBlock:
     tested_to: Annotated[
         int, _one("largest tested pressure drop", "1/4096 code of A", "sides.*.certificate.dp_MPa", bits=32)
     ]
-    beta_unit: Annotated[int, _one("what stands for beta = 1 in a node, for display", key="beta_denominator", bits=32)]
+    beta_unit: Annotated[int, _one("value of beta = 1 in a node, for display", key="beta_denominator", bits=32)]
     beta_factor: Annotated[int, _one("factor from interpolated nodes to beta times 2^15, over 2^beta_shift", bits=32)]
     ramp_up: Annotated[
-        int, _one("largest change of the command a sample, away from zero", "1/65536 code", "drive_functions.ramp_up",
-                  32)
+        int,
+        _one("largest change of the command per sample, away from zero", "1/65536 code", "drive_functions.ramp_up", 32),
     ]
     ramp_down: Annotated[
-        int, _one("the same, back to zero", "1/65536 code", "drive_functions.ramp_down", 32)
+        int,
+        _one("largest change of the command per sample, towards zero", "1/65536 code", "drive_functions.ramp_down", 32),
     ]
     nodes: Annotated[
         tuple[int, ...],
@@ -96,8 +97,8 @@ class SideBlock:
               "the smallest of all, used where the pressures can't be right", unit="1/beta_unit", key="sides.*.beta"),
     ]
     node_count: Annotated[int, _one("nodes of the table in use")]
-    reciprocal_shift: Annotated[int, _one("shift to the right behind the product with reciprocal, beyond 32")]
-    beta_shift: Annotated[int, _one("shift to the right behind the product with beta_factor")]
+    reciprocal_shift: Annotated[int, _one("right shift after the product with reciprocal, beyond 32")]
+    beta_shift: Annotated[int, _one("right shift after the product with beta_factor")]
     span: Annotated[int, _one("codes from zero to full command", "codes", "signals.command")]
     room: Annotated[int, _one("codes from the zero band's end to full command", "codes", "signals.command")]
     band_end: Annotated[int, _one("code at the zero band's end", "codes", "zero_band_codes")]
@@ -114,58 +115,62 @@ class CurrentBlock:
     """The current controller; all zero where the firmware has none."""
 
     integral_limit: Annotated[
-        int, _one("largest integral to either side", "counts / 2^gain_shift", "current_drive.loop.integral_limit", 32)
+        int, _one("largest magnitude of the integral", "counts / 2^gain_shift", "current_drive.loop.integral_limit", 32)
     ]
     release: Annotated[
-        int, _one("how far the output is below the integral", "counts / 2^gain_shift", "current_drive.loop.release", 32)
+        int, _one("output below the integral by", "counts / 2^gain_shift", "current_drive.loop.release", 32)
     ]
     compare_limit: Annotated[int, _one("largest compare value", "counts", "current_drive.loop.compare_limit")]
-    rate: Annotated[int, _one("largest change of the set point a PWM period", "counts", "current_drive.loop.rate")]
-    samples: Annotated[int, _one("codes of the current in a sum", key="current_drive.loop.samples")]
+    rate: Annotated[int, _one("largest change of the set point per PWM period", "counts", "current_drive.loop.rate")]
+    samples: Annotated[int, _one("samples of the current in a sum", key="current_drive.loop.samples")]
     current_gain: Annotated[
-        int, _one("counts of current for a code of the sum, over 2^current_shift",
+        int, _one("counts of current per code of the sum, times 2^current_shift",
                   key="current_drive.loop.current_gain")
     ]
     current_shift: Annotated[
-        int, _one("binary places of current_gain", key="current_drive.loop.current_shift")
+        int, _one("fractional bits of current_gain", key="current_drive.loop.current_shift")
     ]
-    gain_shift: Annotated[int, _one("binary places of the three gains", key="current_drive.loop.gain_shift")]
-    proportional: Annotated[int, _one("PWM counts for a count of error", key="current_drive.loop.proportional")]
-    integral: Annotated[int, _one("the same in each PWM period", key="current_drive.loop.integral")]
+    gain_shift: Annotated[int, _one("fractional bits of the three gains", key="current_drive.loop.gain_shift")]
+    proportional: Annotated[
+        int, _one("PWM counts per count of error, times 2^gain_shift", key="current_drive.loop.proportional")
+    ]
+    integral: Annotated[
+        int, _one("PWM counts per count of error and PWM period, times 2^gain_shift", key="current_drive.loop.integral")
+    ]
     feed_forward: Annotated[
-        int, _one("PWM counts for a count of set point", key="current_drive.loop.feed_forward")
+        int, _one("PWM counts per count of set point, times 2^gain_shift", key="current_drive.loop.feed_forward")
     ]
     offset_nominal: Annotated[
         int, _one("sum without current, as designed", "codes", "current_drive.loop.offset_nominal")
     ]
     offset_low: Annotated[
-        int, _one("least plausible sum without current", "codes", "current_drive.loop.offset_tolerance")
+        int, _one("lowest plausible sum without current", "codes", "current_drive.loop.offset_tolerance")
     ]
     offset_high: Annotated[
-        int, _one("largest plausible sum without current", "codes", "current_drive.loop.offset_tolerance")
+        int, _one("highest plausible sum without current", "codes", "current_drive.loop.offset_tolerance")
     ]
     offset_shift: Annotated[
         int, _one("the offset is the mean of 2^offset_shift sums", key="current_drive.loop.offset_shift")
     ]
     short_sum: Annotated[
-        int, _one("sum from which the load is shorted", "codes", "current_drive.loop.short_sum")
+        int, _one("sum from which the load counts as shorted", "codes", "current_drive.loop.short_sum")
     ]
     over_sum: Annotated[
-        int, _one("sum less offset from which the current is too high", "codes", "current_drive.loop.over_sum")
+        int, _one("sum minus offset from which the current is too high", "codes", "current_drive.loop.over_sum")
     ]
-    over_ticks: Annotated[int, _one("PWM periods of it in a row", key="current_drive.loop.over_ticks")]
+    over_ticks: Annotated[int, _one("such PWM periods in a row that are a fault", key="current_drive.loop.over_ticks")]
     open_sum: Annotated[
-        int, _one("sum less offset below which no current flows", "codes", "current_drive.loop.open_sum")
+        int, _one("sum minus offset below which no current flows", "codes", "current_drive.loop.open_sum")
     ]
     open_compare: Annotated[
-        int, _one("compare value from which one must flow", "counts", "current_drive.loop.open_compare")
+        int, _one("compare value from which current must flow", "counts", "current_drive.loop.open_compare")
     ]
-    open_ticks: Annotated[int, _one("PWM periods of it in a row", key="current_drive.loop.open_ticks")]
+    open_ticks: Annotated[int, _one("such PWM periods in a row that are a fault", key="current_drive.loop.open_ticks")]
     supply_low: Annotated[
-        int, _one("least code of the supply", "codes", "current_drive.loop.supply.valid_codes")
+        int, _one("lowest code of the supply", "codes", "current_drive.loop.supply.valid_codes")
     ]
     supply_high: Annotated[
-        int, _one("largest code of the supply", "codes", "current_drive.loop.supply.valid_codes")
+        int, _one("highest code of the supply", "codes", "current_drive.loop.supply.valid_codes")
     ]
     supply_shift: Annotated[
         int, _one("codes between two nodes of the correction, a power of two",
@@ -188,8 +193,8 @@ class CalibrationBlock:
     shape: Annotated[int, _one("what the firmware must be compiled for")]
     code_max: Annotated[int, _one("largest code of the converter", "codes", "signals.code_max")]
     compare_max: Annotated[int, _one("PWM compare value of full drive", "counts", "signals.compare_max")]
-    sample_Hz: Annotated[int, _one("samples a second", "Hz", "signals.sample_Hz")]
-    tick_Hz: Annotated[int, _one("PWM periods a second", "Hz", "signals.tick_Hz")]
+    sample_Hz: Annotated[int, _one("sampling rate", "Hz", "signals.sample_Hz")]
+    tick_Hz: Annotated[int, _one("PWM frequency", "Hz", "signals.tick_Hz")]
     reserved: Annotated[int, _one("0")] = 0
     compensator_sha256: Annotated[tuple[int, ...], Words(count=SHA256_WORDS, text="SHA-256 of compensator.json")]
     serial: Annotated[tuple[int, ...], Words(count=SERIAL_WORDS, text="serial number, up to 24 octets of UTF-8")]
@@ -202,21 +207,21 @@ class CalibrationBlock:
     a_full: Annotated[int, _one("code of sensor A at its span, for display", "codes", "signals.pressure_a.full_code")]
     b_full: Annotated[int, _one("code of sensor B at its span, for display", "codes", "signals.pressure_b.full_code")]
     balance: Annotated[
-        int, _one("what the difference of the codes is without pressures: a_zero times 4096 less b_zero times "
+        int, _one("difference of the codes at zero pressure: a_zero times 4096 minus b_zero times "
                   "weight_b, modulo 2^32", "1/4096 code of A", bits=32)
     ]
     reverse: Annotated[
         int, _one("a pressure drop less than minus this is a failed sensor", "1/4096 code of A", "reverse_codes", 32)
     ]
     command_zero: Annotated[int, _one("code of zero command", "codes", "signals.command.zero_code")]
-    command_low: Annotated[int, _one("least valid code of the command", "codes", "signals.command.valid_codes")]
-    command_high: Annotated[int, _one("largest valid code of the command", "codes", "signals.command.valid_codes")]
-    a_zero: Annotated[int, _one("code of no pressure, sensor A", "codes", "signals.pressure_a.zero_code")]
-    a_low: Annotated[int, _one("least valid code of sensor A", "codes", "signals.pressure_a.valid_codes")]
-    a_high: Annotated[int, _one("largest valid code of sensor A", "codes", "signals.pressure_a.valid_codes")]
-    b_zero: Annotated[int, _one("code of no pressure, sensor B", "codes", "signals.pressure_b.zero_code")]
-    b_low: Annotated[int, _one("least valid code of sensor B", "codes", "signals.pressure_b.valid_codes")]
-    b_high: Annotated[int, _one("largest valid code of sensor B", "codes", "signals.pressure_b.valid_codes")]
+    command_low: Annotated[int, _one("lowest valid code of the command", "codes", "signals.command.valid_codes")]
+    command_high: Annotated[int, _one("highest valid code of the command", "codes", "signals.command.valid_codes")]
+    a_zero: Annotated[int, _one("code at zero pressure, sensor A", "codes", "signals.pressure_a.zero_code")]
+    a_low: Annotated[int, _one("lowest valid code of sensor A", "codes", "signals.pressure_a.valid_codes")]
+    a_high: Annotated[int, _one("highest valid code of sensor A", "codes", "signals.pressure_a.valid_codes")]
+    b_zero: Annotated[int, _one("code at zero pressure, sensor B", "codes", "signals.pressure_b.zero_code")]
+    b_low: Annotated[int, _one("lowest valid code of sensor B", "codes", "signals.pressure_b.valid_codes")]
+    b_high: Annotated[int, _one("highest valid code of sensor B", "codes", "signals.pressure_b.valid_codes")]
     weight_b: Annotated[int, _one("weight of a code of sensor B", "1/4096 code of A", "signals.pressure_b.span_MPa")]
     beta_step: Annotated[int, _one("codes of pressure drop between two nodes of beta", "codes of A", "beta_step_codes")]
     transition_codes: Annotated[int, _one("codes of command of the transition; 1: none", "codes", "transition_codes")]
@@ -227,7 +232,7 @@ class CalibrationBlock:
                   "drive_functions.leave_zero_codes")
     ]
     fault_samples: Annotated[
-        int, _one("valid samples in a row after which a fault is over", "samples", "drive_functions.fault_samples")
+        int, _one("valid samples in a row that end a fault", "samples", "drive_functions.fault_samples")
     ]
     fault_latch: Annotated[
         int, _one("1: a fault of as many faulty samples stays until a reset", key="drive_functions.fault_latch")
@@ -244,11 +249,11 @@ class CalibrationBlock:
         int, _one("half the dither's period", "PWM periods", "drive_functions.dither_ticks")
     ]
     play_codes: Annotated[
-        int, _one("codes of travel from the one branch to the other; 0: no inverse play", "codes",
+        int, _one("codes of travel from one branch to the other; 0: no inverse play", "codes",
                   "drive_functions.play_codes")
     ]
     play_noise: Annotated[
-        int, _one("codes that the command strays without turning", "codes", "drive_functions.play_noise_codes")
+        int, _one("codes of fluctuation that do not count as a reversal", "codes", "drive_functions.play_noise_codes")
     ]
     play_step_shift: Annotated[
         int, _one("codes between two nodes of the play's width, a power of two", key="drive_functions.play_step_codes")

@@ -59,7 +59,7 @@ NAMED: tuple[tuple[str, int, str, str], ...] = (
 #: The same of the current controller.
 OF_CURRENT: tuple[tuple[str, int, str, str], ...] = (
     ("LARGEST_GAIN", LARGEST_GAIN, "plain", "largest gain"),
-    ("LARGEST_GAIN_SHIFT", LARGEST_GAIN_SHIFT, "plain", "most binary places of the gains"),
+    ("LARGEST_GAIN_SHIFT", LARGEST_GAIN_SHIFT, "plain", "most fractional bits of the gains"),
     ("LARGEST_ERROR", LARGEST_ERROR, "uint32", "largest current that is no short, counts"),
     ("LARGEST_OFFSET_SHIFT", LARGEST_OFFSET_SHIFT, "plain", "most sums that the offset is the mean of, a power of two"),
 )

@@ -80,7 +80,7 @@ def octet_words(octets: bytes) -> tuple[int, ...]:
 
 
 def text_of(words: Sequence[int]) -> str:
-    """Return the text that words hold; what is no UTF-8 is replaced.
+    """Return the text that words hold; what is not UTF-8 is replaced.
 
     Examples
     --------

@@ -14,7 +14,7 @@ from dzdesign.design.signals import SIDE_NAMES, WEIGHT_UNIT
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeReading:
-    """A node of beta: its pressure drop, beta, and the output that the law gives just past zero and at full command."""
+    """A node of beta: its pressure drop, beta, and the law's output just above zero and at full command."""
 
     dp_MPa: float
     beta: float
@@ -25,7 +25,7 @@ class NodeReading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideReading:
-    """The law of one sign of command; a ramp's time is that over the whole command, None where it is not limited."""
+    """The law for one sign of the command. A ramp's time covers the whole command; None: no limit."""
 
     tested_to_MPa: float
     ramp_up_s: float | None
@@ -55,7 +55,7 @@ class CommandReading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveReading:
-    """The drive functions; None or 0 where one is off."""
+    """The drive functions; None or 0 if a function is off."""
 
     output_max_V: float
     zero_band_V: float
@@ -72,7 +72,7 @@ class DriveReading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrationReading:
-    """What a calibration block says."""
+    """The content of a calibration block in engineering units."""
 
     serial: str
     record: str

@@ -25,20 +25,19 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     low, high = certificate.dp_MPa
     where = units.span(float(low), float(high), ".2f MPa") + (", between the tests too" if low < high else "")
     text = (
-        f"Certificate of {compensator.certified_of}: {where}, that lies below the "
-        f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold, by "
-        f"{units.text(1e3 * float(certificate.smallest_margin_V), '.3g mV')} at the least beyond "
-        f"{_counted(compensator)}"
+        f"Certificate of {compensator.certified_of}: {where}, this value lies below the "
+        f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold. The least margin is "
+        f"{units.text(1e3 * float(certificate.smallest_margin_V), '.3g mV')}, in addition to {_counted(compensator)}."
     )
     if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:
-        text += f", so that {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)}."
+        text += f" Hence {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)}."
     elif certificate.guard == "closing":
         by_hand = certificate.level_L_min < compensator.valve.sides[SIDE_NAMES[sign]].certificate.level_L_min
         flow = units.text(certificate.level_L_min, ".3g L/min" if by_hand else ".2f L/min")
-        shown = "as the low-flow readings show" if by_hand else "what the recordings can't show"
-        text += f", so that less than {flow} flows: {shown}."
+        shown = "as the low-flow readings show" if by_hand else "which is less than the recordings can show"
+        text += f" The flow is less than {flow}, {shown}."
     else:
-        text += ". After closing, flow may remain: the closing threshold lies lower, and is not the one guarded."
+        text += " After closing, flow may remain: the closing threshold lies lower and is not the guarded one."
     text += f" {_beyond(compensator, sign)}"
     text += f" {_machine(compensator, sign)}"
     lot = lot_in_words(compensator)
@@ -51,7 +50,8 @@ def _beyond(compensator: Compensator, sign: int) -> str:
     certificate, side = compensator.side(sign).certificate, compensator.valve.sides[SIDE_NAMES[sign]]
     units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
     above = above_in_words(compensator.above, certificate, side, units)
-    return f"{above[0].upper()}{above[1:]}; {below_in_words(certificate, side, units)}."
+    below = below_in_words(certificate, side, units)
+    return f"{above[0].upper()}{above[1:]}. {below[0].upper()}{below[1:]}."
 
 
 def _machine(compensator: Compensator, sign: int) -> str:
@@ -59,8 +59,8 @@ def _machine(compensator: Compensator, sign: int) -> str:
     budget = compensator.side(sign).budget
     if compensator.machine is None or budget is None:
         return (
-            "No machine was declared: its coil temperature, supply, pressure sensors and converters beyond rounding, "
-            "oil and ageing are not in it."
+            "No machine was declared: the certificate does not cover coil temperature, supply, pressure sensors, "
+            "converters beyond rounding, oil or ageing."
         )
     words = taken_off(budget, compensator.valve.recorded_units.of_side(SIDE_NAMES[sign]))
     return f"{words[0].upper()}{words[1:]}; compensator.json lists all of it."
@@ -70,7 +70,7 @@ def _counted(compensator: Compensator) -> str:
     """Return what the certificate's margin is left of."""
     rounding = "the rounding of readings to codes and of the drive to counts"
     if compensator.machine is not None:
-        rounding += ", all that the declared machine may differ in"
+        rounding += ", all declared differences of the machine"
     if not compensator.drive_functions.dither_counts:
         return rounding
     volts = compensator.dither_reserve_counts / compensator.signals.compare_max * float(compensator.u_max_V)
@@ -79,6 +79,6 @@ def _counted(compensator: Compensator) -> str:
     if recorded is not None:
         return (
             f"{rounding} and {counted} by which dz_drive's dither may differ from that of the recordings, "
-            f"{recorded.in_words()}, which the bound has in it"
+            f"{recorded.in_words()}, which the bound includes"
         )
     return f"{rounding} and the dither's peak of {counted}, which dz_drive adds to it"

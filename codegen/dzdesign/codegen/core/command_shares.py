@@ -10,7 +10,7 @@ def share_of_command(compensator: Compensator, codes: int, sign: int = 1) -> str
 
 
 def in_unit(compensator: Compensator, share: float) -> str:
-    """Return a share of full command or drive in the unit that a person sees, behind a comma; nothing in per cent."""
+    """Return a share of full command or drive in the unit that a person sees, behind a comma; nothing in percent."""
     units = compensator.valve.recorded_units
     if units.command.unit == "%":
         return ""

@@ -59,7 +59,7 @@ def current_texts(loop: CurrentLoop, banner: Sequence[str] = ()) -> dict[str, st
 def current_interface(loop: CurrentLoop) -> list[Define]:
     """Return what a caller must know: `#define`s of dz_current.h."""
     return [
-        Define(symbol="DZ_CURRENT_SAMPLES", value=loop.samples, equation="codes of the current in a sum",
+        Define(symbol="DZ_CURRENT_SAMPLES", value=loop.samples, equation="samples of the current in a sum",
                engineering="equally far apart in a PWM period", data=("current_drive.loop.samples",), generator=LOOP),
         Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << loop.offset_shift,
                equation="sums that the offset is the mean of", engineering="with the output off",
@@ -79,16 +79,16 @@ def current_fault_bits() -> list[Define]:
 
 def current_constants(loop: CurrentLoop) -> list[Define]:
     """Return the `#define`s of dz_current.c."""
-    unit, per_count = 1 << loop.gain_shift, "PWM counts for a count of "
+    unit, per_count = 1 << loop.gain_shift, "PWM counts per count of "
     rows: list[tuple[str, int, str, str, str, tuple[str, ...]]] = [
         ("COMPARE_LIMIT", loop.compare_limit, "plain", "largest compare value", "of the PWM", ("compare_limit",)),
         ("RATE", loop.rate, "uint32", "largest change of the set point in a period", "counts", ("rate",)),
         ("CURRENT_GAIN", loop.current_gain, "plain", "counts of current for a code of the sum, over 2^CURRENT_SHIFT",
          f"{loop.current_gain / (1 << loop.current_shift):.6g}", ("current_gain", "current_shift")),
-        ("CURRENT_SHIFT", loop.current_shift, "plain", "binary places of CURRENT_GAIN", "", ("current_shift",)),
+        ("CURRENT_SHIFT", loop.current_shift, "plain", "fractional bits of CURRENT_GAIN", "", ("current_shift",)),
         ("CURRENT_HALF", 1 << (loop.current_shift - 1), "plain", "half a count of current", "rounds to nearest",
          ("current_shift",)),
-        ("GAIN_SHIFT", loop.gain_shift, "plain", "binary places of the gains", "", ("gain_shift",)),
+        ("GAIN_SHIFT", loop.gain_shift, "plain", "fractional bits of the gains", "", ("gain_shift",)),
         ("GAIN_HALF", unit // 2, "plain", "half a PWM count", "rounds to nearest", ("gain_shift",)),
         ("PROPORTIONAL", loop.proportional, "plain", f"{per_count}error, over 2^GAIN_SHIFT",
          f"{loop.proportional / unit:.6g}", ("proportional", "gain_shift")),
@@ -96,9 +96,9 @@ def current_constants(loop: CurrentLoop) -> list[Define]:
          f"{loop.integral / unit:.6g}", ("integral", "gain_shift")),
         ("FEED_FORWARD", loop.feed_forward, "plain", f"{per_count}set point, over 2^GAIN_SHIFT: R i over the supply",
          f"{loop.feed_forward / unit:.6g}", ("feed_forward", "gain_shift")),
-        ("INTEGRAL_LIMIT", loop.integral_limit << loop.gain_shift, "uint32", "largest integral to either side",
+        ("INTEGRAL_LIMIT", loop.integral_limit << loop.gain_shift, "uint32", "largest magnitude of the integral",
          f"{loop.integral_limit} PWM counts", ("integral_limit", "gain_shift")),
-        ("RELEASE", loop.release << loop.gain_shift, "uint32", "how far the output is below the integral",
+        ("RELEASE", loop.release << loop.gain_shift, "uint32", "output below the integral by",
          f"{loop.release} PWM counts: the current does not overshoot on release", ("release", "gain_shift")),
         ("OFFSET_NOMINAL", loop.offset_nominal, "plain", "sum without current", "as designed", ("offset_nominal",)),
         ("OFFSET_LOW", max(loop.offset_nominal - loop.offset_tolerance, 0), "plain", "lowest plausible offset", "",
@@ -109,12 +109,13 @@ def current_constants(loop: CurrentLoop) -> list[Define]:
          ("offset_shift",)),
         ("OFFSET_HALF", (1 << loop.offset_shift) // 2, "plain", "half of the mean's divisor", "rounds to nearest",
          ("offset_shift",)),
-        ("SHORT_SUM", loop.short_sum, "plain", "sum from which the load is shorted", "", ("short_sum",)),
-        ("OVER_SUM", loop.over_sum, "plain", "sum less offset from which the current is too high", "", ("over_sum",)),
-        ("OVER_TICKS", loop.over_ticks, "plain", "PWM periods of it in a row", "", ("over_ticks",)),
-        ("OPEN_SUM", loop.open_sum, "plain", "sum less offset below which no current flows", "", ("open_sum",)),
-        ("OPEN_COMPARE", loop.open_compare, "plain", "compare value from which one must flow", "", ("open_compare",)),
-        ("OPEN_TICKS", loop.open_ticks, "plain", "PWM periods of it in a row", "", ("open_ticks",)),
+        ("SHORT_SUM", loop.short_sum, "plain", "sum from which the load counts as shorted", "", ("short_sum",)),
+        ("OVER_SUM", loop.over_sum, "plain", "sum minus offset from which the current is too high", "", ("over_sum",)),
+        ("OVER_TICKS", loop.over_ticks, "plain", "such PWM periods in a row that are a fault", "", ("over_ticks",)),
+        ("OPEN_SUM", loop.open_sum, "plain", "sum minus offset below which no current flows", "", ("open_sum",)),
+        ("OPEN_COMPARE", loop.open_compare, "plain", "compare value from which current must flow", "",
+         ("open_compare",)),
+        ("OPEN_TICKS", loop.open_ticks, "plain", "such PWM periods in a row that are a fault", "", ("open_ticks",)),
     ]  # fmt: skip
     if loop.supply:
         low, high = loop.supply.valid_codes
@@ -125,7 +126,7 @@ def current_constants(loop: CurrentLoop) -> list[Define]:
             ("SUPPLY_STEP", loop.supply.step_codes, "plain", "codes between two nodes", "", keys),
             ("SUPPLY_SHIFT", loop.supply.step_codes.bit_length() - 1, "plain", "the power of two in SUPPLY_STEP", "",
              keys),
-            ("CORRECTION_SHIFT", CORRECTION_SHIFT, "plain", "binary places of the correction", "", ()),
+            ("CORRECTION_SHIFT", CORRECTION_SHIFT, "plain", "fractional bits of the correction", "", ()),
             ("CORRECTION_HALF", 1 << (CORRECTION_SHIFT - 1), "plain", "half a PWM count", "rounds to nearest", ()),
         ]  # fmt: skip
     return [

@@ -109,7 +109,7 @@ def _fault_samples(compensator: Compensator) -> Define:
     return Define(
         symbol="FAULT_SAMPLES",
         value=samples,
-        equation="valid samples in a row after which a fault is over",
+        equation="valid samples in a row that end a fault",
         engineering=f"{1e3 * samples / signals.sample_Hz:.4g} ms",
         data=("drive_functions.fault_samples", "signals.sample_Hz"),
         generator=OPTIONS,
@@ -166,7 +166,7 @@ def _play(compensator: Compensator) -> list[Define]:
                engineering=share_of_command(compensator, band), data=("transition_codes", "signals.command", "u_max_V"),
                rounding="a power of two", generator=OPTIONS),
         Define(symbol="PLAY_NOISE", value=functions.play_noise_codes, literal="int32",
-               equation="codes that the command strays to either side without turning",
+               equation="codes of fluctuation to either side that do not count as a reversal",
                engineering=share_of_command(compensator, functions.play_noise_codes),
                data=("drive_functions.play_noise_codes", "signals.command", "u_max_V"), generator=PLAY),
         Define(symbol="PLAY_CODES", value=codes, literal="int32",

@@ -25,7 +25,7 @@ from dzdesign.design.signals import WEIGHT_SHIFT
 
 #: What a template prints: texts, and objects of `design` and of this room whose fields it prints.
 Values = Mapping[str, object]
-#: One file a sign of command, all from one template.
+#: One file per sign of command, all from one template.
 CORE_SOURCES = {1: "dz_comp.c", -1: "dz_comp_negative.c"}
 CORE_HEADERS = ("dz_comp.h", "dz_drive.h")
 #: Codes up to half of this leave the top bit of 16 for the sign of a difference.

@@ -189,7 +189,7 @@ def _share(coefficients: tuple[int, ...], sizes: tuple[int, ...]) -> int:
 def _largest_quotient(compensator: Compensator, sign: int, divisor: int) -> int:
     """Return the largest ``total >> shift``: the law's largest value at any node, and the half that rounds it."""
     c, command = compensator, compensator.signals.command
-    # Every node that a code reaches, and the fallback's smallest beta: along dP the law is straight between them.
+    # Every node that a code reaches, and the fallback's smallest beta: along dP the law is linear between them.
     codes = [index * c.beta_step_codes for index in range(c.nodes(sign) - 1)]
     codes += [c.signals.largest_difference(sign), -c.reverse_codes - 1]
     # Along the command it is straight but for the ends of zero band and transition.

@@ -46,8 +46,8 @@ class SignalConstants:
                             units.text(u_max_V, "g V"), keys)  # fmt: skip
         return [
             self._signal("COMMAND_ZERO", zero, "Eq. (29), code of zero command", reading(zero), keys[:1], DOWN),
-            self._signal("COMMAND_LOW", low, "Eq. (29), least valid code of the command", reading(low), valid, DOWN),
-            self._signal("COMMAND_HIGH", high, "Eq. (29), largest valid code of the command", reading(high), valid,
+            self._signal("COMMAND_LOW", low, "Eq. (29), lowest valid code of the command", reading(low), valid, DOWN),
+            self._signal("COMMAND_HIGH", high, "Eq. (29), highest valid code of the command", reading(high), valid,
                          DOWN),
             *([full] if self.passes_full else []),
             *self._sensor("A", signals.pressure_a),
@@ -85,11 +85,11 @@ class SignalConstants:
         a_code = units.text(float(sensor.per_code_MPa), ".6g MPa")
         what = f"text below Eq. (29), {{}} of sensor {name}, {a_code} a code"
         return [
-            self._signal(f"PRESSURE_{name}_ZERO", sensor.zero_code, what.format("code of no pressure"),
+            self._signal(f"PRESSURE_{name}_ZERO", sensor.zero_code, what.format("code at zero pressure"),
                          pressure(sensor.zero_code),
                          codes[:1], DOWN),
-            self._signal(f"PRESSURE_{name}_LOW", low, what.format("least valid code"), pressure(low), valid, DOWN),
-            self._signal(f"PRESSURE_{name}_HIGH", high, what.format("largest valid code"), pressure(high), valid, DOWN),
+            self._signal(f"PRESSURE_{name}_LOW", low, what.format("lowest valid code"), pressure(low), valid, DOWN),
+            self._signal(f"PRESSURE_{name}_HIGH", high, what.format("highest valid code"), pressure(high), valid, DOWN),
         ]  # fmt: skip
 
     def _weights(self) -> list[Define]:

@@ -129,7 +129,7 @@ def _interfaces(model: Model, fmi: Fmi) -> list[str]:
 def _displayed(model: Model, unit: str, command: bool) -> tuple[str, float, float] | None:
     """Return name, factor and offset of the unit in which the valve was recorded, where that is another.
 
-    That of the command is no unit of other voltages.
+    That of the command is not a unit of other voltages.
     """
     if unit not in ("V", "MPa", "L/min", "A") or (unit == "V" and not command):
         return ("mm", 1e3, 0.0) if unit == "m" else None

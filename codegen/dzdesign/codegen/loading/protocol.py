@@ -129,7 +129,7 @@ class DriveState:
     code_max: Annotated[int, Number(bits=16, text="largest code of the converter that they must be for")]
     compare_max: Annotated[int, Number(bits=16, text="the same of counts at 100 % duty")]
     sample_Hz: Annotated[int, Number(bits=16, text="the same of samples a second")]
-    tick_Hz: Annotated[int, Number(bits=16, text="the same of PWM periods a second")]
+    tick_Hz: Annotated[int, Number(bits=16, text="the same of PWM periods per second")]
     beta_step: Annotated[int, Number(bits=16, text="the same of codes between two nodes of beta")]
     crc: Annotated[int, Number(bits=32, text="CRC-32 of the block in use")]
     origin: Annotated[int, Number(bits=32, text="start of its compensator's SHA-256")]

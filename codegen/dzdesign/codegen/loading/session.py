@@ -25,9 +25,9 @@ REPLY_S = 0.3
 TRIES, TRIES_IN_ERASE = round(SILENT_S / REPLY_S), round(ERASE_S / REPLY_S)
 #: The longest that a drive may say that it is still busy: an erase of flash takes seconds.
 BUSY_S = 60.0
-#: A load that lost its place (the drive's time was over, another sender) begins anew so often.
+#: A load that lost its place (the drive's time was over, another sender) begins again so often.
 LOADS = 5
-#: Reasons for which a load begins anew: what came over the line was not what was sent, or not in its order.
+#: Reasons for which a load begins again: what came over the line was not what was sent, or not in its order.
 CRC_FINDING = 1 << list(FINDINGS).index("CRC")
 _LOST = frozenset({Reason.NO_LOAD, Reason.SEQUENCE, Reason.TIME, Reason.ABORTED, Reason.CRC, Reason.INCOMPLETE})
 
@@ -89,7 +89,7 @@ class LoadSession:
     def loading(self, block: bytes, crc: int, origin: int) -> Iterator[Request]:
         """Write a block of whole words, and yield each request that was done.
 
-        A load that lost its place on the line begins anew; what the drive refuses is a `RefusedError`.
+        A load that lost its place on the line begins again; what the drive refuses is a `RefusedError`.
         """
         for attempt in range(LOADS):
             try:

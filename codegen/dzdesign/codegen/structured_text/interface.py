@@ -40,7 +40,7 @@ class SideScaling:
     transition: int
     #: The command must pass this to leave zero command, or to change the side.
     leave_zero: int
-    #: 1: the pressure drop is A less B.
+    #: 1: the pressure drop is A minus B.
     turn: int
     #: Largest pressure drop that was tested, and the largest code of the tables.
     tested_to: int

@@ -86,7 +86,7 @@ _SYNC = _START[:2]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """The serial line of a target: PWM periods a second and from frame to frame, and nominal bits a second."""
+    """The serial line of a target: PWM periods per second and from frame to frame, and nominal bits per second."""
 
     tick_Hz: int
     frame_ticks: int

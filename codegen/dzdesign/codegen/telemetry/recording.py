@@ -38,7 +38,7 @@ class Scalings:
 
 
 def scalings_of(folder: Path, compensator_file: Path | None = None) -> Scalings:
-    """Return the scalings of a firmware folder; one that is no firmware or sends no telemetry is an `InputError`.
+    """Return the scalings of a firmware folder; one that is not a firmware or sends no telemetry is an `InputError`.
 
     A firmware into which another calibration block was loaded has the scalings of that block's `compensator_file`.
     """

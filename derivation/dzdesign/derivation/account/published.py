@@ -24,14 +24,14 @@ METER_ACCURACY_PERCENT = "0.5"
 RECORDS_HZ = 100
 #: "About", of the first valve at 5 MPa.
 ABOUT_LARGEST_L_MIN = "27"
-#: Section 3: duty cycles at a command of 2 V without (Fig. 12) and with the compensator (Fig. 13), per cent.
+#: Section 3: duty cycles at a command of 2 V without (Fig. 12) and with the compensator (Fig. 13), percent.
 DUTY_COMMAND_V = 2
 DUTY_WITHOUT_PERCENT, DUTY_WITH_PERCENT = "20", "55"
 #: Eqs. (29)-(30): largest code of the converter, full scale at its pin, counts per volt there.
 LARGEST_CODE, PIN_V, COUNTS_PER_PIN_VOLT = "4095", "3", "1365"
 #: Section 3: frequency and amplitude of the PWM that both figures show.
 PWM_KHZ, PWM_AMPLITUDE_V = "2.5", "3.16"
-#: Section 4.2: commands from which on the first valve's curves with compensator are flat, V.
+#: Section 4.2: commands from which the first valve's curves with compensator are flat, V.
 SATURATED_FROM_V = ("8", "8.5")
 #: Section 4.3, as are the next two: pressure drop and commands of the tests with load and oil temperature.
 LOAD_DP_MPA = 3
@@ -47,7 +47,7 @@ class PublishedValve:
     #: What the report calls it, and where its numbers are printed.
     name: str
     where: str
-    #: Thresholds at dP0 and dP1 as printed, in per cent of u_max.
+    #: Thresholds at dP0 and dP1 as printed, in percent of u_max.
     dead_zone0_percent: str
     dead_zone1_percent: str
     #: Largest flow without compensator at dP0 and dP1 as printed, L/min.
@@ -56,7 +56,7 @@ class PublishedValve:
     #: The same with compensator.
     flow0_with: str
     flow1_with: str
-    #: Dead zone with compensator, at both pressure drops, per cent.
+    #: Dead zone with compensator, at both pressure drops, percent.
     residual_percent: str
     #: Flow at zero command and dP1 with the compensator that ignores beta, L/min; empty where none is printed. With
     #: beta it is none.
@@ -64,7 +64,7 @@ class PublishedValve:
     #: Largest displacement of the spool at dP0, mm, and by how much less it is at dP1; empty where none is printed.
     stroke0_mm: str = ""
     stroke_falls_mm: str = ""
-    #: The displacement's dead zone at dP0, per cent, and by how much more it is at dP1; empty where none is printed.
+    #: The displacement's dead zone at dP0, percent, and by how much more it is at dP1; empty where none is printed.
     displacement_dead_zone0_percent: str = ""
     displacement_dead_zone_rises_percent: str = ""
 
@@ -75,7 +75,7 @@ class PublishedValve:
 
     @property
     def displacement_dead_zone1_percent(self) -> str:
-        """The displacement's dead zone at dP1, per cent; empty where none is printed."""
+        """The displacement's dead zone at dP1, percent; empty where none is printed."""
         at_dP0, rises = self.displacement_dead_zone0_percent, self.displacement_dead_zone_rises_percent
         return str(Decimal(at_dP0) + Decimal(rises)) if at_dP0 else ""
 

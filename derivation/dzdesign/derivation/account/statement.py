@@ -15,7 +15,7 @@ Replacements = tuple[tuple[Name, sympy.Expr], ...]
 
 
 class Kind(StrEnum):
-    """Where a statement comes from; the first four are taken as given."""
+    """Origin of a statement; statements of the first four kinds are taken as given."""
 
     PREMISE = "premise"  # an equation that the paper starts from
     ASSUMPTION = "assumption"  # a reading of a figure, or an approximation that the paper makes

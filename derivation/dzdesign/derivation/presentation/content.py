@@ -16,81 +16,107 @@ Numbers = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A sentence, and the formula that it leads to, if any."""
+    """A sentence, and the formula to which it leads, if any."""
 
-    words: Annotated[Words, Meta(description="The sentence.")]
-    formula: Annotated[Formula, Meta(description="What it leads to.")] | None = None
+    words: Annotated[Words, Meta(description="Sentence of the step.")]
+    formula: Annotated[Formula, Meta(description="Formula that the sentence leads to.")] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Premise:
-    """A statement that another one rests on."""
+    """A statement on which another one rests."""
 
-    number: Annotated[str, Meta(description="Its number.")]
-    at: Annotated[tuple[Formula, ...], Meta(description="What replaces its symbols.")]
-    words: Annotated[Words, Meta(description="The same in words.")]
+    number: Annotated[str, Meta(description="Number of the statement that is the premise.")]
+    at: Annotated[tuple[Formula, ...], Meta(description="Substitutions for its symbols.")]
+    words: Annotated[Words, Meta(description="Premise and substitutions in words.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Derivation:
     """The derivation of one case."""
 
-    where: Annotated[Words, Meta(description="The case; empty: the only one.")]
-    derived: Annotated[Formula, Meta(description="What the premises give for the statement's symbol.")]
-    discrepancies: Annotated[tuple[Formula, ...], Meta(description="Derived less published, factored; one a member.")]
-    lines: Annotated[tuple[Line, ...], Meta(description="Step by step; a single line: solved all at once.")]
+    where: Annotated[Words, Meta(description="Case that the derivation covers; empty if it is the only one.")]
+    derived: Annotated[Formula, Meta(description="Expression that the premises give for the statement's symbol.")]
+    discrepancies: Annotated[
+        tuple[Formula, ...],
+        Meta(description="Derived minus published expression, factored, for each member of the equation."),
+    ]
+    lines: Annotated[
+        tuple[Line, ...], Meta(description="Steps of the derivation; a single line if everything was solved at once.")
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """A number of ours beside the paper's."""
+    """A number of dzdesign beside that of the paper."""
 
-    label: Annotated[Words, Meta(description="What it is.")]
-    exact: Annotated[Formula, Meta(description="Ours, exactly.")]
-    value: Annotated[float, Meta(description="The same as a number, in `unit`.")]
-    unit: Annotated[str, Meta(description="Its unit.")]
-    published: Annotated[str, Meta(description="As the paper prints it; empty: not printed.")]
-    agrees: Annotated[bool | None, Meta(description="Whether ours rounds to that; null: not printed.")]
-    ours: Annotated[str, Meta(description="Ours with four digits and unit.")]
-    paper: Annotated[str, Meta(description="The paper's with unit, and how far ours is from it.")]
-    remark: Annotated[Words, Meta(description="What explains a difference, or what the number means.")]
+    label: Annotated[Words, Meta(description="Quantity that is compared.")]
+    exact: Annotated[Formula, Meta(description="Exact value of dzdesign.")]
+    value: Annotated[float, Meta(description="The exact value as a number, in `unit`.")]
+    unit: Annotated[str, Meta(description="Unit of the value.")]
+    published: Annotated[str, Meta(description="Value as printed in the paper; empty if it is not printed.")]
+    agrees: Annotated[
+        bool | None, Meta(description="Whether the exact value rounds to the printed one; null if none is printed.")
+    ]
+    ours: Annotated[str, Meta(description="Value of dzdesign with four digits and unit.")]
+    paper: Annotated[str, Meta(description="Value of the paper with unit, and the difference from it.")]
+    remark: Annotated[Words, Meta(description="Reason for a difference, or meaning of the number.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """A statement with its verdict and its derivation."""
 
-    number: Annotated[str, Meta(description="The paper's, or ours: T theorem, L law and so on.")]
-    title: Annotated[Words, Meta(description="In a few words.")]
-    kind: Annotated[Kind, Meta(description="Where it comes from; premises, assumptions and the like are given.")]
-    section: Annotated[str, Meta(description="Its section of the account.")]
-    statement: Annotated[Formula, Meta(description="A chain of equal formulas that SymPy reads back.")]
-    latex: Annotated[str, Meta(description="The same for typesetting.")]
-    premises: Annotated[tuple[Premise, ...], Meta(description="What it rests on.")]
-    outcome: Annotated[Outcome, Meta(description="What was found.")]
-    expected: Annotated[Outcome, Meta(description="What a correct account finds.")]
-    as_expected: Annotated[bool, Meta(description="Whether both are the same, and the units agree.")]
-    holds: Annotated[bool, Meta(description="Whether other statements may rest on it.")]
-    verdict: Annotated[str, Meta(description="What was found, in words.")]
-    judgement: Annotated[Words, Meta(description="The same in sentences; empty: the outcome says it all.")]
-    rearranges: Annotated[bool, Meta(description="Whether it only rearranges a definition or one premise.")]
-    any_of: Annotated[tuple[tuple[Formula, ...], ...], Meta(description="Alternative conditions on which it follows.")]
-    ruled_out_by: Annotated[tuple[Formula, ...], Meta(description="Published values at which none of these holds.")]
-    necessary: Annotated[bool | None, Meta(description="Whether that is proved necessary; null: no condition.")]
-    positive_if: Annotated[Formula, Meta(description="Its left side is positive exactly if this holds.")] | None
-    provided: Annotated[tuple[Formula, ...], Meta(description="What must differ.")]
-    scope: Annotated[Words, Meta(description="Where it is proved; empty: everywhere.")]
-    limited_by: Annotated[Numbers, Meta(description="Statements under it that are proved on a part only.")]
-    inherited: Annotated[Numbers, Meta(description="Statements under it that follow on a condition.")]
-    unit_error: Annotated[str, Meta(description="What is wrong with its units; empty: nothing.")]
-    derivations: Annotated[tuple[Derivation, ...], Meta(description="Case by case.")]
-    differences: Annotated[tuple[Line, ...], Meta(description="Derived less published, where they differ.")]
-    corrections: Annotated[tuple[Line, ...], Meta(description="What it should read.")]
-    corrected_by: Annotated[tuple[Reference, ...], Meta(description="The statement that says so.")]
-    see: Annotated[tuple[Reference, ...], Meta(description="Statements that qualify it.")]
-    figures: Annotated[tuple[Figure, ...], Meta(description="Its numbers beside the paper's.")]
-    signs: Annotated[Mapping[str, tuple[Formula, ...]], Meta(description="What is assumed of its symbols, by sign.")]
-    note: Annotated[Words, Meta(description="What a reader should know.")]
+    number: Annotated[
+        str,
+        Meta(
+            description="Number in the paper, or that of an added statement, such as T for a theorem and L for a law."
+        ),
+    ]
+    title: Annotated[Words, Meta(description="Short title of the statement.")]
+    kind: Annotated[
+        Kind, Meta(description="Origin of the statement. Premises and assumptions, for example, are given.")
+    ]
+    section: Annotated[str, Meta(description="Section of the account in which the statement appears.")]
+    statement: Annotated[Formula, Meta(description="Chain of equal formulas, in a form that SymPy can read.")]
+    latex: Annotated[str, Meta(description="The statement in LaTeX.")]
+    premises: Annotated[tuple[Premise, ...], Meta(description="Premises on which the statement rests.")]
+    outcome: Annotated[Outcome, Meta(description="Outcome of the derivation.")]
+    expected: Annotated[Outcome, Meta(description="Outcome of a correct account.")]
+    as_expected: Annotated[
+        bool, Meta(description="Whether outcome and expectation agree and the units are consistent.")
+    ]
+    holds: Annotated[bool, Meta(description="Whether other statements may rest on this one.")]
+    verdict: Annotated[str, Meta(description="Outcome in words.")]
+    judgement: Annotated[Words, Meta(description="Outcome in full sentences; empty if the outcome alone suffices.")]
+    rearranges: Annotated[bool, Meta(description="Whether the statement only rearranges a definition or one premise.")]
+    any_of: Annotated[
+        tuple[tuple[Formula, ...], ...], Meta(description="Alternative conditions, each of which is sufficient.")
+    ]
+    ruled_out_by: Annotated[
+        tuple[Formula, ...], Meta(description="Published values that contradict each of these conditions.")
+    ]
+    necessary: Annotated[
+        bool | None, Meta(description="Whether the condition is proved to be necessary; null if there is none.")
+    ]
+    positive_if: Annotated[Formula, Meta(description="Condition that is equivalent to a positive left side.")] | None
+    provided: Annotated[tuple[Formula, ...], Meta(description="Quantities that must differ.")]
+    scope: Annotated[
+        Words, Meta(description="Range in which the statement is proved; empty if it is proved everywhere.")
+    ]
+    limited_by: Annotated[
+        Numbers, Meta(description="Underlying statements that are proved in a part of the range only.")
+    ]
+    inherited: Annotated[Numbers, Meta(description="Underlying statements that follow on a condition.")]
+    unit_error: Annotated[str, Meta(description="Inconsistency of the units; empty if there is none.")]
+    derivations: Annotated[tuple[Derivation, ...], Meta(description="Derivation of each case.")]
+    differences: Annotated[tuple[Line, ...], Meta(description="Derived minus published expression, where they differ.")]
+    corrections: Annotated[tuple[Line, ...], Meta(description="Corrected form of the statement.")]
+    corrected_by: Annotated[tuple[Reference, ...], Meta(description="Statement that gives the correction.")]
+    see: Annotated[tuple[Reference, ...], Meta(description="Statements that qualify this one.")]
+    figures: Annotated[tuple[Figure, ...], Meta(description="Numbers of dzdesign beside those of the paper.")]
+    signs: Annotated[Mapping[str, tuple[Formula, ...]], Meta(description="Assumed signs of the symbols.")]
+    note: Annotated[Words, Meta(description="Remark for the reader.")]
 
     @property
     def name(self) -> Words:
@@ -117,11 +143,11 @@ class Entry:
 class Term:
     """A symbol, or a function."""
 
-    name: Annotated[str, Meta(description="As it stands in the formulas.")]
-    symbol: Annotated[Formula, Meta(description="The symbol; of a function with its argument.")]
-    meaning: Annotated[Words, Meta(description="In a few words.")]
-    unit: Annotated[str, Meta(description="Its unit.")]
-    latex: Annotated[str, Meta(description="For typesetting.")]
+    name: Annotated[str, Meta(description="Name of the symbol in the formulas.")]
+    symbol: Annotated[Formula, Meta(description="The symbol; for a function, with its argument.")]
+    meaning: Annotated[Words, Meta(description="Short description of the symbol.")]
+    unit: Annotated[str, Meta(description="Unit of the symbol.")]
+    latex: Annotated[str, Meta(description="The symbol in LaTeX.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,14 +158,14 @@ class DerivationReport(Artefact):
     schema: Annotated[Literal["dzdesign.derivation/2"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.derivation/2"
     )
-    title: Annotated[str, Meta(description="Of the account.")]
-    source: Annotated[str, Meta(description="The paper.")]
-    holds: Annotated[bool, Meta(description="Whether every statement has the verdict expected of it.")]
-    summary: Annotated[tuple[Words, ...], Meta(description="What was found, in sentences.")]
-    wrong: Annotated[tuple[Words, ...], Meta(description="What does not hold, or should read otherwise.")]
-    conditional: Annotated[tuple[Words, ...], Meta(description="What holds on a condition only.")]
-    symbols: Annotated[tuple[Term, ...], Meta(description="The symbols that occur, by name.")]
-    statements: Annotated[tuple[Entry, ...], Meta(description="In the order of the account.")]
+    title: Annotated[str, Meta(description="Title of the account.")]
+    source: Annotated[str, Meta(description="Reference of the paper.")]
+    holds: Annotated[bool, Meta(description="Whether other statements may rest on this one.")]
+    summary: Annotated[tuple[Words, ...], Meta(description="Summary of the outcomes, in sentences.")]
+    wrong: Annotated[tuple[Words, ...], Meta(description="Statements that do not hold or need a correction.")]
+    conditional: Annotated[tuple[Words, ...], Meta(description="Statements that hold only on a condition.")]
+    symbols: Annotated[tuple[Term, ...], Meta(description="All symbols that occur, by name.")]
+    statements: Annotated[tuple[Entry, ...], Meta(description="All statements, in the order of the account.")]
 
     #: What the marks mean, for the reader of the report.
     LEGEND: ClassVar = (

@@ -21,7 +21,7 @@ class OffsetCurve:
 
     #: Nodes, from the first tested pressure drop to the last, rising.
     dp_MPa: tuple[Fraction, ...]
-    #: Offset at each; straight between them.
+    #: Offset at each; linear between them.
     offset_V: tuple[Fraction, ...]
     #: Lower bound of the guarded threshold on that interval; None of an offset that nothing has to bound.
     certified: CertifiedBound | None

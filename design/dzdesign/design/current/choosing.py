@@ -46,10 +46,10 @@ STEPS_OF_SEARCH = 16
 class CurrentSensor:
     """Voltage at the converter's pin for a current, and for the supply where that is measured."""
 
-    V_per_A: Annotated[float, quantity("V/A", "Shunt times amplifier gain.", gt=0)]
-    offset_V: Annotated[float, quantity("V", "Voltage at the pin without current.", ge=0)] = 0.0
+    V_per_A: Annotated[float, quantity("V/A", "Shunt resistance times amplifier gain.", gt=0)]
+    offset_V: Annotated[float, quantity("V", "Voltage at the pin at zero current.", ge=0)] = 0.0
     supply_divider: Annotated[
-        float, quantity("1", "Voltage divider of the supply; 0: the supply is not measured.", ge=0)
+        float, quantity("1", "Ratio of the supply's voltage divider; 0 if the supply is not measured.", ge=0)
     ] = 0.0
 
     def __post_init__(self) -> None:

@@ -25,19 +25,24 @@ class Corner(NamedTuple):
 class CoilCircuit:
     """A solenoid's coil, switched by a PWM from a supply, with a freewheeling diode."""
 
-    resistance_ohm: Annotated[float, quantity("ohm", "Resistance of the coil, at its nominal temperature.", gt=0)]
+    resistance_ohm: Annotated[float, quantity("ohm", "Resistance of the coil at its nominal temperature.", gt=0)]
     inductance_H: Annotated[float, quantity("H", "Inductance of the coil.", gt=0)]
-    rated_A: Annotated[float, quantity("A", "Rated current: that of full command.", gt=0)]
+    rated_A: Annotated[float, quantity("A", "Rated current, which is the current at full command.", gt=0)]
     supply_V: Annotated[
-        tuple[float, float], quantity("V", "Lowest and highest supply; nominal is their geometric mean.")
+        tuple[float, float],
+        quantity("V", "Lowest and highest supply voltage; the nominal one is their geometric mean."),
     ]
-    series_ohm: Annotated[float, quantity("ohm", "Resistance of switch, shunt and wires.", ge=0)] = 0.5
+    series_ohm: Annotated[float, quantity("ohm", "Resistance of the switch, shunt and wires.", ge=0)] = 0.5
     freewheel_V: Annotated[float, quantity("V", "Voltage of the freewheeling diode.", gt=0)] = 0.7
-    resistance_factors: Annotated[Factors, Meta(description="Of the coil's resistance: temperature, manufacture.")] = (
+    resistance_factors: Annotated[
+        Factors, Meta(description="Least and largest factor of the coil's resistance, by temperature and manufacture.")
+    ] = (
         0.75,
         1.35,
     )
-    inductance_factors: Annotated[Factors, Meta(description="Of the inductance: air gap, saturation.")] = (0.5, 1.5)
+    inductance_factors: Annotated[
+        Factors, Meta(description="Least and largest factor of the inductance, by air gap and saturation.")
+    ] = (0.5, 1.5)
 
     def __post_init__(self) -> None:
         for name in ("resistance_ohm", "inductance_H", "rated_A", "freewheel_V"):
@@ -97,15 +102,15 @@ def _with_middle(ends: tuple[float, float]) -> tuple[float, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentSampling:
-    """When the current is sampled and the interrupt comes, in a period of the PWM that begins with the pulse.
+    """Times of the current samples and the interrupt within a PWM period, which begins with the pulse.
 
     The codes are taken at the middles of `samples` equal parts of the period; the interrupt comes after `before` of
     them, and what it computes acts from the next period on.
     """
 
-    tick_Hz: Annotated[int, quantity("Hz", "PWM periods a second.", ge=1)] = 2500
-    samples: Annotated[int, Meta(description="Codes in a PWM period, a power of two.", ge=1, le=16)] = 16
-    before: Annotated[int, Meta(description="How many of them come before the interrupt.", ge=1, le=16)] = 14
+    tick_Hz: Annotated[int, quantity("Hz", "PWM frequency.", ge=1)] = 2500
+    samples: Annotated[int, Meta(description="Current samples in a PWM period, a power of two.", ge=1, le=16)] = 16
+    before: Annotated[int, Meta(description="Number of these samples that precede the interrupt.", ge=1, le=16)] = 14
 
     def __post_init__(self) -> None:
         if self.samples not in (1, 2, 4, 8, 16) or not 1 <= self.before <= self.samples:

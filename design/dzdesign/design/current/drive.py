@@ -29,37 +29,50 @@ from dzdesign.design.target_inputs import Converter
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentDrive:
-    """The law's output is the set point of a current: full drive is the rated one."""
+    """Current control of a drive: the law's output is the set point, and full drive is the rated current."""
 
-    circuit: Annotated[CoilCircuit, Meta(description="Coil and supply, as declared.")]
-    sensor: Annotated[CurrentSensor, Meta(description="Voltages at the converter's pins.")]
-    sampling: Annotated[CurrentSampling, Meta(description="When the current is sampled and the interrupt comes.")]
-    loop: Annotated[CurrentLoop, Meta(description="The controller in the firmware's integers.")]
-    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin of all corners and currents.")]
-    gain_margin: Annotated[float, quantity("1", "Least gain margin of all corners and currents.")]
-    rise_s: Annotated[float, quantity("s", "10 to 90 % of the rated current at the slowest corner.")]
-    least_rise_s: Annotated[float, quantity("s", "The same at that corner with the switch on all the time.")]
-    fall_s: Annotated[float, quantity("s", "90 to 10 % at the slowest corner: the freewheeling diode decides.")]
-    overshoot: Annotated[float, quantity("1", "Largest overshoot of the step up, of its height.")]
+    circuit: Annotated[CoilCircuit, Meta(description="Declared coil and supply.")]
+    sensor: Annotated[CurrentSensor, Meta(description="Voltages at the pins of the converter.")]
+    sampling: Annotated[
+        CurrentSampling, Meta(description="Times at which the current is sampled and the interrupt is triggered.")
+    ]
+    loop: Annotated[CurrentLoop, Meta(description="Controller in the integers of the firmware.")]
+    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin over all corners and currents.")]
+    gain_margin: Annotated[float, quantity("1", "Least gain margin over all corners and currents.")]
+    rise_s: Annotated[float, quantity("s", "Rise time from 10 to 90 % of the rated current at the slowest corner.")]
+    least_rise_s: Annotated[float, quantity("s", "Rise time at that corner with the switch always on.")]
+    fall_s: Annotated[
+        float,
+        quantity("s", "Fall time from 90 to 10 % at the slowest corner, where the freewheeling diode determines it."),
+    ]
+    overshoot: Annotated[
+        float, quantity("1", "Largest overshoot of the step response, relative to the height of the step.")
+    ]
     release_overshoot_A: Annotated[
         float,
         quantity(
             "A",
-            "By how much the current passes the set point that it is released to, at the worst corner; 0: by no more "
-            "than half a code of its sensor.",
+            "Largest overshoot at any corner when the current is released to a set point; 0 if it is at "
+            "most half a code of the sensor.",
             ge=0,
         ),
     ]
     dither_above_counts: Annotated[
         int,
         Meta(
-            description="By how much the current's peak in the dither lies above the set point's at any corner.",
+            description="Largest excess of the current's peak over that of the set point under dither, at any corner.",
             ge=0,
             le=65535,
         ),
     ]
     dither_below_counts: Annotated[
-        int, Meta(description="The same below it: where the loop does not follow to the wave's top.", ge=0, le=65535)
+        int,
+        Meta(
+            description="Largest deficit of the current's peak against that of the set point under dither, if the loop "
+            "can't follow the wave.",
+            ge=0,
+            le=65535,
+        ),
     ]
 
     def __post_init__(self) -> None:

@@ -19,15 +19,16 @@ Gain = Annotated[int, Meta(ge=0, le=LARGEST_GAIN)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SupplyCorrection:
-    """Nominal supply voltage over the measured one, straight between nodes over the converter's codes."""
+    """Nominal supply voltage over the measured one, linear between nodes over the converter's codes."""
 
     valid_codes: Annotated[
-        tuple[Count, Count], Meta(description="Codes of the supply; one outside counts as the nearest of them.")
+        tuple[Count, Count],
+        Meta(description="Range of the supply's codes; a code outside is replaced with the nearest one inside."),
     ]
     step_codes: Annotated[int, Meta(description="Codes between two nodes, a power of two.", ge=1, le=4096)]
     nodes: Annotated[
         tuple[Count, ...],
-        Meta(description="Nominal over measured voltage times 16384 at valid_codes[0], one step further and so on."),
+        Meta(description="Nominal over measured voltage times 16384, at valid_codes[0] and at each further step."),
     ]
 
     def __post_init__(self) -> None:
@@ -51,36 +52,53 @@ class CurrentLoop:
     taken in a PWM period.
     """
 
-    full_counts: Annotated[int, Meta(description="Set point of the rated current, counts.", ge=1, le=65535)]
+    full_counts: Annotated[int, Meta(description="Set point of the rated current, in counts.", ge=1, le=65535)]
     compare_limit: Annotated[Count, Meta(description="Largest compare value of the PWM.")]
-    rate: Annotated[int, Meta(description="Largest change of the set point in a PWM period, counts.", ge=1, le=65535)]
-    samples: Annotated[int, Meta(description="Codes of the current in a PWM period, a power of two.", ge=1, le=16)]
+    rate: Annotated[
+        int, Meta(description="Largest change of the set point in a PWM period, in counts.", ge=1, le=65535)
+    ]
+    samples: Annotated[int, Meta(description="Current samples in a PWM period, a power of two.", ge=1, le=16)]
     current_gain: Annotated[
-        int, Meta(description="Counts of current for the sum of codes less its offset, over 2^current_shift.", ge=1)
+        int,
+        Meta(
+            description="Counts of current per unit of the code sum after offset correction, times 2^current_shift.",
+            ge=1,
+        ),
     ]
-    current_shift: Annotated[int, Meta(description="Binary places of current_gain.", ge=1, le=15)]
-    gain_shift: Annotated[int, Meta(description="Binary places of the three gains.", ge=1, le=13)]
-    proportional: Annotated[Gain, Meta(description="PWM counts for a count of error, over 2^gain_shift.")]
-    integral: Annotated[Gain, Meta(description="The same, added in every PWM period.")]
-    feed_forward: Annotated[Gain, Meta(description="PWM counts for a count of set point, over 2^gain_shift.")]
-    integral_limit: Annotated[Count, Meta(description="Largest integral to either side, PWM counts.")]
+    current_shift: Annotated[int, Meta(description="Fractional bits of current_gain.", ge=1, le=15)]
+    gain_shift: Annotated[int, Meta(description="Fractional bits of the three controller gains.", ge=1, le=13)]
+    proportional: Annotated[Gain, Meta(description="PWM counts per count of error, times 2^gain_shift.")]
+    integral: Annotated[
+        Gain, Meta(description="PWM counts per count of error that are added in every PWM period, times 2^gain_shift.")
+    ]
+    feed_forward: Annotated[Gain, Meta(description="PWM counts per count of set point, times 2^gain_shift.")]
+    integral_limit: Annotated[Count, Meta(description="Largest magnitude of the integral, in PWM counts.")]
     release: Annotated[
-        Count, Meta(description="PWM counts that the output is below the integral, which begins at 0 on release.")
+        Count,
+        Meta(description="PWM counts by which the output stays below the integral, which starts at 0 on release."),
     ]
-    offset_nominal: Annotated[Count, Meta(description="Sum of codes without current, as designed.")]
-    offset_tolerance: Annotated[Count, Meta(description="Largest deviation of it that is calibrated away.")]
+    offset_nominal: Annotated[Count, Meta(description="Designed code sum at zero current.")]
+    offset_tolerance: Annotated[
+        Count, Meta(description="Largest deviation from offset_nominal that calibration removes.")
+    ]
     offset_shift: Annotated[
-        int, Meta(description="The offset is the mean over two to this power PWM periods.", ge=0, le=12)
+        int, Meta(description="The offset is averaged over 2^offset_shift PWM periods.", ge=0, le=12)
     ]
-    short_sum: Annotated[Count, Meta(description="Sum of codes from which the load counts as shorted, at once.")]
-    over_sum: Annotated[Count, Meta(description="Sum less offset from which the current counts as too high.")]
-    over_ticks: Annotated[int, Meta(description="PWM periods of it in a row that are a fault.", ge=1, le=65535)]
-    open_sum: Annotated[Count, Meta(description="Sum less offset below which no current seems to flow.")]
-    open_compare: Annotated[Count, Meta(description="Compare value from which a current must flow.")]
-    open_ticks: Annotated[int, Meta(description="PWM periods of it in a row that are a fault.", ge=1, le=65535)]
-    supply: Annotated[SupplyCorrection | None, Meta(description="Correction by the supply's voltage, if measured.")] = (
-        None
-    )
+    short_sum: Annotated[Count, Meta(description="Code sum from which a short circuit is detected at once.")]
+    over_sum: Annotated[Count, Meta(description="Code sum after offset correction from which the current is too high.")]
+    over_ticks: Annotated[
+        int, Meta(description="Consecutive PWM periods with too high a current that make a fault.", ge=1, le=65535)
+    ]
+    open_sum: Annotated[
+        Count, Meta(description="Code sum after offset correction below which the current counts as absent.")
+    ]
+    open_compare: Annotated[Count, Meta(description="Compare value from which a current is expected.")]
+    open_ticks: Annotated[
+        int, Meta(description="Consecutive PWM periods without an expected current that make a fault.", ge=1, le=65535)
+    ]
+    supply: Annotated[
+        SupplyCorrection | None, Meta(description="Correction for the supply voltage, if it is measured.")
+    ] = None
 
     def __post_init__(self) -> None:
         for name in ("proportional", "integral", "feed_forward"):

@@ -64,7 +64,7 @@ def impulse_response(circuit: CoilCircuit, corner: Corner, sampling: CurrentSamp
 def loop_transfer(
     circuit: CoilCircuit, corner: Corner, sampling: CurrentSampling, gains: Gains, duty: float, omega_s: np.ndarray
 ) -> np.ndarray:
-    """Return the open loop's transfer function at frequencies in rad a second."""
+    """Return the open loop's transfer function at frequencies in rad per second."""
     now, following, last, decay = impulse_response(circuit, corner, sampling, duty)
     z = np.exp(1j * np.asarray(omega_s) * sampling.period_s)
     plant = now + following / z + last / (z**2 * (1 - decay / z))

@@ -13,7 +13,7 @@ from dzdesign.identify.valve.ramp_result import TestResult
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FixedDeadZone:
-    """Dead zone to the knee at one tested pressure drop, shares of command by branch, as far as it was recorded."""
+    """Dead zone up to the knee at one tested pressure drop, as shares of command by recorded branch."""
 
     side: str
     dp_MPa: float

@@ -1,4 +1,4 @@
-"""That a lot setting over-compensates no valve of its lot: its offset under the bounds of each of them."""
+"""Proof that a lot setting over-compensates no valve of its lot: its offset lies below the bounds of each."""
 
 from dataclasses import dataclass
 from fractions import Fraction

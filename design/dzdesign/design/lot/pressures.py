@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.design.lot.valves import LotSide, LotValve
 
-#: Tests nearer than this share are at one pressure drop of the lot: no bench sets it to a per cent.
+#: Tests nearer than this share are at one pressure drop of the lot: no bench sets it to a percent.
 SAME = 0.05
 #: Trends of which a test between two others raises the bound: of another, the lowest of all holds everywhere.
 SLOPING = ("decreasing", "increasing")

@@ -21,20 +21,28 @@ from dzdesign.identify.valve.staircase import Direction
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotSide:
-    """One sign of command of a valve: lower bounds of the guarded threshold."""
+    """Lower bounds of a valve's guarded threshold for one sign of the command."""
 
     trend: Annotated[
         Direction | None,
-        Meta(description="How the threshold runs with the pressure drop; null where fewer than two were tested."),
+        Meta(
+            description="Trend of the threshold over the pressure drop; null if fewer than two pressure drops were "
+            "tested."
+        ),
     ]
-    confidence: Annotated[float, quantity("1", "Confidence with which all bounds hold together.", ge=0.5, le=1)]
-    premise: Annotated[Premise, Meta(description="What the bound rests on between the tests.")]
+    confidence: Annotated[float, quantity("1", "Joint confidence level of all bounds.", ge=0.5, le=1)]
+    premise: Annotated[Premise, Meta(description="Premise of the bound between the tests.")]
     curvature_V_MPa2: Annotated[
         tuple[SecondDifference, ...],
-        quantity("V/MPa2", "M between neighbouring tests, one fewer than tests; 0 for line, empty for monotone."),
+        quantity(
+            "V/MPa2",
+            "Bound M of the curvature in each interval between neighbouring tests; 0 for line, empty for monotone.",
+        ),
     ]
-    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops, rising.")]
-    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V", "Lower bound of the threshold at each.")]
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops, in ascending order.")]
+    u_lower_V: Annotated[
+        tuple[Voltage, ...], quantity("V", "Lower bound of the threshold at each tested pressure drop.")
+    ]
 
     def __post_init__(self) -> None:
         if not self.dp_MPa or len(self.dp_MPa) != len(self.u_lower_V):
@@ -69,11 +77,11 @@ class LotSide:
 class LotValve:
     """A valve of the lot."""
 
-    name: Annotated[str, Meta(description="By which it stands in the table of the batch.")]
+    name: Annotated[str, Meta(description="Name of the valve in the table of the batch.")]
     valve_sha256: Annotated[Sha256, Meta(description="SHA-256 of its valve.json.")]
-    positive: Annotated[LotSide, Meta(description="Bounds of positive commands.")]
+    positive: Annotated[LotSide, Meta(description="Bounds for positive commands.")]
     negative: Annotated[
-        LotSide | None, Meta(description="Bounds of negative commands; null: the setting drives none.")
+        LotSide | None, Meta(description="Bounds for negative commands; null if the setting drives none.")
     ] = None
 
     def side(self, sign: int) -> LotSide | None:

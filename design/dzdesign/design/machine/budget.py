@@ -46,26 +46,36 @@ DIGITS_mV = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BudgetLine:
-    """One component."""
+    """One component of an uncertainty budget."""
 
-    component: Annotated[Component, Meta(description="What may differ.")]
-    origin: Annotated[Origin, Meta(description="Measured from the recordings, declared, or a default.")]
-    source: Annotated[str, Meta(description="Where it is from, in words: an option, or whose default.")]
-    half_width: Annotated[float, Meta(description="By how much, in `unit`; of a range its end that lowers the offset.")]
+    component: Annotated[Component, Meta(description="Source of the uncertainty.")]
+    origin: Annotated[
+        Origin,
+        Meta(description="Whether the half-width was measured from the recordings, declared, or set by default."),
+    ]
+    source: Annotated[str, Meta(description="Option or default from which the half-width was taken.")]
+    half_width: Annotated[
+        float,
+        Meta(description="Half-width of the uncertainty, in `unit`. For a range, the end that lowers the offset."),
+    ]
     unit: Annotated[str, Meta(description="Unit of the half-width: mV, MPa, codes, counts, K, V or %.")]
     sensitivity_mV: Annotated[
-        tuple[float, ...], quantity("mV", "Contribution for one unit, at each tested pressure drop.")
+        tuple[float, ...], quantity("mV", "Contribution per unit of the half-width, at each tested pressure drop.")
     ]
     contribution_mV: Annotated[
         tuple[float, ...],
-        quantity("mV", "By how much it alone lowers the certified threshold where a tested pressure drop is read."),
+        quantity(
+            "mV",
+            "Amount by which this component alone lowers the certified threshold where the sensors read a "
+            "tested pressure drop.",
+        ),
     ]
     price: Annotated[
         float,
         quantity(
             "1",
-            "By how much the offset would rise if this component alone were zero, over full command, at most of the "
-            "tested pressure drops: what its dead zone costs.",
+            "Price of this component in dead zone, over full command. It is the rise of the offset if this "
+            "component alone were zero, at the tested pressure drop where the rise is largest.",
         ),
     ]
 
@@ -75,11 +85,14 @@ class Budget:
     """Uncertainty budget of one side, at its tested pressure drops."""
 
     dp_MPa: Annotated[tuple[float, ...], quantity("MPa", "Tested pressure drops.")]
-    threshold_V: Annotated[tuple[float, ...], quantity("V", "Guarded threshold there, as the recordings have it.")]
-    ceiling_V: Annotated[
-        tuple[float, ...], quantity("V", "Largest offset there that the certificate allows: all of the budget less.")
+    threshold_V: Annotated[
+        tuple[float, ...], quantity("V", "Guarded threshold at each tested pressure drop, as recorded.")
     ]
-    lines: Annotated[tuple[BudgetLine, ...], Meta(description="The components.")]
+    ceiling_V: Annotated[
+        tuple[float, ...],
+        quantity("V", "Largest offset at each that the certificate allows: the threshold minus the whole budget."),
+    ]
+    lines: Annotated[tuple[BudgetLine, ...], Meta(description="Components of the budget.")]
 
     def __post_init__(self) -> None:
         tables: list[Sequence[float]] = [self.threshold_V, self.ceiling_V]

@@ -1,4 +1,4 @@
-"""What a coil colder than the bench's does to a design for which no machine was declared."""
+"""Effect of a coil colder than the bench's on a design without a declared machine."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -55,8 +55,8 @@ def colder_coil_in_words(compensator: Compensator, sign: int) -> str:
     lowered = units.text(1e3 * found.lowered_V, ".0f mV")
     flow = units.text(found.flow_L_min, ".2f L/min") if found.seen else "less than the recordings show"
     return (
-        f"certified of the recording alone: no machine is declared. With the duty straight to the coil, one {COLDER_K} "
-        f"K colder than {REFERENCE_C} degC on the bench lowers the threshold by {lowered}; zero command then passes "
-        f"{flow} at {units.text(found.dp_MPa, '.2f MPa')}. Declare --coil-temperature and --supply, --amplifier, or "
-        "--drive current"
+        "the certificate covers the recording only: no machine is declared. If the duty drives the coil directly, "
+        f"a coil {COLDER_K} K colder than {REFERENCE_C} degC on the bench lowers the threshold by {lowered}; zero "
+        f"command then passes {flow} at {units.text(found.dp_MPa, '.2f MPa')}. Declare --coil-temperature and "
+        "--supply, --amplifier, or --drive current"
     )

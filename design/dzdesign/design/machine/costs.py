@@ -1,4 +1,4 @@
-"""What a declared machine costs, and what was not declared, in a person's words."""
+"""Costs of a declared machine, and what was not declared, in words."""
 
 from fractions import Fraction
 

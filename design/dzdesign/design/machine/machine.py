@@ -45,64 +45,99 @@ Supply = Annotated[float, Meta(ge=SUPPLY_V[0], le=SUPPLY_V[1])]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Machine:
-    """By how much the machine may differ from the bench; every error is a half-width, and systematic."""
+    """Declared differences between the machine and the bench; every error is a systematic half-width."""
 
     drive: Annotated[
         DriveKind,
         Meta(
-            description="duty: the PWM switches the coil itself, so the threshold as a duty goes with R/V. amplifier: "
-            "one that controls the current stands between. current: the firmware controls it."
+            description="How the coil is driven. duty: the PWM switches the coil itself, so that the threshold in duty "
+            "depends on resistance and supply. amplifier: a current-controlled amplifier drives it. "
+            "current: the firmware controls the current."
         ),
     ]
-    coil_temperature_C: Annotated[
-        tuple[Temperature, Temperature],
-        quantity("degC", "Coldest and hottest coil; null where the current is controlled and nobody declared it."),
-    ] | None = None
+    coil_temperature_C: (
+        Annotated[
+            tuple[Temperature, Temperature],
+            quantity(
+                "degC",
+                "Lowest and highest coil temperature; null if the current is controlled and no range was declared.",
+            ),
+        ]
+        | None
+    ) = None
     bench_coil_C: Annotated[
-        Temperature, quantity("degC", "Coil while the ramps were recorded; null with its range.")
+        Temperature, quantity("degC", "Coil temperature during the ramp tests; null if no range was declared.")
     ] | None = None
     supply_V: Annotated[
         tuple[Supply, Supply],
-        quantity("V", "Lowest and highest supply; null where an amplifier was declared and it was not."),
+        quantity("V", "Lowest and highest supply voltage; null if an amplifier was declared without a supply."),
     ] | None = None
     bench_supply_V: Annotated[
-        Supply, quantity("V", "Supply while the ramps were recorded; else null.")
+        Supply, quantity("V", "Supply voltage during the ramp tests; null if no range was declared.")
     ] | None = None
-    amplifier_error: Annotated[
-        Share,
-        quantity("1", "By how much the amplifier's current for a drive may differ from that of the bench; else null."),
-    ] | None = None
-    current_error: Annotated[
-        Share,
-        quantity(
-            "1", "Error of the controlled current, of its value: shunt, amplifier, converter's gain; else null."
-        ),
-    ] | None = None
-    current_rest_error: Annotated[
-        Share,
-        quantity("1", "What rounding and the calibrated offset leave of it, of the rated current; else null."),
-    ] | None = None
+    amplifier_error: (
+        Annotated[
+            Share,
+            quantity(
+                "1",
+                "Relative error of the amplifier's current against that of the bench at the same drive; null "
+                "without an amplifier.",
+            ),
+        ]
+        | None
+    ) = None
+    current_error: (
+        Annotated[
+            Share,
+            quantity(
+                "1",
+                "Relative error of the controlled current, by shunt, amplifier and the converter's gain; "
+                "null without current control.",
+            ),
+        ]
+        | None
+    ) = None
+    current_rest_error: (
+        Annotated[
+            Share,
+            quantity(
+                "1",
+                "Remaining error of the controlled current by rounding and the calibrated offset, as a share of "
+                "the rated current; null without current control.",
+            ),
+        ]
+        | None
+    ) = None
     bench_current_error: Annotated[
         Share,
-        quantity("1", "Error of the bench's current at a recorded command, of its value; else null."),
+        quantity("1", "Relative error of the bench's current at a recorded command; null without current control."),
     ] | None = None
-    bench_full_A: Annotated[
-        float, quantity("A", "Coil's current at full command on the bench, as declared; else null.", gt=0, le=1000)
-    ] | None = None
+    bench_full_A: (
+        Annotated[
+            float,
+            quantity(
+                "A", "Declared coil current at full command on the bench; null if none was declared.", gt=0, le=1000
+            ),
+        ]
+        | None
+    ) = None
     pressure_error_a_MPa: Annotated[
-        Pressure, quantity("MPa", "Error of the sensor ahead of the metering edge, offset and gain together.")
+        Pressure, quantity("MPa", "Error of the sensor upstream of the metering edge, offset and gain combined.")
     ]
-    pressure_error_b_MPa: Annotated[Pressure, quantity("MPa", "The same of the sensor behind it.")]
+    pressure_error_b_MPa: Annotated[
+        Pressure, quantity("MPa", "Error of the sensor downstream of the metering edge, offset and gain combined.")
+    ]
     bench_pressure_error_MPa: Annotated[Pressure, quantity("MPa", "Error of the recorded pressure drop.")]
-    pressure_offset_codes: Annotated[Error, Meta(description="Offset of the converter on each pressure channel.")]
+    pressure_offset_codes: Annotated[Error, Meta(description="Offset error of the converter on each pressure channel.")]
     pressure_gain_codes: Annotated[
-        Error, Meta(description="Its gain error on each pressure channel, at the top of its range.")
+        Error, Meta(description="Gain error of the converter on each pressure channel, at the top of its range.")
     ]
-    pressure_noise_codes: Annotated[Error, Meta(description="Peak of its noise on each pressure channel.")]
-    oil_error: Annotated[Share, quantity("1", "By how much the oil's temperature moves the threshold, of its value.")]
-    ageing_error: Annotated[Share, quantity("1", "By how much ageing moves the threshold, of its value.")]
+    pressure_noise_codes: Annotated[Error, Meta(description="Peak noise of the converter on each pressure channel.")]
+    oil_error: Annotated[Share, quantity("1", "Relative change of the threshold with the oil's temperature.")]
+    ageing_error: Annotated[Share, quantity("1", "Relative change of the threshold by ageing.")]
     defaults: Annotated[
-        Mapping[str, str], Meta(description="Keys above that nobody declared, and whose value each one took.")
+        Mapping[str, str],
+        Meta(description="Quantities above that were not declared, with the source of the default value."),
     ]
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What a certificate is of, and what the budget takes off, in a person's words: for C, README, report and terminal."""
+"""Coverage of a certificate and the deductions of the budget, in words for C, README, report and terminal."""
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator

@@ -1,4 +1,4 @@
-"""The offset above the last tested pressure drop: held, lowered with the continued bound, or let go.
+"""The offset above the last tested pressure drop: held, lowered with the continued bound, or released.
 
 Let go means a beta of one unit: the compensation ends, and the command drives the valve on. A drive of zero would shut
 a valve that a pressure spike reaches at full command, which is a motion of its own; without an offset the dead zone is
@@ -20,8 +20,8 @@ from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.guard_curve import CertifiedCurve
 from dzdesign.identify.valve.side_model import SideModel
 
-#: Segments of the table in which an offset that is let go comes down, beside that in which the tests end: a table is
-#: straight between its nodes, and the tests keep their offset.
+#: Segments of the table in which an offset that is released comes down, beside that in which the tests end: a table is
+#: linear between its nodes, and the tests keep their offset.
 RELEASE_SEGMENTS = 1
 #: Beyond the span of any sensor.
 FURTHEST_MPa = 1000
@@ -100,7 +100,7 @@ class AboveChoice:
         return OffsetAbove.under(CertifiedBound(pieces=(held,)), last_V, certified=False)
 
     def released_from(self, tested: range) -> int | None:
-        """Return the code from which on an offset is let go that was tested at codes in a range; None: it is not.
+        """Return the code from which an offset is released that was tested at codes in a range; None: it is not.
 
         It is that of a node of the table: the offset comes down in the segment before it, under the continued bound.
         """
@@ -136,7 +136,7 @@ def above_in_words(choice: Above, certificate: Certificate, side: SideModel, uni
     """Return what the law does above the tests, up to where that is certified, and on what premise."""
     curve, last = side.certified[certificate.guard], units.text(float(certificate.dp_MPa[1]), ".2f MPa")
     if choice == "hold" or (choice == "lower" and curve.above is None):
-        why = "" if choice == "hold" else " (one test shows no slope to lower it by)"
+        why = "" if choice == "hold" else " (a single test gives no slope for lowering it)"
         return (
             f"above {last} the offset of the highest test is held{why} and nothing is certified: where the threshold "
             "falls, flow at zero command is possible"
@@ -144,13 +144,13 @@ def above_in_words(choice: Above, certificate: Certificate, side: SideModel, uni
     released = certificate.released_from_MPa
     text = f"above {last} the offset is lowered with the continued bound"
     if choice == "release":
-        text = f"above {last} the offset is let go"
+        text = f"above {last} the offset is released"
     if released is not None:
         at = units.text(float(released), ".3g MPa")
-        text += f", and none is left from {at} on: the dead zone is back, and the command drives the valve on"
+        text += f", which reaches zero at {at}; beyond, the dead zone is back and the command alone drives the valve"
     holds_to = certificate.holds_to_MPa
     if curve.above is None:
-        return f"{text}; not certified: one test shows no slope"
+        return f"{text}; not certified: a single test gives no slope"
     rests = curve.above.in_words(curve.premise, side.trend or "flat", units)
     return f"{text}; {rests}" + (
         f", up to {units.text(float(holds_to), '.3g MPa')}" if holds_to > certificate.dp_MPa[1] else ""
@@ -164,5 +164,5 @@ def below_in_words(certificate: Certificate, side: SideModel, units: RecordedUni
     if side.trend == "increasing":
         return f"{text}: the threshold grows with the pressure drop, so flow at zero command is possible there"
     if side.trend == "decreasing":
-        return f"{text}; a threshold that goes on growing towards no pressure drop stays above it"
+        return f"{text}; a threshold that keeps growing towards zero pressure drop stays above it"
     return text

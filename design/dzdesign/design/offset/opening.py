@@ -50,7 +50,7 @@ def opening_ceiling(
     """Return the opening threshold at every pressure code: no bound, so rounding to codes does not count.
 
     Above the tests it comes down by as much as the certified offset: a transition, and the hysteresis that a play takes
-    out of it, stay as they are at the last test. Where the offset is let go, only that height is left of it.
+    out of it, stay as they are at the last test. Where the offset is released, only that height is left of it.
     """
     last = signals.largest_difference(sign)
     limit = offset_row(opening, signals, 0, last)
@@ -63,7 +63,7 @@ def opening_ceiling(
 
 
 def _less_what_is_lowered(opening: ExactRow, certified: OffsetCurve, signals: Signals, codes: range) -> ExactRow:
-    """Return what is left above the tests of the opening threshold there; behind the codes the offset is let go."""
+    """Return what is left above the tests of the opening threshold there; behind the codes the offset is released."""
     height = opening.line(Fraction(1), certified.offset_V[-1])
     if not codes:
         return height

@@ -18,7 +18,7 @@ WORTH_ABOVE = 0.01
 
 
 def _with_release(ceiling: OffsetCeiling, least: Fraction, above: AboveChoice) -> OffsetCeiling:
-    """Return a ceiling that above the tests leaves room for the least offset, and for no other where it is let go."""
+    """Return a ceiling that above the tests leaves room for the least offset, and for no other where it is released."""
     count, tested = len(ceiling.limit), ceiling.certified.stop
     released_from = above.released_from(ceiling.certified)
     end = count if released_from is None else min(released_from, count)

@@ -55,7 +55,7 @@ class _Programme:
     def solved(self, limit: np.ndarray, gain: np.ndarray) -> list[float]:
         """Return the best nodes.
 
-        A simplex ends in a vertex: no interior-point fuzz to round away. It starts anew: from the last valve's vertex
+        A simplex ends in a vertex: no interior-point fuzz to round away. It starts again: from the last valve's vertex
         it could end in another one, and a table would depend on what was designed before it.
         """
         import highspy
@@ -110,7 +110,7 @@ def _translated(problem: "cp.Problem") -> dict[str, Any]:
 
 @lru_cache(maxsize=16)
 def _node_weights(count: int) -> "csr_array":
-    """Return by how much each node counts at each of so many codes, straight between the nodes: (codes, nodes)."""
+    """Return by how much each node counts at each of so many codes, linear between the nodes: (codes, nodes)."""
     from scipy.sparse import csr_array
 
     codes = np.arange(count)
@@ -136,7 +136,7 @@ def _one_way(beta: "cp.Variable", trend: str | None, last: int) -> list["cp.Cons
 
 
 def between_nodes(nodes: Sequence[int], count: int, step_codes: int = STEP_CODES) -> np.ndarray:
-    """Return a table at so many codes, straight between its nodes, times their distance: whole numbers."""
+    """Return a table at so many codes, linear between its nodes, times their distance: whole numbers."""
     index, past = np.divmod(np.arange(count), step_codes)
     table = np.array(nodes, dtype=np.int64)  # at most 2^31 times a step: far from 2^63
     between: np.ndarray = table[index] * (step_codes - past) + table[index + 1] * past

@@ -19,7 +19,7 @@ LIKELY_LAG = 0.1
 COARSE_STEP = 5e-4
 #: The same where it is more than the bounds' distance from the threshold: a certificate that counts on less is none.
 SMALL_SHIFT = 5e-5
-#: Readings a level, from which on a flow is one of steps.
+#: Readings a level, from which a flow is one of steps.
 READINGS_A_LEVEL = 5
 
 

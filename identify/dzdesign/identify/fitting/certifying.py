@@ -278,7 +278,7 @@ def _check(bound: BoundUnderPremise, offset: OffsetUnderBound | None, tested: Te
     """Return a premise's test, and the largest dead zone on opening that a law without transition would leave.
 
     Between the tests too, where the offset may sag and the opening knee is taken as straight: by the tests alone a
-    curvature would look cheaper than it is. Both are straight between their nodes, so one of these has the largest.
+    curvature would look cheaper than it is. Both are linear between their nodes, so one of these has the largest.
     """
     left = None
     if offset is not None:

@@ -1,6 +1,6 @@
 """The law's offset under a certified bound: the problem that chooses it, in CasADi.
 
-The offset is straight between nodes: the tests, and points between them. It comes as near to the identified curve as
+The offset is linear between nodes: the tests, and points between them. It comes as near to the identified curve as
 the bound allows, and runs the way of the trend. The bound is a constraint at every node and at points between, and what
 it lacks between those points is taken off in closed form.
 """
@@ -34,7 +34,7 @@ WRONG_WAY = 2 * ACTIVE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OffsetUnderBound:
-    """An offset, straight between its nodes (N,): MPa and V; u_min0 is that at dP0, V."""
+    """An offset, linear between its nodes (N,): MPa and V; u_min0 is that at dP0, V."""
 
     dp_MPa: np.ndarray
     offset: np.ndarray

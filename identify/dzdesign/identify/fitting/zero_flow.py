@@ -65,7 +65,7 @@ def largest_at_rest(group: DescribedTests, options: IdentifyOptions) -> list[flo
 
 
 def refuse_a_large_zero_flow(group: DescribedTests, options: IdentifyOptions) -> None:
-    """Refuse a flow at zero that lies on the straight part of the characteristic: it is no leak but an opening."""
+    """Refuse a flow at zero that lies on the straight part of the characteristic: it is not a leak but an opening."""
     if options.zero_flow is None:
         return
     least = min(group.tests, key=lambda item: item.q_max)

@@ -42,7 +42,7 @@ class BranchShape:
     dropped: float
     #: Standard deviation of a reading while the valve is shut, m³/s.
     noise: float
-    #: Flow from which on a single reading counts as flow: the meter's floor, its noise or `USEFUL_FLOW`, whichever is
+    #: Flow from which a single reading counts as flow: the meter's floor, its noise or `USEFUL_FLOW`, whichever is
     #: largest.
     level: float
     #: What averages over the dead zone show below that.

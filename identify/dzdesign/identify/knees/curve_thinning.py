@@ -64,7 +64,7 @@ def recorded_curve(
 
 @dataclass(frozen=True, slots=True)
 class _Supply:
-    """How the bench's pressure drop sags over the flow: m³/s and Pa, straight between."""
+    """How the bench's pressure drop sags over the flow: m³/s and Pa, linear between."""
 
     q: np.ndarray
     dp: np.ndarray

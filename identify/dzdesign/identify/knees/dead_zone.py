@@ -17,7 +17,7 @@ from dzdesign.identify.ramps.medians import median
 #: Stretches of command over which readings are averaged, over u_max, and by how much of itself each is moved on: the
 #: longest sees the smallest flows, the shorter ones the steeper edges. One of them says the noise level.
 STRETCHES, STEP, OF_THE_LEVEL = (0.03, 0.015, 0.0075), 0.25, 0.015
-#: Standard errors of such an average that the noise level has, and share of the noise level from which on an average is
+#: Standard errors of such an average that the noise level has, and share of the noise level from which an average is
 #: flow: noise feigns flow in one stretch of 6000, and a flow of the noise level is missed in one of 120.
 RESOLVED, SEEN = 6.0, 0.6
 #: Commands that tell what the meter reads while the valve is shut: from this share of u_max to this of the knee.

@@ -10,7 +10,7 @@ from dzdesign.identify.knees.profile import crossing
 from dzdesign.identify.knees.table_lines import line_through_levels
 from dzdesign.identify.ramps.medians import median
 
-#: Most rounds in which outliers are left out and the line is laid anew: each finds those that the ones before hid.
+#: Most rounds in which outliers are left out and the line is laid again: each finds those that the ones before hid.
 ROUNDS = 20
 #: Logarithm of the probability below which a run of readings below the floor is not the noise's: about one run in ten
 #: million, and a branch has a hundred.

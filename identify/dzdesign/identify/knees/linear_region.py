@@ -23,7 +23,7 @@ from dzdesign.identify.ramps.branches import Branch
 USEFUL_FLOW = 0.005
 #: Standard deviations of a shut reading above which a single reading is flow.
 NOISE_LEVEL = 3.0
-#: Share of the readings while the valve is shut that are the lowest one, from which on the noise is cut off there;
+#: Share of the readings while the valve is shut that are the lowest one, from which the noise is cut off there;
 #: shares of the readings below the middle of a normal law, and below one standard deviation more.
 CUT_OFF, ONE_SIGMA = 0.25, (0.5, 0.841)
 #: The window may reach down to this multiple of the first flow that counts: nearer to a floor readings are cut off.
@@ -44,7 +44,7 @@ class StraightParts:
     #: One per branch, as wide as the characteristic goes on straight, and those in the window that was asked for.
     lines: tuple[GatedLine, ...]
     narrow: tuple[GatedLine, ...]
-    #: Per branch, m³/s: the flow that is no use or below the meter's floor, the one from which on a single reading is
+    #: Per branch, m³/s: the flow that is no use or below the meter's floor, the one from which a single reading is
     #: flow, and the noise of a reading while the valve is shut.
     least: tuple[float, ...]
     levels: tuple[float, ...]

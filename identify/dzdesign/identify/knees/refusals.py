@@ -24,7 +24,7 @@ EXTRAPOLATED = 0.1
 
 
 def refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
-    """Refuse a pressure drop (Pa; None if it is unknown) that is no valve's: a wrong unit, or swapped ports."""
+    """Refuse a pressure drop (Pa; None if it is unknown) that is not a valve's: a wrong unit, or swapped ports."""
     if dp is None:
         return
     if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:

@@ -30,7 +30,7 @@ class Premise:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeriesRow:
-    """One series and what it is predicted to certify; see `Prediction`."""
+    """One series and its predicted result; see `Prediction`."""
 
     name: str
     pressure_drops_MPa: tuple[float, ...]
@@ -55,7 +55,7 @@ class SeriesRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class SeriesPlan(ShownInNotebooks):
-    """A test series, and what it and others are predicted to certify."""
+    """A test series with its predicted result, and alternatives to it."""
 
     chosen: SeriesRow
     #: Pressure drop of each ramp, in the order of recording.

@@ -17,7 +17,7 @@ from dzdesign.core.errors import InputError
 PORTS = ("pP", "pA", "pB", "pT")
 #: Sign of the command -> its edges, inlet first, each from the port ahead to the port behind.
 EDGES = {1: (("pP", "pA"), ("pB", "pT")), -1: (("pP", "pB"), ("pA", "pT"))}
-#: Sensors named A and B alone stand ahead of the edge and behind it, whatever the command's sign.
+#: Sensors named A and B alone stand upstream of the edge and behind it, whatever the command's sign.
 AHEAD_AND_BEHIND = ("pA", "pB")
 #: Commands within this share of u_max are at rest: noise about zero does not turn the valve round.
 AT_REST = 0.01

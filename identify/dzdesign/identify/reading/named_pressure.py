@@ -20,7 +20,7 @@ def pressures_in_name(name: str) -> tuple[str, ...]:
     """Return the pressures as which a file's name can be read: none, one, or the decimal one and the other.
 
     ``2p5`` is a decimal number; ``2_5MPa`` may be 2.5 MPa, or 5 MPa after a number of its own, so may ``0_5MPa`` (valve
-    0, run 0), and ``2.000 bar`` may be two thousand. What is no valve's pressure drop is none of the readings.
+    0, run 0), and ``2.000 bar`` may be two thousand. What is not a valve's pressure drop is none of the readings.
 
     Examples
     --------

@@ -37,7 +37,7 @@ MIN_ROWS = 20
 SIMULATED_MARK = "SIMULATED"
 #: Stands for the column of time where the sample rate is declared.
 DECLARED_CLOCK = Column(label="--sample-rate", unit="s")
-#: SI numbers beyond these are no measurement of a valve: a wrong unit, or what a logger writes for an overflow.
+#: SI numbers beyond these are not a measurement of a valve: a wrong unit, or what a logger writes for an overflow.
 LARGEST = {"time": 1e12, "voltage": 1e4, "pressure": 1e9, "flow": 10.0}
 
 
@@ -59,7 +59,7 @@ def read_ramp_file(
         ``u [V]``, ``u (V)``). In text, lines that start with ``#`` are comments, blank cells are
         missing samples. Pressures of ports may stand in place of ``dP``: see `metering_edge`.
     u_max : float
-        Command in V that 100 % means, where the command is in per cent.
+        Command in V that 100 % means, where the command is in percent.
     columns : mapping, optional
         Quantity -> label in the file, as `column_labels.parse_columns` gives it; it goes before what labels say.
     dp : float, optional
@@ -139,7 +139,7 @@ def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
 
 
 def _is_marked(comments: str) -> bool:
-    """Tell whether a comment line says that this is no measurement; a spreadsheet may have put it in quotes."""
+    """Tell whether a comment line says that this is not a measurement; a spreadsheet may have put it in quotes."""
     return re.search(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', comments, re.MULTILINE) is not None
 
 

@@ -12,7 +12,7 @@ from dzdesign.identify.valve.left_out import LeftOut
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RampTest:
-    """One recorded ramp test, SI, read-only.
+    """One recorded ramp test in SI units, read-only.
 
     Attributes
     ----------

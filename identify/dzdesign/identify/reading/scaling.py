@@ -18,7 +18,7 @@ from dzdesign.identify.reading.column_labels import (
     same_unit,
 )
 
-#: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, per cent or bare numbers.
+#: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, percent or bare numbers.
 TRANSMITTED = ("current", "voltage")
 SIGNALS = (*TRANSMITTED, "frequency")
 #: Full scale in the examples of messages.
@@ -96,7 +96,7 @@ def _ends_in_the_file(quantity: str, column: Column, found: SignalRange) -> tupl
 
 
 def _factor(quantity: str, unit: str, u_max: float) -> float:
-    """Return the factor from a unit to SI; a command may also be in per cent of u_max."""
+    """Return the factor from a unit to SI; a command may also be in percent of u_max."""
     if quantity == "u" and unit.lower() in PER_CENT:
         return u_max * si_factor(unit, "ratio")
     return si_factor(unit, QUANTITY_OF_COLUMN[quantity])

@@ -51,7 +51,7 @@ class Table(ABC):
 
     @abstractmethod
     def numbers(self, label: str) -> np.ndarray:
-        """Return a column as float64, NaN where a sample is missing; InputError where a cell is no number."""
+        """Return a column as float64, NaN where a sample is missing; InputError where a cell is not a number."""
 
     @abstractmethod
     def length(self, label: str) -> int:

@@ -1,6 +1,6 @@
 """Thinning of long recordings: of every few rows in a row the median of each column is kept.
 
-A ramp test needs some ten thousand samples a branch; what a logger writes beyond that only averages noise. Of a
+A ramp test needs some ten thousand samples per branch; what a logger writes beyond that only averages noise. Of a
 recording of more than `MOST_ROWS` rows, runs of an odd number of rows become one row each. The median and not the mean,
 because it is a value that was recorded:
 

@@ -95,7 +95,7 @@ def _extreme(factor: float) -> bool:
 def _command_unit(path: Path, column: Column, u_max: float) -> CommandUnit:
     """Return the unit of a command: that of the signal as it is declared, or else the column's own.
 
-    A range of volts that stands for other volts, or for per cent, is shown in what it stands for: two kinds of volts
+    A range of volts that stands for other volts, or for percent, is shown in what it stands for: two kinds of volts
     in one table would be taken for one another.
     """
     scaling, unit, declared = scaling_of(path, "u", column, u_max), column.unit.strip(), ""

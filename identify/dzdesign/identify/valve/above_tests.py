@@ -29,48 +29,54 @@ LOWEST_V = -1e3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AboveTests:
-    """The bound above the last tested pressure drop; beyond its last node nothing is known."""
+    """The bound above the last tested pressure drop; nothing is known beyond its last node."""
 
     certified: Annotated[
         bool,
         Meta(
-            description="Whether the bound holds, above the tests too, with the side's confidence if the premise does. "
-            "False: the premise bounds nothing there, or the tests contradict it."
+            description="Whether the bound above the tests holds with the side's confidence, provided that its premise "
+            "holds. False: the premise gives no bound there, or the tests contradict it."
         ),
     ]
     slope_from_MPa: Annotated[
         PressureDrop | None,
-        Meta(description="Of smooth: the test whose chord to the last one gives the slope; null for another premise."),
+        Meta(
+            description="For the premise smooth, the test whose chord to the last test gives the slope; null for "
+            "another premise."
+        ),
     ]
     curvature_V_MPa2: Annotated[
         SecondDifference,
-        quantity("V/MPa2", "M above the tests: how much the threshold may bend, downwards too; 0 but for smooth."),
+        quantity(
+            "V/MPa2", "Bound M of the curvature above the tests, in both directions; 0 unless the premise is smooth."
+        ),
     ]
     lack_of_fit_p: Annotated[
         Probability | None,
         Meta(
-            description="Probability of tests that bend downwards as much as these if M were true; below 0.01 nothing "
-            "is certified. null: M was estimated from them, or another premise."
+            description="Probability that the tests bend downwards at least as much as these if M were true; nothing "
+            "is certified below 0.01. Null: M was estimated from the tests, or the premise is another."
         ),
     ]
     dp_MPa: Annotated[
         tuple[PressureDrop, ...],
-        quantity("MPa", "Nodes, from the last tested pressure drop on, up to where the bound comes to zero."),
+        quantity("MPa", "Nodes from the last tested pressure drop to the point at which the bound reaches zero."),
     ]
     band_V: Annotated[
         tuple[VoltageError, ...],
         quantity(
             "V",
-            "What errors take off the continued threshold at each node: noise, scatter and systematic errors, with the "
-            "leverage of the tests.",
+            "Amount that errors take off the continued threshold at each node. It covers noise, scatter and "
+            "systematic errors, with the leverage of the tests.",
         ),
     ]
     u_lower_V: Annotated[
         tuple[Voltage, ...],
         quantity(
             "V",
-            "Lower bounds at the nodes: the continued threshold less the band and M/2 (dP - last) (dP - slope_from). "
-            "Between nodes their chord, in the first interval less M/2 (dP - a) (b - dP).",
+            "Lower bounds at the nodes: the continued threshold minus the band and M/2 (dP - last) (dP - "
+            "slope_from). Between nodes the bound is their chord, minus M/2 (dP - a) (b - dP) in the first "
+            "interval.",
         ),
     ]
 
@@ -137,16 +143,16 @@ class AboveTests:
     def in_words(self, premise: Premise, trend: Direction, units: RecordedUnits) -> str:
         """Return what the continued bound rests on, and whether it is certified."""
         if premise == "line":
-            rests = "the threshold goes on straight, with the line's band"
+            rests = "the threshold continues as a straight line, with the line's band"
         elif premise == "smooth":
             bend = units.text(1e3 * self.curvature_V_MPa2, ".3g mV/MPa²")
-            rests = f"the threshold goes on from the last tests' value and slope, and bends by at most M = {bend}"
+            rests = f"the threshold continues from the last tests' value and slope, with curvature at most M = {bend}"
             if not self.certified:
                 rests += f", which the tests contradict (p = {self.lack_of_fit_p or 0.0:.2g})"
         elif trend == "increasing":
-            rests = "the threshold goes on rising, or stays"
+            rests = "the threshold keeps rising or stays constant"
         else:
-            rests = "the threshold goes on with the steepest slope between two tests: nothing bounds it there"
+            rests = "the threshold continues with the steepest slope between two tests: nothing bounds it there"
         return f"{'certified if' if self.certified else 'not certified:'} {rests}"
 
 

@@ -30,37 +30,39 @@ class BoundErrors:
     noise_se_V: Annotated[
         tuple[VoltageError, ...], quantity("V", "Standard error of each threshold by the noise of the readings.")
     ]
-    ramp_sd_V: Annotated[VoltageError, Meta(description="Standard deviation of the threshold from ramp to ramp, sd.")]
+    ramp_sd_V: Annotated[VoltageError, Meta(description="Standard deviation of the threshold from ramp to ramp.")]
     ramp_noise_V: Annotated[
-        VoltageError, Meta(description="What of it is the noise of one ramp; 0 where it was not measured.")
+        VoltageError,
+        Meta(description="Part of ramp_sd_V that is the noise of a single ramp; 0 if it was not measured."),
     ]
     degrees_of_freedom: Annotated[
-        float, quantity("1", "Of the measured sd; null where it was not measured.", gt=0, le=1e9)
+        float, quantity("1", "Degrees of freedom of ramp_sd_V; null if it was not measured.", gt=0, le=1e9)
     ] | None
     of_largest: Annotated[
         bool,
         Meta(
-            description="Whether sd is that of the pressure drop with the largest scatter: then C stands in place of "
-            "1 - (1 - C)/T."
+            description="Whether ramp_sd_V is that of the pressure drop with the largest scatter. If so, the level C "
+            "replaces 1 - (1 - C)/T."
         ),
     ]
     covariance: Annotated[
         tuple[tuple[Lever, ...], ...],
         Meta(
-            description="Covariance c of the tests' thresholds over sd^2, a row a test; last row and column, if there "
-            "is one more, are the drift's."
+            description="Covariance of the tests' thresholds over ramp_sd_V^2, one row per test. An additional last "
+            "row and column are those of the drift."
         ),
     ]
     drift_V: Annotated[
-        Voltage | None, Meta(description="Drift from the first ramp of the series to the last; null: not in the model.")
+        Voltage | None,
+        Meta(description="Drift from the first ramp of the series to the last; null if the model has none."),
     ]
-    uneven_V: Annotated[VoltageError, Meta(description="Largest departure from a straight drift that does not show.")]
+    uneven_V: Annotated[VoltageError, Meta(description="Largest undetected departure from a linear drift.")]
     budget_V: Annotated[
         tuple[Voltage, ...],
         quantity(
             "V",
-            "What is taken off each bound beside noise and scatter: lag and zero error of the meter, a leak, a soft "
-            "edge, stick and slip, a departure from the trend. Negative where a declared zero flow moves the bound up.",
+            "Systematic errors taken off each bound: lag and zero error of the meter, leak, soft edge, "
+            "stick-slip, and departure from the trend. Negative if a declared zero flow raises the bound.",
         ),
     ]
 

@@ -114,7 +114,7 @@ class CertifiedBound:
 
 
 def largest_excess(bound: CertifiedBound, nodes: np.ndarray, offset: np.ndarray) -> float:
-    """Return by how much an offset, straight between its nodes (MPa, V), exceeds a bound at most, V."""
+    """Return by how much an offset, linear between its nodes (MPa, V), exceeds a bound at most, V."""
     return max(_excess(piece, nodes, offset) for piece in bound.pieces)
 
 

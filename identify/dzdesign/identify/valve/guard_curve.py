@@ -45,29 +45,31 @@ ANYWHERE = (1.0,)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PremiseCheck:
-    """One premise about the threshold between the tests: how it fits them, and what it would leave."""
+    """One premise about the threshold between the tests: how it fits them, and the dead zone that it would leave."""
 
     premise: Annotated[
         Premise,
         Meta(
-            description="line: the threshold is straight over the pressure drop. smooth: its second divided "
-            "difference, kinks included, is at most M. monotone: it runs one way between neighbouring tests."
+            description="Premise. line: the threshold is a straight line over the pressure drop. smooth: its second "
+            "divided difference, kinks included, is at most M. monotone: it only rises or only falls "
+            "between neighbouring tests."
         ),
     ]
     lack_of_fit_p: Annotated[
         Probability | None,
         Meta(
-            description="Probability of tests as unlike the premise as these if it were true, against noise and "
-            "scatter; below 0.01 it is refused. Of monotone the smaller of two: of its steps, and of a lowest point "
-            "between two tests. null: the tests can't contradict it."
+            description="Probability of tests that contradict the premise at least as much as these if it were true, "
+            "given noise and scatter. The premise is rejected below 0.01. For monotone it is the smaller of "
+            "two: that of the steps, and that of a minimum between two tests. Null: the tests can't "
+            "contradict the premise."
         ),
     ]
     dead_zone_over_u_max: Annotated[
         Ratio | None,
         quantity(
             "1",
-            "Largest dead zone on opening that a law without transition would leave on the tested interval, with an "
-            "opening knee that is straight between two tests; null where no positive offset follows.",
+            "Largest dead zone on opening that a law without transition would leave on the tested interval. "
+            "The opening knee is taken as straight between tests. Null: no positive offset follows.",
         ),
     ]
 
@@ -79,44 +81,46 @@ class CertifiedCurve:
     Those of two curves are not meant to hold together: a certificate protects one threshold.
     """
 
-    premise: Annotated[Premise, Meta(description="What the bound rests on between the tests.")]
+    premise: Annotated[Premise, Meta(description="Premise of the bound between the tests.")]
     premises: Annotated[
-        tuple[PremiseCheck, ...], Meta(description="The premises that these tests allow, and what each would leave.")
+        tuple[PremiseCheck, ...],
+        Meta(description="Premises that these tests allow, with the dead zone that each would leave."),
     ]
     curvature_V_MPa2: Annotated[
         tuple[SecondDifference, ...],
-        quantity("V/MPa2", "M between neighbouring tests, one fewer than tests; 0 for line, empty for monotone."),
+        quantity(
+            "V/MPa2",
+            "Bound M of the curvature in each interval between neighbouring tests; 0 for line, empty for monotone.",
+        ),
     ]
     curvature_is: Annotated[
         Literal["declared", "estimated"] | None,
-        Meta(description="Where the M of a smooth curve is from; null for another premise."),
+        Meta(description="Whether the M of a smooth curve was declared or estimated; null for another premise."),
     ]
     dp_MPa: Annotated[
-        tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty where the pressure drop is unknown.")
+        tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty if the pressure drop is unknown.")
     ]
-    u_threshold_V: Annotated[
-        tuple[Voltage, ...], quantity("V", "The threshold at each test, as the fit under the premise has it.")
-    ]
+    u_threshold_V: Annotated[tuple[Voltage, ...], quantity("V", "Threshold at each test, as fitted under the premise.")]
     u_lower_V: Annotated[
         tuple[Voltage, ...],
         quantity(
             "V",
-            "Lower bounds of the threshold at the tests. Between two of them the bound is their chord less "
-            "M/2 (dP - a) (b - dP), or, for monotone, the lower of both.",
+            "Lower bounds of the threshold at the tests. Between two tests the bound is their chord minus "
+            "M/2 (dP - a) (b - dP). For monotone it is the lower of the two.",
         ),
     ]
-    errors: Annotated[BoundErrors, Meta(description="What the lower bounds at the tests are made of.")]
-    u_min0_V: Annotated[Voltage, Meta(description="The largest offset at dP0 that the certificate allows.")]
+    errors: Annotated[BoundErrors, Meta(description="Error components of the lower bounds at the tests.")]
+    u_min0_V: Annotated[Voltage, Meta(description="Largest offset at dP0 that the certificate allows.")]
     offset_dp_MPa: Annotated[
-        tuple[PressureDrop, ...], quantity("MPa", "Nodes of the offset; empty where the pressure drop is unknown.")
+        tuple[PressureDrop, ...], quantity("MPa", "Nodes of the offset; empty if the pressure drop is unknown.")
     ]
     offset_V: Annotated[
         tuple[Voltage, ...],
-        quantity("V", "The largest offset that runs the way of the trend under the bound, straight between its nodes."),
+        quantity("V", "Largest piecewise linear offset below the bound that follows the direction of the trend."),
     ]
     above: Annotated[
         AboveTests | None,
-        Meta(description="The bound above the last test; null of one test, and where the pressure drop is unknown."),
+        Meta(description="Bound above the last test; null for a single test, or if the pressure drop is unknown."),
     ]
 
     def __post_init__(self) -> None:
@@ -210,7 +214,7 @@ class CertifiedCurve:
             return f"Premise line: the threshold is straight over the pressure drop ({tested})"
         if self.premise == "smooth":
             if self.curvature_is == "estimated":
-                tested = "from these very tests, so no test of it"
+                tested = "from the same tests, so they do not test it"
             bends = [1e3 * value for value in self.curvature_V_MPa2]
             inner, ends = min(bends), (bends[0], bends[-1])
             first, last = (units.number(end, ".3g mV/MPa²") for end in ends)
@@ -267,9 +271,10 @@ class OpeningCurve:
 
     dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the tests.")]
     u_V: Annotated[
-        tuple[Voltage, ...], quantity("V", "The threshold there, running the way of the trend (flat: constant).")
+        tuple[Voltage, ...],
+        quantity("V", "Opening threshold at each test, monotone in the direction of the trend (flat: constant)."),
     ]
-    u_se_V: Annotated[tuple[VoltageError, ...], quantity("V", "Standard error of that test's knee.")]
+    u_se_V: Annotated[tuple[VoltageError, ...], quantity("V", "Standard error of each test's knee.")]
 
     def __post_init__(self) -> None:
         if not self.dp_MPa or not len(self.dp_MPa) == len(self.u_V) == len(self.u_se_V) or not _rises(self.dp_MPa):

@@ -21,23 +21,26 @@ BETA_ROUNDING = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IdentifiedCurve:
-    """Thresholds of one branch (their knees) by the joint fit, and Eq. (5)'s ratio of them; one entry a test."""
+    """Thresholds (knees) of one branch by the joint fit, and their ratio of Eq. (5); one entry for each test."""
 
     dp_MPa: Annotated[
-        tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty where the pressure drop is unknown.")
+        tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops; empty if the pressure drop is unknown.")
     ]
     u_V: Annotated[
-        tuple[Voltage, ...], quantity("V", "u_min: the threshold, a knee, as the fit under the premise has it.")
+        tuple[Voltage, ...], quantity("V", "Threshold u_min at each test: the knee as fitted under the premise.")
     ]
     u_se_V: Annotated[
         tuple[VoltageError, ...],
-        quantity("V", "Its standard error: noise, scatter from ramp to ramp, the width of the straight part."),
+        quantity(
+            "V",
+            "Standard error of the threshold by noise, scatter from ramp to ramp, and the width of the straight part.",
+        ),
     ]
     beta: Annotated[
         tuple[IdentifiedRatio, ...],
-        quantity("1", "Eq. (5): the threshold over that at dP0; empty where dP is unknown."),
+        quantity("1", "Threshold relative to that at dP0 (Eq. 5); empty if the pressure drop is unknown."),
     ]
-    beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Its standard error; 0 at dP0.")]
+    beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Standard error of beta; 0 at dP0.")]
 
     def __post_init__(self) -> None:
         count = len(self.u_V)

@@ -22,22 +22,23 @@ AnyPressure = Annotated[float, quantity("MPa", ge=-1e3, le=1e3)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeftOut:
-    """A stretch of a recording that belongs to no ramp."""
+    """A part of a recording that belongs to no ramp."""
 
-    recording: Annotated[str, Meta(description="File.")]
-    from_s: Annotated[Time, Meta(description="Its first sample, on the recording's own clock.")]
-    to_s: Annotated[Time, Meta(description="Its last sample.")]
+    recording: Annotated[str, Meta(description="Name of the recording.")]
+    from_s: Annotated[Time, Meta(description="Time of the first sample left out, on the recording's own clock.")]
+    to_s: Annotated[Time, Meta(description="Time of the last sample left out.")]
     reason: Annotated[
         Literal["option", "pressure", "no-pressure", "partial", "no-ramp"],
         Meta(
-            description="'option': by --from or --to. 'pressure': a rest, or a part of a ramp, whose pressure drop is "
-            "not the ramp's, as before the pump is started. 'no-pressure': a sweep without pressure or flow. "
-            "'partial': a sweep that stays below half of the largest command. 'no-ramp': a fragment without a ramp."
+            description="Reason why it was left out. option: --from or --to. pressure: a rest or part of a ramp at "
+            "another pressure drop, such as before the pump started. no-pressure: a sweep without pressure "
+            "or flow. partial: a sweep that stays below half of the largest command. no-ramp: a fragment "
+            "without a ramp."
         ),
     ]
     dp_MPa: Annotated[
         tuple[AnyPressure, AnyPressure] | None,
-        quantity("MPa", "Lowest and highest pressure drop in it; null where that is unknown."),
+        quantity("MPa", "Lowest and highest pressure drop in the part left out; null if unknown."),
     ]
 
     def in_words(self, units: RecordedUnits) -> str:

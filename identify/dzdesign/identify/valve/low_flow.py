@@ -19,16 +19,17 @@ SmallFlow = Annotated[float, quantity("L/min", ge=0, le=1e6)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LowFlow:
-    """One reading: command and pressure drop held, flow by volume and time, or by the speed and area of a piston."""
+    """One reading by hand at a constant command and pressure drop, by volume and time or by piston speed and area."""
 
-    source: Annotated[str, Meta(description="Table and row.")]
+    source: Annotated[str, Meta(description="Table and row of the reading.")]
     branch: Annotated[
-        Branch, Meta(description="Way on which the command was reached: rising from below, falling from above.")
+        Branch,
+        Meta(description="Direction from which the command was approached: rising from below, falling from above."),
     ]
-    u_V: Annotated[Voltage, Meta(description="Command.")]
-    dp_MPa: Annotated[PressureDrop, Meta(description="Pressure drop over the metering edge.")]
-    q_L_min: Annotated[SmallFlow, Meta(description="Flow, a leak included.")]
-    q_error_L_min: Annotated[SmallFlow, Meta(description="Its largest error.")]
+    u_V: Annotated[Voltage, Meta(description="Command during the reading.")]
+    dp_MPa: Annotated[PressureDrop, Meta(description="Pressure drop across the metering edge.")]
+    q_L_min: Annotated[SmallFlow, Meta(description="Measured flow, leak included.")]
+    q_error_L_min: Annotated[SmallFlow, Meta(description="Largest error of the measured flow.")]
 
     @property
     def table(self) -> str:

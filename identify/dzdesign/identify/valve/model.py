@@ -27,21 +27,27 @@ DECIMALS = 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Meter:
-    """What was taken of the flow meter."""
+    """Properties of the flow meter as assumed."""
 
-    floor_L_min: Annotated[Flow, Meta(description="Flow below which it reads zero, declared or found.")]
-    lag_s: Annotated[float, quantity("s", "Its lag.", ge=0, le=1e6)]
+    floor_L_min: Annotated[Flow, Meta(description="Flow below which the meter reads zero, declared or found.")]
+    lag_s: Annotated[float, quantity("s", "First-order lag of the meter.", ge=0, le=1e6)]
     lag_is: Annotated[
         LagOrigin,
-        Meta(description="Where the lag is from; unknown: it was taken as zero."),
+        Meta(description="Whether the lag was declared or identified. If it is unknown, it was taken as zero."),
     ]
     lag_longer_s: Annotated[
-        float, quantity("s", "By how much the true lag may be longer: lowers the bounds of the opening.", ge=0, le=1e6)
+        float,
+        quantity(
+            "s", "Largest amount by which the true lag may be longer; it lowers the bounds on opening.", ge=0, le=1e6
+        ),
     ]
     lag_shorter_s: Annotated[
-        float, quantity("s", "By how much it may be shorter: lowers the bounds of the closing.", ge=0, le=1e6)
+        float,
+        quantity(
+            "s", "Largest amount by which the true lag may be shorter; it lowers the bounds on closing.", ge=0, le=1e6
+        ),
     ]
-    zero_L_min: Annotated[Flow, Meta(description="Bound of its zero error, by which all bounds are lowered.")]
+    zero_L_min: Annotated[Flow, Meta(description="Bound of the meter's zero error, by which all bounds are lowered.")]
 
     def lag_in_words(self) -> str:
         """Return the lag with its tolerance and how it is known."""
@@ -65,11 +71,11 @@ def lag_in_words(seconds: float, origin: LagOrigin, *, longer: float = 0.0, shor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Warning_:
-    """Something a person should know."""
+    """A warning about the data or the result."""
 
-    code: Annotated[str, Meta(description="For machines; the documentation lists them.")]
-    text: Annotated[str, Meta(description="With the numbers, and what to do.")]
-    source: Annotated[str | None, Meta(description="Recording that it is about; null: all.")]
+    code: Annotated[str, Meta(description="Machine-readable code; the documentation explains each.")]
+    text: Annotated[str, Meta(description="Warning with its figures and what to do.")]
+    source: Annotated[str | None, Meta(description="Recording that the warning is about; null if it is about all.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -86,31 +92,37 @@ class ValveModel(ShownInNotebooks, Artefact):
             Annotated[str, Meta(min_length=1, max_length=LONGEST_TEXT)],
         ],
         Meta(
-            description="Who and what, as given by --record or [record]: any names, such as serial or oil. Nothing is "
-            "computed from it.",
+            description="Details given by --record or [record], such as serial number or oil. They are not used in any "
+            "computation.",
             max_length=MOST_ENTRIES,
         ),
     ]
     options: Annotated[
         StatedOptions | None,
         Meta(
-            description="Options of `identify` with which the files in made_from give this file again; null where "
-            "nobody wrote them down."
+            description="Options of `identify` that reproduce this file from the files in made_from; null if they were "
+            "not recorded."
         ),
     ] = None
     simulated: Annotated[
-        bool, Meta(description="Whether a recording is simulated: no measurement, so no firmware for a machine.")
+        bool,
+        Meta(
+            description="Whether a recording is simulated. A simulation is no measurement, so its firmware must not be "
+            "used on a machine."
+        ),
     ]
     u_max_V: Annotated[float, quantity("V", "Full command.", ge=1e-3, le=1e4)]
-    meter: Annotated[Meter, Meta(description="What was taken of the flow meter.")]
+    meter: Annotated[Meter, Meta(description="Properties of the flow meter as assumed.")]
     knee_window: Annotated[
         tuple[Probability, Probability],
-        quantity("1", "Shares of the largest flow between which the characteristic was taken as straight at first."),
+        quantity(
+            "1", "Initial range in which the characteristic was taken as straight, as shares of the largest flow."
+        ),
     ]
     sides: Annotated[
         Mapping[str, SideModel],
         Meta(
-            description="What was tested: one side or both.",
+            description="Tested sides of the valve: one or both.",
             min_length=1,
             extra_json_schema={"propertyNames": {"enum": list(SIDES)}},
         ),
@@ -118,19 +130,20 @@ class ValveModel(ShownInNotebooks, Artefact):
     untested_sides: Annotated[
         tuple[Literal["positive", "negative"], ...], Meta(description="Sides without a usable recording.")
     ] = field(init=False)
-    warnings: Annotated[tuple[Warning_, ...], Meta(description="In the order in which they matter.")]
+    warnings: Annotated[tuple[Warning_, ...], Meta(description="Warnings in descending order of importance.")]
     recorded_units: Annotated[
         RecordedUnits,
         Meta(
-            description="Units of the recordings, in which a person sees what stands here in V, MPa and L/min; of a "
-            "quantity that the recordings have in several units, those."
+            description="Units of the recordings, in which values are displayed; the file itself uses V, MPa and "
+            "L/min. For a quantity recorded in several units the displayed units are V, MPa and L/min, "
+            "too."
         ),
     ] = AS_COMPUTED
     dithered: Annotated[
         Dither | UnsetType,
         Meta(
-            description="Dither that the drive superimposed on the command while the ramps were recorded: thresholds "
-            "and characteristics are those of the dithered valve. Left out where it had none."
+            description="Dither that the drive superimposed on the command during the ramps. Thresholds and "
+            "characteristics are those of the dithered valve. Omitted if there was none."
         ),
     ] = UNSET
 

@@ -22,7 +22,9 @@ class RampConditions:
     rate_V_s: (
         Annotated[
             float,
-            quantity("V/s", "Pace of the command, of several ramps the fastest; null: unknown.", ge=0, le=LARGEST),
+            quantity(
+                "V/s", "Rate of the command ramp, the fastest if there are several; null if unknown.", ge=0, le=LARGEST
+            ),
         ]
         | None
     )
@@ -31,15 +33,15 @@ class RampConditions:
             float,
             quantity(
                 "Hz",
-                "Samples used per second: where several rows of a file became one sample, their medians count. Null: "
-                "no time was recorded.",
+                "Number of samples used per second. If several rows of a file became one sample, their "
+                "medians count. Null: no time was recorded.",
                 ge=0,
                 le=LARGEST,
             ),
         ]
         | None
     )
-    samples: Annotated[int, Meta(description="Samples used, of all ramps.", ge=0, le=10**12)]
+    samples: Annotated[int, Meta(description="Number of samples used, over all ramps.", ge=0, le=10**12)]
 
 
 def conditions_of(rates_V_s: Sequence[float], time_s: np.ndarray) -> RampConditions:

@@ -12,121 +12,134 @@ from dzdesign.identify.valve.quantity_types import Flow, FlowGain, PressureDrop,
 from dzdesign.identify.valve.ramp_conditions import RampConditions
 from dzdesign.identify.valve.recorded_curve import RecordedCurve
 
-#: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has next to none.
+#: Standard errors by which closing must lie above opening to be no noise; and V, for a simulation has almost none.
 ORDER_SIGNIFICANCE, ORDER_LEAST_V = 5.0, 1e-3
 #: Of a branch: the thresholds, each with its standard error.
 THRESHOLDS = ("knee", "level", "onset")
 BRANCHES = ("rising", "falling")
 
-StandardError = Annotated[VoltageError | None, Meta(description="Its standard error.")]
+StandardError = Annotated[VoltageError | None, Meta(description="Standard error of this threshold.")]
 LinearRange = tuple[Ratio, Ratio]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TestResult:
-    """One pressure drop: all ramps within 2 % of it. A threshold is null where its branch was not recorded."""
+    """Result at one pressure drop: all ramps within 2 % of it. A threshold is null if its branch was not recorded."""
 
     __test__ = False  # not a test case, whatever its name
 
-    source: Annotated[str, Meta(description="Recording, or the first of several.")]
+    source: Annotated[str, Meta(description="Recording of the test; the first one if there are several.")]
     dp_MPa: Annotated[
-        PressureDrop | None, Meta(description="Pressure drop at no flow; null where none was recorded or declared.")
+        PressureDrop | None, Meta(description="Pressure drop at zero flow; null if none was recorded or declared.")
     ]
     dp_from: Annotated[
         str | None,
         Meta(
-            description="Columns of the recordings that make it, such as pP_MPa - pA_MPa; 'declared' by --dp or [dp]; "
-            "null where it is unknown."
+            description="Origin of the pressure drop: columns of the recordings, such as pP_MPa - pA_MPa, or "
+            "'declared' by --dp or [dp]. Null: the pressure drop is unknown."
         ),
     ]
     u_knee_rising_V: Annotated[
-        Voltage | None, Meta(description="Knee on opening: the straight part of Q/sqrt(dP), extrapolated to zero.")
+        Voltage | None, Meta(description="Knee on opening: the straight part of Q/sqrt(dP), extrapolated to zero flow.")
     ]
     u_knee_rising_se_V: StandardError
     u_level_rising_V: Annotated[
         Voltage | None,
-        Meta(description="Level on opening: command at which the flow passes what counts as flow."),
+        Meta(description="Level on opening: the command at which the flow reaches the noise level."),
     ]
     u_level_rising_se_V: StandardError
     u_onset_rising_V: Annotated[
         Voltage | None,
         Meta(
-            description="Onset on opening, as far as the meter shows it: the first flow that stands out of its noise, "
+            description="Onset on opening, as far as the meter shows it. It is the first flow above the meter's noise, "
             "or the tail extrapolated to zero, whichever is lower."
         ),
     ]
     u_onset_rising_se_V: StandardError
     straight_rising: Annotated[
         LinearRange | None,
-        quantity("1", "Flows between which the rising branch was found straight, as shares of its largest."),
+        quantity("1", "Range of flow in which the rising branch is straight, as shares of its largest flow."),
     ]
-    u_knee_falling_V: Annotated[Voltage | None, Meta(description="Knee on closing.")]
+    u_knee_falling_V: Annotated[
+        Voltage | None, Meta(description="Knee on closing: the straight part of Q/sqrt(dP), extrapolated to zero flow.")
+    ]
     u_knee_falling_se_V: StandardError
-    u_level_falling_V: Annotated[Voltage | None, Meta(description="Level on closing.")]
+    u_level_falling_V: Annotated[
+        Voltage | None, Meta(description="Level on closing: the command at which the flow reaches the noise level.")
+    ]
     u_level_falling_se_V: StandardError
-    u_onset_falling_V: Annotated[Voltage | None, Meta(description="Onset on closing: the last flow.")]
+    u_onset_falling_V: Annotated[
+        Voltage | None, Meta(description="Onset on closing: the command of the last flow that the meter shows.")
+    ]
     u_onset_falling_se_V: StandardError
     straight_falling: Annotated[
         LinearRange | None,
-        quantity("1", "Flows between which the falling branch was found straight, as shares of its largest."),
+        quantity("1", "Range of flow in which the falling branch is straight, as shares of its largest flow."),
     ]
     not_observable: Annotated[
-        Mapping[str, str], Meta(description="Key of a threshold that the meter can't show, and why.")
+        Mapping[str, str],
+        Meta(description="Reason for each threshold that the meter can't show, by the threshold's key."),
     ]
-    u_knee_se_V: Annotated[VoltageError, Meta(description="The larger of the knees' standard errors.")] = field(
+    u_knee_se_V: Annotated[VoltageError, Meta(description="Larger standard error of the two knees.")] = field(
         init=False
     )
     u_guard_V: Annotated[
         Voltage,
         Meta(
-            description="Threshold that the certificate protects: on the guarded branch the knee, or below it what a "
-            "soft edge still passes, the tail's zero or where the flow falls to the noise level."
+            description="Threshold that the certificate protects, on the guarded branch. It is the knee or, for a soft "
+            "edge that still passes flow below the knee, the zero of the tail or the fall to the noise "
+            "level."
         ),
     ]
-    u_guard_lower_V: Annotated[Voltage, Meta(description="Its lower confidence bound.")]
-    slope_L_min_V: Annotated[FlowGain, Meta(description="Slope of the straight part, at the test's pressure drop.")]
-    q_max_L_min: Annotated[Flow, Meta(description="Largest flow, brought to the test's pressure drop.")]
+    u_guard_lower_V: Annotated[Voltage, Meta(description="Lower confidence bound of u_guard_V.")]
+    slope_L_min_V: Annotated[FlowGain, Meta(description="Slope of the straight part at the test's pressure drop.")]
+    q_max_L_min: Annotated[Flow, Meta(description="Largest flow, scaled to the test's pressure drop.")]
     saturates: Annotated[
-        bool, Meta(description="Whether the flow stops growing before full command: the spool is at its stop.")
+        bool, Meta(description="Whether the flow stops growing before full command because the spool reaches its stop.")
     ]
     leak_L_min: Annotated[
         Flow,
         Meta(
-            description="Flow at zero command that grows with the pressure drop: a leak. The knees are those of the "
-            "flow beyond it, the bounds allow for its end where the valve opens."
+            description="Leak: flow at zero command that grows with the pressure drop. The knees refer to the flow "
+            "minus the leak, and the bounds allow for its end where the valve opens."
         ),
     ]
     noise_level_L_min: Annotated[
         Flow,
         Meta(
-            description="Flow below which there is none: the largest of the meter's floor, what averages over the dead "
-            "zone resolve, and 0.5 % of the largest flow or what was declared."
+            description="Noise level: a flow below it counts as none. It is the largest of the meter's floor, the "
+            "resolution of averages over the dead zone, and 0.5 % of the largest flow or the declared "
+            "level."
         ),
     ]
     zero_flow_L_min: Annotated[
         Flow | None,
         Meta(
-            description="Flow at zero command, a leak included, that the bound answers for where one was declared by "
-            "--zero-flow: the declared one, or leak and noise level where they are more. Null: none was declared."
+            description="Flow at zero command, leak included, that the bound allows if --zero-flow declared one. It is "
+            "the declared flow, or the sum of leak and noise level if that is larger. Null: none was "
+            "declared."
         ),
     ]
-    noise_L_min: Annotated[Flow, Meta(description="Standard deviation of the flow's noise.")]
+    noise_L_min: Annotated[Flow, Meta(description="Standard deviation of the flow noise.")]
     noise_variance_inflation: Annotated[
         float,
-        quantity("1", "Variance of a mean of the flow over that under white noise of the same size.", ge=0, le=1e6),
+        quantity("1", "Variance of a mean flow relative to that under white noise of the same size.", ge=0, le=1e6),
     ]
     spool_ripple_V: Annotated[
         VoltageError,
-        Meta(description="Standard deviation of the spool about its mean course, as a command: stick and slip."),
+        Meta(description="Standard deviation of the spool around its mean motion by stick-slip, as a command."),
     ]
-    outliers: Annotated[int, Meta(description="Samples of the straight part that were left out.", ge=0, le=10**12)]
-    recorded: Annotated[RecordedCurve, Meta(description="Flow over command as recorded, thinned to few points.")]
-    ramps: Annotated[tuple[str, ...], Meta(description="The ramps that were pooled.", min_length=1)]
+    outliers: Annotated[
+        int, Meta(description="Number of samples of the straight part that were excluded as outliers.", ge=0, le=10**12)
+    ]
+    recorded: Annotated[RecordedCurve, Meta(description="Recorded flow over command, reduced to few points.")]
+    ramps: Annotated[tuple[str, ...], Meta(description="Ramps that were pooled in this test.", min_length=1)]
     left_out: Annotated[
-        tuple[LeftOut, ...], Meta(description="What of the recordings was left out: in these ramps, and before them.")
+        tuple[LeftOut, ...],
+        Meta(description="Parts of the recordings that were left out, in these ramps and before them."),
     ] = ()
     conditions: Annotated[
-        RampConditions | UnsetType, Meta(description="How it was recorded. Left out where nobody wrote it down.")
+        RampConditions | UnsetType, Meta(description="Recording conditions. Omitted if they were not kept.")
     ] = UNSET
 
     def __post_init__(self) -> None:

@@ -31,8 +31,8 @@ class RecordedSamples:
     u_V: Annotated[
         tuple[Voltage, ...],
         Meta(
-            description="Commands of the samples, rising: of equal steps over the branch the sample nearest to each, "
-            "whichever ramp it is of.",
+            description="Commands of the samples in ascending order. The branch is divided into equal steps; the "
+            "sample nearest to each step is kept, whichever ramp it belongs to.",
             min_length=1,
             max_length=MOST_SAMPLES,
             extra_json_schema={"unit": "V"},
@@ -40,7 +40,9 @@ class RecordedSamples:
     ]
     q_L_min: Annotated[
         tuple[SignedFlow, ...],
-        quantity("L/min", "Flow of each as read, the meter's lag and its error at rest taken out; a leak is in it."),
+        quantity(
+            "L/min", "Flow of each sample as read, corrected for the meter's lag and zero error; a leak is included."
+        ),
     ]
 
     def __post_init__(self) -> None:
@@ -50,12 +52,12 @@ class RecordedSamples:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedBranch:
-    """One branch of a test: flow over command, straight between the points."""
+    """One branch of a test: flow over command, linear between the points."""
 
     u_V: Annotated[
         tuple[Voltage, ...],
         Meta(
-            description="Commands of the points, rising.",
+            description="Commands of the points in ascending order.",
             min_length=2,
             max_length=MOST_POINTS + 4,
             extra_json_schema={"unit": "V"},
@@ -63,25 +65,25 @@ class RecordedBranch:
     ]
     q_L_min: Annotated[
         tuple[Flow, ...],
-        quantity("L/min", "Flow there, at the pressure drop that the bench had then; a leak is in it."),
+        quantity("L/min", "Flow at each point, at the actual pressure drop of the bench; a leak is included."),
     ]
     u_seen_V: Annotated[
         Voltage,
         Meta(
-            description="Command from which on the flow is seen, above the noise level; below it the points stand on a "
-            "straight line to the onset, which no reading shows."
+            description="Command from which the flow exceeds the noise level. Below it the points lie on a straight "
+            "line to the onset, which no reading confirms."
         ),
     ]
     error_L_min: Annotated[
         Flow,
         Meta(
-            description="Largest departure of the lines from the recorded flow, averaged over 0.5 % of full command, "
-            "where it is seen."
+            description="Largest deviation of the piecewise linear curve from the visible recorded flow, averaged over "
+            "0.5 % of full command."
         ),
     ]
     samples: Annotated[
         RecordedSamples | UnsetType,
-        Meta(description="A few of its samples, not averaged. Left out where nobody kept any."),
+        Meta(description="Selection of single samples, not averaged. Omitted if none were kept."),
     ] = UNSET
 
     def __post_init__(self) -> None:
@@ -111,14 +113,14 @@ class RecordedBranch:
 class RecordedCurve:
     """The recorded characteristic of one test; a branch that was not recorded is null."""
 
-    rising: Annotated[RecordedBranch | None, Meta(description="On opening.")]
-    falling: Annotated[RecordedBranch | None, Meta(description="On closing.")]
+    rising: Annotated[RecordedBranch | None, Meta(description="Opening branch.")]
+    falling: Annotated[RecordedBranch | None, Meta(description="Closing branch.")]
     dp_at_flow_MPa: Annotated[
         tuple[PressureDrop, ...] | None,
         quantity(
             "MPa",
-            "Pressure drop of the bench at flows in equal steps from none to the largest of the points: how its supply "
-            "sags. Null where no pressure drop was recorded.",
+            "Pressure drop of the bench at equally spaced flows from zero to the largest point. It shows "
+            "how the supply sags. Null: no pressure drop was recorded.",
         ),
     ]
 

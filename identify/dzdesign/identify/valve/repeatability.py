@@ -21,22 +21,28 @@ class Repeatability:
     origin: Annotated[
         Origin,
         Meta(
-            description="Where it is from: measured on repeats, declared by --repeatability, or the tool's own "
-            "assumption."
+            description="Origin of the standard deviation: measured on repeats, declared by --repeatability, or "
+            "assumed by dzdesign."
         ),
     ]
     degrees_of_freedom: (
-        Annotated[float, quantity("1", "Of the measured one; null where it was not measured.", gt=0, le=1e9)] | None
+        Annotated[
+            float,
+            quantity(
+                "1", "Degrees of freedom of a measured standard deviation; null if it was not measured.", gt=0, le=1e9
+            ),
+        ]
+        | None
     )
     drift_V: Annotated[
         Voltage | None,
         Meta(
-            description="Change of the threshold from the first ramp of the series to the last; null where it is not "
-            "in the model. The thresholds are those in the middle of the series, the bounds hold at either end."
+            description="Change of the threshold from the first ramp of the series to the last; null if the model has "
+            "no drift. The thresholds refer to the middle of the series, and the bounds hold at both ends."
         ),
     ]
-    drift_se_V: Annotated[VoltageError | None, Meta(description="Its standard error.")]
-    no_drift: Annotated[NoDrift, Meta(description="Why there is no drift in the model; empty where there is.")]
+    drift_se_V: Annotated[VoltageError | None, Meta(description="Standard error of drift_V.")]
+    no_drift: Annotated[NoDrift, Meta(description="Reason why the model has no drift; empty if it has one.")]
 
     def __post_init__(self) -> None:
         if (self.origin == "repeats") != (self.degrees_of_freedom is not None):

@@ -34,120 +34,136 @@ DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """The law's reference point."""
+    """The reference point of the law."""
 
-    dp_MPa: Annotated[PressureDrop | None, Meta(description="dP0; null where the ramp test has no pressure.")]
-    u_min_V: Annotated[
-        Voltage, Meta(description="u_min0: the identified threshold at dP0, of the branch that is guarded by default.")
+    dp_MPa: Annotated[
+        PressureDrop | None, Meta(description="Reference pressure drop dP0; null if the ramp test has no pressure.")
     ]
-    u_min_se_V: Annotated[VoltageError, Meta(description="Its standard error.")]
+    u_min_V: Annotated[
+        Voltage, Meta(description="Identified threshold u_min0 at dP0, on the branch that is guarded by default.")
+    ]
+    u_min_se_V: Annotated[VoltageError, Meta(description="Standard error of u_min0.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BetaNodes:
-    """beta(dP) of Eq. (5), identified on the branch that is guarded by default; without nodes where dP is unknown."""
+    """Identified beta(dP) of Eq. (5), on the branch that is guarded by default; without nodes if dP is unknown."""
 
-    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the nodes, those of the tests.")]
-    beta: Annotated[tuple[IdentifiedRatio, ...], quantity("1", "beta there: u_min(dP) / u_min0.")]
-    beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Standard error of each; 0 at dP0.")]
+    dp_MPa: Annotated[
+        tuple[PressureDrop, ...], quantity("MPa", "Pressure drops of the nodes, which are those of the tests.")
+    ]
+    beta: Annotated[
+        tuple[IdentifiedRatio, ...],
+        quantity("1", "Threshold at each node relative to that at dP0: u_min(dP) / u_min0."),
+    ]
+    beta_se: Annotated[tuple[RatioError, ...], quantity("1", "Standard error of beta at each node; 0 at dP0.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundsBasis:
-    """What the lower bounds rest on."""
+    """Basis of the lower bounds."""
 
     confidence: Annotated[
-        float, quantity("1", "Confidence with which all bounds of a guard hold together.", ge=0.5, le=1)
+        float, quantity("1", "Joint confidence level of all bounds of a guard.", ge=0.5, le=1)
     ]
     guard: Annotated[
         Guard,
         Meta(
-            description="The threshold that is protected unless `design --guard` asks for another: the safest that was "
-            "recorded."
+            description="Threshold that is protected by default: the safest one that was recorded. `design --guard` "
+            "can select another."
         ),
     ]
     level_L_min: Annotated[
         Flow,
         Meta(
-            description="Flow below which there is none: the largest noise level of the tests."
+            description="Largest noise level of the tests; a flow below it counts as none."
         ),
     ]
     zero_flow_L_min: Annotated[
         Flow | None,
-        Meta(description="Flow at zero command, a leak included, that --zero-flow declared as allowed; null: none."),
+        Meta(description="Flow at zero command, leak included, that --zero-flow declared as allowed; null if none was "
+            "declared."),
     ]
     unseen_below_L_min: Annotated[
         Flow,
         Meta(
-            description="Flow at the guard's bounds below which nothing is known: level_L_min, or less where the "
-            "low-flow readings show at every test, at its guarded threshold or above, that no more flows."
+            description="Flow below which nothing is known at the guard's bounds. It is level_L_min, or less if "
+            "low-flow readings at or above the guarded threshold of every test show that no more flows."
         ),
     ]
-    repeatability: Annotated[Repeatability, Meta(description="What differs from ramp to ramp.")]
+    repeatability: Annotated[Repeatability, Meta(description="Differences from ramp to ramp.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideModel:
-    """One side of the valve, identified on its own; on the negative side commands and flows count from zero down."""
+    """One side of the valve, identified separately. The negative side counts commands and flows from zero downwards."""
 
-    tests: Annotated[tuple[TestResult, ...], Meta(description="In the order of rising pressure drop.", min_length=1)]
-    reference: Annotated[Reference, Meta(description="The law's reference point.")]
+    tests: Annotated[
+        tuple[TestResult, ...], Meta(description="Ramp tests in ascending order of pressure drop.", min_length=1)
+    ]
+    reference: Annotated[Reference, Meta(description="Reference point of the law.")]
     k_x_max_over_u_max: Annotated[
         float,
         quantity(
             "1",
-            "Command that full stroke takes beyond the knee, over full command (k x_max / u_max of Eq. 18).",
+            "Command range from the knee to full stroke, over full command (k x_max / u_max of Eq. 18).",
             ge=1e-3,
             le=1e3,
         ),
     ]
-    k_x_max_over_u_max_se: Annotated[float, quantity("1", "Its standard error.", ge=0, le=1e3)]
-    k_V_mm: Annotated[float, quantity("V/mm", "k of Eq. (11), where --x-max was given.", ge=0, le=1e9)] | None
-    k_V_mm_se: Annotated[float, quantity("V/mm", "Its standard error.", ge=0, le=1e9)] | None
+    k_x_max_over_u_max_se: Annotated[float, quantity("1", "Standard error of k_x_max_over_u_max.", ge=0, le=1e3)]
+    k_V_mm: Annotated[float, quantity("V/mm", "Constant k of Eq. (11), if --x-max was given.", ge=0, le=1e9)] | None
+    k_V_mm_se: Annotated[float, quantity("V/mm", "Standard error of k_V_mm.", ge=0, le=1e9)] | None
     trend: Annotated[
         Direction | None,
         Meta(
-            description="How the guarded threshold runs with the pressure drop; null where fewer than two were tested."
+            description="Trend of the guarded threshold over the pressure drop; null if fewer than two pressure drops "
+            "were tested."
         ),
     ]
     trend_change_V: Annotated[
-        Voltage | None, Meta(description="Change of the guarded threshold over the tested range, by a straight line.")
+        Voltage | None,
+        Meta(description="Change of the guarded threshold over the tested range, by a straight-line fit."),
     ]
-    trend_change_se_V: Annotated[VoltageError | None, Meta(description="Its standard error.")]
+    trend_change_se_V: Annotated[VoltageError | None, Meta(description="Standard error of trend_change_V.")]
     trend_p: Annotated[
-        Probability | None, Meta(description="Probability of so large a change if the threshold were flat.")
+        Probability | None,
+        Meta(description="Probability of a change at least this large if the threshold were constant."),
     ]
-    beta: Annotated[BetaNodes, Meta(description="beta(dP), identified; no bound.")] = field(init=False)
+    beta: Annotated[BetaNodes, Meta(description="Identified beta(dP). It is an estimate, not a bound.")] = field(
+        init=False
+    )
     valid_dp_MPa: Annotated[
-        tuple[PressureDrop, PressureDrop] | None, quantity("MPa", "Tested interval; nothing is certified outside it.")
+        tuple[PressureDrop, PressureDrop] | None,
+        quantity("MPa", "Tested interval of the pressure drop; nothing is certified outside it."),
     ] = field(init=False)
-    certificate: Annotated[BoundsBasis, Meta(description="What the lower bounds rest on.")]
+    certificate: Annotated[BoundsBasis, Meta(description="Basis of the lower bounds.")]
     low_flow: Annotated[
         tuple[LowFlow, ...],
-        Meta(description="Flows that were measured by hand where the meter shows none, as --low-flow gave them."),
+        Meta(description="Flows measured by hand below the meter's floor, from the table of --low-flow."),
     ]
     active_constraints: Annotated[
-        tuple[str, ...], Meta(description="Constraints of the fits that hold with equality, in words.")
+        tuple[str, ...], Meta(description="Constraints that are active in the fits, in words.")
     ]
     identified: Annotated[
         Mapping[str, IdentifiedCurve],
         Meta(
-            description="What the data say of the threshold (its knee) of each recorded branch, with its error: no "
-            "bound, nothing is safe by it.",
+            description="Identified threshold (knee) of each recorded branch with its error. It is an estimate, not a "
+            "safe bound.",
             extra_json_schema={"propertyNames": {"enum": list(IDENTIFIED)}},
         ),
     ]
     certified: Annotated[
         Mapping[str, CertifiedCurve],
         Meta(
-            description="What is safe to rely on. One curve for each threshold that the recordings allow: closing, "
-            "opening and the mean of both, its error taken as large as their covariance could make it.",
+            description="Safe bounds: one curve for each threshold that the recordings allow, which are closing, "
+            "opening and the mean of both. The error of the mean assumes the least favourable covariance.",
             extra_json_schema={"propertyNames": {"enum": list(GUARDS)}},
         ),
     ]
     opening_curve: Annotated[
         OpeningCurve | None,
-        Meta(description="Where useful flow begins on opening; null without a rising branch or without pressure."),
+        Meta(description="Threshold of useful flow on opening; null without a rising branch or without pressure."),
     ]
 
     def __post_init__(self) -> None:

@@ -14,16 +14,19 @@ Words = Annotated[str, Meta(max_length=LONGEST)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedOptions:
-    """Options of `identify` as written, those that were not given by their default; without one they are left out."""
+    """Options of `identify` as entered, defaults included; an option without a value is omitted."""
 
-    texts: Annotated[Mapping[Name, Words], Meta(description="Options of one text, such as meter_lag.")] = field(
+    texts: Annotated[Mapping[Name, Words], Meta(description="Options with one text value, such as meter_lag.")] = field(
         default_factory=dict
     )
     tables: Annotated[
         Mapping[Name, Mapping[Name, Words]],
-        Meta(description="Options that were given as a table, such as columns, or dp by the recording's name."),
+        Meta(description="Options given as a table, such as columns, or dp by the recording's name."),
     ] = field(default_factory=dict)
     lists: Annotated[
         Mapping[Name, tuple[Words, ...]],
-        Meta(description="Options of several texts; of order the recordings in the order in which they were taken."),
+        Meta(
+            description="Options with several text values. The list of `order` holds the recordings in the order in "
+            "which they were taken."
+        ),
     ] = field(default_factory=dict)

@@ -95,7 +95,7 @@ def _found(reading: Reading) -> Found:
 
 
 def _loss(item: PressureAssessment) -> Found | None:
-    """Return by how much the largest flow fell, per cent."""
+    """Return by how much the largest flow fell, percent."""
     both = item.quantities.get("largest_flow")
     old, new = (both.before, both.after) if both else (None, None)
     if old is None or new is None or not old.value or new.value is None:

@@ -24,7 +24,7 @@ from dzdesign.verify.loop_results import PressureResult
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Where the enlarged panel ends, per cent of full command.
+#: Where the enlarged panel ends, percent of full command.
 NEAR_ZERO = 15.0
 
 
@@ -106,7 +106,7 @@ def _pressure(end: str, units: RecordedUnits) -> str:
 
 
 def _first_flow(curves: Curves, column: str) -> float:
-    """Return the first command at which there is flow, per cent."""
+    """Return the first command at which there is flow, percent."""
     flowing = curves.columns["command_percent"][curves.columns[column] > 0]
     return float(flowing[0]) if flowing.size else 100.0
 

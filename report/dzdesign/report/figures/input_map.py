@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
 
-#: How far the map of the tested interval reaches into commands of the other sign, per cent.
+#: How far the map of the tested interval reaches into commands of the other sign, percent.
 OTHER_SIGN = 8.0
 
 
@@ -64,7 +64,7 @@ def map_figure(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Grid:
-    """What the core gives on a grid: command in per cent, pressure drop and output in the units that are shown, and
+    """What the core gives on a grid: command in percent, pressure drop and output in the units that are shown, and
     where it is wrong or falls back, each (pressures, commands)."""
 
     u: np.ndarray
@@ -128,7 +128,7 @@ def _draw_zero_strip(axes: "Axes", zero: Curves | None, units: RecordedUnits) ->
     if zero is None:
         return 0
     dp, above = zero.columns["dp_MPa"], zero.columns["drive_V"] > zero.columns["bound_V"]
-    dp, ends = units.convert(dp, "MPa"), (0.0, 2.0)  # per cent of command: wide enough to be seen
+    dp, ends = units.convert(dp, "MPa"), (0.0, 2.0)  # percent of command: wide enough to be seen
     axes.fill_betweenx(dp, *ends, where=~above, color=LIGHT["green"], lw=0, zorder=4)
     axes.fill_betweenx(dp, *ends, where=above, facecolor="#ff2d2d", edgecolor="#ffffff", hatch="xxxx", lw=0, zorder=4)
     return int(above.sum())

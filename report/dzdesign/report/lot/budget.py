@@ -26,25 +26,29 @@ ENDS = ("least", "median", "largest")
 class LotBudgetLine:
     """One component of the budgets of the calibrated valves."""
 
-    side: Annotated[str, Meta(description="positive or negative.")]
-    component: Annotated[str, Meta(description="What may differ.")]
+    side: Annotated[str, Meta(description="Side of the valve: positive or negative.")]
+    component: Annotated[str, Meta(description="Source of the uncertainty.")]
     origin: Annotated[
-        tuple[str, ...], Meta(description="Measured, declared or default: each that some valve's budget has.")
+        tuple[str, ...], Meta(description="Measured, declared or default: each origin that occurs in a valve's budget.")
     ]
     contribution_mV: Millivolts
     price_percent: Annotated[
-        tuple[Price, Price, Price], Meta(description="Least, median and largest price, percent of command.")
+        tuple[Price, Price, Price], Meta(description="Least, median and largest price, in percent of command.")
     ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotBudget:
-    """What the certificates of a lot are of, and the components of their budgets."""
+    """What the certificates of a lot cover, and the components of their budgets."""
 
     certified_of: Annotated[
-        tuple[str, ...], Meta(description="The recording, or it and the declared machine: each that there is.")
+        tuple[str, ...],
+        Meta(
+            description="What the certificates cover: the recording alone, or the recording and the declared machine. "
+            "Each that occurs."
+        ),
     ]
-    lines: Annotated[tuple[LotBudgetLine, ...], Meta(description="The components, those of each side together.")]
+    lines: Annotated[tuple[LotBudgetLine, ...], Meta(description="Components, with those of each side together.")]
 
 
 def lot_budget(designed: Mapping[str, Compensator]) -> LotBudget | None:

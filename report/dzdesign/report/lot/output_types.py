@@ -15,33 +15,35 @@ DOES_NOT_HOLD: Final = "does not hold"
 NOT_VERIFIED: Final = "not verified"
 NOT_MADE: Final = "not made"
 #: A folder stands beside what it belongs to: no path.
-FolderName = Annotated[str, Meta(description="Its folder, in the folder of a valve.", pattern=r"^\w{1,40}$")]
+FolderName = Annotated[
+    str, Meta(description="Folder of the output, within the folder of a valve.", pattern=r"^\w{1,40}$")
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveOutput:
-    """What came of one output of one valve."""
+    """Result of one output of one valve."""
 
-    target: Annotated[str, Meta(description="Kind of output, as `codegen --list-targets` names it.", max_length=100)]
+    target: Annotated[str, Meta(description="Kind of output, as listed by `codegen --list-targets`.", max_length=100)]
     folder: FolderName
-    verdict: Annotated[OutputVerdict, Meta(description="Whether its verification holds; not made: it was refused.")]
-    reason: Annotated[str, Meta(description="Why it was not made or does not hold, in one sentence.")] = ""
-    inputs: Annotated[Count, Meta(description="How many inputs were compared with the exact law.")] = 0
+    verdict: Annotated[OutputVerdict, Meta(description="Result of the verification. not made: the output was refused.")]
+    reason: Annotated[str, Meta(description="Reason why it was not made or does not hold, in one sentence.")] = ""
+    inputs: Annotated[Count, Meta(description="Number of inputs that were compared with the exact law.")] = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotOutput:
-    """One kind of output, made of each valve of a lot."""
+    """One kind of output that was requested for each valve of a lot."""
 
     folder: FolderName
     settings: Annotated[
         Mapping[str, str],
-        Meta(description="Option of `codegen` that is of this kind alone, without hyphens, to its value."),
+        Meta(description="Values of the `codegen` options that only this kind of output has, by name without hyphens."),
     ]
-    holds: Annotated[Names, Meta(description="Valves whose output was verified, and every requirement of it holds.")]
-    does_not_hold: Annotated[Names, Meta(description="Valves whose output was verified and does not hold.")]
-    not_verified: Annotated[Names, Meta(description="Valves whose output was made and not verified.")]
-    not_made: Annotated[Names, Meta(description="Valves of which this output could not be made.")]
+    holds: Annotated[Names, Meta(description="Valves whose output was verified, with every requirement met.")]
+    does_not_hold: Annotated[Names, Meta(description="Valves whose output was verified, with a requirement not met.")]
+    not_verified: Annotated[Names, Meta(description="Valves whose output was made but not verified.")]
+    not_made: Annotated[Names, Meta(description="Valves whose output could not be made.")]
 
     @property
     def made(self) -> int:

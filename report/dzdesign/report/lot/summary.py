@@ -38,167 +38,194 @@ DOES_NOT_HOLD: Final = "does not hold"
 class Quantiles:
     """Quantiles over the valves, linear between the two nearest: the median of an even number is the mean of two."""
 
-    least: Annotated[Number, Meta(description="The least.")]
-    q05: Annotated[Number, Meta(description="One valve in twenty is below.")]
-    q25: Annotated[Number, Meta(description="One valve in four is below.")]
-    median: Annotated[Number, Meta(description="The median.")]
-    q75: Annotated[Number, Meta(description="One valve in four is above.")]
-    q95: Annotated[Number, Meta(description="One valve in twenty is above.")]
-    largest: Annotated[Number, Meta(description="The largest.")]
+    least: Annotated[Number, Meta(description="Minimum.")]
+    q05: Annotated[Number, Meta(description="5 % quantile.")]
+    q25: Annotated[Number, Meta(description="25 % quantile.")]
+    median: Annotated[Number, Meta(description="Median.")]
+    q75: Annotated[Number, Meta(description="75 % quantile.")]
+    q95: Annotated[Number, Meta(description="95 % quantile.")]
+    largest: Annotated[Number, Meta(description="Maximum.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailedValve:
     """A valve that is not calibrated."""
 
-    name: Annotated[str, Meta(description="Its name.")]
+    name: Annotated[str, Meta(description="Name of the valve.")]
     status: Annotated[
         Literal["failed", "does not hold"],
-        Meta(description="Not made, or a requirement of its verification is not met."),
+        Meta(description="Whether the valve was not made, or a requirement of its verification does not hold."),
     ]
-    reason: Annotated[str, Meta(description="Why, in one sentence.")]
+    reason: Annotated[str, Meta(description="Reason, in one sentence.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntestedPressures:
-    """Pressure drops at which half of the lot or more was tested, and one side of one valve was not."""
+    """Pressure drops at which at least half of the lot was tested, but one side of this valve was not."""
 
     name: Annotated[str, Meta(description="Name of the valve.")]
-    side: Annotated[Literal["positive", "negative"], Meta(description="Sign of command.")]
-    dp_MPa: Annotated[tuple[Pressure, ...], quantity("MPa", "Pressure drops that it lacks.")]
-    narrows: Annotated[bool, Meta(description="Whether that makes the interval of the lot setting narrower.")]
+    side: Annotated[Literal["positive", "negative"], Meta(description="Sign of the command.")]
+    dp_MPa: Annotated[tuple[Pressure, ...], quantity("MPa", "Pressure drops at which the valve was not tested.")]
+    narrows: Annotated[bool, Meta(description="Whether the missing tests narrow the interval of the lot setting.")]
     coarser_V: Annotated[
         Distance,
         quantity(
             "V",
-            "How far its bound there lies under the straight line between its bounds at the tests beside: about what a "
-            "test would gain; 0 outside its tests or without a trend.",
+            "Estimated gain of a test: distance of the valve's bound below the straight line between its "
+            "bounds at the neighbouring tests. 0 outside its tests or without a trend.",
         ),
     ]
     cost_percent: Annotated[
-        Distance, quantity("%", "The same in percent of command if it holds the lot setting down, else 0.")
+        Distance,
+        quantity("%", "Estimated gain in percent of command if this valve limits the lot setting; otherwise 0."),
     ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SmallestMargin:
-    """That the lot setting lies under the bounds of every valve: proved at every code of its own tested interval."""
+    """Proof that the lot setting lies below the bounds of every valve, at every code of the valve's tested interval."""
 
-    valves: Annotated[int, Meta(description="For how many valves.", ge=2, le=10**9)]
+    valves: Annotated[int, Meta(description="Number of valves compared.", ge=2, le=10**9)]
     worst: Annotated[str, Meta(description="Name of the valve with the smallest margin.")]
-    dp_MPa: Annotated[Pressure, quantity("MPa", "Pressure drop where it has it.")]
+    dp_MPa: Annotated[Pressure, quantity("MPa", "Pressure drop at which that valve has the smallest margin.")]
     smallest_margin_V: Annotated[
         Number,
         quantity(
             "V",
-            "That margin of the exact law under its bound, with half a count of rounding kept; what `verify` states is "
-            "of the whole numbers of the C, rounded as they are.",
+            "Smallest margin of the exact law below the valve's bound, with half a count reserved for "
+            "rounding. The margin in `verify` refers to the rounded integers of the C.",
         ),
     ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SettingOfOthers:
-    """The lot setting of the others, if the valves that hold it down kept settings of their own."""
+    """The lot setting of the remaining valves, if those that limit it kept their own settings."""
 
-    left_out: Annotated[Names, Meta(description="Valves that keep settings of their own.")]
+    left_out: Annotated[Names, Meta(description="Valves that keep their own settings.")]
     quantiles: Annotated[
         Mapping[str, Quantiles],
-        Meta(description="Dead zone that it leaves beyond each valve's own, in percent of command; empty of none."),
+        Meta(
+            description="Additional dead zone against each valve's own setting, in percent of command; empty if there "
+            "is no setting."
+        ),
     ]
-    why_not: Annotated[str | None, Meta(description="Why there is no such setting; null if there is one.")] = None
+    why_not: Annotated[str | None, Meta(description="Reason why there is no such setting; null if there is one.")] = (
+        None
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotSettingSummary:
-    """One setting that is safe for each calibrated valve."""
+    """Setting that is safe for each calibrated valve."""
 
-    file: Annotated[str, Meta(description="Its compensator.", pattern=r"^\w[\w.-]{0,99}$", max_length=100)]
-    sha256: Annotated[Sha256, Meta(description="SHA-256 of that file.")]
-    dp_MPa: Annotated[Pressures, quantity("MPa", "Interval in which it is certified for each valve.")]
+    file: Annotated[
+        str, Meta(description="Name of the compensator's file.", pattern=r"^\w[\w.-]{0,99}$", max_length=100)
+    ]
+    sha256: Annotated[Sha256, Meta(description="SHA-256 of the compensator's file.")]
+    dp_MPa: Annotated[
+        Pressures, quantity("MPa", "Interval of the pressure drop on which it is certified for each valve.")
+    ]
     untested: Annotated[
         tuple[UntestedPressures, ...],
-        Meta(description="Valves that were not tested at a pressure drop at which half of the lot was."),
+        Meta(description="Valves without a test at a pressure drop at which half of the lot was tested."),
     ]
     dp_without_MPa: Annotated[
         Pressures | None,
-        quantity("MPa", "What `dp_MPa` would be without those that make it narrower; null without any or of none."),
+        quantity("MPa", "Interval without the valves that narrow it; null if there are none, or no interval remains."),
     ]
-    carrier: Annotated[str, Meta(description="Valve that the compensator holds: the nearest to the least.")]
-    binding: Annotated[Names, Meta(description="Valves that hold its offset down.")]
+    carrier: Annotated[
+        str, Meta(description="Valve that the compensator contains: the one nearest to the lot's minimum.")
+    ]
+    binding: Annotated[Names, Meta(description="Valves that limit the offset.")]
     smallest_margin_V: Annotated[
         Mapping[str, tuple[Number, ...]],
         quantity(
             "V",
-            "Of these valves: smallest margin of the offset under the valve's own ceiling, on each side: what its own "
-            "offset may not exceed, straight between the tests and nowhere above the bounds, with half a count of "
-            "rounding kept.",
+            "Smallest margin, over these valves and sides, of the offset below the valve's own ceiling. The "
+            "ceiling is the largest piecewise linear offset below the valve's bounds. Half a count is "
+            "reserved for rounding.",
         ),
     ]
-    checked: Annotated[SmallestMargin, Meta(description="The smallest margin under the bounds of all valves.")]
+    checked: Annotated[SmallestMargin, Meta(description="Smallest margin below the bounds of all valves.")]
     without_binding: Annotated[
         SettingOfOthers | None,
         Meta(
-            description="What it would cost if the valves that hold it down kept settings of their own; null where "
-            "fewer than two valves would be left."
+            description="Cost if the limiting valves kept their own settings; null if fewer than two valves would "
+            "remain."
         ),
     ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotFirmware:
-    """The one firmware of a lot whose valves have calibration blocks."""
+    """The common firmware of a lot whose valves have calibration blocks."""
 
-    folder: Annotated[str, Meta(description="Its folder, beside this file.", pattern=r"^\w+/\w+$", max_length=100)]
-    target: Annotated[str, Meta(description="Its microcontroller.", max_length=100)]
-    manifest_sha256: Annotated[Sha256, Meta(description="SHA-256 of the manifest.json in it.")]
+    folder: Annotated[
+        str, Meta(description="Folder of the firmware, beside this file.", pattern=r"^\w+/\w+$", max_length=100)
+    ]
+    target: Annotated[str, Meta(description="Microcontroller of the firmware.", max_length=100)]
+    manifest_sha256: Annotated[Sha256, Meta(description="SHA-256 of the firmware's manifest.json.")]
     block_of: Annotated[
         str,
-        Meta(description="Whose block it has until another is loaded: the lot setting, or the valve of this name."),
+        Meta(
+            description="Source of the calibration block until another is loaded: the lot setting, or the valve of "
+            "this name."
+        ),
     ]
-    blocks: Annotated[Names, Meta(description="Files of a valve's folder that hold its own block.")]
+    blocks: Annotated[Names, Meta(description="Files with a valve's own block, in the valve's folder.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LotSummary(Artefact):
-    """What a lot of valves came to, as `dzdesign batch` writes it."""
+    """The result of a lot of valves, as `dzdesign batch` writes it."""
 
     FILE_NAME: ClassVar[str] = SUMMARY_NAME
     schema: Annotated[Literal["dzdesign.batch/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.batch/1"
     )
-    valves: Annotated[int, Meta(description="How many there are.", ge=1, le=10**9)]
-    calibrated: Annotated[Count, Meta(description="How many have a firmware, verified if asked for.")] = field(
-        init=False
-    )
-    failed: Annotated[tuple[FailedValve, ...], Meta(description="The others.")]
-    verified: Annotated[bool, Meta(description="Whether each firmware was verified too.")]
-    warnings: Annotated[Mapping[str, Names], Meta(description="Code of each warning to the valves that have it.")]
+    valves: Annotated[int, Meta(description="Number of valves.", ge=1, le=10**9)]
+    calibrated: Annotated[
+        Count, Meta(description="Number of valves with a firmware, verified if that was requested.")
+    ] = field(init=False)
+    failed: Annotated[tuple[FailedValve, ...], Meta(description="Valves that are not calibrated.")]
+    verified: Annotated[bool, Meta(description="Whether each firmware was also verified.")]
+    warnings: Annotated[Mapping[str, Names], Meta(description="Valves with each warning, by its code.")]
     anomalies: Annotated[
-        Names, Meta(description="What is odd though each valve is in order, such as a recording that two share.")
+        Names,
+        Meta(
+            description="Anomalies across valves that are individually in order, such as a recording that two valves "
+            "share."
+        ),
     ]
-    files: Annotated[Mapping[str, Sha256], Meta(description="SHA-256 of the table, by the name of its file.")]
+    files: Annotated[Mapping[str, Sha256], Meta(description="SHA-256 of the table, by file name.")]
     quantiles: Annotated[
         Mapping[str, Quantiles],
-        Meta(description="Spread of the calibrated valves: column of the table to quantiles, where any valve has it."),
+        Meta(
+            description="Quantiles over the calibrated valves for each column of the table, if any valve has a value."
+        ),
     ]
     lot_setting: Annotated[
-        LotSettingSummary | None, Meta(description="One setting that is safe for each calibrated valve; null of none.")
+        LotSettingSummary | None,
+        Meta(description="Setting that is safe for every calibrated valve; null if there is none."),
     ]
-    why_no_lot_setting: Annotated[str | None, Meta(description="Why there is none; null if there is one.")]
+    why_no_lot_setting: Annotated[
+        str | None, Meta(description="Reason why there is no such setting; null if there is one.")
+    ]
     budget: Annotated[
-        LotBudget | None, Meta(description="Uncertainty budgets of the calibrated valves; null without such a valve.")
+        LotBudget | None,
+        Meta(description="Uncertainty budgets of the calibrated valves; null if there is no calibrated valve."),
     ] = None
     firmware: Annotated[
         LotFirmware | None,
-        Meta(description="The one firmware, of valves with calibration blocks; null where each has a firmware."),
+        Meta(description="Common firmware of valves with calibration blocks; null if each valve has its own firmware."),
     ] = None
     outputs: Annotated[
         Mapping[str, LotOutput],
-        Meta(description="Outputs of each valve beside its firmware, by target as `codegen --list-targets` names it."),
+        Meta(description="Other outputs of each valve, by target as listed by `codegen --list-targets`."),
     ] = field(default_factory=dict)
     recorded_units: Annotated[
-        RecordedUnits, Meta(description="Units of the valves' recordings; the numbers here are in V and MPa.")
+        RecordedUnits, Meta(description="Units of the recordings; the numbers in this file are in V and MPa.")
     ] = AS_COMPUTED
 
     def __post_init__(self) -> None:
@@ -214,7 +241,7 @@ class UnfinishedLot(Artefact):
     """A lot whose batch runs, or was stopped: the same command takes it up."""
 
     FILE_NAME: ClassVar[str] = SUMMARY_NAME
-    schema: Annotated[
-        Literal["dzdesign.batch-unfinished/1"], Meta(description="Name and version of this schema.")
-    ] = "dzdesign.batch-unfinished/1"
-    names: Annotated[Names, Meta(description="The valves, in the order of the table.")]
+    schema: Annotated[Literal["dzdesign.batch-unfinished/1"], Meta(description="Name and version of this schema.")] = (
+        "dzdesign.batch-unfinished/1"
+    )
+    names: Annotated[Names, Meta(description="Names of the valves, in the order of the table.")]

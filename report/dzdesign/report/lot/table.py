@@ -1,4 +1,4 @@
-"""valves.csv: the table of a lot, one row a valve, written and read back."""
+"""valves.csv: the table of a lot, one row per valve, written and read back."""
 
 import csv
 import io

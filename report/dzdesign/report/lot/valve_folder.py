@@ -23,24 +23,26 @@ FIRMWARE = "firmware"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveManifest(Artefact):
-    """What came of one valve of a lot."""
+    """Result of one valve of a lot."""
 
     FILE_NAME: ClassVar[str] = MANIFEST_NAME
     schema: Annotated[Literal["dzdesign.batch-valve/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.batch-valve/1"
     )
     name: Annotated[str, Meta(description="Name of the valve.")]
-    status: Annotated[Status, Meta(description="Whether it is calibrated; does not hold: a requirement.")]
-    reason: Annotated[str, Meta(description="Why it is not, in one sentence.")] = ""
+    status: Annotated[
+        Status, Meta(description="Whether the valve is calibrated. does not hold: a requirement is not met.")
+    ]
+    reason: Annotated[str, Meta(description="Reason why it is not calibrated, in one sentence.")] = ""
     inputs_sha256: Annotated[
         Sha256 | None,
-        Meta(description="SHA-256 of recordings, options and version; null where the next run tries it again."),
+        Meta(description="SHA-256 of the recordings, options and version; null if the next run must try again."),
     ] = None
-    board: Annotated[tuple[str, ...], Meta(description="Files of its firmware that are the user's to fill in.")] = ()
+    board: Annotated[tuple[str, ...], Meta(description="Files of the firmware for the user to complete.")] = ()
     outputs: Annotated[
-        tuple[ValveOutput, ...], Meta(description="What came of its outputs beside the C firmware; empty of none.")
+        tuple[ValveOutput, ...], Meta(description="Results of the other outputs; empty if there are none.")
     ] = ()
-    files: Annotated[Mapping[str, Sha256], Meta(description="SHA-256 of each file beside this one.")]
+    files: Annotated[Mapping[str, Sha256], Meta(description="SHA-256 of each file in the same folder.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

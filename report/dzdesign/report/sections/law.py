@@ -1,4 +1,4 @@
-"""The law's derivation, as the report shows it: proved anew when the report is made."""
+"""The law's derivation, as the report shows it: proved again when the report is made."""
 
 from dataclasses import dataclass
 from functools import cache

@@ -7,7 +7,7 @@
 
 #include <stdint.h>
 
-/* 25000000 Hz / 2500 Hz = 10000 counts: SysTick runs from 9999 to 0. Another clock, another number. */
+/* 25000000 Hz / 2500 Hz = 10000 counts: SysTick runs from 9999 to 0. Change it with the clock. */
 #define DZ_TICK_RELOAD UINT32_C(9999)
 
 /* Written by the interrupt only. */

@@ -6,7 +6,7 @@
 
 #include "dz_tick.h"
 
-/* Borders that the linker script defines; only their addresses mean something. */
+/* Symbols that the linker script defines; only their addresses have a meaning. */
 extern uint32_t dz_stack_top;
 extern const uint32_t dz_data_load;
 extern uint32_t dz_data_start;

@@ -14,7 +14,7 @@
 
 /* In counts of the PWM the law is sum / (divisor * 2^shift), both of the block's reciprocal, with the integer of 64 bits
  *     sum = B * (slope * X + offset) + linear * X + half - (B - B_zero) * transition * missing
- * X: command that the law is given. Of k codes past the zero band it is k * transition_codes + zero_band * t, t being
+ * X: command that enters the law. Of k codes past the zero band it is k * transition_codes + zero_band * t, t being
  *    those of k in the transition; `missing` are the codes that are missing to its end.
  * B: the table's value at dP; B_zero: the same of the certified beta at zero command.
  * Nothing is rounded before the one shift and the one division, which is a product with a reciprocal.
@@ -33,7 +33,7 @@
 /* Place of DZ_STATUS_DIFFERENCE in the status word: bit 3 (a convention). */
 #define DIFFERENCE_PLACE 3u
 
-/* ---- words: a number below zero stands 2^32 higher; masks in place of branches, all ones for yes and 0 for no ---- */
+/* ---- words: a negative number is stored 2^32 higher; masks in place of branches, all ones for yes and 0 for no ---- */
 
 /* All ones if the subtraction that gave x went below zero, else 0. */
 static uint32_t below_zero(uint32_t x)
@@ -49,7 +49,7 @@ static uint32_t at_most(uint32_t left, uint32_t right)
     return right + (room & below_zero(room));
 }
 
-/* The number that a word stands for. */
+/* The signed value of a word. */
 static int32_t number(uint32_t word)
 {
     const uint32_t others = ~word;
@@ -57,7 +57,7 @@ static int32_t number(uint32_t word)
     return (word <= LARGEST_NUMBER) ? (int32_t)word : (-1 - (int32_t)others);
 }
 
-/* The product of the numbers that two words stand for, modulo 2^64. */
+/* The product of the signed values of two words, modulo 2^64. */
 static uint64_t product(uint32_t left, uint32_t right)
 {
     const int64_t signed_product = (int64_t)number(left) * number(right);
@@ -73,19 +73,19 @@ static uint64_t whole(const uint32_t *halves)
 
 /* ---- signals ---- */
 
-/* All ones if the command is outside its valid range: no working signal gives it. */
+/* All ones if the command is outside its valid range: no working signal produces it. */
 static uint32_t invalid_command(const struct dz_calibration *block, uint32_t u)
 {
     return below_zero((u - block->command_low) | (block->command_high - u));
 }
 
-/* Difference of the pressures, A less B, in codes of sensor A times 4096. */
+/* Difference of the pressures, A minus B, in codes of sensor A times 4096. */
 static uint32_t pressure_difference(const struct dz_calibration *block, uint32_t p_a, uint32_t p_b)
 {
     return (p_a << WEIGHT_SHIFT) - (p_b * block->weight_b) - block->balance;
 }
 
-/* All ones if the pressures can't be right: one is outside its valid range, or the drop is below -reverse. */
+/* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -reverse. */
 static uint32_t failed_pressures(const struct dz_calibration *block, uint32_t p_a, uint32_t p_b, uint32_t difference)
 {
     return below_zero((p_a - block->a_low) | (block->a_high - p_a) | (p_b - block->b_low) | (block->b_high - p_b) |
@@ -94,14 +94,14 @@ static uint32_t failed_pressures(const struct dz_calibration *block, uint32_t p_
 
 /* ---- beta ---- */
 
-/* What the table has at a pressure drop: beta of the law, and the certified one at zero command. */
+/* The table's values at a pressure drop: beta of the law, and the certified one at zero command. */
 struct betas
 {
     uint32_t law;
     uint32_t zero;
 };
 
-/* Straight between the nodes; the smallest of all, at the table's end, where the pressures can't be right. */
+/* Linear between the nodes; the smallest of all, at the table's end, if the pressures are implausible. */
 static inline struct betas betas_at(const struct dz_calibration_side *side, uint32_t difference, uint32_t failed)
 {
     const uint32_t drop = (difference & ~below_zero(difference)) | failed;
@@ -122,7 +122,7 @@ static inline uint32_t sum_of(const struct dz_calibration *block, const struct d
                               uint32_t towards, struct betas beta)
 {
     const uint32_t past = at_most(towards, side->room);
-    /* The codes that are missing to the transition's end, with the sign turned; and the command that the law is given. */
+    /* The codes that are missing to the transition's end, with the sign turned; and the command that enters the law. */
     const uint32_t from_end = past - block->transition_codes;
     const uint32_t not_missing = from_end & below_zero(from_end);
     const uint32_t command =
@@ -171,7 +171,7 @@ uint16_t dz_status(const struct dz_calibration *block, uint16_t u_adc, uint16_t 
     const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
-    /* The top bit is set where a code is outside its valid range, and where the difference is beyond its limits. */
+    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
     const uint32_t a = (p_a - block->a_low) | (block->a_high - p_a);
     const uint32_t b = (p_b - block->b_low) | (block->b_high - p_b);
     const uint32_t difference = pressure_difference(block, p_a, p_b);
@@ -179,7 +179,7 @@ uint16_t dz_status(const struct dz_calibration *block, uint16_t u_adc, uint16_t 
     const uint32_t above = block->sides[0].tested_to - difference;
     const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE));
 
-    /* Of a pressure outside its valid range the difference says nothing. */
+    /* The difference has no meaning if a pressure is outside its valid range. */
     return (uint16_t)((invalid_command(block, u) & DZ_STATUS_COMMAND) | ((a >> 31) * DZ_STATUS_PRESSURE_A) |
                       ((b >> 31) * DZ_STATUS_PRESSURE_B) | ((of_drop & ~below_zero(a | b)) * DZ_STATUS_DIFFERENCE));
 }
@@ -223,7 +223,7 @@ uint16_t dz_status_negative(const struct dz_calibration *block, uint16_t u_adc, 
     const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
-    /* The top bit is set where a code is outside its valid range, and where the difference is beyond its limits. */
+    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
     const uint32_t a = (p_a - block->a_low) | (block->a_high - p_a);
     const uint32_t b = (p_b - block->b_low) | (block->b_high - p_b);
     const uint32_t difference = 0u - pressure_difference(block, p_a, p_b);
@@ -231,7 +231,7 @@ uint16_t dz_status_negative(const struct dz_calibration *block, uint16_t u_adc, 
     const uint32_t above = block->sides[1].tested_to - difference;
     const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE));
 
-    /* Of a pressure outside its valid range the difference says nothing. */
+    /* The difference has no meaning if a pressure is outside its valid range. */
     return (uint16_t)((invalid_command(block, u) & DZ_STATUS_COMMAND) | ((a >> 31) * DZ_STATUS_PRESSURE_A) |
                       ((b >> 31) * DZ_STATUS_PRESSURE_B) | ((of_drop & ~below_zero(a | b)) * DZ_STATUS_DIFFERENCE));
 }

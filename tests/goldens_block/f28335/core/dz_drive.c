@@ -20,9 +20,9 @@
 /* Mask of play_step_shift: 15 (exact). */
 #define PLAY_SHIFT_MASK 15u
 
-/* ---- ramps: commands in words, positive ones above zero; one below zero stands 2^32 higher ---- */
+/* ---- ramps: commands in words, positive ones above zero; a negative one is stored 2^32 higher ---- */
 
-/* All ones if a word stands for a number below zero, else 0. */
+/* All ones if the signed value of a word is negative, else 0. */
 static uint32_t is_negative(uint32_t x)
 {
     return 0u - (x >> 31);
@@ -33,7 +33,7 @@ static uint32_t lesser(uint32_t left, uint32_t right)
     return (left < right) ? left : right;
 }
 
-/* The number that a word stands for. */
+/* The signed value of a word. */
 static int32_t command_number(uint32_t word)
 {
     const uint32_t others = ~word;
@@ -71,7 +71,7 @@ static int32_t within(int32_t value, int32_t low, int32_t high)
     return (raised > high) ? high : raised;
 }
 
-/* From zero command on: the next travel is a rise. */
+/* From zero command: the next travel is a rise. */
 static void reset_play(const struct dz_calibration *block, struct dz_drive *drive)
 {
     drive->rising = block->play_codes;
@@ -89,7 +89,7 @@ static uint32_t play_width(const struct dz_calibration *block, const struct dz_c
     return ((side->play[node] * (step - beyond)) + (side->play[node + 1u] * beyond)) >> shift;
 }
 
-/* The law less what a falling command is driven lower by. It begins with the transition, in the zero band it is nothing,
+/* The law, lowered for a falling command by the valve's hysteresis. That begins with the transition, is 0 in the zero band,
  * and follows the travel of the command without its noise. */
 static uint16_t with_play(const struct dz_calibration *block, const struct dz_calibration_side *side,
                           struct dz_drive *drive, int32_t towards, uint16_t law)
@@ -123,13 +123,13 @@ static uint32_t valid_samples(const struct dz_calibration *block, uint32_t valid
     return (valid + ((valid - block->fault_samples) >> 31)) & ~fault;
 }
 
-/* All ones as long as there have not been fault_samples of them. */
+/* All ones until there have been fault_samples of them. */
 static uint32_t too_few(const struct dz_calibration *block, uint32_t valid)
 {
     return is_negative(valid - block->fault_samples);
 }
 
-/* Faults since the last one was over, up to fault_samples; 0 where none is latched. */
+/* Faults since the last one ended, up to fault_samples; 0 where none is latched. */
 static uint32_t faulty_samples(const struct dz_calibration *block, uint32_t faulty, uint32_t fault)
 {
     return (faulty + (fault & ((faulty - block->fault_samples) >> 31))) & all_ones(block->fault_latch);
@@ -141,7 +141,7 @@ static uint32_t latched(const struct dz_calibration *block, uint32_t faulty)
     return is_negative((block->fault_samples - (uint32_t)1u) - faulty);
 }
 
-/* All ones as long as the pressures are not to be used, for the status of a new sample. */
+/* All ones while the pressures must not be used, from the status of a new sample. */
 static uint32_t held_pressures(const struct dz_calibration *block, struct dz_drive *drive, uint32_t status)
 {
     const uint32_t wrong = status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE);
@@ -155,7 +155,7 @@ static uint32_t held_pressures(const struct dz_calibration *block, struct dz_dri
     return held;
 }
 
-/* All ones without a command to be followed: let go at once, and start from rest when it comes back. */
+/* All ones without a command to follow: de-energise at once, and start from rest when it returns. */
 static uint32_t no_command(const struct dz_calibration *block, struct dz_drive *drive, uint32_t invalid, int32_t asked)
 {
     const uint32_t codes = (uint32_t)asked;
@@ -173,7 +173,7 @@ static uint32_t no_command(const struct dz_calibration *block, struct dz_drive *
 
 /* ---- rest ---- */
 
-/* 1 if the command counts as zero, `towards` being its codes from zero on; 0 without a zero band. Between the band's two
+/* 1 if the command counts as zero, `towards` being its codes from zero; 0 without a zero band. Between the band's two
  * ends the drive stays as it was; without a command it is at rest. */
 static uint32_t rest(const struct dz_calibration *block, uint16_t at_rest, int32_t towards, uint32_t gone)
 {
@@ -184,7 +184,7 @@ static uint32_t rest(const struct dz_calibration *block, uint16_t at_rest, int32
     return (((at_rest | in_band) & stays) | (gone & 1u)) & all_ones(block->zero_band);
 }
 
-/* The command that the law is given: codes past the zero band, none at rest. */
+/* The command that enters the law: codes past the zero band, 0 at rest. */
 static uint32_t past_band(const struct dz_calibration *block, uint32_t at_rest, int32_t towards)
 {
     const uint32_t past = (uint32_t)towards - block->zero_band;
@@ -212,7 +212,7 @@ void dz_drive_init(const struct dz_calibration *block, struct dz_drive *drive)
     drive->faulty_pressures = 0u;
 }
 
-/* The command in codes from zero on, positive ones above, after the ramps. */
+/* The command in codes from zero, positive ones above, after the ramps. */
 static int32_t command_of(const struct dz_calibration *block, struct dz_drive *drive, int32_t asked, uint32_t gone)
 {
     int32_t command = asked;
@@ -249,7 +249,7 @@ void dz_drive_sample(const struct dz_calibration *block, struct dz_drive *drive,
     } else if (command < -leave) {
         drive->side = -1;
     } else {
-        /* about zero: the side stays, so that noise does not throw the spool to and fro */
+        /* near zero: the side stays, so that noise does not move the spool back and forth */
     }
     away = (drive->side < 0) ? -command : command;
     side = (drive->side < 0) ? &block->sides[1] : &block->sides[0];
@@ -288,7 +288,7 @@ void dz_drive_tick(const struct dz_calibration *block, struct dz_drive *drive)
             drive->ticks = 0u;
         }
         if (compare == 0u) {
-            /* let go: nothing to dither */
+            /* de-energised: nothing to dither */
         } else if (drive->ticks < block->dither_ticks) {
             compare += block->dither_counts;
         } else if (compare > block->dither_counts) {

@@ -27,7 +27,7 @@ void dz_load_init(struct dz_load *load, const struct dz_calibration *linked)
     }
     else
     {
-        /* a loaded block that went bad is not replaced by one that may be another valve's */
+        /* a loaded block that became invalid is not replaced by one that may belong to another valve */
     }
 }
 

@@ -60,7 +60,7 @@ void dz_load_receive(struct dz_load_receiver *receiver, uint16_t octet, uint16_t
     }
     if (receiver->whole != 0u)
     {
-        /* Nobody sends before the reply: not meant for us. */
+        /* Nobody sends before the reply, so this is not meant for us. */
     }
     else if (receiver->count < 2u)
     {

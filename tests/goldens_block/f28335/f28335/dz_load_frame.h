@@ -37,7 +37,7 @@
  *    2        code_max   largest code of the converter that they must be for
  *    2        compare_max the same of counts at 100 % duty
  *    2        sample_Hz  the same of samples a second
- *    2        tick_Hz    the same of PWM periods a second
+ *    2        tick_Hz    the same of PWM periods per second
  *    2        beta_step  the same of codes between two nodes of beta
  *    4        crc        CRC-32 of the block in use
  *    4        origin     start of its compensator's SHA-256

@@ -3,7 +3,7 @@
 
 #include "dz_board.h"
 
-/* No hardware yet: the codes come from a debugger, and the compare value goes to where a debugger sees it. Put your
+/* No hardware yet: the codes come from a debugger, and the compare value goes where a debugger can see it. Put your
  * converter and your timer here. */
 volatile uint16_t dz_board_u_adc = DZ_NO_CODE;
 volatile uint16_t dz_board_p_a_adc = DZ_NO_CODE;

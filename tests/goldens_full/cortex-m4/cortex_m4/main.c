@@ -4,7 +4,7 @@
 #include "dz_board.h"
 #include "dz_tick.h"
 
-/* Every exception but SysTick ends here, from startup.c: the valve is let go, and your watchdog resets the chip. */
+/* Every exception but SysTick ends here, from startup.c: the valve is de-energised, and your watchdog resets the chip. */
 void dz_fault(void);
 
 void dz_fault(void)
@@ -25,7 +25,7 @@ int main(void)
         if (dz_state.ticks != ticks_seen)
         {
             ticks_seen = dz_state.ticks;
-            /* Serve your watchdog here: then it watches the interrupt, not this loop. */
+            /* Service your watchdog here: it then monitors the interrupt, not this loop. */
         }
     }
 }

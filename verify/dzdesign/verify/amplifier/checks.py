@@ -17,7 +17,7 @@ SAFE = Requirement(
     how=HOW,
 )  # fmt: skip
 DEAD_ZONES = Requirement(
-    id="amplifier-dead-zones", title="the dead zones stated are those of the file's law", how=HOW
+    id="amplifier-dead-zones", title="the stated dead zones are those of the file's law", how=HOW
 )
 #: Pressure drops between the tests of each side, beside the tests themselves.
 PLACES = 1000
@@ -51,10 +51,10 @@ def checks(
         return (READ_BACK.check(holds=False, text=str(error)),)
     signs = compensator.signals.signs
     if missing := [SIDE_NAMES[sign] for sign in signs if sign not in laws]:
-        return (READ_BACK.check(holds=False, text=f"nothing in it is of {' and '.join(missing)} commands"),)
+        return (READ_BACK.check(holds=False, text=f"it contains nothing for {' and '.join(missing)} commands"),)
     others = [SIDE_NAMES[sign] for sign in laws.keys() - set(signs) if _adds(laws[sign])]
     if others and device not in BOTH_SIGNS:
-        text = f"it compensates {others[0]} commands, which the design has not: nothing is certified of them"
+        text = f"it compensates {others[0]} commands, which the design does not drive: nothing is certified for them"
         return (READ_BACK.check(holds=False, text=text),)
     read = f"{len(content.splitlines())} lines, {len(laws)} direction{'s' * (len(laws) > 1)} of command"
     return (
@@ -128,11 +128,11 @@ def _dead_zones(
             knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
             recorded = {branch: knee for branch, knee in knees.items() if knee is not None}
             if abs(dp_MPa - (test.dp_MPa or 0.0)) > ROUNDED or set(shares) != set(recorded):
-                return DEAD_ZONES.check(holds=False, text=f"what is stated at {dp_MPa:g} MPa is of no test")
+                return DEAD_ZONES.check(holds=False, text=f"no test has the values stated at {dp_MPa:g} MPa")
             for branch, knee in recorded.items():
                 found = _dead_zone(laws[sign], Fraction(repr(knee)) / compensator.u_max_V)
                 compared, largest = compared + 1, max(largest, abs(min(found, 2.0) - min(shares[branch], 2.0)))
-    text = f"{compared} compared, at most {largest:.4%} of command apart"
+    text = f"{compared} values compared, at most {largest:.4%} of command apart"
     return DEAD_ZONES.check(holds=largest <= float(ALLOWED), text=text)
 
 

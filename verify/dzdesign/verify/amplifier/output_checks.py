@@ -25,7 +25,7 @@ TABLE, HEADER = "dead_zones.csv", "side,dp_MPa,branch,dead_zone_fixed,dead_zone_
 #: A line of it; no command opens the valve where a share is infinite.
 LINE = re.compile(r"([a-z]+),(\d{1,9}\.\d{6}),([a-z]+),(\d{1,9}\.\d{6}|inf),(\d{1,9}\.\d{6}|inf)", re.ASCII)
 LAW_DEAD_ZONES = Requirement(
-    id="amplifier-law-dead-zones", title="the dead zones stated beside them are those of the design's law"
+    id="amplifier-law-dead-zones", title="the dead zones stated beside them are those of the design"
 )
 
 
@@ -120,4 +120,4 @@ def _law_dead_zones(rows: Sequence[Row], compensator: Compensator) -> Check:
         if not row.states(wanted):
             text = f"{TABLE}, line {number}: it states {row}, expected {wanted}"
             return LAW_DEAD_ZONES.check(holds=False, text=text)
-    return LAW_DEAD_ZONES.check(holds=True, text=f"{len(rows)} lines, each of a branch of a test")
+    return LAW_DEAD_ZONES.check(holds=True, text=f"{len(rows)} lines, one for each branch of each test")

@@ -97,7 +97,7 @@ def _west(text: str) -> Mapping[int, FileLaw]:
     sides = {sign: (found.pop(f"MIN{end}"), found.pop(f"MAX{end}")) for sign, end in there.items()}
     laws = _jump(found.pop("TRIGGER"), sides, HUNDREDTHS)
     if found:
-        raise ValueError(f"'{next(iter(found))}' is no command for this")
+        raise ValueError(f"'{next(iter(found))}' is not a command of this device")
     return laws
 
 
@@ -123,7 +123,7 @@ def _rmc(text: str) -> Mapping[int, FileLaw]:
     name, _, value = line.partition(" = ")
     number, unit = value.split(" ")
     if name not in ("Dead Band Eliminator", "Output Deadband"):
-        raise ValueError(f"'{name}' is no parameter for this")
+        raise ValueError(f"'{name}' is not a parameter of this device")
     offset = _number(number) * {"V": 1000, "mV": 1}[unit] / FULL_MV
     law = FileLaw(rest=ZERO, points=((ZERO, offset), (ONE - offset, ONE), (ONE, ONE)))
     return {1: law, -1: law}
@@ -148,27 +148,27 @@ def _csv(text: str) -> Mapping[int, FileLaw]:
 
 
 def _count(text: str) -> int:
-    """Return a whole number as it is written in digits; another form, which a device may read otherwise, is none."""
+    """Return a whole number as written in digits; another form, which a device may read otherwise, is none."""
     if not COUNT.fullmatch(text):
-        raise ValueError(f"{text[:20]!r} is no whole number")
+        raise ValueError(f"{text[:20]!r} is not a whole number")
     return int(text)
 
 
 def _number(text: str) -> Fraction:
     """Return a decimal number; another form is a `ValueError`."""
     if not DECIMAL.fullmatch(text):
-        raise ValueError(f"{text[:20]!r} is no decimal number")
+        raise ValueError(f"{text[:20]!r} is not a decimal number")
     return Fraction(text)
 
 
 def _table(points: Sequence[tuple[Fraction, Fraction]]) -> Mapping[int, FileLaw]:
-    """Return the law of points over both directions: a side whose drive is next to none has no solenoid."""
+    """Return the law of points over both directions: a side whose drive is almost none has no solenoid."""
     if any(left[0] >= right[0] or left[1] >= right[1] for left, right in pairwise(points)):
-        raise ValueError("the points do not rise")
+        raise ValueError("the points do not increase")
     if (ZERO, ZERO) not in points or points[-1][0] != 1:
         raise ValueError("the points do not pass zero and reach full command")
     if any(abs(drive) > 1 for _, drive in points):
-        raise ValueError("a point is beyond full drive")
+        raise ValueError("a point exceeds full drive")
     laws = {1: FileLaw(rest=ZERO, points=tuple(point for point in points if point[0] >= 0))}
     negative = tuple((-x, -y) for x, y in reversed(points) if x <= 0)
     if len(negative) > 2:

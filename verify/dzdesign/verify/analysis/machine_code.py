@@ -48,7 +48,7 @@ def check_on_machine(folder: Path, machine: Machine, host: InputCheck) -> Machin
 
 
 def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Check]:
-    """Return one requirement a machine: its machine code is right at every input, or at a sample of them.
+    """Return one requirement per machine: its machine code is right at every input, or at a sample of them.
 
     Of a drive by current also one of its controller.
     """

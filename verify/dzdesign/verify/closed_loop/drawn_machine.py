@@ -103,7 +103,7 @@ def _errors(scene: Scene, machine: Machine, at: dict[str, float], index: int) ->
     a_codes, b_codes = channels.codes_per_MPa
     a_MPa = at["pressure sensor A"] * machine.pressure_error_a_MPa
     b_MPa = at["pressure sensor B"] * machine.pressure_error_b_MPa
-    # It is drawn for a drop of A less B; where that is B less A, all of it turns round.
+    # It is drawn for a drop of A minus B; where that is B minus A, all of it turns round.
     a_MPa += at["bench pressure drop"] * machine.bench_pressure_error_MPa
     way = -1.0 if channels.swapped else 1.0
     offset_a, offset_b = (at[f"offset of converter {name}"] * machine.pressure_offset_codes for name in "AB")

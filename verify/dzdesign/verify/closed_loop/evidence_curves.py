@@ -34,7 +34,7 @@ def curve_files(loops: Sequence[LoopComparison], maps: Sequence[InputMap]) -> di
 
 
 def _ramps(loops: Sequence[LoopComparison]) -> str:
-    """Return the ramps of one side: a row a record, two columns of flow a pressure drop."""
+    """Return the ramps of one side: one row per record, two columns of flow a pressure drop."""
     first = loops[0].direct
     kept = slice(None, None, KEPT_RECORD)
     columns: dict[str, Iterable[str]] = {
@@ -57,7 +57,7 @@ def _csv(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def read_curves(text: str) -> Mapping[str, np.ndarray]:
-    """Read one of these files back, column to numbers; what is no table of numbers is a `ValueError`."""
+    """Read one of these files back, column to numbers; what is not a table of numbers is a `ValueError`."""
     lines = text.splitlines()
     header = lines[0].split(",") if lines else []
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])

@@ -53,7 +53,7 @@ def plant_opens(ramps: Sequence[PressureResult], units: RecordedUnits) -> Check:
     least = min(ramps, key=lambda ramp: ramp.q_max_L_min)
     return PLANT_OPENS.check(
         holds=least.q_max_L_min > NO_FLOW_L_MIN,
-        text=f"{units.text(least.q_max_L_min, '.4g L/min')} at full command and {_at(least, units)}, where it is least",
+        text=f"least flow at full command {units.text(least.q_max_L_min, '.4g L/min')} (at {_at(least, units)})",
     )
 
 
@@ -78,10 +78,10 @@ def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Ch
     holds = opens and closes
     units = valve.recorded_units
     plant_at, valve_at = (units.of_side(worst.side).text(opens, ".2f V") for opens in (plant_V, valve_V))
-    text = f"at {plant_at}, the ramp tests at {valve_at} (at {_at(worst, units)}, the worst); "
+    text = f"at {plant_at}, the ramp tests at {valve_at} (worst case, at {_at(worst, units)}); "
     if not closes:
         above = units.of_side(early.side).text(late_V(early), ".2f dV")
-        text += f"it closes {above} above them (at {_at(early, units)}); "
+        text += f"it closes {above} above the ramp tests (at {_at(early, units)}); "
     text += _miss(max(ramps, key=lambda ramp: ramp.flow_miss), units)
     if not holds:
         text += "; the closed loop is of another valve: correct preload, spring or force in --plant"
@@ -97,8 +97,8 @@ def stand_in_is_the_recording(ramps: Sequence[PressureResult], valve: ValveModel
     except RuleError as error:
         return PLANT_IS_THE_VALVE.check(
             holds=False,
-            text=f"{error}. So this plant says nothing of the valve, as where outliers are many: record it again, or "
-            "give a plant (--plant)",
+            text=f"{error}. So this plant does not represent the valve, perhaps because of many outliers: record it "
+            "again, or give a plant (--plant)",
         )
     return PLANT_IS_THE_VALVE.check(
         holds=worst.flow_miss <= SAME_FLOW,
@@ -113,8 +113,8 @@ def _at(where: PressureResult | ScenarioResult, units: RecordedUnits) -> str:
 def _miss(worst: PressureResult, units: RecordedUnits) -> str:
     """Say how near the plant's flow is to the recorded one."""
     return (
-        f"its mean flow per {BIN:.0%} of command departs from the recorded one by {worst.flow_miss:.1%} of the largest "
-        f"flow (at {_at(worst, units)}, the worst)"
+        f"averaged over {BIN:.0%} of command, its flow deviates from the recorded one by at most "
+        f"{worst.flow_miss:.1%} of the largest flow (at {_at(worst, units)})"
     )
 
 
@@ -132,15 +132,15 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
     if chosen:
         return ZERO_FLOW.check(
             holds=None,
-            text=f"the {chosen[0]} threshold was chosen to be guarded, above the one at which the valve closes: "
+            text=f"the guard is the {chosen[0]} threshold, which lies above the closing threshold: "
             f"{_flow(worst, worst.q_zero_L_min, units)} after closing (at {_at(worst, units)}) is the price of that "
-            "choice. Design with --guard closing to have none",
+            "choice. Design with --guard closing to avoid it",
         )
     if not plant_given and "opening" in guards.values():
         return ZERO_FLOW.check(
             holds=None,
-            text="no falling branch was recorded, so where the valve closes is not known; valves close below where "
-            "they open, and flow at zero command after closing is to be expected. Record the falling branch",
+            text="no falling branch was recorded, so the closing threshold is unknown; it lies below the opening "
+            "threshold, and flow at zero command after closing is to be expected. Record the falling branch",
         )
     return ZERO_FLOW.check(
         holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN,
@@ -169,7 +169,7 @@ def _allowed(worst: PressureResult | ScenarioResult, units: RecordedUnits) -> st
     if not allowed:
         return ""
     at_most = units.text(allowed, ".3g L/min")
-    return f"; allowed there are {at_most}, a leak included: the declared zero flow, or leak and noise level"
+    return f"; {at_most} are allowed, leak included: the declared zero flow, or leak plus noise level"
 
 
 def _leak(ramps: Sequence[PressureResult], units: RecordedUnits) -> str:
@@ -178,7 +178,7 @@ def _leak(ramps: Sequence[PressureResult], units: RecordedUnits) -> str:
     if worst.leak_L_min <= NO_FLOW_L_MIN:
         return ""
     return (
-        f"; of it {units.text(worst.leak_L_min, '.2g L/min')} (at {_at(worst, units)}) leak through the shut valve, "
+        f"; {units.text(worst.leak_L_min, '.2g L/min')} of it (at {_at(worst, units)}) leak through the closed valve, "
         "which no compensator can stop"
     )
 
@@ -191,7 +191,7 @@ def _flow(where: PressureResult | ScenarioResult, flow_L_min: float, units: Reco
     opened = flow_L_min - where.leak_L_min
     more = ""
     if opened > NO_FLOW_L_MIN:
-        more = f": {units.text(opened, '.2g L/min')} if the first flow seen goes on below"
+        more = f": {units.text(opened, '.2g L/min')} by extrapolation of the first flow seen"
     return f"below {units.text(unseen, '.2f L/min')} (less than the recordings show{more})"
 
 
@@ -210,11 +210,11 @@ def shut_after_scenarios(
         others = [each for each in scenarios if each.not_required == reason]
         most = max(others, key=_zero_flow)
         text += f"; not required ({reason}): {_flow(most, most.q_zero_L_min, units)} ({most.name}, at "
-        text += f"{_at(most, units)}, the most of {len({each.name for each in others})})"
+        text += f"{_at(most, units)}, the highest of {len({each.name for each in others})})"
         if reason == NO_CORE_CAN_KNOW and any(each.name.startswith(OPEN_CIRCUITS) for each in others):
-            text += "; signals with a live zero and room above the span would show the failed sensor"
+            text += "; signals with a live zero and headroom above the span would reveal the failed sensor"
     if not plant_given and not any(each.is_load_step for each in scenarios):
-        text += "; load steps and frozen sensors were not tried: that needs ramps at two pressure drops, or --plant"
+        text += "; load steps and frozen sensors were not tried: they need ramps at two pressure drops, or --plant"
     if zero_flow.holds is None:
         return ZERO_FLOW_AFTER_SCENARIOS.check(holds=None, text=f"{text}; see the ramps")
     return ZERO_FLOW_AFTER_SCENARIOS.check(
@@ -226,18 +226,18 @@ def of_population(population: Population, zero_flow: Check, units: RecordedUnits
     """Tell whether any machine drawn from the budget passes flow at zero command."""
     text = (
         f"{population.flowing} of {population.machines} machines at {population.pressures} pressure drops each (seed "
-        f"{population.seed}), so with {population.confidence:.0%} confidence fewer than {population.upper_limit:.2g} "
-        "of all machines"
+        f"{population.seed}) pass flow; with {population.confidence:.0%} confidence, less than a fraction of "
+        f"{population.upper_limit:.2g} of all machines does"
     )
     if population.flowing:
         most = sorted(population.worst.items(), key=lambda item: -abs(item[1]))[:3]
         at = ", ".join(f"{name} {share:+.2f}" for name, share in most)
         text += (
-            f"; most {units.text(population.largest_L_min, '.2g L/min')} at "
-            f"{units.text(population.largest_dp_MPa, '.2f MPa')}, by one with {at} of its half-width"
+            f"; at most {units.text(population.largest_L_min, '.2g L/min')} at "
+            f"{units.text(population.largest_dp_MPa, '.2f MPa')}, by a machine with {at} of the half-widths"
         )
     if population.never_open:
-        text += f"; {population.never_open} did not open, so that their closing says nothing"
+        text += f"; {population.never_open} did not open, so their closing could not be checked"
     if zero_flow.holds is None:
         return POPULATION.check(holds=None, text=f"{text}; see the ramps")
     return POPULATION.check(holds=population.flowing == 0 == population.never_open, text=text)

@@ -26,7 +26,7 @@ MPA, L_MIN = 1e6, 1e-3 / 60
 LARGEST_PARAMETER = 1e12
 #: Characters of a key to which the nearest known one is looked for.
 LONGEST_KEY = 80
-#: Faster than this is no valve's spool, and would take the integrator a thousand steps a phase.
+#: Faster than this is not a valve's spool, and would take the integrator a thousand steps a phase.
 FASTEST_RAD_S = 1e6
 #: Of a hydraulic system, for the flow force.
 LARGEST_DP_MPA = 40.0
@@ -39,27 +39,27 @@ def _parameter(unit: str, description: str) -> Meta:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plant:
-    """Parameters of the plant; the names are those of Eqs. (19)-(24), the units stand in them."""
+    """Parameters of the plant, named as in Eqs. (19)-(24), with the unit at the end of each name."""
 
-    u_max_V: Annotated[float, _parameter("V", "Command at which the PWM is fully on (Eq. 19: u_max or 0).")] = 10.0
+    u_max_V: Annotated[float, _parameter("V", "Command at full duty of the PWM (Eq. 19: u_max or 0).")] = 10.0
     K_a: Annotated[float, _parameter("1", "Amplifier gain, K_e of Eq. (19).")] = 4.0
-    K_fi_V_A: Annotated[float, _parameter("V/A", "Current feedback.")] = 9.0
+    K_fi_V_A: Annotated[float, _parameter("V/A", "Gain of the current feedback.")] = 9.0
     R_c_ohm: Annotated[float, _parameter("ohm", "Resistance of the coil.")] = 3.5
     r_p_ohm: Annotated[float, _parameter("ohm", "Internal resistance of the amplifier.")] = 0.5
     L_c_H: Annotated[float, _parameter("H", "Inductance of the coil.")] = 0.04
     K_i_N_A: Annotated[float, _parameter("N/A", "Force of the solenoid per current.")] = 60.0
     m_e_kg: Annotated[float, _parameter("kg", "Moving mass.")] = 0.06
-    B_e_N_s_m: Annotated[float, _parameter("N s/m", "Damping.")] = 45.0
-    K_et_N_m: Annotated[float, _parameter("N/m", "Spring.")] = 15000.0
+    B_e_N_s_m: Annotated[float, _parameter("N s/m", "Damping coefficient.")] = 45.0
+    K_et_N_m: Annotated[float, _parameter("N/m", "Stiffness of the spring.")] = 15000.0
     preload_N: Annotated[float, _parameter("N", "Load force f_eL at rest.")] = 27.6
-    pressure_force_N_MPa: Annotated[float, _parameter("N/MPa", "By how much it falls with dP.")] = 0.32
-    flow_force_N_mm_MPa: Annotated[float, _parameter("N/(mm MPa)", "By how much it grows with dP and opening.")] = 1.5
+    pressure_force_N_MPa: Annotated[float, _parameter("N/MPa", "Decrease of the load force with dP.")] = 0.32
+    flow_force_N_mm_MPa: Annotated[float, _parameter("N/(mm MPa)", "Flow force, by dP and opening.")] = 1.5
     overlap_mm: Annotated[float, _parameter("mm", "Travel before the edge opens.")] = 0.3
     stroke_mm: Annotated[float, _parameter("mm", "Travel to the stop.")] = 2.2
     hysteresis_V: Annotated[float, _parameter("V", "Play between current and force, as command.")] = 0.15
     C_d_W_mm: Annotated[float, _parameter("mm", "Discharge coefficient times area gradient, Eq. (24).")] = 3.2
-    rho_kg_m3: Annotated[float, _parameter("kg/m3", "Density, Eq. (24).")] = 860.0
-    droop_MPa_L_min2: Annotated[float, _parameter("MPa/(L/min)^2", "Pressure drop lost per flow squared.")] = 4e-4
+    rho_kg_m3: Annotated[float, _parameter("kg/m3", "Density of the oil, Eq. (24).")] = 860.0
+    droop_MPa_L_min2: Annotated[float, _parameter("MPa/(L/min)^2", "Loss of pressure drop per flow squared.")] = 4e-4
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -84,11 +84,11 @@ class Plant:
 
     @property
     def parameters(self) -> "Plant":
-        """The plant that moves the spool: itself."""
+        """The plant that moves the spool, which is this one."""
         return self
 
     def with_oil(self, viscosity: float, density: float) -> "Plant":
-        """Return it with oil of so many times the viscosity, with which its damping goes, and density."""
+        """Return the plant with other oil, by factors of viscosity and density; the damping follows the viscosity."""
         return replace(self, B_e_N_s_m=self.B_e_N_s_m * viscosity, rho_kg_m3=self.rho_kg_m3 * density)
 
     @property
@@ -99,19 +99,19 @@ class Plant:
 
     @property
     def coil_rad_s(self) -> float:
-        """Rate at which the current settles, from Eqs. (19)-(21)."""
+        """Rate at which the current settles, by Eqs. (19)-(21)."""
         return (self.K_a * self.K_fi_V_A + self.R_c_ohm + self.r_p_ohm) / self.L_c_H
 
     @property
     def force_per_volt(self) -> float:
-        """Force in N per volt of command at rest, from Eqs. (19)-(22)."""
+        """Force per volt of command at rest, N/V, by Eqs. (19)-(22)."""
         return self.K_i_N_A * self.K_a / (self.R_c_ohm + self.r_p_ohm + self.K_a * self.K_fi_V_A)
 
 
 def read_plant(path: Path, say: Callable[[str], None] = lambda _: None) -> Plant:
-    """Read a plant from TOML; a key that is none of `Plant`'s is refused, with the nearest that is.
+    """Read a plant from a TOML file; an unknown key is refused, with the nearest known one.
 
-    `say` is told which parameters the file leaves as the default plant has them.
+    `say` receives a message about the parameters that keep the default plant's values.
     """
     values = read_parameters(path, "plant file")
     try:

@@ -2,7 +2,7 @@
 
 Each component of the budget is drawn by itself, evenly between its ends: valve, coil, supply or current, sensors,
 converter, oil, ageing. The valve's threshold lies between the certified bound and as far on the other side of the
-plant's own, at every pressure drop; that of a stand-in, which is known at the tests, runs straight between them. Each
+plant's own, at every pressure drop; that of a stand-in, which is known at the tests, runs linearly between them. Each
 machine opens and closes at every tested pressure drop, and at one drawn between each two of them; then zero command is
 held, with the converter's noise. No formula stands in for the loop.
 """
@@ -135,7 +135,7 @@ def _no_flow(scene: Scene, dp_MPa: float) -> float:
 
 
 def _certified(compensator: Compensator, sign: int) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the certified bound, V, at pressure drops, from the ramp tests anew."""
+    """Return the certified bound, V, at pressure drops, from the ramp tests again."""
     bounds = guarded_bounds(compensator, sign)
     if bounds.premise != "monotone" and len(bounds.dp_MPa) > 1:
         sagging, ends_MPa = SaggingBound(bounds), (bounds.dp_MPa[0] + WITHIN_MPA, bounds.dp_MPa[-1] - WITHIN_MPA)
@@ -242,7 +242,7 @@ class _Run:
         tested = np.array(sorted(tested_MPa))
         band = threshold_band(scene, tested_MPa)
         shares = draw(machines, seed, worst_ends(scene), drawn)
-        # Where the threshold of the plant was found: it need not be straight between two tests.
+        # Where the threshold of the plant was found: it need not be linear between two tests.
         steps = np.random.default_rng([seed, 1]).integers(1, NODES, (machines, tested.size - 1))
         between = band.dp_MPa[steps + NODES * np.arange(tested.size - 1)]
         dp = np.concatenate([np.tile(tested, (machines, 1)), between], axis=1)

@@ -11,7 +11,7 @@ from dzdesign.design.signals import Signals
 class ReadingErrors:
     """What the converter, and the sensors before it, read wrong; of command, sensor A and sensor B, (3,) each.
 
-    The noise is white: whole codes from minus its peak to plus it, drawn anew at every sample of the core.
+    The noise is white: whole codes from minus its peak to plus it, drawn again at every sample of the core.
     """
 
     offset_codes: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -24,7 +24,7 @@ class ReadingErrors:
 
     @property
     def table(self) -> np.ndarray:
-        """The errors as loop.c has them, a row a channel."""
+        """The errors as loop.c has them, one row per channel."""
         return np.array([self.offset_codes, self.gain_codes, self.noise_codes], dtype=float).T.copy()
 
 
@@ -42,7 +42,7 @@ class Channels:
         self.fulls = np.array([full, *(sensor.full_code for sensor in sensors)], dtype=np.int32)
         self.spans = np.array([1.0, *(float(sensor.span_MPa) for sensor in sensors)])
         self.code_max = signals.code_max
-        #: Whether sensor B stands ahead of the edge.
+        #: Whether sensor B stands upstream of the edge.
         self.swapped = sign < 0 and signals.swapped
 
     @property
@@ -62,7 +62,7 @@ class Channels:
         return middle
 
     def pressure_codes(self, dp_MPa: float | np.ndarray, back_MPa: float | np.ndarray) -> np.ndarray:
-        """Return the codes of sensors A and B at a pressure drop and a pressure behind the edge, (..., 2)."""
+        """Return the codes of sensors A and B at a pressure drop and a pressure downstream of the edge, (..., 2)."""
         back = np.asarray(back_MPa, dtype=float)
         ahead = back + dp_MPa
         values = np.stack([back, ahead] if self.swapped else [ahead, back], axis=-1)

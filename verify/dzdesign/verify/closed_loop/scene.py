@@ -24,7 +24,7 @@ SETTLE_S, RAMP_S = 0.4, 2.0
 Ends = tuple[float, float]
 NO_FIGURES: Mapping[str, float] = MappingProxyType({})
 #: Why a scenario is not required, in words of the report.
-NO_CORE_CAN_KNOW = "no core can know"
+NO_CORE_CAN_KNOW = "the firmware cannot detect it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class Scene:
     reference_MPa: float
     #: Of the tests; None where the plant holds at `dp_MPa` only.
     tested_MPa: Ends | None
-    #: Pressures behind the edge, rising; what has nothing to do with them runs at the highest.
+    #: Pressures downstream of the edge, rising; what has nothing to do with them runs at the highest.
     backs_MPa: tuple[float, ...]
 
     @property
@@ -57,7 +57,7 @@ class Scene:
 
     @property
     def back_MPa(self) -> float:
-        """The highest pressure behind the edge that is within the sensors' spans at this pressure drop."""
+        """The highest pressure downstream of the edge that is within the sensors' spans at this pressure drop."""
         return self.back_within_span(self.backs_MPa[-1])
 
     def back_within_span(self, back_MPa: float) -> float:
@@ -121,7 +121,7 @@ class Scene:
         """Return the result, judged at its end, or by its largest flow where it is judged throughout.
 
         Zero command counts once the valve has had the time to come to rest. It ended at this pressure drop and at this
-        pressure behind the edge unless told otherwise. `not_required` is the reason, if no flow is not required.
+        pressure downstream of the edge unless told otherwise. `not_required` is the reason, if no flow is not required.
         """
         ended_MPa = self.dp_MPa if end_MPa is None else end_MPa
         shut = judged or np.flatnonzero(held_for(run.command <= 0, round(self.settle_s / STEP_S)))

@@ -11,7 +11,7 @@ SENSORS = ("A", "B")
 
 
 def sensor_failures(scene: Scene) -> Iterator[ScenarioResult]:
-    """Run every failure in the middle of a ramp of the command, at each pressure behind the edge."""
+    """Run every failure in the middle of a ramp of the command, at each pressure downstream of the edge."""
     code_max = scene.compensator.signals.code_max
     ends = sorted({scene.back_within_span(back) for back in scene.backs_MPa})
     for back_MPa in ends:

@@ -32,15 +32,15 @@ LARGEST_SCATTER = 0.1
 class Bench:
     """The sensors and the recorder of a bench."""
 
-    rate_Hz: Annotated[float, quantity("Hz", "Rows per second.")] = 25.0
+    rate_Hz: Annotated[float, quantity("Hz", "Sampling rate.")] = 25.0
     meter_lag_s: Annotated[float, quantity("s", "First-order lag of the flow meter.", ge=0, le=1e6)] = 0.1
     meter_floor_L_min: Annotated[float, quantity("L/min", "Flow below which it reads zero.", ge=0, le=1e6)] = 0.6
-    meter_noise_L_min: Annotated[float, quantity("L/min", "Standard deviation of its noise.", ge=0, le=1e6)] = 0.08
-    command_noise_V: Annotated[float, quantity("V", "Standard deviation of the command's noise.", ge=0, le=1e6)] = 0.002
-    pressure_noise_MPa: Annotated[
-        float, quantity("MPa", "Standard deviation of the pressures' noise.", ge=0, le=1e6)
-    ] = 0.01
-    seed: Annotated[int, Meta(description="Of the noise; the same seed gives the same bytes.")] = 1
+    meter_noise_L_min: Annotated[float, quantity("L/min", "Standard deviation of the flow noise.", ge=0, le=1e6)] = 0.08
+    command_noise_V: Annotated[float, quantity("V", "Standard deviation of the command noise.", ge=0, le=1e6)] = 0.002
+    pressure_noise_MPa: Annotated[float, quantity("MPa", "Standard deviation of the pressure noise.", ge=0, le=1e6)] = (
+        0.01
+    )
+    seed: Annotated[int, Meta(description="Random seed of the noise; the same seed gives the same bytes.")] = 1
 
     def __post_init__(self) -> None:
         if not 1 <= self.rate_Hz <= 1 / RECORD_S:
@@ -51,7 +51,7 @@ class Bench:
 class Series:
     """Ramps at every pressure drop, each by itself, in random order, and by how much the valve scatters over them."""
 
-    repeats: Annotated[int, Meta(description="Ramps at each pressure drop.")] = 1
+    repeats: Annotated[int, Meta(description="Number of ramps at each pressure drop.")] = 1
     scatter_V: Annotated[
         float, quantity("V", "Standard deviation of the threshold from ramp to ramp.", ge=0, le=1e6)
     ] = 0.0
@@ -72,10 +72,10 @@ class SimulationManifest(Artefact):
     schema: Annotated[Literal["dzdesign.simulation/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.simulation/1"
     )
-    simulated: Annotated[Literal[True], Meta(description="No measurement.")] = True
-    plant: Annotated[Plant, Meta(description="The valve.")]
-    bench: Annotated[Bench, Meta(description="What recorded it.")]
-    series: Annotated[Series, Meta(description="How often, and how well it repeats.")] = ONE_OF_EACH
+    simulated: Annotated[Literal[True], Meta(description="Always true: the recordings are no measurement.")] = True
+    plant: Annotated[Plant, Meta(description="Simulated valve.")]
+    bench: Annotated[Bench, Meta(description="Simulated sensors and recorder.")]
+    series: Annotated[Series, Meta(description="Number of repeats and repeatability.")] = ONE_OF_EACH
 
 
 def simulate_ramp(

@@ -61,11 +61,11 @@ def valve_at_corners_check(found: Sequence[ValveAtCorners], units: RecordedUnits
     released = max(found, key=lambda each: each.q_released_L_min)
     moved = widest.opening_largest - widest.opening_least
     text = (
-        f"{sum(each.runs for each in found)} ramps, with the declared coil and at the ends of its ranges and the "
-        f"supply's: the dead zone on opening moves by {moved:.2%} of full command (at "
-        f"{units.text(widest.dp_MPa, '.2f MPa')}; allowed: {MOST_MOVED:.1%}), the flow at zero command after "
-        f"closing is at most {_flow(closed, closed.q_zero_L_min, units)}, and as the drive is released, the set point "
-        f"stepping to the offset, {_flow(released, released.q_released_L_min, units)}"
+        f"{sum(each.runs for each in found)} ramps, with the declared coil and at the limits of coil and supply: the "
+        f"dead zone on opening moves by {moved:.2%} of full command (at {units.text(widest.dp_MPa, '.2f MPa')}; "
+        f"allowed: {MOST_MOVED:.1%}); the flow at zero command after closing is at most "
+        f"{_flow(closed, closed.q_zero_L_min, units)}; on release, as the set point steps to the offset, it is at most "
+        f"{_flow(released, released.q_released_L_min, units)}"
     )
     return CURRENT_VALVE.check(holds=moved <= MOST_MOVED and worst.q_beyond_L_min <= NO_FLOW_L_MIN, text=text)
 
@@ -75,4 +75,4 @@ def _flow(found: ValveAtCorners, flow_L_min: float, units: RecordedUnits) -> str
     shown = f"{flow_in_words(flow_L_min, found.unseen_below_L_min, units)} {units.label('L/min')}"
     if found.unseen_below_L_min is None or not found.leak_L_min + NO_FLOW_L_MIN < flow_L_min < found.unseen_below_L_min:
         return shown
-    return f"{shown} ({units.text(flow_L_min, '.2g L/min')} if the first flow seen goes on below)"
+    return f"{shown} ({units.text(flow_L_min, '.2g L/min')} by extrapolation of the first flow seen)"

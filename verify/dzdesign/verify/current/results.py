@@ -8,8 +8,8 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import quantity
 
 Number = Annotated[int, Meta(ge=0, le=2**60)]
-Share = Annotated[float, quantity("1", "Of the rated current.", ge=0, le=1)]
-Codes = Annotated[float, quantity("codes", "Of the converter.", ge=-65536, le=65536)]
+Share = Annotated[float, quantity("1", "Share of the rated current.", ge=0, le=1)]
+Codes = Annotated[float, quantity("codes", "Codes of the converter.", ge=-65536, le=65536)]
 #: Names of the bits of dz_current.h.
 FaultName = Literal["NO_OFFSET", "SENSOR", "OPEN", "SHORT", "OVER"]
 
@@ -21,60 +21,67 @@ def about(description: str) -> Meta:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerStates:
-    """The C of the controller against its exact model."""
+    """Comparison of the controller's C with its exact model."""
 
-    states: Annotated[Number, about("States and calibrations that were compared.")]
-    seed: Annotated[Number, about("Of the first block of states; each block has the next one.")]
-    wrong: Annotated[Number, about("Those of which any number differs.")]
-    first_wrong: Annotated[str | None, about("The first of them, in words.")]
+    states: Annotated[Number, about("Number of states and calibrations that were compared.")]
+    seed: Annotated[Number, about("Random seed of the first block of states; each further block uses the next seed.")]
+    wrong: Annotated[Number, about("Number of states in which any value differs.")]
+    first_wrong: Annotated[str | None, about("First difference, in words.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentCorner:
-    """One coil at one supply: margins of its equations, and what the C does with it."""
+    """One coil at one supply: margins of the loop by its equations, and the behaviour of the C."""
 
-    resistance_ohm: Annotated[float, quantity("ohm", "Of the whole circuit.", ge=0, le=1e6)]
-    inductance_H: Annotated[float, quantity("H", "Inductance.", ge=0, le=1e6)]
-    supply_V: Annotated[float, quantity("V", "Supply.", ge=0, le=1e6)]
-    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin of all currents.", ge=0, le=180)]
-    gain_margin: Annotated[float, quantity("1", "Least gain margin of all currents.", ge=0, le=1e6)]
+    resistance_ohm: Annotated[float, quantity("ohm", "Resistance of the whole circuit.", ge=0, le=1e6)]
+    inductance_H: Annotated[float, quantity("H", "Inductance of the coil.", ge=0, le=1e6)]
+    supply_V: Annotated[float, quantity("V", "Supply voltage.", ge=0, le=1e6)]
+    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin over all currents.", ge=0, le=180)]
+    gain_margin: Annotated[float, quantity("1", "Least gain margin over all currents.", ge=0, le=1e6)]
     limit_cycle_codes: Annotated[
-        float, quantity("codes", "Largest swing of the settled mean current, or of its reading.", ge=0, le=1e6)
+        float, quantity("codes", "Largest peak-to-peak swing of the settled mean current or its reading.", ge=0, le=1e6)
     ]
     steady_error_codes: Annotated[
-        float, quantity("codes", "Largest departure of the mean reading from the set point.", ge=0, le=1e6)
+        float, quantity("codes", "Largest deviation of the mean reading from the set point.", ge=0, le=1e6)
     ]
     current_error_codes: Annotated[
         float,
         quantity(
             "codes",
-            "The same of the current itself: with the rounding of codes without noise, and the ripple between samples.",
+            "Largest deviation of the mean current from the set point. It includes the rounding of codes "
+            "without noise and the ripple between samples.",
             ge=0, le=1e6,
         ),
     ]  # fmt: skip
     release_overshoot_codes: Annotated[
-        float, quantity("codes", "Largest mean current beyond the set point, as that comes from zero.", ge=0, le=1e6)
+        float,
+        quantity(
+            "codes", "Largest overshoot of the mean current beyond the set point on release from zero.", ge=0, le=1e6
+        ),
     ]
     rise_s: Annotated[
         float | None,
-        quantity("s", "10 to 90 % of the rated current; null where the supply can't carry that, or it is not reached."),
+        quantity(
+            "s",
+            "Rise time from 10 to 90 % of the rated current; null if the supply can't carry it or it is not reached.",
+        ),
     ]
-    least_rise_s: Annotated[float | None, quantity("s", "The same with the switch on all the time.")]
-    overshoot: Annotated[float | None, quantity("1", "Of that step, of its height.")]
-    faults: Annotated[Number, about("Bits of the faults that the C saw, of DZ_CURRENT_...: must be 0.")]
+    least_rise_s: Annotated[float | None, quantity("s", "Rise time with the switch always on.")]
+    overshoot: Annotated[float | None, quantity("1", "Overshoot of that step, relative to its height.")]
+    faults: Annotated[Number, about("Fault bits DZ_CURRENT_... that the C set; must be 0.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultRun:
-    """One fault of the circuit in motion, taken away again."""
+    """One fault injected into the running circuit and removed again."""
 
-    name: Annotated[str, about("What happens.")]
-    expected: Annotated[FaultName, about("Bit of the faults that it must set.")]
+    name: Annotated[str, about("Fault that is injected.")]
+    expected: Annotated[FaultName, about("Fault bit that must be set.")]
     seen_after_s: Annotated[
-        float | None, quantity("s", "From the fault to that bit; null: it was not set.")
+        float | None, quantity("s", "Time from the fault to its bit; null if the bit was not set.")
     ]
-    limit_s: Annotated[float, quantity("s", "How long that may take.", ge=0, le=1e6)]
-    latched: Annotated[bool, about("Whether the output stays off, and the bit set, once the fault is gone.")]
+    limit_s: Annotated[float, quantity("s", "Longest permitted time.", ge=0, le=1e6)]
+    latched: Annotated[bool, about("Whether the output stays off and the bit stays set after the fault is removed.")]
 
     @property
     def holds(self) -> bool:
@@ -88,24 +95,26 @@ OpeningShare = Annotated[float, quantity("1", "Of full command.", ge=0, le=1)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveAtCorners:
-    """The valve in closed loop at one pressure drop, its current made by every coil at every supply."""
+    """The valve in closed loop at one pressure drop, with the current of every coil at every supply."""
 
     dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=0, le=1000)]
-    runs: Annotated[Number, about("Coils at a supply: the declared one, and the ends of all ranges.")]
+    runs: Annotated[Number, about(
+        "Number of coil and supply combinations: the declared one and the ends of all ranges.")]
     opening_least: Annotated[OpeningShare, about("Least dead zone on opening that the compensator leaves.")]
-    opening_largest: Annotated[OpeningShare, about("The largest.")]
-    q_zero_L_min: Annotated[Flow, about("Largest flow at zero command after closing; a leak is in it.")]
+    opening_largest: Annotated[OpeningShare, about("Largest dead zone on opening that the compensator leaves.")]
+    q_zero_L_min: Annotated[Flow, about("Largest flow at zero command after closing, leak included.")]
     q_released_L_min: Annotated[
-        Flow, about("Largest flow before the ramp, as the set point steps to the offset when the drive is released.")
+        Flow, about("Largest flow before the ramp, when the drive is released and the set point steps to the offset.")
     ]
     unseen_below_L_min: Annotated[
         Flow | None,
-        about("Flow below which the recordings show none, so that the plant's is not known; null of a given plant."),
+        about("Flow below which the recordings show none, so that the plant's flow is unknown; null for a "
+            "given plant."),
     ]
-    leak_L_min: Annotated[Flow, about("Flow without any drive, which no compensator can stop.")]
+    leak_L_min: Annotated[Flow, about("Flow without drive, which no compensator can stop.")]
     allowed_at_zero_L_min: Annotated[
         Flow | None,
-        about("Flow allowed at zero command, a leak included, as --zero-flow declares; null: none but the leak."),
+        about("Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."),
     ]
 
     @property
@@ -116,25 +125,29 @@ class ValveAtCorners:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentLoopResult:
-    """What was found of the current loop: the C by itself, and with the coil at every corner of the declared ranges."""
+    """Result of the current loop: the C alone, and with the coil at every corner of the declared ranges."""
 
-    states: Annotated[ControllerStates, about("State by state.")]
-    seconds: Annotated[float, quantity("s", "For which each set point was held, once settled.", ge=0, le=1e6)]
-    shares: Annotated[tuple[Share, ...], about("Those set points, of the rated current.")]
-    not_carried: Annotated[Number, about("Pairs of corner and set point that the supply can't carry: not tried.")]
-    corners: Annotated[tuple[CurrentCorner, ...], about("One entry a corner.")]
+    states: Annotated[ControllerStates, about("Comparison of the controller with its exact model, state by state.")]
+    seconds: Annotated[float, quantity("s", "Time for which each set point was held after settling.", ge=0, le=1e6)]
+    shares: Annotated[tuple[Share, ...], about("Set points, as shares of the rated current.")]
+    not_carried: Annotated[Number, about(
+        "Combinations of corner and set point that the supply can't carry. They were not tried.")]
+    corners: Annotated[tuple[CurrentCorner, ...], about("Result of each corner.")]
     offset_codes: Annotated[
-        tuple[Codes, ...], about("Errors of the sensor's zero that were calibrated away at the nominal corner.")
+        tuple[Codes, ...], about("Zero errors of the sensor that were calibrated away at the nominal corner.")
     ]
     offset_error_codes: Annotated[
-        float, quantity("codes", "Largest departure of the mean reading from the set point with them.", ge=0, le=1e6)
+        float,
+        quantity("codes", "Largest deviation of the mean reading from the set point with these errors.", ge=0, le=1e6),
     ]
     dither_above_counts: Annotated[
-        float, quantity("counts", "By how much the current's peak in the dither lies above the set point's.", ge=0)
+        float, quantity("counts", "Excess of the current's peak over that of the set point under dither.", ge=0)
     ]
-    dither_below_counts: Annotated[float, quantity("counts", "The same below it.", ge=0)]
-    faults: Annotated[tuple[FaultRun, ...], about("One entry a fault.")]
+    dither_below_counts: Annotated[
+        float, quantity("counts", "Deficit of the current's peak against that of the set point under dither.", ge=0)
+    ]
+    faults: Annotated[tuple[FaultRun, ...], about("Result of each injected fault.")]
     valve: Annotated[
         tuple[ValveAtCorners, ...],
-        about("The valve behind it, one entry a tested pressure drop; none if the closed loop did not run."),
+        about("Valve in closed loop at each tested pressure drop; empty if the closed loop did not run."),
     ] = ()

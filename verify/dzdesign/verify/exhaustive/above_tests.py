@@ -1,6 +1,6 @@
 """What the zero-command drive does above the tested pressure drops, against what the certificate says of it there.
 
-Argued from valve.json anew: the nodes of the continued bound, straight between them but for the first interval, where a
+Argued from valve.json again: the nodes of the continued bound, linear between them but for the first interval, where a
 threshold that bends by at most M may sag below their chord. Nothing is taken of how the table was made.
 """
 
@@ -82,19 +82,19 @@ def above_checked(inputs: InputCheck, units: RecordedUnits, sign: str) -> Check:
     """Tell whether the drive above the tests is what the certificate says; `sign` says whose where there are two."""
     above = inputs.above
     faults = above.over_compensated + above.rising + above.not_released
-    parts = [f"--above {above.choice}, {above.codes} pressure codes above the tests"]
+    parts = [f"--above {above.choice}: {above.codes} pressure codes lie above the tests"]
     if above.certified_to_MPa is None:
         parts.append("nothing is certified there")
     else:
         margin = "" if above.smallest_margin_V is None else (
-            f", smallest margin of the C's compare values {units.text(1e3 * above.smallest_margin_V, '.3f mV')}"
+            f" (smallest margin of the C's compare values {units.text(1e3 * above.smallest_margin_V, '.3f mV')})"
         )
         parts.append(
-            f"up to {units.text(above.certified_to_MPa, '.3g MPa')} {above.over_compensated} above the bound that the "
-            f"curve's premise continues{margin}"
+            f"up to {units.text(above.certified_to_MPa, '.3g MPa')}, {above.over_compensated} exceed the bound that "
+            f"the curve's premise continues{margin}"
         )
-    parts.append(f"{above.rising} driven higher than the certified offset of the last test")
+    parts.append(f"{above.rising} exceed the certified offset of the last test")
     if above.released_from_MPa is not None:
         at = units.text(above.released_from_MPa, ".3g MPa")
-        parts.append(f"let go from {at} on, {above.not_released} not")
+        parts.append(f"the offset is released from {at}, with {above.not_released} exceptions")
     return ABOVE_TESTS.check(name=sign + ABOVE_TESTS.title, holds=faults == 0, text="; ".join(parts))

@@ -82,27 +82,27 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
         (
             requirements.MONOTONE,
             inputs.out_of_range + inputs.not_monotone_in_u + inputs.not_monotone_in_dp,
-            f"{inputs.out_of_range} out of range, {inputs.not_monotone_in_u} falls with rising command, "
-            f"{inputs.not_monotone_in_dp} steps against the law in dP",
+            f"{inputs.out_of_range} values out of range, {inputs.not_monotone_in_u} decreases with rising command, "
+            f"{inputs.not_monotone_in_dp} steps over dP against the law's direction",
         ),
         (
             requirements.ZERO_COMMAND,
             inputs.over_compensated,
-            f"{inputs.over_compensated} pressure codes above the threshold's lower bound, smallest margin of the C's "
-            f"compare values {margin}",
+            f"drive above the threshold's lower bound at {inputs.over_compensated} pressure codes; smallest margin of "
+            f"the C's compare values {margin}",
         ),
         (
             requirements.PRESSURE_DIFFERENCE,
             inputs.odd_pairs,
             f"{inputs.odd_pairs} of {inputs.pressure_pairs} pairs of pressure codes differ (the commands of each "
-            "difference take its pairs in turn; at zero command all pairs that the law follows or that lie outside the "
-            "sensors' valid range)",
+            "difference use its pairs in turn; zero command uses all pairs that the law follows or that lie outside "
+            "the sensors' valid range)",
         ),
         (
             requirements.FALLBACK,
             inputs.bad_fallbacks + inputs.bad_status + inputs.bad_betas,
-            f"{inputs.bad_fallbacks} such codes without the safe value, {inputs.bad_status} status words that say "
-            f"otherwise, {inputs.bad_betas} values of dz_beta() that are not the law's",
+            f"{inputs.bad_fallbacks} such codes without the safe value, {inputs.bad_status} wrong status "
+            f"words, {inputs.bad_betas} wrong values of dz_beta()",
         ),
     )
     sign = f"{inputs.side} commands: " if both_signs else ""

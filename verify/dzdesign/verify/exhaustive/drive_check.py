@@ -259,10 +259,10 @@ def drive_follows(folder: Path, compensator: Compensator) -> Check:
         found = CompiledDrive(folder).check(prepared)
     except RequirementError as error:
         return DRIVE.check(holds=False, text=str(error))
-    text = f"outputs and state after each of {found.ticks} PWM periods, {len(prepared.samples)} samples of corners, "
-    text += f"steps, noise and random codes (seed {SEED})"
-    text += f", {prepared.put} of them every valid command from every state of rest and side" if prepared.put else ""
-    text += f", {prepared.memories} the borders of the inputs from every memory of faults"
-    text += f": {found.faults} wrong"
+    text = f"outputs and state compared after each of {found.ticks} PWM periods: {len(prepared.samples)} samples of "
+    text += f"corner values, steps, noise and random codes (seed {SEED})"
+    text += f", {prepared.put} of them for every valid command from every rest and side state" if prepared.put else ""
+    text += f", {prepared.memories} for the limits of the inputs from every fault state"
+    text += f"; {found.faults} wrong"
     text += f" ({found.first_wrong})" if found.faults else ""
     return DRIVE.check(holds=found.faults == 0, text=text)

@@ -40,7 +40,7 @@ class FaultMemory:
         return self.latches and self.faulty == self.needed
 
     def take(self, *, fault: bool, unwanted: bool = False) -> None:
-        """Take a sample; one that is sound but `unwanted` is no fault, and ends a row of sound ones like one."""
+        """Take a sample; one that is sound but `unwanted` is not a fault, and ends a row of sound ones like one."""
         if fault and self.latches and self.faulty < self.needed:
             self.faulty += 1
         if fault or unwanted or self.is_latched:

@@ -28,7 +28,7 @@ class InputMap:
 
     side: Side
     #: Command code, difference of pressure codes, compare value, its error in counts, and status word; along the
-    #: commands first. Of a command that is not sound the law says nothing, and there is no error.
+    #: commands first. Of a command that is not sound the law says nothing, and there is not an error.
     grid: tuple[tuple[int, int, int, int, int], ...]
     #: At every difference of the tested interval: its code, pressure drop in MPa, drive at zero command in V (with a
     #: dither that the recordings lack its peak), and the lower bound of the threshold in V.

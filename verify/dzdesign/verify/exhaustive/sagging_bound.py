@@ -1,6 +1,6 @@
 """The lower bound of a threshold whose second divided difference is at most M between neighbouring tests.
 
-Argued from the ramp tests anew: 2 f[a, x, b] <= M with f(a) >= A and f(b) >= B says, for x = a + s (b - a),
+Argued from the ramp tests again: 2 f[a, x, b] <= M with f(a) >= A and f(b) >= B says, for x = a + s (b - a),
 f(x) >= A + s (B - A) - M (b - a)² s (1 - s) / 2, a parabola that is open above. Its least value over an interval lies
 at an end, or where its slope is zero.
 """

@@ -36,7 +36,7 @@ def vectors_follow(folder: Path, manifest: FirmwareManifest, compensator: Compen
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
     if fault := next(_faults(lines, manifest.vectors, compensator), ""):
         return (VECTORS.check(holds=False, text=f"{fault}; make the firmware again with `dzdesign codegen`"),)
-    text = f"{len(lines) - 1} rows of {VECTORS_NAME}, every value the exactly rounded law's"
+    text = f"{len(lines) - 1} rows of {VECTORS_NAME}, every value equals the exactly rounded law"
     return (VECTORS.check(holds=True, text=text),)
 
 

@@ -1,6 +1,6 @@
 """What the zero-command drive leaves to a threshold's lower bound, at every difference of pressure codes.
 
-The bound is argued from the ramp tests anew. By monotonicity a threshold that falls with dP is at least the bound of
+The bound is argued from the ramp tests again. By monotonicity a threshold that falls with dP is at least the bound of
 any test at a higher dP, one that rises at least that of any test at a lower dP, and of a flat one only the lowest bound
 is known. One of limited curvature sags below the chord of two tests by a parabola at most (`SaggingBound`). A code
 stands for all pressures that may have made it; what of a dither the recordings do not have counts as drive.
@@ -167,7 +167,7 @@ def _is_staircase(bounds: LotSide) -> bool:
 
 
 def counted_dither(compensator: Compensator) -> int:
-    """Return how many counts of the dither are drive at zero command, written from the documentation anew.
+    """Return how many counts of the dither are drive at zero command, written from the documentation again.
 
     The whole peak, unless the ramps were recorded with a dither: then by how much its peak is another, and what a
     motion that falls with the square of the frequency makes of the frequency's difference. Of a controlled current

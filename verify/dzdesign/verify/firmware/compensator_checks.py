@@ -30,10 +30,10 @@ def certificate_follows(compensator: Compensator) -> Check:
     certificate = compensator.positive.certificate
     valves = len(compensator.lot)
     common = f"of {valves} valves the one in compensator.json: " if valves else ""
-    text = f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound, "
+    text = f"{common}the {certificate.guard} threshold's {100 * certificate.confidence:.6g}% lower bound "
     low, high = map(float, certificate.dp_MPa)
     tested = compensator.valve.recorded_units.span(low, high, ".2f MPa")
-    text += f"{tested}, proved again at every difference of pressure codes"
+    text += f"{tested} was proved again at every pressure-difference code"
     return CERTIFICATE.check(holds=True, text=text)
 
 
@@ -53,7 +53,7 @@ def law_follows(compensator: Compensator) -> Check:
         text = str(error) if known else f"designed by dzdesign {version}, and this is {THIS_TOOL.version}: {error}"
         return LAW.check(holds=False if known else None, text=text)
     target = compensator.target.name
-    text = f"designed again from the valve and the options in compensator.json, for {target}: every number the same"
+    text = f"designed again from the valve and the options in compensator.json, for {target}: every number is the same"
     return LAW.check(holds=True, text=text)
 
 
@@ -73,7 +73,8 @@ def valve_follows(folder: Path, compensator: Compensator) -> Check:
         if each.valve != valve
     )
     if stated == compensator.valve_sha256:  # as `identify` writes it: no file is needed
-        text = f"the valve that compensator.json holds has, as `identify` writes it, the SHA-256 {stated} in made_from"
+        text = f"written as `identify` writes it, the valve in compensator.json has the SHA-256 {stated} that "
+        text += "made_from states"
         return VALVE.check(holds=True, text=other + text)
     for each in around:
         if each.sha256 == stated:

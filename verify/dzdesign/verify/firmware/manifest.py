@@ -77,7 +77,7 @@ def _text(path: Path) -> str:
 
 
 def constants_in(text: str) -> Iterator[tuple[str, Value]]:
-    """Yield name and value of the constants in C: of a table its rows, of what is no number its text.
+    """Yield name and value of the constants in C: of a table its rows, of what is not a number its text.
 
     A number of a table without rows is a row that does not change.
 

@@ -165,7 +165,7 @@ def drive_check(fmu: FmuFile, binary: bytes, compensator: Compensator) -> Check:
     except RequirementError as error:
         return requirements.FMU_DRIVE.check(holds=False, text=str(error), name=name)
     wrong = np.flatnonzero((found != np.array(expected)).any(axis=1))
-    text = f"{len(expected)} steps of a PWM period, {wrong.size} otherwise than the exact drive"
+    text = f"{len(expected)} steps of a PWM period, {wrong.size} differ from the exact drive"
     if wrong.size:
         first = int(wrong[0])
         text += f"; the first after step {first}: {found[first].tolist()}, expected {list(expected[first])}"
@@ -197,7 +197,7 @@ def physical_check(fmu: FmuFile, binary: bytes, compensator: Compensator) -> Che
         expected = [_law(law, command, p_a, p_b) for law in laws.values()]
         if found[index].tolist() != expected:
             wrong.append(f"{rows[index].round(6).tolist()} gives {found[index].tolist()}, expected {expected}")
-    text = f"{len(inside)} random inputs in V and MPa, {len(wrong)} otherwise than the exact law of their codes"
+    text = f"{len(inside)} random inputs in V and MPa, {len(wrong)} differ from the exact law of their codes"
     return requirements.FMU_UNITS.check(
         holds=not wrong and len(inside) > PHYSICAL_ROWS // 2, text=f"{text}{': ' * bool(wrong)}{and_more(wrong, 1)}"
         if wrong else text, name=name,

@@ -31,7 +31,7 @@ def closed_loop_check(
         worst, periods, text = _compared(fmu, plant_fmu, Plant(**plant), compensator)
     except RequirementError as error:
         return FMU_CLOSED_LOOP.check(holds=False, text=str(error), name=name)
-    words = f"{periods} PWM periods, flow apart by at most {worst:.2g} of the largest, {TOLERANCE:g} allowed{text}"
+    words = f"{periods} PWM periods, flows differ by at most {worst:.2g} of the largest; {TOLERANCE:g} is allowed{text}"
     return FMU_CLOSED_LOOP.check(holds=worst <= TOLERANCE, text=words, name=name)
 
 

@@ -32,7 +32,7 @@ def starts_check(fmu: FmuFile, binary: bytes) -> Check:
     except RequirementError as error:
         return FMU_STARTS.check(holds=False, text=str(error), name=title)
     others = [
-        f"{name} begins at {value:g}, described as {fmu.variables[name].start}"
+        f"{name} starts at {value:g}, described as {fmu.variables[name].start}"
         for name, (value,) in zip(names, found, strict=True)
         if value != float(fmu.variables[name].start or 0.0)
     ]
@@ -145,7 +145,7 @@ def _plant_faults(fmu: FmuFile, binary: bytes, plant: Plant, compare_max: int) -
 
 
 def _stop_faults(fmu: FmuFile, binary: bytes, plant: Plant) -> Iterator[str]:
-    """Yield what is wrong as the spool meets a stop, is held there, and is let go: each an event."""
+    """Yield what is wrong as the spool meets a stop, is held there, and is released: each an event."""
     stroke, loop_ohm = 1e-3 * plant.stroke_mm, plant.K_a * plant.K_fi_V_A + plant.R_c_ohm + plant.r_p_ohm
     strong = 2 * (plant.K_et_N_m * stroke + plant.preload_N + 1) / plant.K_i_N_A  # A, and half the play
     strong += plant.K_a * plant.hysteresis_V / loop_ohm

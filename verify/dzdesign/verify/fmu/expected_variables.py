@@ -35,7 +35,7 @@ class Expected:
     derivative_of: str = ""
     #: Further attributes.
     others: Mapping[str, str] | None = None
-    #: Shown as the command of this side was recorded; 0: it is no command.
+    #: Shown as the command of this side was recorded; 0: it is not a command.
     command: int = 0
 
     @property

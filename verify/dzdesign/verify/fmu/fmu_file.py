@@ -100,7 +100,8 @@ def read_fmu(path: Path) -> FmuFile:
         manifest = json.loads(files[f"{EXTRA}/manifest.json"])
         variables, units = _variables(document), _units(document)
     except (KeyError, ValueError, RecursionError, ElementTree.ParseError) as error:
-        raise InputError(f"'{path}' is no FMU of dzdesign: {error}; make it again with `dzdesign codegen`") from error
+        raise InputError(f"'{path}' is not an FMU of dzdesign: {error}; make it again with `dzdesign "
+        "codegen`") from error
     version = document.get("fmiVersion", "")
     if version not in ("2.0", "3.0") or not isinstance(manifest, dict):
         raise InputError(f"'{path}' is for FMI '{version[:20]}', expected 2.0 or 3.0")

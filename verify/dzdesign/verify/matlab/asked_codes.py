@@ -30,7 +30,7 @@ ANSWERS = "answers"
 ENDINGS = {1: "", -1: "_negative"}
 #: Octets of the codes of an input, and of an answer.
 CODES_SIZE, ANSWER_SIZE = 6, 2
-#: Inputs from which on they are divided among processes.
+#: Inputs from which they are divided among processes.
 WORTH_A_PROCESS = 1 << 20
 
 

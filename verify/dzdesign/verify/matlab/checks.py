@@ -40,7 +40,8 @@ def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say
     except InputError as error:
         return OutputChecks(checks=(MATLAB_SUBSET.check(holds=False, text=str(error)),))
     lines, parts = sum(len(text.splitlines()) for text in functions.values()), sum(map(len, read.values()))
-    words = f"{lines} lines, {parts} functions that MATLAB and Octave read alike: integers, no loop, file or evaluation"
+    words = f"{lines} lines, {parts} functions that MATLAB and Octave interpret alike: integers, without loops, files "
+    "or eval"
     found, tried = [MATLAB_SUBSET.check(holds=True, text=words)], []
     octave = available_octave()
     for sign, content in functions.items():
@@ -125,7 +126,7 @@ def _inputs(octave: str, sign: int, texts: dict[str, bytes]) -> Check:
     except RequirementError as error:
         return MATLAB_INPUTS.check(holds=False, text=str(error), name=title)
     faults = [text for holds, text in cases if not holds]
-    text = f"{len(cases)} cases of classes, sizes and refusals as its help says; {SETUP} parses, and was not run"
+    text = f"{len(cases)} cases of classes, sizes and refusals agree with its help; {SETUP} was parsed but not run"
     return MATLAB_INPUTS.check(holds=not faults, text=and_more(faults, MOST_NAMED) if faults else text, name=title)
 
 

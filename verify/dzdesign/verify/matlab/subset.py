@@ -71,19 +71,19 @@ def _tokens(text: str, source: str) -> Iterator[Token]:
     """Yield the words of a text, without blanks, comments and what continues a line."""
     line, place = 1, 0
     if not text.isascii():
-        raise InputError(f"{source} is no text in ASCII")
+        raise InputError(f"{source} is not ASCII text")
     if len(text) > LONGEST:
         raise InputError(f"{source} has {len(text)} characters, expected at most {LONGEST}")
     while place < len(text):
         found = TOKENS.match(text, place)
         if found is None or found.lastgroup == "refused":
             near = text[place : place + 12]
-            raise InputError(f"{source}, line {line}: {near!r} is not of the subset that is verified")
+            raise InputError(f"{source}, line {line}: {near!r} is outside the verified subset")
         kind, word = str(found.lastgroup), found[0]
         if kind == "number" and len(word) > MOST_DIGITS:
             raise InputError(f"{source}, line {line}: a number has {len(word)} digits, expected at most {MOST_DIGITS}")
         if kind == "comment" and word[1:2] in ("{", "}"):
-            raise InputError(f"{source}, line {line}: a block comment is not of the subset that is verified")
+            raise InputError(f"{source}, line {line}: a block comment is outside the verified subset")
         if kind not in ("blank", "comment", "next"):
             yield Token(kind, word, line)
         line += word.count("\n")
@@ -113,7 +113,7 @@ def _check_names(function: ReadFunction, own: set[str], source: str) -> None:
     known = KEYWORDS | CALLED | own | assigned
     for word in function.body:
         if word.kind == "name" and word.text not in known:
-            raise InputError(f"{source}, line {word.line}: {word.text} is not of the subset that is verified")
+            raise InputError(f"{source}, line {word.line}: {word.text} is outside the verified subset")
 
 
 def _assigned(function: ReadFunction) -> Iterator[str]:

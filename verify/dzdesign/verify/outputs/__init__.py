@@ -1,1 +1,1 @@
-"""An output that is no C firmware, in; what its manifest says, and what the room of its kind found, out."""
+"""An output other than a C firmware, in; what its manifest says, and what the room of its kind found, out."""

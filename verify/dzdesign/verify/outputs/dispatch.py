@@ -64,7 +64,7 @@ class OutputVerification(ShownInNotebooks):
 
     @property
     def verdict(self) -> str:
-        """In words: what does not hold goes before what could not be checked."""
+        """In words: what does not hold takes precedence over what could not be checked."""
         return self.evidence.verdict
 
 

@@ -50,7 +50,7 @@ def files_unchanged(folder: Path, manifest: OutputManifest) -> Check:
 
 
 def manifest_follows(folder: Path, manifest: OutputManifest, compensator: Compensator) -> Check:
-    """Tell whether the manifest says what the output was made from."""
+    """Tell whether the manifest states what the output was made from."""
     faults = list(_faults_of_origin(folder, manifest, compensator))
     if faults:
         text = f"{and_more(faults, 1)}; make the output again with `dzdesign codegen`"

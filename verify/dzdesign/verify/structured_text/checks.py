@@ -72,7 +72,7 @@ def _text(path: Path) -> str:
     try:
         return read_bytes(path, "Structured Text").decode("ascii")
     except UnicodeDecodeError as error:
-        raise InputError(f"'{path}' is no text in ASCII; make it again with `dzdesign codegen`") from error
+        raise InputError(f"'{path}' is not ASCII text; make it again with `dzdesign codegen`") from error
 
 
 def _check_ends(block: FunctionBlock, compensator: Compensator) -> None:
@@ -133,7 +133,8 @@ def _tried(
         STATES.check(
             holds=not any(each.wrong_status + each.wrong_state for each in sets),
             text=f"{sum(each.calls for each in sets)} calls from every state near zero command, "
-            f"{sum(each.wrong_status for each in sets)} wrong status, {sum(each.wrong_state for each in sets)} states",
+            f"{sum(each.wrong_status for each in sets)} wrong status words, "
+            f"{sum(each.wrong_state for each in sets)} wrong states",
         ),
         *(_zero_command(tried, place) for place in range(len(tried.exact))),
     ]

@@ -101,7 +101,7 @@ class ExactBlock(ExactLaw):
     def parts(self, corners: list[tuple[int, Fraction]]) -> list[list[int]]:
         """Return the law along the command in straight parts between its corners, each in whole numbers.
 
-        First and last command, from zero on; the output before it is limited, as a whole and a numerator, at the first;
+        First and last command, from zero; the output before it is limited, as a whole and a numerator, at the first;
         what each further command adds to both; and their denominator.
         """
         found: list[list[int]] = []

@@ -48,13 +48,13 @@ def read_xml(path: Path) -> Element:
     content = read_bytes(path, "file for a PLC's tool")
     inside = content.removeprefix(BEGIN)
     if inside == content or not inside.isascii():
-        raise InputError(f"'{path}' begins otherwise than generated, or is no ASCII; make it again")
+        raise InputError(f"'{path}' does not begin as generated, or is not ASCII; make it again")
     if b"<!" in inside or b"<?" in inside:
         raise InputError(f"'{path}' declares a document type or has a comment, as no generated file; make it again")
     try:
         return ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
-        raise InputError(f"'{path}' is no XML: {error}; make it again with `dzdesign codegen`") from error
+        raise InputError(f"'{path}' is not XML: {error}; make it again with `dzdesign codegen`") from error
 
 
 def plcopen_faults(document: Element, block: FunctionBlock, text: str) -> Iterator[str]:

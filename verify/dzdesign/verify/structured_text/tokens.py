@@ -29,7 +29,7 @@ def tokens_of(text: str, source: str) -> list[Token]:
         match = TOKEN.match(text, position)
         if match is None:
             stranger = quoted(text[position : position + 10])
-            raise InputError(f"{source}, {place}: {stranger} is not of the subset that is verified")
+            raise InputError(f"{source}, {place}: {stranger} is outside the verified subset")
         if match.lastgroup != "space":
             found.append(Token(match[0], str(match.lastgroup), place))
         breaks = match[0].count("\n")

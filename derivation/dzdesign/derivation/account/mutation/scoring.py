@@ -34,28 +34,30 @@ WAYS = ("formulas", "scopes", "grounds", "kinds", "published numbers")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatementMutants:
-    """Mutants of one statement in one way."""
+    """Changes of one statement of one kind, and how many were detected."""
 
-    number: Annotated[str, Meta(description="The statement, or the name of a number that the paper prints.")]
-    changed: Annotated[str, Meta(description="What of it was changed.")]
-    mutants: Annotated[int, Meta(description="Changes of its meaning that were tried.")]
-    caught: Annotated[int, Meta(description="Those of them that show.")]
-    survivors: Annotated[tuple[str, ...], Meta(description="Those that do not.")]
-    equivalent: Annotated[tuple[str, ...], Meta(description="Changes that leave its meaning, so that none can.")]
+    number: Annotated[str, Meta(description="Number of the statement, or name of a number printed in the paper.")]
+    changed: Annotated[str, Meta(description="Part of the statement that was changed.")]
+    mutants: Annotated[int, Meta(description="Number of changes that alter the meaning.")]
+    caught: Annotated[int, Meta(description="Number of those changes that were detected.")]
+    survivors: Annotated[tuple[str, ...], Meta(description="Changes that were not detected.")]
+    equivalent: Annotated[
+        tuple[str, ...], Meta(description="Number of changes that do not alter the meaning and so can't be detected.")
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AccountMutants(Artefact):
-    """How many wrong statements the account catches."""
+    """Number of wrong statements that the account detects."""
 
     FILE_NAME: ClassVar[str] = "mutants.json"
     schema: Annotated[Literal["dzdesign.mutation/1"], Meta(description="Name and version of this schema.")] = (
         "dzdesign.mutation/1"
     )
-    mutants: Annotated[int, Meta(description="Wrong statements and numbers.")]
-    caught: Annotated[int, Meta(description="Those that show.")]
+    mutants: Annotated[int, Meta(description="Number of wrong statements and numbers that were tried.")]
+    caught: Annotated[int, Meta(description="Number of those that were detected.")]
     statements: Annotated[
-        tuple[StatementMutants, ...], Meta(description="By what was changed, in the account's order.")
+        tuple[StatementMutants, ...], Meta(description="Results by kind of change, in the order of the account.")
     ]
 
 

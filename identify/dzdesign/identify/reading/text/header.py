@@ -37,7 +37,7 @@ NO_VALUE = re.compile(
 )
 #: An artefact of dzdesign begins with its schema.
 ARTEFACT = re.compile(rb'\s*\{\s*"(?:[^"{}]*"\s*:\s*"[^"]*",?\s*")*?schema"\s*:\s*"(dzdesign\.[\w.-]+/\d+)"')
-#: First characters of text that is no table.
+#: First characters of text that is not a table.
 DOCUMENTS = {b"{": "JSON", b"<": "HTML or XML"}
 logger = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from dzdesign.identify.reading.column_labels import QUANTITIES, names_a_quantity
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS
 from dzdesign.identify.reading.text.cells import BLANKS, cells_of, is_number
 
-#: A recording has some ten columns; a header beyond this is no table, and would take minutes to be searched.
+#: A recording has some ten columns; a header beyond this is not a table, and would take minutes to be searched.
 MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
 #: Lines in which the header is looked for, and the longest of them.
 MOST_LINES, LONGEST_LINE = 1000, 1 << 16

@@ -73,7 +73,7 @@ class TextTable(Table):
         cells = self.rows[: max(self.rows.find(b"\n"), 0) or None].decode().split(self.separator)
         likely = [label for label in labels if len(self.lines) and NUMBER.fullmatch(cells[self.labels.index(label)])]
         if likely:
-            with suppress(pl.exceptions.PolarsError):  # a cell is no number
+            with suppress(pl.exceptions.PolarsError):  # a cell is not a number
                 self._loaded.update(self._read(dict.fromkeys(likely, pl.Float64)))
 
     def numbers(self, label: str) -> np.ndarray:
