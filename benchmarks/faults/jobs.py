@@ -54,11 +54,11 @@ def _codegen(folder: Path) -> list[Job]:
     """Return a job for each target of `codegen`, and for the form with a calibration block."""
 
     def job(name: str, *options: str) -> Job:
-        def words(compensator: str) -> tuple[str, ...]:
-            return ("codegen", f"{compensator}.json", *options, "-o", "made", "--replace")
+        def words(transition: str) -> tuple[str, ...]:
+            return ("codegen", "valve.json", "--transition", transition, *options, "-o", "made", "--replace")
 
-        inputs = (folder / "a.json", folder / "b.json", folder / "plant.toml")
-        return Job(name=f"codegen {name}", old=words("a"), new=words("b"), units=("made",), inputs=inputs)
+        inputs = (folder / "valve.json", folder / "plant.toml")
+        return Job(name=f"codegen {name}", old=words("2 %"), new=words("1 %"), units=("made",), inputs=inputs)
 
     block = ("--target", "f28335", "--calibration", "block")
     return [*(job(name, "--target", name, *options) for name, options in TARGETS.items()), job("block", *block)]
