@@ -42,11 +42,12 @@ def run_kills(job: Job, folder: Path, kills: int, rng: random.Random) -> list[Ki
         each.mkdir(parents=True)
     for path in job.inputs:
         (shutil.copytree if path.is_dir() else shutil.copy)(path, base / path.name)
-    begun = time.monotonic()
-    _run(job.old, base, temporary)
-    lasts = time.monotonic() - begun
+    if job.old:
+        _run(job.old, base, temporary)
     old = tree(base)
+    begun = time.monotonic()
     new = _new_of(job, folder, temporary)
+    lasts = time.monotonic() - begun
     return [_one(job, folder, number, rng, lasts, old, new) for number in range(kills)]
 
 

@@ -140,6 +140,7 @@ class Job:
     """A command that writes folders, from an old state to a new one; both are made by commands in the same folder."""
 
     name: str
+    #: Without one, nothing is there before.
     old: tuple[str, ...]
     new: tuple[str, ...]
     #: Folders that are written whole.
@@ -148,6 +149,12 @@ class Job:
     on_the_way: tuple[str, ...] = ()
     #: What an artefact is made from, copied beside it.
     inputs: tuple[Path, ...]
+    #: Whether the command leaves what it has made alone, with status 2.
+    refused_again: bool = False
+
+    def ends_well(self, status: int, left: str) -> bool:
+        """Tell whether the status is that of a command which made its artefacts, or found them made."""
+        return status in (0, 1) or (status == 2 and self.refused_again and left == "new")
 
 
 def run_job(job: Job, folder: Path, cuts: int, rng: random.Random) -> list[Cut]:
@@ -157,7 +164,8 @@ def run_job(job: Job, folder: Path, cuts: int, rng: random.Random) -> list[Cut]:
     with mounted(base, folder / "mount") as place:
         for path in job.inputs:
             (shutil.copytree if path.is_dir() else shutil.copy)(path, place / path.name)
-        subprocess.run([PROGRAM, *job.old], cwd=place, check=False, capture_output=True)
+        if job.old:
+            subprocess.run([PROGRAM, *job.old], cwd=place, check=False, capture_output=True)
         old = tree(place)
     found = []
     for number in range(cuts):
@@ -171,7 +179,7 @@ def run_job(job: Job, folder: Path, cuts: int, rng: random.Random) -> list[Cut]:
             if when != "writing" and left != "new":
                 left = f"BROKEN: ended well, and left the {left}"
             again = subprocess.run([PROGRAM, *job.new], cwd=place, capture_output=True, check=False)
-            made = again.returncode in (0, 1) and judged(place, old, new, job) == "new"
+            made = job.ends_well(again.returncode, left) and judged(place, old, new, job) == "new"
             made = made and not any(UNPLACED in path.as_posix() for path in place.rglob("*"))
         found.append(Cut(command=job.name, during=when, left=left, made_again=made))
     return found

@@ -16,6 +16,7 @@ import pytest
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_files, write_folder
 from dzdesign.core.errors import InputError
+from dzdesign.core.folder_swap import RETIRED, UNPLACED
 from tests.support.paths import DEVICES
 
 HERE = DEVICES
@@ -25,7 +26,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="calls are intercepted by a Linux loader's means"),
 ]
 #: What a kill may leave behind: hidden, and in nobody's way.
-LITTER = ".dzdesign-"
+LITTER = UNPLACED
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +97,7 @@ def test_without_an_exchange_of_the_system_the_next_run_brings_the_old_folder_ba
     beside = 0
     for row in rest:
         after = without_litter(row["after"])
-        retired = {name.removeprefix(".firmware.old/old/"): text for name, text in after.items() if "old/old/" in name}
+        retired = {name.partition("/old/")[2]: text for name, text in after.items() if name.startswith(RETIRED)}
         stands = {name: text for name, text in after.items() if name.startswith("firmware/")}
         assert stands in (first["old"], first["new"]) or (
             row["way"] in ("SIGKILL", "SIGINT")

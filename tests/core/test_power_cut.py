@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_folder
+from dzdesign.core.artefact_files import MANIFEST_NAME, write_file, write_files, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import UNPLACED, alone_in
 
@@ -51,6 +51,35 @@ def test_all_files_of_a_folder_are_synced_then_it_then_its_rename(tmp_path, step
     )
     assert before[-1] == ("sync", folder.stat().st_ino)
     assert steps[-1] == ("sync", tmp_path.stat().st_ino)
+
+
+def test_the_names_of_new_folders_above_it_are_synced(tmp_path, steps):
+    write_folder(tmp_path / "a" / "b" / "firmware", FILES, FIRMWARE)
+    write_files(tmp_path / "c" / "plots", {"a.svg": b"a"}, "--plots")
+    synced = [number for step, number in steps if step == "sync"]
+    for place in (tmp_path, tmp_path / "a", tmp_path / "c"):
+        assert place.stat().st_ino in synced, place
+
+
+@pytest.mark.parametrize("in_one_step", [True, False])
+def test_what_lies_beside_a_folder_under_a_like_name_is_somebodys_own(tmp_path, monkeypatch, in_one_step):
+    if not in_one_step:
+        monkeypatch.setattr("dzdesign.core.folder_swap.exchanged", lambda *_: False)
+    notes = tmp_path / ".firmware.old" / "notes.txt"
+    notes.parent.mkdir()
+    notes.write_text("mine")
+    for text in ("old\n", "new\n"):
+        write_folder(tmp_path / "firmware", {**FILES, "README.md": text}, FIRMWARE)
+    assert notes.read_text() == "mine" and sorted(os.listdir(tmp_path)) == [".firmware.old", "firmware"]
+
+
+@pytest.mark.parametrize("in_one_step", [True, False])
+def test_a_folder_may_have_the_longest_name(tmp_path, monkeypatch, in_one_step):
+    if not in_one_step:
+        monkeypatch.setattr("dzdesign.core.folder_swap.exchanged", lambda *_: False)
+    for text in ("old\n", "new\n"):
+        write_folder(tmp_path / ("x" * 255), {**FILES, "README.md": text}, FIRMWARE)
+    assert (tmp_path / ("x" * 255) / "README.md").read_text() == "new\n"
 
 
 def test_a_replaced_folder_is_removed_only_after_the_new_name_is_on_the_disk(tmp_path, steps, monkeypatch):

@@ -105,7 +105,6 @@ def _settings(place: Path, outside: Path, canary: Path) -> None:
     touch = f"touch '{canary}/{{}}'"
     for name, text in {
         "ipopt.opt": f"output_file {outside}/ipopt.txt\nfile_print_level 5\nmax_iter 0\n",
-        "matplotlibrc": "text.usetex: True\nbackend: module://conftest\n",
         ".octaverc": f"system(\"{touch.format('octaverc')}\");\n",
         ".gdbinit": f"shell {touch.format('gdbinit')}\n",
         "Makefile": f"all:\n\t{touch.format('make')}\n",
@@ -122,6 +121,7 @@ def _settings(place: Path, outside: Path, canary: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
         path.chmod(0o755)
+    (place / "matplotlibrc").write_bytes(b"text.usetex: True\nbackend: module://conftest\n\xff\n")
 
 
 def _files(place: Path, canary: Path) -> list[str]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dzdesign.core.disk_sync import sync_file, sync_folder, sync_tree
+from dzdesign.core.disk_sync import make_folder, sync_file, sync_folder, sync_tree
 from dzdesign.core.documents import family_of, parse_document, sha256_of, sha256_of_file, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_contents import (
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MANIFEST_NAME", "TOOL", "check_file_may_be_written", "check_folder_may_be_written", "check_inside",
-    "check_place_of_files", "open_bytes", "parse_document", "read_bytes", "sha256_of", "sha256_of_file", "to_json",
-    "write_file", "write_files", "write_folder",
+    "check_place_of_files", "note_written", "open_bytes", "parse_document", "read_bytes", "sha256_of", "sha256_of_file",
+    "to_json", "write_file", "write_files", "write_folder",
 ]  # fmt: skip
 
 TOOL = {"name": "dzdesign", "version": __version__}
@@ -67,7 +67,7 @@ def write_files(folder: Path, files: Mapping[str, bytes], option: str) -> None:
     """Add files to a folder, which is created if missing. Each is written atomically and may replace a file."""
     check_place_of_files(folder, option)
     try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
+        make_folder(Path(folder))
     except OSError as error:
         raise InputError(f"'{folder}' can't be made: {reason_of(error)}; choose another {option}") from error
     for name, content in files.items():
@@ -118,11 +118,12 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
         with alone_in(place.parent) as alone:
             remove_abandoned(place.parent, alone=alone)
             _replace_file(place, data)
-    _note_written(path)
+    note_written(path)
     logger.debug("wrote '%s', %d bytes", path, len(data))
 
 
-def _note_written(path: Path) -> None:
+def note_written(path: Path) -> None:
+    """Note what was written, for the last word of a command that can't end well."""
     if path not in written and not is_scratch(path):
         written.append(path)
 
@@ -216,14 +217,14 @@ def write_folder(
         folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced
         if not folder.parent.is_dir():
             _check_folder(folder, document.get("schema"))
-        folder.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(folder.parent)
         with alone_in(folder.parent) as alone:
             remove_abandoned(folder.parent, alone=alone)
             bring_back(folder)
             check()
             _check_folder(folder, document.get("schema"))
             kept = _replace_folder(folder, contents, listing, board_of(document))
-    _note_written(named)
+    note_written(named)
     logger.debug("wrote '%s', %d files", folder, len(contents))
     return kept
 

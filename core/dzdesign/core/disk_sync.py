@@ -36,6 +36,22 @@ def sync_folder(path: Path) -> None:
         sync_file(path)
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, if they are missing, and wait until the new names are on the disk.
+
+    Without this a power cut may take what was synced in them: no name leads there.
+    """
+    missing = []
+    while not path.is_dir():
+        missing.append(path)
+        if path == path.parent:
+            break
+        path = path.parent
+    for each in reversed(missing):
+        each.mkdir(exist_ok=True)
+        sync_folder(each.parent)
+
+
 def sync_tree(folder: Path) -> None:
     """Wait until all files in a folder, and the folder itself, are on the disk; what a link leads to is not touched."""
     for place, _, names in os.walk(folder, topdown=False):

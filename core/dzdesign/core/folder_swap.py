@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 
 from dzdesign.core.disk_sync import sync_folder
@@ -21,6 +22,8 @@ EXCHANGE, HERE = 2, -100
 UNKNOWN = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
 #: How files and folders are called until they are put in their place.
 UNPLACED = ".dzdesign-new-"
+#: How a place is called in which an old folder waits until the new one stands.
+RETIRED = ".dzdesign-old-"
 #: Where a system has no locks, one of this age was left by a process that was killed.
 ABANDONED_S = 86400.0
 #: The folders that a thread is alone in.
@@ -110,7 +113,7 @@ def put_in_place(staging: Path, folder: Path) -> None:
     """
     if exchanged(staging, folder):
         return
-    retired = folder.parent / f".{folder.name}.old"
+    retired = _retired(folder)
     old = retired / "old"
     retired.mkdir(exist_ok=True)
     try:
@@ -126,9 +129,14 @@ def put_in_place(staging: Path, folder: Path) -> None:
     shutil.rmtree(retired, ignore_errors=True)
 
 
+def _retired(folder: Path) -> Path:
+    """Return where a folder stands between two steps: a name that no person gives, and short, as of `beside`."""
+    return folder.parent / f"{RETIRED}{sha256(os.fsencode(folder.name)).hexdigest()[:16]}"
+
+
 def bring_back(folder: Path) -> None:
     """Undo the first of two steps, if a process was killed between them; clear away what is left of the second."""
-    retired = folder.parent / f".{folder.name}.old"
+    retired = _retired(folder)
     if not retired.is_dir():
         return
     if not os.path.lexists(folder) and (retired / "old").is_dir():

@@ -84,7 +84,6 @@ def write_lot_firmware(
     fits = setting is not None and project_of(setting) == project
     compensator = setting if setting is not None and fits else designed[first]
     folder = output / LOT / FIRMWARE
-    folder.parent.mkdir(exist_ok=True)
     firmware = generate(compensator, project.target, to_json_bytes(compensator), "block")
     write_firmware(firmware, folder, over_another=True)
     return LotFirmware(

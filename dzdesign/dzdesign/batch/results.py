@@ -1,8 +1,6 @@
 """The folder of a lot: one folder per valve, written whole; what is there and still valid is not made again."""
 
 import json
-import re
-import shutil
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +8,7 @@ from pathlib import Path
 from dzdesign.batch.calibration import Outcome
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
+from dzdesign.core.disk_sync import make_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
@@ -37,19 +36,14 @@ class Results:
                 raise InputError(
                     f"'{folder}' is not empty and no folder of a batch, so it is left alone; choose another with -o"
                 )
-            (folder / VALVES).mkdir(parents=True, exist_ok=True)
+            make_folder(folder / VALVES)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"'{folder}' can't be written into: {reason}; choose another folder with -o") from error
 
     def begin(self, names: Collection[str]) -> None:
-        """Mark the folder as a lot's, and take away what a killed run left half-written of these valves."""
+        """Mark the folder as a lot's."""
         self.write_summary(UnfinishedLot(tool=THIS_TOOL, made_from=(), names=tuple(names)))
-        left = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
-        for path in (self.folder / VALVES).iterdir():
-            found = left.fullmatch(path.name)
-            if found and found[1] in names and path.is_dir():
-                shutil.rmtree(path, ignore_errors=True)
 
     def write_summary(self, summary: LotSummary | UnfinishedLot) -> None:
         """Write batch.json, of a lot that has come to its end or not."""

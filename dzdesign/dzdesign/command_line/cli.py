@@ -6,6 +6,7 @@ happens inside the stage that needs it.
 
 import errno
 import os
+import signal
 import sys
 
 from dzdesign.core.errors import DzdesignError, RequirementError, clear_line
@@ -25,7 +26,7 @@ def main(argv: list[str] | None = None) -> int:
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (as long as the process lives)
     if sys.stdout is None:
-        print("dzdesign: the standard output is closed, and results go there; leave it open", file=sys.stderr)
+        _tell("the standard output is closed, and results go there; leave it open")
         return BAD_INPUT
     call = None
     try:
@@ -45,7 +46,7 @@ def main(argv: list[str] | None = None) -> int:
             sys.stdout.flush()  # what can't be printed is said here and not when Python ends
             return status
     except RequirementError as error:
-        print(f"dzdesign: does not hold: {clear_line(str(error))}", file=sys.stderr)
+        _tell(f"does not hold: {clear_line(str(error))}")
         return DOES_NOT_HOLD
     except DzdesignError as error:
         text = str(error)
@@ -53,10 +54,11 @@ def main(argv: list[str] | None = None) -> int:
             from dzdesign.command_line.options_file import in_words_of_the_file
 
             text = in_words_of_the_file(text, call.options_file, call.from_file)
-        print(f"dzdesign: {clear_line(text)}", file=sys.stderr)
+        _tell(clear_line(text))
         return BAD_INPUT
     except KeyboardInterrupt:
-        print("dzdesign: interrupted; nothing half-written was left", file=sys.stderr)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one would end the clearing away behind this function
+        _tell(f"interrupted; nothing half-written was left{_what_was_written()}")
         return INTERRUPTED
     except BrokenPipeError:
         _print_nothing_more()
@@ -65,8 +67,16 @@ def main(argv: list[str] | None = None) -> int:
         if (reason := _reason_in_the_system(error)) is None:
             raise
         _print_nothing_more()
-        print(f"dzdesign: {reason}{_what_was_written()}", file=sys.stderr)
+        _tell(f"{reason}{_what_was_written() or '; nothing was written'}")
         return BAD_INPUT
+
+
+def _tell(text: str) -> None:
+    """Say something on stderr; where that takes nothing, as on a full disk, the exit status alone says it."""
+    try:
+        print(f"dzdesign: {text}", file=sys.stderr, flush=True)
+    except OSError:
+        return
 
 
 def _reason_in_the_system(error: Exception) -> str | None:
@@ -82,7 +92,7 @@ def _what_was_written() -> str:
     from dzdesign.core.artefact_files import written
 
     names = ", ".join(f"'{path}'" for path in written)
-    return clear_line(f"; written before that: {names}") if names else "; nothing was written"
+    return clear_line(f"; written before that: {names}") if names else ""
 
 
 def _print_nothing_more() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from dzdesign.core.artefact_files import TOOL, check_folder_may_be_written, write_folder
+from dzdesign.core.disk_sync import make_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option
 from dzdesign.example import example_folder
@@ -40,7 +41,7 @@ def run(arguments: Arguments, json: bool) -> int:
     for part in ("firmware", "evidence", EXAMPLE):
         check_folder_may_be_written(folder / part)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
     except OSError as error:
         raise InputError(f"the folder '{folder}' can't be made: {error.strerror}") from error
     bundled = {

@@ -66,7 +66,8 @@ def say(text: str) -> None:
     """Report progress on stderr; stdout is for results."""
     if not _Verbosity.quiet:
         since = f"{time.perf_counter() - _Verbosity.begin:8.3f} s  " if _Verbosity.verbose else ""
-        print(f"dzdesign: {since}{clear_line(text)}", file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError):  # a log on a full disk, or that nobody reads any more, ends no work
+            print(f"dzdesign: {since}{clear_line(text)}", file=sys.stderr, flush=True)
 
 
 def is_quiet() -> bool:

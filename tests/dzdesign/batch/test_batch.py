@@ -26,6 +26,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
+from dzdesign.core.folder_swap import UNPLACED
 from dzdesign.design.ceiling.offset_curve import DECIMALS
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.design_choices import DesignChoices
@@ -194,9 +195,12 @@ def test_a_killed_run_leaves_whole_folders_and_is_taken_up_by_more_jobs(lot, mad
     assert 3 <= len(found) < COUNT and "unfinished" in json.loads((output / "batch.json").read_text())["schema"]
     results = Results(output)
     assert all(results.is_done(name, read_manifest(results.of(name)).inputs_sha256) for name in found)
-    torn = output / "valves" / ".V0001.abcd1234"  # as a kill in the middle of a write leaves it
-    torn.mkdir()
+    torn = output / "valves" / f"{UNPLACED}abcd1234"  # as a kill in the middle of a write leaves it
+    kept = output / "valves" / ".V0001.original"  # somebody's own
+    for each in (torn, kept):
+        each.mkdir()
     assert main([*command, "2"]) == 1
+    kept.rmdir()
     assert tree(output) == tree(made) and not torn.exists()
     said = capsys.readouterr()
     assert f"9 of {COUNT} valves calibrated, 3 not" in said.out

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_files import write_file
 from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="shells, devices and limits of Linux")
@@ -50,6 +52,28 @@ def test_a_closed_output_is_said_before_any_work(tmp_path):
 def test_a_closed_standard_error_says_nothing_and_does_the_work(tmp_path):
     done = run("dz simulate --dp '1 MPa' -o ramps 2>&-", tmp_path)
     assert done.returncode == 0 and (tmp_path / "ramps/manifest.json").is_file()
+
+
+def test_a_full_standard_error_says_nothing_and_does_the_work(tmp_path):
+    done = run("dz simulate --dp '1 MPa' -o ramps 2>/dev/full", tmp_path)
+    assert done.returncode == 0 and (tmp_path / "ramps/manifest.json").is_file()
+    assert run("dz design absent.json 2>/dev/full", tmp_path).returncode == 2
+
+
+def test_an_interrupt_names_what_was_written_before(tmp_path, monkeypatch, capsys):
+    def interrupted(*_) -> int:
+        write_file(tmp_path / "valve.json", "{}")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dzdesign.core.artefact_files.written", [])
+    monkeypatch.setattr("dzdesign.commands.doctor.run", interrupted)
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    assert main(["doctor"]) == 130
+    said = capsys.readouterr().err
+    assert (
+        said
+        == f"dzdesign: interrupted; nothing half-written was left; written before that: '{tmp_path / 'valve.json'}'\n"
+    )
 
 
 def test_too_little_memory_for_recordings(tmp_path):

@@ -10,6 +10,7 @@ import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,12 +53,12 @@ class Bench:
     def output(self) -> Path:
         return self.folder / "ramp.csv"
 
-    def listen(self, *options: str, firmware: Path | None = None) -> None:
+    def listen(self, *options: str, firmware: Path | None = None, out: Any = subprocess.PIPE) -> None:
         """Start the monitor, and wait until it has the port."""
         command = [PROGRAM, "monitor", os.ttyname(self.slave), "--firmware", firmware or self.firmware, "--json"]
         self.monitor = subprocess.Popen(
             [*map(str, command), "-o", str(self.output), *options],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            stdout=out, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         first = self.monitor.stderr.readline()
         assert "listening" in first, first + self.monitor.stderr.read()
@@ -244,6 +245,15 @@ def test_what_asks_it_to_end_ends_the_recording_as_ctrl_c_does(bench, number):
     bench.monitor.send_signal(number)
     status, result, _ = bench.end()
     assert status == 0 and result["frames"] == 20 and len(table(bench.output)) == 20
+
+
+@pytest.mark.slow
+def test_a_recording_whose_count_can_t_be_printed_is_named(bench):
+    with open("/dev/full", "w") as full:
+        bench.listen(out=full)
+    bench.send([bench.frame(index) for index in range(20)])
+    status, _, said = bench.stop()
+    assert status == 2 and f"written before that: '{bench.output}'" in said and len(table(bench.output)) == 20
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from dzdesign.core.artefact_files import note_written
 from dzdesign.core.disk_sync import sync_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import reason_of
@@ -36,6 +37,7 @@ class RecordingFile:
         try:
             if data and self._descriptor < 0:
                 self._descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | BINARY, 0o666)
+                note_written(self.path)
                 sync_folder(self.path.parent)
             while done < len(data):
                 done += os.write(self._descriptor, data[done:])

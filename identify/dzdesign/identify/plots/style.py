@@ -1,5 +1,7 @@
 """One style for all plots: of `identify --plots`, of `assess --plots` and of the report."""
 
+import os
+import sys
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -57,9 +59,26 @@ def plot_style(**changes: object) -> Iterator[None]:
 
     A name may have letters that the font for measuring lacks.
     """
+    _import_matplotlib()
     from matplotlib import style
 
     own = {name.replace("__", "."): value for name, value in changes.items()}
     with style.context(["default", {**STYLE, **own}]), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
+
+
+def _import_matplotlib() -> None:
+    """Import matplotlib without the matplotlibrc of the working folder: recordings lie there, and it may be anything.
+
+    matplotlib looks there before all else, and no setting forbids that; one that is no text ends the import, and a pipe
+    holds it for ever. Rejected: another working folder meanwhile, into which other threads would write.
+    """
+    if "matplotlib" in sys.modules:
+        return
+    exists = os.path.exists
+    os.path.exists = lambda path: path != "matplotlibrc" and exists(path)
+    try:
+        import matplotlib  # noqa: F401
+    finally:
+        os.path.exists = exists
