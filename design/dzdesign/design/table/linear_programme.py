@@ -11,10 +11,12 @@ from dzdesign.core.errors import RequirementError
 
 if TYPE_CHECKING:
     import cvxpy as cp
-    from scipy.sparse import csc_array, csr_array
+    from scipy.sparse import csr_array
 
 #: Pressure codes between neighbouring nodes: a power of two, so that the firmware finds a node by a shift.
 STEP_CODES = 64
+#: Why SciPy's solver gives no nodes, by its status.
+NOT_SOLVED = {1: "limit of iterations", 2: "infeasible", 3: "unbounded"}
 
 
 def best_nodes(limit: np.ndarray, worth: np.ndarray, trend: str | None, last: int, top: float) -> list[float]:
@@ -44,9 +46,9 @@ def best_nodes(limit: np.ndarray, worth: np.ndarray, trend: str | None, last: in
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Programme:
-    """The programme as cvxpy translates it for HiGHS: ``rows @ x <= most``, the first `equal` rows equal to it."""
+    """The programme as cvxpy translates it: ``rows @ x <= most``, the first `equal` rows equal to it."""
 
-    rows: "csc_array"
+    rows: "csr_array"
     equal: int
     #: Largest values; of a limit the rows that have it, one for each code.
     most: np.ndarray
@@ -58,26 +60,22 @@ class _Programme:
         A simplex ends in a vertex: no interior-point fuzz to round away. It starts again: from the last valve's vertex
         it could end in another one, and a table would depend on what was designed before it.
         """
-        import highspy
+        from scipy.optimize import linprog
 
-        count, size = self.rows.shape
-        model, most = highspy.HighsLp(), self.most.copy()
+        most = self.most.copy()
         most[self.of_limit] = limit
-        model.num_row_, model.num_col_ = count, size
-        model.col_cost_, model.row_upper_ = -gain, most
-        model.row_lower_ = np.where(np.arange(count) < self.equal, most, -highspy.kHighsInf)
-        model.col_lower_, model.col_upper_ = np.full(size, -highspy.kHighsInf), np.full(size, highspy.kHighsInf)
-        model.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-        model.a_matrix_.start_, model.a_matrix_.index_ = self.rows.indptr, self.rows.indices
-        model.a_matrix_.value_ = self.rows.data
-        solver = highspy.Highs()  # type: ignore[no-untyped-call]
-        solver.setOptionValue("output_flag", False)
-        taken = solver.passModel(model), solver.run()  # a model that is refused leaves another one's status
-        status = solver.getModelStatus()
-        if set(taken) != {highspy.HighsStatus.kOk} or status != highspy.HighsModelStatus.kOptimal:
-            found = "model refused" if highspy.HighsStatus.kError in taken else status.name.removeprefix("k").lower()
-            raise RequirementError(f"no table of beta lies under the certified offset (solver: {found})")
-        return list(solver.getSolution().col_value)
+        rows, equal = self.rows, self.equal
+        try:
+            found = linprog(
+                -gain, A_ub=rows[equal:], b_ub=most[equal:], A_eq=rows[:equal] if equal else None,
+                b_eq=most[:equal] if equal else None, bounds=(None, None), method="highs-ds",
+            )  # fmt: skip
+            reason = "" if found.success else NOT_SOLVED.get(found.status, "numerical difficulties")
+        except ValueError:  # a limit that is no number
+            reason = "model refused"
+        if reason:
+            raise RequirementError(f"no table of beta lies under the certified offset (solver: {reason})")
+        return [float(node) for node in found.x]
 
 
 @lru_cache(maxsize=16)
@@ -97,14 +95,14 @@ def _programme(count: int, trend: str | None, last: int, top: float) -> _Program
     of_limit = np.argsort(moved, kind="stable")[-count:]
     if not np.array_equal(moved[of_limit], limit.value) or np.count_nonzero(moved) != count:
         raise RuntimeError("cvxpy states the limits of the table otherwise than row by row")
-    return _Programme(rows=data["A"].tocsc(), equal=data["dims"].zero, most=most, of_limit=of_limit)
+    return _Programme(rows=data["A"].tocsr(), equal=data["dims"].zero, most=most, of_limit=of_limit)
 
 
 def _translated(problem: "cp.Problem") -> dict[str, Any]:
-    """Return what cvxpy hands to HiGHS."""
+    """Return the cone form of the programme, whose rows are those that SciPy's simplex takes."""
     import cvxpy as cp
 
-    data: dict[str, Any] = problem.get_problem_data(cp.HIGHS)[0]
+    data: dict[str, Any] = problem.get_problem_data(cp.CLARABEL)[0]
     return data
 
 
