@@ -154,7 +154,7 @@ def test_a_wrong_controller_is_seen(fault):
 def test_a_controller_that_crashes_is_a_failure_and_not_the_end():
     core = current_texts(PLAIN)
     crash = "    if (set_point > 65530u) {\n        *(volatile uint32_t *)0 = 1u;\n    }\n"
-    begin = "    /* The set point, no faster than RATE."
+    begin = "    /* The set point, limited to RATE."
     assert core["dz_current.c"].count(begin) == 1
     core["dz_current.c"] = core["dz_current.c"].replace(begin, crash + begin)
     with pytest.raises(RequirementError, match="ended with"):
