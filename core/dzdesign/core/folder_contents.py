@@ -8,7 +8,7 @@ from typing import Any
 
 from dzdesign.core.documents import PIECE, family_of, sha256_of_file
 from dzdesign.core.errors import InputError
-from dzdesign.core.input_files import json_object, reason_of
+from dzdesign.core.input_files import MOST_DOCUMENT, json_object, reason_of
 
 #: File by which a folder is known as made by dzdesign, so that it may be made again.
 MANIFEST_NAME = "manifest.json"
@@ -35,7 +35,8 @@ def _is_name_inside(name: str) -> bool:
 def check_inside(folder: Path, names: Iterable[str], source: str) -> None:
     """Refuse names of files that lie outside their folder, also by way of a link, and what is not a regular file.
 
-    They are as a manifest gives them, `source` is who names them; one that is missing is no concern here.
+    They are as a manifest gives them, `source` is who names them; one that is missing is no concern here. A file that
+    is larger than any of dzdesign is refused too.
     """
     home = os.path.realpath(folder)
     for name in names:
@@ -52,6 +53,11 @@ def check_inside(folder: Path, names: Iterable[str], source: str) -> None:
             raise InputError(f"'{path}' is a link to a place outside of '{folder}'; put the file itself there")
         if not os.path.isfile(found):
             raise InputError(f"'{path}', which {source} names, is not a file; make the folder again")
+        if os.path.getsize(found) > MOST_DOCUMENT:  # whoever looks at it reads it whole
+            raise InputError(
+                f"'{path}' is larger than {MOST_DOCUMENT >> 20} MiB, which no file of dzdesign is; make the folder "
+                "again"
+            )
 
 
 def check_folder_is_ours(folder: Path, schema: str | None) -> None:
@@ -82,11 +88,15 @@ def refuse_to_replace_unknown(folder: Path, contents: Mapping[str, bytes]) -> No
     """Refuse to overwrite files of a folder whose manifest a power cut erased, unless they are erased or identical."""
     for name, data in contents.items():
         path = folder / name
-        if os.path.lexists(path) and not _is_erased(path) and (not path.is_file() or path.read_bytes() != data):
+        if os.path.lexists(path) and not _is_erased(path) and not _holds(path, data):
             raise InputError(
                 f"a power cut erased '{folder / MANIFEST_NAME}', so nobody knows who wrote '{path}'; "
                 "move that file away, or choose a new folder with -o"
             )
+
+
+def _holds(path: Path, data: bytes) -> bool:
+    return path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data
 
 
 def _refuse_to_lose(folder: Path, changed: set[str]) -> None:
@@ -101,7 +111,7 @@ def _changed_in(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
     """Yield the files of a folder that are there and not as dzdesign wrote them; a link is a person's, wherever to."""
     for name, digest in manifest["files"].items():
         path = folder / name
-        if path.is_symlink() or (path.is_file() and _digest(path) != digest):
+        if path.is_symlink() or (path.is_file() and digest_of(path) != digest):
             yield name
 
 
@@ -111,7 +121,8 @@ def board_of(manifest: Mapping[str, Any]) -> set[str]:
     return {name for name in board if isinstance(name, str)} if isinstance(board, list | tuple) else set()
 
 
-def _digest(path: Path) -> str:
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file of any size."""
     with open(path, "rb") as file:
         return sha256_of_file(file)
 

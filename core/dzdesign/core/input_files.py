@@ -71,16 +71,16 @@ def json_object(path: Path) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def check_address_space(what: str) -> None:
+def check_address_space(what: str, needed_MiB: int = NEEDED_MIB) -> None:
     """Refuse work for which this process is not given enough address space, as by ``ulimit -v``; `what` names it."""
     try:
         import resource
     except ImportError:  # Windows has no such limit
         return
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit != resource.RLIM_INFINITY and limit < NEEDED_MIB << 20:
+    if limit != resource.RLIM_INFINITY and limit < needed_MiB << 20:
         raise InputError(
-            f"{what} needs {NEEDED_MIB} MiB of address space, and this process is limited to {limit >> 20} MiB; raise "
+            f"{what} needs {needed_MiB} MiB of address space, and this process is limited to {limit >> 20} MiB; raise "
             "the limit (ulimit -v)"
         )
 

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
+from dzdesign.core.errors import InputError
+
 #: How the folders are called, in the system's folder for temporary files. A folder is hidden until its lock is held.
 PREFIX, HIDDEN = "dzdesign-run-", ".dzdesign-run-"
 #: A hidden folder of this age was left by a process that was killed before it held the lock.
@@ -56,6 +58,12 @@ def remove_scratch() -> None:
 
 
 def _made() -> Path:
+    try:
+        tempfile.gettempdir()
+    except FileNotFoundError as error:
+        raise InputError(
+            "no folder for temporary files can be written into; set TMPDIR to one that can, and make room there"
+        ) from error
     _remove_abandoned()
     if os.name != "posix":
         folder = Path(os.path.realpath(tempfile.mkdtemp(prefix=PREFIX)))

@@ -13,6 +13,8 @@ from dzdesign.core.errors import DzdesignError, RequirementError, clear_line
 
 #: What the system says of an output that takes no more: full, beyond a quota, closed, a device that fails.
 UNPRINTABLE = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EBADF, errno.EIO, errno.EFBIG)
+#: Address space in MiB below which the libraries of linear algebra end the process without a word of ours.
+LEAST_MIB = 580
 DOES_NOT_HOLD, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 
 
@@ -38,9 +40,11 @@ def main(argv: list[str] | None = None) -> int:
             return 0
         from dzdesign.command_line.invocation import parse
         from dzdesign.command_line.parser import command_module
+        from dzdesign.core.input_files import check_address_space
         from dzdesign.terminal.progress import reporting
 
         call = parse(argv)
+        check_address_space("dzdesign", LEAST_MIB)
         with reporting(quiet=call.quiet, verbose=call.verbose):
             status: int = command_module(call.command).run(call.arguments, call.json)
             sys.stdout.flush()  # what can't be printed is said here and not when Python ends
@@ -84,8 +88,19 @@ def _reason_in_the_system(error: Exception) -> str | None:
     if isinstance(error, MemoryError) or (isinstance(error, ImportError) and "failed to map" in str(error)):
         return "memory ran out; close other programs, or raise the limit (ulimit -v)"
     if isinstance(error, OSError) and error.errno in UNPRINTABLE and error.filename is None:
+        if _is_of_a_file(error):
+            return f"a temporary file can't be written: {error.strerror}; make room, or set TMPDIR to another folder"
         return f"the results can't be printed: {error.strerror}"
     return None
+
+
+def _is_of_a_file(error: OSError) -> bool:
+    """Tell whether an error without a name is of a file: nothing is printed by these modules."""
+    frame = error.__traceback__
+    while frame is not None and frame.tb_next is not None:
+        frame = frame.tb_next
+    module = "" if frame is None else str(frame.tb_frame.f_globals.get("__name__"))
+    return module.partition(".")[0] in ("pathlib", "shutil", "tempfile")
 
 
 def _what_was_written() -> str:

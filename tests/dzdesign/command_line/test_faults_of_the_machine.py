@@ -81,6 +81,21 @@ def test_too_little_memory_for_recordings(tmp_path):
     assert "address space" in sentence(done) and not list(tmp_path.iterdir())
 
 
+def test_too_little_memory_for_any_command(tmp_path):
+    """A library of linear algebra would end the process by itself, with status 1."""
+    for limit in (400_000, 100_000):
+        done = run(f"ulimit -v {limit}; '{DZDESIGN}' schema valve", tmp_path)
+        assert "address space" in sentence(done) and not done.stdout
+
+
+@pytest.mark.parametrize(("blocks", "said"), [(0, "no folder for temporary files"), (8, "a temporary file can't be")])
+def test_no_room_for_temporary_files(tmp_path, blocks, said):
+    done = run(
+        f"ulimit -f {blocks}; '{DZDESIGN}' simulate --dp '1 MPa' -o ramps", tmp_path, XDG_CACHE_HOME=str(tmp_path / "c")
+    )
+    assert said in sentence(done) and "TMPDIR" in sentence(done) and not (tmp_path / "ramps").exists()
+
+
 def test_a_compiler_that_is_no_command(tmp_path):
     assert "$CC" in run("dz doctor", tmp_path, CC='gcc "').stdout
 

@@ -1,11 +1,14 @@
 """What can't be looked at in a firmware folder is refused: of it nothing could be said to hold."""
 
 import os
+import shutil
+from pathlib import Path
 
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.verify.firmware.folder import check_firmware_inside
+from dzdesign.verify.firmware.folder import check_firmware_inside, read_firmware_manifest
+from dzdesign.verify.firmware.user_code import interference
 from tests.support.attacked_firmware import add
 
 
@@ -49,4 +52,34 @@ def test_a_name_that_is_no_text_is_refused(folder, place):
     except OSError:
         pytest.skip("this file system takes no such name")
     with pytest.raises(InputError, match=r"my\?\.c' has a name that is no text"):
+        check_firmware_inside(folder)
+
+
+def enlarge(path: Path, octets: int = 1 << 40) -> None:
+    """Make a file huge that takes no room on the disk."""
+    with open(path, "r+b" if path.exists() else "xb") as file:
+        file.truncate(octets)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="such a file takes room there")
+@pytest.mark.parametrize("name", ["core/dz_comp.c", "compensator.json", "f28335/README.md", "f28335/more.h"])
+def test_a_file_larger_than_any_of_dzdesign_is_refused_before_it_is_read(firmware_folder, tmp_path, name):
+    folder = tmp_path / "enlarged"
+    shutil.copytree(firmware_folder, folder)
+    enlarge(folder / name, 1 << 29)
+    with pytest.raises(InputError, match=f"{name}.* is larger than 16 MiB"):
+        read_firmware_manifest(folder)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="such a file takes room there")
+def test_a_huge_file_of_the_users_is_refused_before_it_is_read(tmp_path):
+    enlarge(tmp_path / "more.cmd")
+    with pytest.raises(InputError, match=r"more.cmd.* is larger than 16 MiB"):
+        list(interference(tmp_path, ["more.cmd"], {}, frozenset()))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="such a file takes room there")
+def test_a_huge_file_beside_is_refused_before_it_is_hashed(folder):
+    enlarge(folder / "board" / "image.elf")
+    with pytest.raises(InputError, match=r"image.elf' is larger than 1024 MiB"):
         check_firmware_inside(folder)

@@ -7,7 +7,7 @@ from pathlib import Path
 from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
-from dzdesign.core.input_files import reason_of
+from dzdesign.core.input_files import MOST_RECORDING, reason_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 
@@ -40,6 +40,8 @@ def _check_readable(folder: Path) -> None:
                 raise InputError(f"'{quotable(path)}' has a name that is no text in UTF-8; rename it, or take it away")
             if os.path.exists(path) and not os.access(path, os.R_OK):
                 raise InputError(f"'{path}' can't be read: no permission; change who may read it")
+            if os.path.isfile(path) and os.path.getsize(path) > MOST_RECORDING:  # each is hashed
+                raise InputError(f"'{path}' is larger than {MOST_RECORDING >> 20} MiB; take it out of the firmware")
 
 
 def quotable(path: str) -> str:

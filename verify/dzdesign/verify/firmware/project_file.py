@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from xml.etree import ElementTree
 
+from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import quoted
 from dzdesign.verify.firmware.build_inputs import SOURCES
 
@@ -34,7 +35,7 @@ def project_faults(path: Path, generated: str, firmware: Path) -> Iterator[str]:
         return
     builder = _PlainBuilder()
     try:
-        found = ElementTree.fromstring(path.read_bytes(), ElementTree.XMLParser(target=builder))
+        found = ElementTree.fromstring(read_bytes(path, "project"), ElementTree.XMLParser(target=builder))
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         yield f"it is not XML ({error})"
         return

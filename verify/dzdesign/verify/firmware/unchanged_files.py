@@ -2,8 +2,8 @@
 
 from pathlib import Path, PurePosixPath
 
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import and_more
+from dzdesign.core.folder_contents import digest_of
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
 from dzdesign.verify.firmware.build_inputs import is_built, is_source, is_taken_for, is_written_by_cmake
@@ -69,14 +69,14 @@ def changed_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
     return [
         name
         for name, digest in manifest.files.items()
-        if not (folder / name).is_file() or sha256_of((folder / name).read_bytes()) != digest
+        if not (folder / name).is_file() or digest_of(folder / name) != digest
     ]
 
 
 def differing_files(folder: Path, manifest: FirmwareManifest) -> dict[str, str]:
     """Return the SHA-256 of each file that was changed or added since it was generated: as it was verified."""
     names = sorted({*changed_files(folder, manifest), *added_files(folder, manifest)})
-    return {name: sha256_of((folder / name).read_bytes()) for name in names if (folder / name).is_file()}
+    return {name: digest_of(folder / name) for name in names if (folder / name).is_file()}
 
 
 def added_files(folder: Path, manifest: FirmwareManifest) -> list[str]:

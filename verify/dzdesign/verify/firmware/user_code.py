@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
+from dzdesign.core.artefact_files import read_bytes
 from dzdesign.verify.firmware.build_inputs import SOURCES
 
 #: Texts are kept: what looks like a comment in one is none.
@@ -58,12 +59,18 @@ def interference(folder: Path, names: list[str], generated: Mapping[str, str], b
         path = folder / name
         if not path.is_file():
             continue
-        text = _without_comments(path.read_text(encoding="utf-8", errors="replace"))
+        text = _without_comments(_text_of(path))
         before = _without_comments(generated.get(name, ""))
         yield from (f"{name} {fault}" for fault in _faults(path, text, before, used, functions))
         if path.suffix.lower() in LINKER_FILES:
             yield from (f"{name} {fault}" for fault in _unplaced(text, sections, entries))
         yield from (f"{name} includes {found}" for found in _odd_includes(path, text, folder))
+
+
+def _text_of(path: Path) -> str:
+    """Return a file's text, its lines ended alike; one that no person writes, so large is it, is refused."""
+    text = read_bytes(path, "file of the firmware").decode(errors="replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _faults(path: Path, text: str, before: str, used: set[str], functions: set[str]) -> Iterator[str]:
@@ -108,7 +115,7 @@ def _matches(pattern: str, sections: Iterable[str]) -> bool:
 def _entries(path: Path, before: str | None) -> Iterator[str]:
     """Yield the functions of a C or assembly file of the user's; of one as generated only that of a reset."""
     if path.suffix.lower() in C_FILES and path.is_file():
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = _text_of(path)
         defined = DEFINED.findall(_without_comments(text))
         yield from (name for pair in defined for name in pair if name and (text != before or name == RESET))
 

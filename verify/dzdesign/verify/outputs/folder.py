@@ -8,7 +8,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile, schema_of
 from dzdesign.core.documents import family_of
 from dzdesign.core.errors import and_more
-from dzdesign.core.folder_contents import manifest_of
+from dzdesign.core.folder_contents import digest_of, manifest_of
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify.firmware.folder import check_firmware_inside
@@ -42,7 +42,7 @@ def files_unchanged(folder: Path, manifest: OutputManifest) -> Check:
     changed = [
         name
         for name, digest in manifest.files.items()
-        if name not in there or sha256_of((folder / name).read_bytes()) != digest
+        if name not in there or digest_of(folder / name) != digest
     ]
     if changed:
         return FILES.check(holds=False, text=f"changed or missing: {and_more(changed, MOST_NAMED)}")
