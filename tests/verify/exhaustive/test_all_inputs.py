@@ -299,7 +299,7 @@ def test_an_int_of_16_bits_is_seen_on_the_avr_alone(tmp_path):
 
 
 def test_a_machine_that_is_not_here_is_not_passed(plain, monkeypatch):
-    monkeypatch.setattr(machines.shutil, "which", lambda _: None)
+    monkeypatch.setattr(machines, "find_program", lambda _: None)
     host = input_check_of(plain)
     checks = machine_code_checks(plain, (host,))
     assert [check.holds for check in checks] == [None, None]

@@ -1,1 +1,4 @@
-"""Toolchain: C sources enter; programs for the host, a Cortex-M4 in QEMU and an AVR in simavr leave."""
+"""Toolchain: C sources enter; programs for the host, a Cortex-M4 in QEMU and an AVR in simavr leave.
+
+So do C functions that are called as data. Whatever runs is a process of its own within limits.
+"""
