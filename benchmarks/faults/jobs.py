@@ -120,7 +120,7 @@ def _of_folders(folder: Path) -> list[Job]:
             inputs=(),
         ),
         Job(name="reproduce", old=(), new=("reproduce", "-o", "made"), units=("made",), inputs=()),
-        Job(name="demo", old=(), new=("demo", "made"), units=("made/firmware", "made/evidence"), inputs=()),
+        Job(name="demo", old=(), new=("demo", "made"), units=("made/firmware", "made/evidence", "made/example"), inputs=()),
     ]
 
 
