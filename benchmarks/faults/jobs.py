@@ -13,6 +13,8 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "host": (), "f28335": (), "f280049c": (), "cortex-m4": (), "avr": (), "iec61131": (),
     "fmu": ("--plant", "plant.toml"), "matlab": (), "amplifier": ("--device", "west"),
 }  # fmt: skip
+#: Folders that `demo` writes.
+DEMO = ("firmware", "evidence", "example")
 #: Commands that write something, but not whole: a recording grows line by line.
 LINE_BY_LINE = ("monitor",)
 
@@ -120,7 +122,7 @@ def _of_folders(folder: Path) -> list[Job]:
             inputs=(),
         ),
         Job(name="reproduce", old=(), new=("reproduce", "-o", "made"), units=("made",), inputs=()),
-        Job(name="demo", old=(), new=("demo", "made"), units=("made/firmware", "made/evidence", "made/example"), inputs=()),
+        Job(name="demo", old=(), new=("demo", "made"), units=tuple(f"made/{part}" for part in DEMO), inputs=()),
     ]
 
 
