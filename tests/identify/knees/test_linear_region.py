@@ -7,8 +7,9 @@ import pytest
 
 from dzdesign.identify.knees import linear_region as straight_part
 from dzdesign.identify.knees.prepared_tests import describe_tests
-from dzdesign.identify.knees.profile import crossing, flow_at_top
+from dzdesign.identify.knees.profile import crossing, flow_at_top, largest_flow, smooth_profile
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.branches import Branch
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -81,6 +82,18 @@ def test_drop_outs_do_not_lower_the_flow_at_full_command():
         for start, stop in zip(lost[::2], lost[1::2], strict=True):
             y[start:stop] = 0.0
         assert flow_at_top(u, y) == pytest.approx(5.0, abs=0.02)
+
+
+def test_the_largest_flow_is_that_which_flowed_where_the_valve_has_play():
+    """Falling, the spool stands still over the play: a line through the top of that branch ends above the flow."""
+    up, play = np.linspace(0.0, 10.0, 5000), 0.15
+    down = up[::-1]
+    spool_down = np.minimum(down + play, 10.0)
+    rising, falling = (np.clip(3.0 * (spool - 5.0), 0.0, None) for spool in (up, spool_down))
+    branches = (Branch(rising=True, u=up, q=rising, dp=None), Branch(rising=False, u=down, q=falling, dp=None))
+    assert flow_at_top(*smooth_profile(down, falling, 10.0)) > 15.2  # the fault that this is about
+    assert largest_flow(branches, 10.0) == pytest.approx(15.0, abs=0.01)
+    assert largest_flow((None, branches[1]), 10.0) >= 15.0
 
 
 class TestTables:

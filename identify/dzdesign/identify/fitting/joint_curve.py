@@ -158,7 +158,10 @@ def _solve(
 
 @dataclass(frozen=True, slots=True)
 class _LargestFlow:
-    """The largest flow at dP0, the mean of its branches, with its standard error, m³/s, and each branch's weight."""
+    """The largest flow at dP0, of the rising branch where there is one, with its standard error, m³/s.
+
+    `weights` are 1 for that branch, 0 for the others.
+    """
 
     flow: float
     flow_se: float
@@ -166,15 +169,10 @@ class _LargestFlow:
 
 
 def _largest_flow(placed: Sequence[tuple[int, int, BranchShape]], reference: int) -> _LargestFlow:
-    at_dp0 = [index for index, (row, _, _) in enumerate(placed) if row == reference]
-    weights = np.zeros(len(placed))
-    weights[at_dp0] = 1 / len(at_dp0)
-    shapes = [placed[index][2] for index in at_dp0]
-    return _LargestFlow(
-        flow=float(np.mean([shape.y_max for shape in shapes])),
-        flow_se=float(np.sqrt(sum(_top_error(shape) ** 2 for shape in shapes))) / len(shapes),
-        weights=weights,
-    )
+    of_dp0 = {column: index for index, (row, column, _) in enumerate(placed) if row == reference}
+    index = of_dp0[min(of_dp0)]  # a falling branch begins with the flat stretch of the hysteresis
+    shape = placed[index][2]
+    return _LargestFlow(flow=shape.y_max, flow_se=_top_error(shape), weights=np.eye(len(placed))[index])
 
 
 def _top_error(shape: BranchShape) -> float:

@@ -178,11 +178,12 @@ def _with_ramps_together(item: PooledTest, row: int, between: Sequence[BetweenRa
 def _describe(item: PooledTest, shapes: Iterator[BranchShape]) -> DescribedTest:
     """Put a test together; `shapes` gives those of its branches next."""
     rising, falling = (next(shapes) if branch else None for branch in item.branches)
+    first_branch = next(shape for shape in (rising, falling) if shape)  # as `largest_flow` has it
     return DescribedTest(
         test=item.test,
         dp=nominal_dp(item.test),
         shapes=(rising, falling),
-        q_max=max(flow_at_top(*shape.prepared.recorded) for shape in (rising, falling) if shape),
+        q_max=flow_at_top(*first_branch.prepared.recorded),
         ramps=item.ramps,
         when=item.when,
         files=item.files,

@@ -60,8 +60,13 @@ def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[f
 
 
 def largest_flow(branches: Sequence[Branch | None], u_max: float) -> float:
-    """Return the largest flow that a test's branches have as recorded, m³/s."""
-    return max(flow_at_top(*smooth_profile(branch.u, branch.q, u_max)) for branch in branches if branch)
+    """Return the largest flow of a test as recorded, m³/s: that of its first branch, the rising one where it has one.
+
+    A falling branch begins with a stretch as flat as the hysteresis is wide: a line through its top reads more than
+    flowed.
+    """
+    first = next(branch for branch in branches if branch)
+    return flow_at_top(*smooth_profile(first.u, first.q, u_max))
 
 
 def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:
