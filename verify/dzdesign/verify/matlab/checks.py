@@ -40,8 +40,8 @@ def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say
     except InputError as error:
         return OutputChecks(checks=(MATLAB_SUBSET.check(holds=False, text=str(error)),))
     lines, parts = sum(len(text.splitlines()) for text in functions.values()), sum(map(len, read.values()))
-    words = f"{lines} lines, {parts} functions that MATLAB and Octave interpret alike: integers, without loops, files "
-    "or eval"
+    words = f"{lines} lines, {parts} functions that MATLAB and Octave interpret alike: integers, without loops, "
+    words += "files or eval"
     found, tried = [MATLAB_SUBSET.check(holds=True, text=words)], []
     octave = available_octave()
     for sign, content in functions.items():
