@@ -172,7 +172,8 @@ def _lies_within(known: _Trace, time: np.ndarray) -> np.ndarray:
 def _in_both(known: _Trace, compared: _Trace, shift: float) -> np.ndarray:
     """Return the numbers of the samples with a large flow whose times the other one has too."""
     rows = compared.flowing
-    return rows[_lies_within(known, compared.time[rows] + shift)]
+    found: np.ndarray = rows[_lies_within(known, compared.time[rows] + shift)]
+    return found
 
 
 def _agrees(known: _Trace, compared: _Trace, shift: float | np.ndarray, rows: np.ndarray, channels: int) -> np.ndarray:
