@@ -203,16 +203,30 @@ def _refuse_unnamed(tests: list["RampTest"], declared: Table) -> None:
             )
 
 
-def refuse_copies(tests: Sequence["RampTest | LowFlowTable"]) -> None:
-    """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty."""
+def refuse_copies(recordings: Sequence["RampTest | LowFlowTable"]) -> None:
+    """Refuse a recording that is given twice: counting a copy as a repeat would understate the uncertainty.
+
+    The same file, or the same samples: see `copies`.
+    """
+    from dzdesign.identify.reading.copies import find_copy
+    from dzdesign.identify.reading.ramp_test import RampTest
+
     known: dict[str, str] = {}
-    for test in tests:
-        if test.sha256 in known:
+    for recording in recordings:
+        if recording.sha256 in known:
             raise InputError(
-                f"'{test.source}' is an exact copy of the recording '{known[test.sha256]}'; give it once "
+                f"'{recording.source}' is an exact copy of the recording '{known[recording.sha256]}'; give it once "
                 "(a repeated ramp test is welcome, a copy is no repetition)"
             )
-        known[test.sha256] = test.source
+        known[recording.sha256] = recording.source
+    tests = [recording for recording in recordings if isinstance(recording, RampTest)]
+    if copy := find_copy(tests):
+        raise InputError(
+            f"'{tests[copy.other].source}' is the recording '{tests[copy.one].source}', saved again: from "
+            f"{copy.from_s:.1f} to {copy.to_s:.1f} s, {copy.agree} of {copy.compared} samples with flow have the same "
+            "command, flow and pressure drop. Give it once. A repeated ramp test is welcome, but a copy is no "
+            "repetition, nor is a second run of a simulation without noise"
+        )
 
 
 def check_places(kind: "type[Artefact]", output: AnyPath | None, plots: AnyPath | None) -> None:

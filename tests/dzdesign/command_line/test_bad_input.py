@@ -148,6 +148,14 @@ def test_a_copy_is_no_repetition(refusal, bench):
     assert "'again.csv' is an exact copy of the recording 'a.csv'; give it once" in line
 
 
+def test_a_recording_that_was_saved_again_is_no_repetition(refusal, bench, wording):
+    """In another encoding, with other line ends, without its comments and with fewer decimals it has the same samples."""
+    lines = [line for line in (bench / "a.csv").read_text().splitlines() if not line.startswith("#")]
+    rows = [",".join(f"{float(cell):.3f}" for cell in line.split(",")) for line in lines[1:]]
+    (bench / "again.csv").write_bytes(b"\xef\xbb\xbf" + "\r\n".join([lines[0], *rows, ""]).encode())
+    wording("bad recordings: a copy that was saved again", refusal("identify", "a.csv", "again.csv"))
+
+
 def test_several_tests_without_pressure(refusal, bench):
     (bench / "c.csv").write_text(csv(ramp()[:, [0, 1, 3]], "time_s,u_V,Q_Lmin"))
     assert "'c.csv' has no column of dP" in refusal("identify", "a.csv", "c.csv")

@@ -104,6 +104,38 @@ class TestTolerance:
             IdentifyOptions(meter_lag=0.1, meter_lag_tolerance=-0.1)
 
 
+class TestOneRate:
+    """Ramps of one rate show neither whether a declared lag is right, nor whether a hysteresis is the valve's."""
+
+    @staticmethod
+    def warned(tests, code, **choices):
+        valve = identify(tests, IdentifyOptions(repeatability=0.0, **choices))
+        return [warning for warning in valve.warnings if warning.code == code]
+
+    def test_a_wide_hysteresis_may_be_the_lag(self, wording):
+        """The meter lags by 0.5 s, and 0.1 s are declared: half of the difference is the meter's."""
+        fast = recordings(0.5, seconds=50.0)
+        (warning,) = self.warned(fast, "hysteresis", meter_lag=0.1)
+        wording("meter lag: a hysteresis on ramps of one rate", warning.text)
+
+    def test_on_ramps_of_two_rates_it_is_the_valve(self, wording):
+        both = recordings(0.0, seconds=100.0, opening=5.6) + recordings(0.0, seconds=50.0, opening=5.6)
+        (warning,) = self.warned(both, "hysteresis", meter_lag=0.0)
+        wording("meter lag: a hysteresis on ramps of two rates", warning.text)
+
+    @pytest.mark.parametrize(
+        ("seconds", "lag", "said"),
+        [((50.0,), 0.1, True), ((100.0,), 0.1, False), ((50.0,), 0.0, False), ((100.0, 50.0), 0.1, False)],
+        ids=["it matters", "it is small", "none is declared to matter", "two rates check it"],
+    )
+    def test_a_declared_lag_that_nothing_checks_is_said_where_it_matters(self, seconds, lag, said, wording):
+        tests = [test for each in seconds for test in recordings(0.1, seconds=each)]
+        warnings = self.warned(tests, "lag-unchecked", meter_lag=lag)
+        assert bool(warnings) is said
+        for warning in warnings:
+            wording("meter lag: a declared one that nothing checks", warning.text)
+
+
 class TestContradiction:
     def test_two_rates_that_show_another_lag_are_said_and_the_bounds_allow_for_both(self):
         tests = recordings(0.1, seconds=100.0) + recordings(0.1, seconds=20.0)

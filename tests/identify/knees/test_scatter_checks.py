@@ -21,6 +21,7 @@ from tests.identify.knees.test_between_ramps import (
     shuffled,
     side_of,
 )
+from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
 TESTS, NOISE_SE = 4, 1e-3
 
@@ -167,6 +168,65 @@ class TestOutlyingRamp:
         taken = series(self.ORDER, scatter=0.003, seed=14)
         taken.tests[4] = moved(taken.tests[4], 0.08)
         assert not self.warned(taken.tests)
+
+
+class TestAlikeRepeats:
+    """Repeats that were made from one another, and benches on which true repeats are nearly the same."""
+
+    ORDER = shuffled(17)
+
+    @staticmethod
+    def means(test, count=2):
+        """Return a recording that another logger, or a script, made of this one: means of so many rows."""
+        whole = test.u.size // count * count
+        averaged = {
+            name: getattr(test, name)[:whole].reshape(-1, count).mean(axis=1) for name in ("time", "u", "q", "dp")
+        }
+        return replace(test, **averaged)
+
+    def copies(self):
+        """Return one recording at each pressure drop, and two that were made from it."""
+        first = series(tuple(range(len(PRESSURES))), scatter=0.02, seed=17, dated=False).tests
+        made = [(test, self.means(test), self.means(test, 3)) for test in first]
+        every = [each for group in made for each in group]
+        return [replace(test, source=f"ramp{place}.csv", sha256=f"{place:064d}") for place, test in enumerate(every)]
+
+    def test_copies_with_other_samples_are_said(self, wording):
+        (warning,) = warned(self.copies(), "alike-repeats")
+        wording("between ramps: alike", warning.text)
+        assert warning.source.startswith("ramp")
+
+    def test_the_check_that_is_off_is_seen(self, monkeypatch):
+        monkeypatch.setattr(scatter_checks, "AS_ALIKE", 0.0)
+        assert not warned(self.copies(), "alike-repeats")
+
+    @pytest.mark.parametrize("repeats", [2, 3, 6])
+    def test_true_repeats_are_as_alike_once_in_a_thousand_series(self, repeats):
+        """The valve itself scatters not at all: nothing but the noise, of another size at each pressure drop."""
+        rng, count, found_alike = np.random.default_rng(repeats), 5000, 0
+        order = np.repeat(np.arange(TESTS), repeats)
+        least = np.array([8e-3, 3e-3, 1e-3, 0.5e-3])[order] ** 2
+        design = (order[:, None] == np.arange(TESTS)).astype(float)
+        for _ in range(count):
+            knees = np.sqrt(least) * rng.standard_normal(order.size)
+            residual = knees - design @ np.linalg.lstsq(design, knees, rcond=None)[0]
+            found_alike += scatter_checks.find_alike_repeats(residual, design, order, least) is not None
+        assert found_alike <= binom.isf(1e-4, count, scatter_checks.AS_ALIKE)
+
+    @pytest.mark.parametrize(
+        ("noise", "step", "ripple"),
+        [(0.0, 0.0147, 0.0), (0.0, 0.1, 0.0), (0.03, 0.06, 0.0), (0.1, 0.05, 0.0), (0.05, 0.0, 0.5), (0.0, 0.0, 0.0)],
+        ids=["no noise, 12 bits", "no noise, coarse", "half a step", "two steps", "a pump's ripple", "no noise at all"],
+    )
+    def test_repeats_of_a_quiet_bench_are_not_said(self, noise, step, ripple):
+        rng, tests = np.random.default_rng(18), []
+        for place, dp in enumerate(PRESSURES * 3):
+            truth = Truth(knee_rising=5.4 + 2e-4 * rng.standard_normal(), slope=4 * dp**0.5, noise=noise)
+            test = synthetic_ramp(dp, truth, seed=place, rate_Hz=20.0, ramp_s=20.0)
+            q = test.q + ripple * L_MIN * np.sin(2 * np.pi * (9.0 * test.time + rng.uniform()))
+            q = np.round(q / L_MIN / step) * step * L_MIN if step else q
+            tests.append(replace(test, q=q, source=f"ramp{place}.csv", sha256=f"{place:064d}"))
+        assert not warned(tests, "alike-repeats")
 
 
 class TestSerialScatter:

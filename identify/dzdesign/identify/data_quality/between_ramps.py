@@ -41,7 +41,11 @@ def _about_premises(
     found: Repeatability, checks: ScatterChecks, tests: Sequence[DescribedTest], u_max: float
 ) -> Iterator[Finding]:
     """Yield what the repeats say against a scatter that is normal, alike at all pressure drops, and independent."""
-    largest, outlying = checks.largest, checks.outlying
+    largest, outlying, alike = checks.largest, checks.outlying, checks.alike
+    if alike:
+        where = "at all pressure drops together, and most of all here," if alike.everywhere else "here"
+        sd = {"sd_mV": 1e3 * alike.sd, "noise_mV": 1e3 * alike.of_noise}
+        yield warn("alike-repeats", tests[alike.test].test.source, where=where, **sd)
     if largest and found.origin == "repeats":
         yield warn(
             "unequal-scatter",

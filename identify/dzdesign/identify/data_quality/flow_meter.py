@@ -13,6 +13,8 @@ from dzdesign.identify.valve.side_model import PROMISED, SideModel
 
 #: Shift of the knees by the meter's lag, over u_max, above which a tenth of it matters.
 LARGE_LAG = 1e-2
+#: The same, above which a declared lag is not to be taken unchecked.
+NOTED_LAG = 1.5e-3
 #: Lag that a flow meter without a word about it may well have, s.
 LIKELY_LAG = 0.1
 #: Half a step of the flow, as a shift of the threshold over u_max, above which it matters whether it was cut off.
@@ -114,6 +116,9 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
     elif fastest * lag.seconds > LARGE_LAG * options.u_max:
         shift_mV = 1e3 * fastest * lag.seconds
         yield warn("lag-large", lag_s=lag.seconds, shift_mV=shift_mV, rate_V_s=fastest, tenth_mV=0.1 * shift_mV)
+    if lag.origin == "declared" and not lag.seen_by_rates and fastest * lag.seconds > NOTED_LAG * options.u_max:
+        shift_mV, tolerance_mV = 1e3 * fastest * lag.seconds, 1e3 * fastest * lag.shorter
+        yield warn("lag-unchecked", lag_s=lag.seconds, shift_mV=shift_mV, rate_V_s=fastest, tolerance_mV=tolerance_mV)
     if lag.contradicted_by is not None:
         found, se = lag.contradicted_by
         yield warn("lag-contradicted", None, "rates", lag_s=lag.seconds, found_s=found, se_s=se)

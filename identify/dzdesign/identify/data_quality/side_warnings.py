@@ -62,7 +62,7 @@ def find_warnings(
             for test in side.tests
             if test.spool_ripple_V > 0
         ),
-        *_about_hysteresis(side, options.u_max),
+        *_about_hysteresis(side, group, options.u_max),
         *about_flow_gains(side.tests),
         *_about_pressure(side, group.tests),
         *about_sweeps(side, group.tests, options.u_max),
@@ -93,11 +93,20 @@ def _checks(side: SideModel, group: DescribedTests) -> ScatterChecks:
     return group.between(1 if side.certificate.guard == "closing" else 0).checks
 
 
-def _about_hysteresis(side: SideModel, u_max: float) -> Iterator[Finding]:
-    for test in side.tests:
-        gap = (test.u_knee_rising_V or 0.0) - (test.u_knee_falling_V or math.inf)
-        if gap > WIDE_HYSTERESIS * u_max:
-            yield warn("hysteresis", test.source, gap_mV=1e3 * gap, percent=100 * gap / u_max)
+def _about_hysteresis(side: SideModel, group: DescribedTests, u_max: float) -> Iterator[Finding]:
+    """Say of a wide hysteresis whether it may be the meter's lag: on ramps of one rate both look alike."""
+    gaps = [(test.u_knee_rising_V or 0.0) - (test.u_knee_falling_V or math.inf) for test in side.tests]
+    widest = int(np.argmax(gaps))
+    if gaps[widest] <= WIDE_HYSTERESIS * u_max:
+        return
+    wide = sum(gap > WIDE_HYSTERESIS * u_max for gap in gaps)
+    numbers = {"gap_mV": 1e3 * gaps[widest], "percent": 100 * gaps[widest] / u_max, "count": wide, "tests": len(gaps)}
+    both = float(group.rates(0)[widest] + group.rates(1)[widest])
+    if group.lag.seen_by_rates or not both > 0:
+        yield warn("hysteresis", side.tests[widest].source, "rates", **numbers)
+    else:
+        lag = {"longer_s": gaps[widest] / both, "lag_s": group.lag.seconds}
+        yield warn("hysteresis", side.tests[widest].source, "one-rate", **lag, **numbers)
 
 
 def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterator[Finding]:

@@ -22,7 +22,8 @@ import numpy as np
 
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.gated_line import fit_line
-from dzdesign.identify.knees.scatter_checks import ScatterChecks, check_scatter
+from dzdesign.identify.knees.least_noise import least_noise, least_step
+from dzdesign.identify.knees.scatter_checks import ScatterChecks, check_scatter, find_alike_repeats
 from dzdesign.identify.valve.repeatability import NoDrift, Origin
 
 #: Standard deviation of the thresholds from ramp to ramp, over u_max, taken where nothing tells it: data sheets of
@@ -171,6 +172,8 @@ class RampKnees:
     noise: np.ndarray
     #: When it was recorded, s on a clock common to all; NaN where that is not known.
     when: np.ndarray
+    #: Variance that the noise gives each knee at least, V²; 0, or no array, where it is not known.
+    least: np.ndarray | None = None
 
 
 def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
@@ -212,6 +215,7 @@ def pool_scatter(known: RampKnees, counts: Sequence[int], *, declared: float | N
     measured = origin == "repeats"
     least = known.noise + (FINEST * u_max) ** 2
     checks = check_scatter(residual, design, known.test, known.number, least, known.when)
+    checks = replace(checks, alike=find_alike_repeats(residual, design, known.test, known.least))
     sd = math.sqrt(squares / degrees) if measured else ASSUMED_REPEATABILITY * u_max if declared is None else declared
     rows = told if no_drift else np.ones(count + 1, dtype=bool)
     # A test without a ramp that tells its knee counts as one ramp.
@@ -250,7 +254,7 @@ def knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float]
     told: list[tuple[float, ...]] = []
     for test, (shape, times) in enumerate(zip(shapes, when, strict=True)):
         branch, seen = shape.prepared.branch, shape.line.kept & ~shape.line.censored
-        width = float(np.ptp(branch.u[seen]))
+        width, step = float(np.ptp(branch.u[seen])), least_step(branch.q)
         for number, part in enumerate(branch.ramps):
             u, y = branch.u[part][seen[part]], shape.prepared.y[part][seen[part]]
             if u.size < RAMP_SAMPLES or np.ptp(u) < RAMP_SPAN * width:
@@ -260,8 +264,9 @@ def knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float]
                 continue
             lever = 1 / u.size + (u.mean() - knee) ** 2 / float(np.sum((u - u.mean()) ** 2))
             noise = (shape.sigma / slope) ** 2 * lever * shape.variance_inflation
-            told.append((test, number, knee, noise, times[number]))
-    columns = np.array(told).reshape(-1, 5).T
+            at_least = least_noise(branch.q[part][seen[part]], step) / slope**2 * lever
+            told.append((test, number, knee, noise, times[number], at_least))
+    columns = np.array(told).reshape(-1, 6).T
     return RampKnees(*columns[:2].astype(int), *columns[2:])
 
 

@@ -53,6 +53,8 @@ class MeterLag:
     shorter: float
     #: What ramps of two rates tell, and its standard error, s, where that contradicts the declared one.
     contradicted_by: tuple[float, float] | None = None
+    #: Whether ramps of two rates tell the lag well enough to check one that was declared.
+    seen_by_rates: bool = False
 
     def shift_at(self, rates: np.ndarray, *, rising: bool) -> np.ndarray:
         """Return by how much knees, at ramps of such rates (V/s), may be too high, V; an unknown rate (NaN) tells 0."""
@@ -81,6 +83,7 @@ def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
         origin="identified",
         longer=max(seconds - taken, 0.0) + LAG_ERRORS * se,
         shorter=min(taken, LAG_ERRORS * se),
+        seen_by_rates=True,
     )
 
 
@@ -116,6 +119,7 @@ def _declared(seconds: float, stated: float | None, left: tuple[float, float] | 
         longer=longer,
         shorter=min(shorter, seconds),  # no meter runs ahead of the flow
         contradicted_by=contradicted_by,
+        seen_by_rates=left is not None,
     )
 
 

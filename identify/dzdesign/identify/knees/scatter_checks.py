@@ -11,6 +11,8 @@ import numpy as np
 
 #: Probability, under the premise, of what the ramps show, below which the premise is refused.
 REFUSED = 0.01
+#: Probability with which true repeats are as alike as copies are.
+AS_ALIKE = 1e-3
 #: Fewest degrees of freedom in which neighbouring ramps can be told to be alike.
 FEWEST_IN_A_ROW = 4
 #: Degrees of freedom below the one, and squares over those of the noise below the other, are rounding.
@@ -42,6 +44,18 @@ class OutlyingRamp:
     ratio: float
 
 
+@dataclass(frozen=True, slots=True)
+class AlikeRepeats:
+    """Repeats that scatter less than the meter's noise makes possible: copies, or one recording twice."""
+
+    #: Test whose repeats are the most alike, from 0, and whether it is that one or all tests together.
+    test: int
+    everywhere: bool
+    #: Standard deviation of the knees, V, and what the noise alone gives them at least.
+    sd: float
+    of_noise: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScatterChecks:
     """What the ramps of one branch say against the premises; None where they don't."""
@@ -50,6 +64,7 @@ class ScatterChecks:
     outlying: OutlyingRamp | None
     #: Correlation of neighbouring ramps.
     serial: float | None
+    alike: AlikeRepeats | None = None
 
 
 def check_scatter(
@@ -82,6 +97,35 @@ def check_scatter(
         outlying=_find_outlying_ramp(residual, free, test, number),
         serial=_serial_correlation(residual, basis, when) if np.isfinite(when).all() else None,
     )
+
+
+def find_alike_repeats(
+    residual: np.ndarray, design: np.ndarray, test: np.ndarray, least: np.ndarray | None
+) -> AlikeRepeats | None:
+    """Return repeats whose residuals are smaller than their noise makes likely, at one pressure drop or at all of them.
+
+    Whatever the valve does, the knees of true repeats scatter by their noise at least (R,): the sum of squares over it
+    has at least a chi-squared distribution. Of true repeats one series in 1 / `AS_ALIKE` is found, Bonferroni over the
+    pressure drops and all together. Where the noise of a ramp is not known nothing is said.
+    """
+    from scipy.special import gammainc
+
+    if least is None or residual.size <= design.shape[1] or not (least > 0).all():
+        return None
+    free = 1 - np.sum(np.linalg.qr(design)[0] ** 2, axis=1)
+    groups = [np.flatnonzero(test == one) for one in np.unique(test)]
+    groups = [group for group in groups if free[group].sum() > 1 - NO_DEGREES]
+    found = []
+    for group in [*groups, np.arange(test.size)]:
+        degrees = float(free[group].sum())
+        chance = float(gammainc(degrees / 2, float(np.sum(residual[group] ** 2 / least[group])) / 2))
+        sd = math.sqrt(float(residual[group] @ residual[group]) / degrees)
+        found.append((chance * (len(groups) + 1), sd, math.sqrt(float(least[group].mean()))))
+    if not groups or min(found)[0] > AS_ALIKE:
+        return None
+    most = min(range(len(groups)), key=lambda place: found[place])
+    everywhere = found[-1][0] <= found[most][0]
+    return AlikeRepeats(int(test[groups[most][0]]), everywhere, *found[-1 if everywhere else most][1:])
 
 
 def _find_largest_scatter(
