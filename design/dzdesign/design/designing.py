@@ -20,6 +20,7 @@ from dzdesign.design.costs import costs_of
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.bench_current import check_bench_current
+from dzdesign.design.negative_drop import with_negative_drop
 from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.offset.opening import opening_ceiling, opening_offset
 from dzdesign.design.offset.refusals import refuse_crossed_branches, refuse_two_signs
@@ -63,15 +64,16 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
 
 
 def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | None) -> Compensator:
-    signals = options.signals
     law(options.law)
+    if len(options.signals.signs) == 2:
+        refuse_two_signs(valve, options.guard)
+        options = with_negative_drop(valve, options)
+    signals = options.signals
     u_max = _full_command(valve, options)
     if options.current is not None and (machine := options.machine) is not None:
         check_bench_current(valve, options.current.circuit.rated_A, machine.bench_full_A)
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
-    if len(signals.signs) == 2:
-        refuse_two_signs(valve, options.guard)
     functions = options.drive_functions(transition_codes)
     dither = functions.dither(signals)
     dither.check(valve.dither)

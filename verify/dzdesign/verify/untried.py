@@ -11,6 +11,7 @@ from dzdesign.verify.requirements import (
     OPTIONAL,
     OWN_PLANT,
     POPULATION,
+    PRESSURE_INPUTS,
     SERIES,
     Requirement,
 )
@@ -40,6 +41,8 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         untried.append(POPULATION)
     if evidence.monte_carlo is None:
         untried.append(SERIES)
+    if len(evidence.inputs) > 1 and PRESSURE_INPUTS.id not in tried:
+        untried.append(PRESSURE_INPUTS)
     optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())
     return tuple(untried + [each for each in optional if each.id not in tried])
 
