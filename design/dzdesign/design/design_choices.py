@@ -71,8 +71,8 @@ class DesignChoices(MachineChoices, CurrentChoices):
     """Signal of the sensor downstream of the metering edge (default: as upstream)."""
     negative_dp: Annotated[Text, Option("D", CONNECTIONS, "recorded", choices=NEGATIVE_DP)] = None
     """Pressure drop at negative commands, of the two pressure inputs. recorded: as the recordings show it, and same if
-    they do not. same: A minus B, as at positive commands. swapped: B minus A. wired: the machine switches the inputs, so
-    that A minus B is the metering drop at both signs."""
+    they do not. same: A minus B, as at positive commands. swapped: B minus A. wired: the machine switches the inputs,
+    so that A minus B is the metering drop at both signs."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None

@@ -1,7 +1,7 @@
 """Which pressure input is the one ahead at negative commands: as the recordings show it, or as the engineer declares.
 
-The firmware has two pressure inputs, and their wires stay where they are. At positive commands A minus B is the pressure
-drop. At negative ones the same two sensors give A minus B or B minus A, and no other drop.
+The firmware has two pressure inputs, and their wires stay where they are. At positive commands A minus B is the
+pressure drop. At negative ones the same two sensors give A minus B or B minus A, and no other drop.
 """
 
 from dataclasses import replace
@@ -14,8 +14,8 @@ from dzdesign.identify.reading.metering_edge import TWO_SENSORS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.recorded_drop import RecordedDrop
 
-#: What recordings of both sides say: the drop of negative commands is A minus B, B minus A, that of other ports than the
-#: two of positive commands, or nothing. A dP that is above zero on both sides may be a magnitude.
+#: What recordings of both sides say: the drop of negative commands is A minus B, B minus A, that of other ports than
+#: the two of positive commands, or nothing. A dP that is above zero on both sides may be a magnitude.
 Shown = Literal["same", "swapped", "other ports", "nothing"]
 IN_WORDS = {"same": "A minus B", "swapped": "B minus A"}
 
@@ -49,16 +49,18 @@ def with_negative_drop(valve: ValveModel, options: DesignOptions) -> DesignOptio
     positive, negative = (_recorded(valve, name) for name in ("positive", "negative"))
     if shown == "other ports":
         raise InputError(
-            f"the pressure drop was recorded as {positive} at positive commands and as {negative} at negative ones. No "
-            "fixed wiring of the firmware's two pressure inputs gives both, and three are not supported. Design one side "
-            "alone, by a --command-signal of one sign, or give --negative-dp wired if the machine switches the inputs"
+            f"the pressure drop was recorded as {positive} at positive commands and as {negative} at negative ones. "
+            "No fixed wiring of the firmware's two pressure inputs gives both, and three are not supported. Design one "
+            "side alone, by a --command-signal of one sign, or give --negative-dp wired if the machine switches the "
+            "inputs"
         )
     if declared == "recorded":
         return replace(options, signals=replace(signals, swapped=shown == "swapped"))
     if shown not in (declared, "nothing"):
         raise InputError(
-            f"--negative-dp {declared} is {IN_WORDS[declared]}, but the recordings have {negative} at negative commands, "
-            f"which is {IN_WORDS[shown]}; leave it out, or give --negative-dp wired if the machine switches the inputs"
+            f"--negative-dp {declared} is {IN_WORDS[declared]}, but the recordings have {negative} at negative "
+            f"commands, which is {IN_WORDS[shown]}; leave it out, or give --negative-dp wired if the machine switches "
+            "the inputs"
         )
     return replace(options, signals=replace(signals, swapped=declared == "swapped"))
 
@@ -72,7 +74,7 @@ def wiring_in_words(compensator: Compensator) -> list[str]:
 
 
 def negative_drop_in_words(compensator: Compensator) -> str:
-    """Say how the pressure drop of negative commands comes of the inputs, and why; nothing for a command of one sign."""
+    """Say how the pressure drop of negative commands comes of the inputs, and why; nothing for one sign."""
     if compensator.negative is None:
         return ""
     drop = IN_WORDS["swapped" if compensator.signals.swapped else "same"]
@@ -85,7 +87,8 @@ def input_columns(compensator: Compensator) -> tuple[str, str] | None:
     drop = compensator.valve.sides["positive"].recorded_drop
     if drop is None or len(drop.ways) != 1 or len(drop.columns[0].labels) != 2:
         return None
-    ahead, behind = (" or ".join(dict.fromkeys(labels)) for labels in zip(*(each.labels for each in drop.columns), strict=True))
+    of_each = zip(*(each.labels for each in drop.columns), strict=True)
+    ahead, behind = (" or ".join(dict.fromkeys(labels)) for labels in of_each)
     return ahead, behind
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.requirements import (
     ALWAYS,
@@ -45,6 +46,11 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         untried.append(PRESSURE_INPUTS)
     optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())
     return tuple(untried + [each for each in optional if each.id not in tried])
+
+
+def label_of_untried(requirement: Requirement) -> str:
+    """Return the words for a requirement that was not tried: only what every `verify` checks was to be."""
+    return NOT_CHECKED if requirement.id in {each.id for each in ALWAYS} else NOT_ASKED_FOR
 
 
 def not_tried(evidence: Evidence) -> tuple[str, ...]:

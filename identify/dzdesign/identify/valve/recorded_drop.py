@@ -61,7 +61,7 @@ class RecordedDrop:
 
     columns: Annotated[
         tuple[DropColumns, ...],
-        Meta(description="Columns that make the pressure drop; several entries if the recordings differ.", min_length=1),
+        Meta(description="Columns that make the pressure drop; several if the recordings differ.", min_length=1),
     ]
     sign: Annotated[
         DropSign,
