@@ -20,12 +20,12 @@ from dzdesign.design.costs import costs_of
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.bench_current import check_bench_current
-from dzdesign.design.negative_drop import with_negative_drop
 from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.offset.opening import opening_ceiling, opening_offset
 from dzdesign.design.offset.refusals import refuse_crossed_branches, refuse_two_signs
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
+from dzdesign.design.pressure_inputs.negative_drop import with_negative_drop
 from dzdesign.design.quantise import Units, finest_units, fits
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES, Signals

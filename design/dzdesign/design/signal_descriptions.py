@@ -1,7 +1,7 @@
 """The codes of a compensator in words, and the wire failures that they do not reveal."""
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.negative_drop import wiring_in_words
+from dzdesign.design.pressure_inputs.negative_drop import wiring_in_words
 from dzdesign.design.signals import PressureSignal, Signals
 
 

@@ -1,7 +1,7 @@
 """What the verdict on a compensator's outputs does not cover, whatever its requirements say."""
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.negative_drop import is_wired, shown_direction
+from dzdesign.design.pressure_inputs.negative_drop import is_wired, shown_direction
 
 
 def not_covered(compensator: Compensator) -> tuple[str, ...]:
