@@ -14,12 +14,13 @@ from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError, and_more, one_line, quoted
 from dzdesign.core.options import Paths
 from dzdesign.core.value_differences import differences
-from dzdesign.stages.identify import IdentifyArguments, identify_again, stated_options
+from dzdesign.stages.identify import IdentifyArguments, identify_again, read_again, stated_options
 from dzdesign.stages.recordings import expand
 
 if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
+    from dzdesign.verify.exhaustive.recorded_inputs import Answers
     from dzdesign.verify.requirements import Check
 
 #: valve.json has seven decimals: on another machine the last one may differ. Of a larger number the same share.
@@ -91,6 +92,29 @@ def identified_again(
     if others := len(compensator.lot) - 1 if compensator.lot else 0:
         text += f"; of the lot's other {others} valves {AS_STATED}"
     return _check(holds=True, text=text)
+
+
+def inputs_again(compensator: "Compensator", given: GivenFiles, answers: "Answers | None" = None) -> "list[Check]":
+    """Tell whether the pressure inputs of a compensator for both signs, wired as recorded, give the recorded drop.
+
+    `answers` calls the firmware. Without it the exact law answers, to which another output was compared.
+    """
+    from dzdesign.verify.exhaustive.recorded_inputs import recorded_inputs_follow
+    from dzdesign.verify.exhaustive.stored_vectors import exact_answers
+    from dzdesign.verify.requirements import PRESSURE_INPUTS
+
+    valve = compensator.valve
+    if compensator.negative is None:
+        return []
+    stated = {each.sha256: each.source for each in valve.made_from}
+    if set(stated) != set(given.paths) or valve.options is None:
+        return [PRESSURE_INPUTS.check(holds=None, text="--ramps are not the files that valve.json was made from")]
+    files = {each.source: given.paths[each.sha256] for each in valve.made_from}
+    try:
+        tests = read_again(valve.options, files).tests
+    except InputError as error:
+        return [PRESSURE_INPUTS.check(holds=False, text=one_line(f"the recordings can't be read: {error}"))]
+    return [recorded_inputs_follow(compensator, tests, answers or exact_answers(compensator))]
 
 
 def _check(*, holds: bool | None, text: str) -> "Check":

@@ -7,8 +7,9 @@ voltage is that at the converter's pin, behind them.
 from dataclasses import dataclass
 from fractions import Fraction
 
-from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.errors import one_line
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.pressure_inputs.negative_drop import input_columns, negative_drop_in_words
 from dzdesign.design.signals import CommandSignal, PressureSignal
 from dzdesign.design.target_inputs import Converter
 
@@ -66,6 +67,8 @@ class PressureWiring:
     """One pressure sensor, at no pressure and at its full span."""
 
     name: str
+    #: Column of the recordings that it stands for; empty where none does.
+    recorded: str
     signal: PressureSignal
     zero: PinReading
     full: PinReading
@@ -100,6 +103,8 @@ class Wiring:
     no_voltage: str
     no_voltage_drives: bool
     pressures: tuple[PressureWiring, ...]
+    #: How the pressure drop of negative commands comes of the inputs; empty for a command of one sign.
+    negative_drop: str
     #: With current control alone.
     current: CurrentWiring | None
 
@@ -117,9 +122,10 @@ def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
         no_voltage=_no_voltage(command, signals.signs),
         no_voltage_drives=any(command.from_zero(0, sign) for sign in signals.signs) and command.valid_codes[0] == 0,
         pressures=tuple(
-            _pressure(name, signal, converter, compensator.valve.recorded_units)
+            _pressure(name, signal, converter, compensator)
             for name, signal in (("A", signals.pressure_a), ("B", signals.pressure_b))
         ),
+        negative_drop=_in_a_table(negative_drop_in_words(compensator)).replace("negative", "Negative", 1),
         current=_current(compensator, converter),
     )
 
@@ -160,10 +166,17 @@ def _percent(share: Fraction) -> str:
     return f"{100 * float(share):.3g} %"
 
 
-def _pressure(name: str, signal: PressureSignal, converter: Converter, units: RecordedUnits) -> PressureWiring:
+def _in_a_table(text: str) -> str:
+    """Return a text, which may hold labels of recordings, as a cell of a Markdown table takes it."""
+    return one_line(text).replace("|", "\\|")
+
+
+def _pressure(name: str, signal: PressureSignal, converter: Converter, compensator: Compensator) -> PressureWiring:
+    units, columns = compensator.valve.recorded_units, dict(zip("AB", input_columns(compensator) or (), strict=False))
     zero, full = (PinReading(code=code, converter=converter) for code in (signal.zero_code, signal.full_code))
     return PressureWiring(
         name=name,
+        recorded=_in_a_table(columns.get(name, "")),
         signal=signal,
         zero=zero,
         full=full,

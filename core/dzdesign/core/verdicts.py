@@ -1,10 +1,12 @@
 """The words of a verdict, the same in the terminal, in the report and in every description of an artefact."""
 
 HOLDS, DOES_NOT_HOLD, NOT_CHECKED = "HOLDS", "DOES NOT HOLD", "NOT CHECKED"
+#: Of a check that is made on request: without one nothing is open.
+NOT_ASKED_FOR = "NOT ASKED FOR"
 
 
 def verdict_words(holds: bool | None) -> str:
-    """Return the words for a verdict; None means not checked.
+    """Return the words for a verdict; None: it was to be checked, and could not be.
 
     Examples
     --------

@@ -21,7 +21,9 @@ BELOW_DP0: tuple[BelowDp0, ...] = get_args(BelowDp0)
 #: What to do above the last tested pressure drop: hold its offset, lower it with the continued bound, or release it.
 Above = Literal["hold", "lower", "release"]
 ABOVE: tuple[Above, ...] = get_args(Above)
-POLARITIES, NEGATIVE_DP = ("normal", "inverted"), ("same", "swapped")
+POLARITIES = ("normal", "inverted")
+NegativeDp = Literal["recorded", "same", "swapped", "wired"]
+NEGATIVE_DP: tuple[NegativeDp, ...] = get_args(NegativeDp)
 HYSTERESIS = ("keep", "play")
 ON_OFF = ("on", "off")
 
@@ -67,8 +69,10 @@ class DesignChoices(MachineChoices, CurrentChoices):
     mA on a shunt that keeps 21 mA within the converter's range, 140 ohm for 3 V."""
     pressure_b: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
     """Signal of the sensor downstream of the metering edge (default: as upstream)."""
-    negative_dp: Annotated[Text, Option("D", CONNECTIONS, "same", choices=NEGATIVE_DP)] = None
-    """Pressure drop at negative commands. same: A minus B, as at positive commands. swapped: B minus A."""
+    negative_dp: Annotated[Text, Option("D", CONNECTIONS, "recorded", choices=NEGATIVE_DP)] = None
+    """Pressure drop at negative commands, of the two pressure inputs. recorded: as the recordings show it, and same if
+    they do not. same: A minus B, as at positive commands. swapped: B minus A. wired: the machine switches the inputs,
+    so that A minus B is the metering drop at both signs."""
     ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
     ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None

@@ -25,6 +25,7 @@ from dzdesign.design.offset.opening import opening_ceiling, opening_offset
 from dzdesign.design.offset.refusals import refuse_crossed_branches, refuse_two_signs
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
+from dzdesign.design.pressure_inputs.negative_drop import with_negative_drop
 from dzdesign.design.quantise import Units, finest_units, fits
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES, Signals
@@ -63,15 +64,16 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
 
 
 def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | None) -> Compensator:
-    signals = options.signals
     law(options.law)
+    if len(options.signals.signs) == 2:
+        refuse_two_signs(valve, options.guard)
+        options = with_negative_drop(valve, options)
+    signals = options.signals
     u_max = _full_command(valve, options)
     if options.current is not None and (machine := options.machine) is not None:
         check_bench_current(valve, options.current.circuit.rated_A, machine.bench_full_A)
     transition_codes = _transition_codes(valve, options)
     units = finest_units(signals, transition_codes)
-    if len(signals.signs) == 2:
-        refuse_two_signs(valve, options.guard)
     functions = options.drive_functions(transition_codes)
     dither = functions.dither(signals)
     dither.check(valve.dither)

@@ -20,6 +20,7 @@ from dzdesign.design.design_choices import (
     Above,
     BelowDp0,
     DesignRequest,
+    NegativeDp,
 )
 from dzdesign.design.machine.texts import machine_of
 from dzdesign.design.options import DesignOptions
@@ -76,13 +77,13 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         sample_Hz=target.sample_Hz,
         tick_Hz=target.tick_Hz,
         command=command,
-        swapped=text["negative_dp"] == "swapped",
         **sensors,
     )
     current = current_request(text, target)
     return DesignOptions(
         law=text["law"],
         signals=signals,
+        negative_dp=cast(NegativeDp, text["negative_dp"]),
         guard=cast(Guard, text["guard"]),
         below_dp0=cast(BelowDp0, text["below_dp0"]),
         above=cast(Above, text["above"]),

@@ -7,7 +7,7 @@ from math import ceil, floor
 from dzdesign.core.dither import HIGHEST_HZ, LARGEST_PEAK, LOWEST_HZ
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.design.current.drive import CurrentDrive, CurrentRequest, design_current_drive
-from dzdesign.design.design_choices import ABOVE, BELOW_DP0, Above, BelowDp0, DesignRequest
+from dzdesign.design.design_choices import ABOVE, BELOW_DP0, Above, BelowDp0, DesignRequest, NegativeDp
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES, RAMP_UNIT, DriveFunctions
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.signals import Signals
@@ -40,6 +40,8 @@ class DesignOptions:
         ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
     signals : Signals
         Scalings of the converter and the PWM.
+    negative_dp : {"recorded", "same", "swapped", "wired"} or None
+        Pressure drop at negative commands. None: as `signals` states it.
     guard : {"closing", "mean", "opening"}
         Threshold that the certificate must protect. Zero command comes after closing. A valve without a recorded
         falling branch is therefore refused, unless the guard is "opening".
@@ -83,6 +85,7 @@ class DesignOptions:
 
     law: str = "paper"
     signals: Signals = field(default_factory=Signals)
+    negative_dp: NegativeDp | None = None
     guard: Guard = "closing"
     below_dp0: BelowDp0 = "hold"
     above: Above = "lower"

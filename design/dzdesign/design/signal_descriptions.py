@@ -1,11 +1,13 @@
 """The codes of a compensator in words, and the wire failures that they do not reveal."""
 
-from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.pressure_inputs.negative_drop import wiring_in_words
 from dzdesign.design.signals import PressureSignal, Signals
 
 
-def signals_in_words(signals: Signals, u_max_V: float, units: RecordedUnits) -> list[str]:
-    """Return one line for the command and one for each sensor."""
+def signals_in_words(compensator: Compensator) -> list[str]:
+    """Return one line for the command, one for each sensor, and what the sensors are in the recordings."""
+    signals, u_max_V, units = compensator.signals, float(compensator.u_max_V), compensator.valve.recorded_units
     command = signals.command
     text = f"command: code {command.zero_code} is zero, {command.full_code} is {units.text(u_max_V, 'g V')}"
     if command.negative_full_code is not None:
@@ -16,9 +18,7 @@ def signals_in_words(signals: Signals, u_max_V: float, units: RecordedUnits) -> 
             f"pressure {name}: code {sensor.zero_code} is zero pressure, {sensor.full_code} is "
             f"{units.text(float(sensor.span_MPa), 'g MPa')}; {_valid(sensor.valid_codes)}"
         )
-    if signals.swapped:
-        lines.append("the pressure drop of negative commands is B less A")
-    return lines
+    return [*lines, *wiring_in_words(compensator)]
 
 
 def unseen_failures(signals: Signals) -> list[str]:

@@ -43,6 +43,7 @@ EXAMPLES = (
     "dzdesign demo demo                       run the whole chain on the bundled example",
     "dzdesign init ramps/*.csv                inspect recordings and write dzdesign.toml",
     "dzdesign identify ramps/*.csv --config dzdesign.toml",
-    "dzdesign codegen valve.json --target f28335",
-    "dzdesign verify firmware",
+    "dzdesign design valve.json               with --command-signal for a valve driven to both sides",
+    "dzdesign codegen compensator.json --target f28335",
+    "dzdesign verify firmware --ramps ramps/*.csv",
 )

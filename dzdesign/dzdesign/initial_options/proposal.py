@@ -121,7 +121,8 @@ def propose(
     text = _rendered(
         seen=seen, opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent, skip_rows=skip_rows,
         declared=declared, ends_at_full=ENDS_AT_FULL, sample_rate=sample_rate,
-        meter=valve and valve.meter, first=paths[0].name, look=looks[0], columns=chosen,
+        meter=valve and valve.meter, negative_drop=_negative_drop(valve),
+        first=paths[0].name, look=looks[0], columns=chosen,
         unclear=unclear, guessed_dp=guessed_dp, dp=table, readings=readings,
     )  # fmt: skip
     return Proposal(
@@ -130,6 +131,16 @@ def propose(
         unknown_dp=readings or ({paths[0].name: ()} if is_unknown else {}), guessed_dp=guessed_dp,
         u_max_is_guess=not declared.u_max and (u_seen is None or u_seen < ENDS_AT_FULL * u_max),
     )  # fmt: skip
+
+
+def _negative_drop(valve: "ValveModel | None") -> dict[str, str]:
+    """Return what the recordings show of the pressure drop at negative commands; nothing of one side."""
+    from dzdesign.design.pressure_inputs.negative_drop import shown_direction
+
+    if valve is None or len(valve.sides) < 2:
+        return {}
+    drop = valve.sides["negative"].recorded_drop
+    return {"shown": shown_direction(valve), "recorded": drop.in_words() if drop else "not recorded"}
 
 
 def _found_recordings() -> list[Path]:

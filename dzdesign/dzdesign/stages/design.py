@@ -48,7 +48,7 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
     options = options_of({name: getattr(choices, name) or "" for name in DEFAULTS}, target_named(target).inputs())
     if options.signals.command.negative_full_code is not None:
         return options
-    useless = [flag_of(name) for name in OF_BOTH_SIGNS if getattr(choices, name) is not None]
+    useless = [flag_of(name) for name in OF_BOTH_SIGNS if getattr(choices, name) not in (None, DEFAULTS[name])]
     useless += [
         f"the second time of {flag_of(name)}"
         for name in ("ramp_up", "ramp_down")

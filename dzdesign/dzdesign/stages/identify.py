@@ -198,6 +198,28 @@ def identify_again(options: "StatedOptions", record: Mapping[str, str], files: M
         If an option or a file can't be read, or no threshold can be given; the reason.
     """
     from dzdesign.identify.identification import identify_sides
+
+    again = read_again(options, files)
+    return replace(identify_sides(again.tests, again.options, record, again.tables).model, options=options)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadAgain:
+    """The files of a valve.json, read as its options say."""
+
+    options: "IdentifyOptions"
+    tests: "list[RampTest]"
+    tables: "list[LowFlowTable]"
+
+
+def read_again(options: "StatedOptions", files: Mapping[str, Path]) -> ReadAgain:
+    """Read the files of a valve.json as it says that they were read, by the names of made_from.
+
+    Raises
+    ------
+    InputError
+        If an option or a file can't be read.
+    """
     from dzdesign.identify.reading.series_order import in_stated_order
 
     known = {argument.name for argument in arguments_of(IdentifyArguments)} - {*NOT_STATED, *FILES}
@@ -218,8 +240,7 @@ def identify_again(options: "StatedOptions", record: Mapping[str, str], files: M
             raise InputError("its option order does not name each recording once")
         stated = {test.source: test for test in in_stated_order([by_name[name] for name in order])}
         tests = [stated[test.source] for test in tests]
-    model = identify_sides(tests, choices, record, tables).model
-    return replace(model, options=options)
+    return ReadAgain(options=choices, tests=tests, tables=tables)
 
 
 def stated_options(

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import KW_ONLY, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -110,7 +111,7 @@ def verify_output_folder(
     """Verify an output other than a C firmware; `identified` is as in `verify_firmware`."""
     from dzdesign.changed_code import code_of_output
     from dzdesign.regeneration import output_again, output_regenerated
-    from dzdesign.reidentification import GivenFiles, identified_again
+    from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.outputs.dispatch import SCHEMA, kind_for, output_evidence_files, verify_output
     from dzdesign.verify.verification import evidence_manifest
@@ -128,7 +129,8 @@ def verify_output_folder(
     added = [output_regenerated(folder, again)]
     if recordings:
         with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
-            added.append(identified_again(read_compensator(folder), recordings, identified))
+            compensator = read_compensator(folder)
+            added += [identified_again(compensator, recordings, identified), *inputs_again(compensator, recordings)]
     verification = replace(verification, evidence=verification.evidence.with_checks(*added))
     if arguments.output is not None:
         manifest = evidence_manifest(verification.evidence)
@@ -155,12 +157,13 @@ def _verify_code(
     """Verify a C firmware whose code is compiled and run from a folder of its own."""
     from dzdesign.block_checks import blocks_checked, given_blocks
     from dzdesign.regeneration import regenerated
-    from dzdesign.reidentification import GivenFiles, identified_again
+    from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
     from dzdesign.verify.firmware.folder import read_compensator
+    from dzdesign.verify.toolchain.compiled_core import core_answers
     from dzdesign.verify.verification import evidence_files, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
@@ -184,7 +187,10 @@ def _verify_code(
         )  # fmt: skip
     if recordings:
         with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
-            added.append(identified_again(read_compensator(folder), recordings, identified))
+            compensator = read_compensator(folder)
+            added.append(identified_again(compensator, recordings, identified))
+            if verification.evidence.inputs:  # the core compiles and runs
+                added += inputs_again(compensator, recordings, partial(core_answers, code))
     if blocks:
         with stage_progress("comparing every input with each of the calibration blocks"):
             added += blocks_checked(folder, blocks, code)

@@ -40,7 +40,8 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
         units = valve.recorded_units.of_side(name)
         title = f"Thresholds ({units.label('V')})" + ("" if len(valve.sides) == 1 else f", {name} side")
         _put_thresholds(console, side, title, units)
-        for line in _side_lines(side, units):
+        at = "" if len(valve.sides) == 1 else f" at {name} commands"
+        for line in (f"pressure drop{at}: {_made_of(side)}", *_side_lines(side, units)):
             put_line(console, line)
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
@@ -109,9 +110,7 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
     dp0 = side.reference.dp_MPa
     at = "" if dp0 is None else f" at dP0 = {units.text(dp0, '.3f MPa')}"
     certificate = side.certificate
-    made_of = dict.fromkeys(test.dp_from or "not recorded" for test in side.tests)
     return (
-        f"pressure drop: {', '.join(made_of)}",
         f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
         f"threshold {_guarded(side, units)}",
         f"from ramp to ramp: {certificate.repeatability.in_words(units)}",
@@ -134,6 +133,12 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         else f"trend with dP: {side.trend} ({units.number(1e3 * side.trend_change_V, '+.1f mV')} ± "
         f"{units.text(1e3 * side.trend_change_se_V, '.1f mV')} over the tested range, {chance(side.trend_p or 0.0)})",
     )
+
+
+def _made_of(side: "SideModel") -> str:
+    """Say which columns make the pressure drop, the pressure ahead first, and what is below zero as recorded."""
+    made_of = ", ".join(dict.fromkeys(test.dp_from or "not recorded" for test in side.tests))
+    return made_of + (" (recorded below zero)" if side.recorded_drop and side.recorded_drop.sign < 0 else "")
 
 
 def _guarded(side: "SideModel", units: "RecordedUnits") -> str:
@@ -183,7 +188,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     chosen, units = law(compensator.law), compensator.valve.recorded_units
     lines = [
         f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
-        *signals_in_words(compensator.signals, float(compensator.u_max_V), units),
+        *signals_in_words(compensator),
     ]
     for sign in compensator.signals.signs:
         side = compensator.side(sign)

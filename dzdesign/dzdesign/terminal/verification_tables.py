@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.core.verdicts import NOT_CHECKED, verdict_words
+from dzdesign.core.verdicts import NOT_ASKED_FOR, verdict_words
 from dzdesign.terminal.page import new_console, put_line, put_rows, volts
 
 if TYPE_CHECKING:
@@ -25,13 +25,13 @@ def _percent(share: float) -> str:
 
 def print_verification(verification: "Verification", console: "Console | None" = None) -> None:
     """Print every check, what was not tried, and the closed loop per pressure drop."""
-    from dzdesign.verify.untried import not_tried
+    from dzdesign.verify.untried import label_of_untried, untried_requirements
 
     console = console or new_console()
     for check in verification.evidence.checks:
         put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
-    for name in not_tried(verification.evidence):
-        put_line(console, f"{NOT_CHECKED}  {name}".replace("`", ""))
+    for each in untried_requirements(verification.evidence):
+        put_line(console, f"{label_of_untried(each)}  {each.title}: {each.how}".replace("`", ""))
     units = verification.derived.valve.recorded_units if verification.derived else AS_COMPUTED
     if verification.loops:
         _put_closed_loop(console, verification, units)
@@ -51,7 +51,7 @@ def print_output_verification(verification: "OutputVerification", console: "Cons
     for check in verification.evidence.checks:
         put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
     if not any(check.id == RAMPS.id for check in verification.evidence.checks):
-        put_line(console, f"{NOT_CHECKED}  {RAMPS.title}: {RAMPS.how}".replace("`", ""))
+        put_line(console, f"{NOT_ASKED_FOR}  {RAMPS.title}: {RAMPS.how}".replace("`", ""))
     put_line(console, verification.verdict)
 
 

@@ -31,6 +31,7 @@ from dzdesign.identify.valve.guard_curve import GUARDS, CertifiedCurve, Guard
 from dzdesign.identify.valve.low_flow import LowFlow
 from dzdesign.identify.valve.ramp_conditions import conditions_of
 from dzdesign.identify.valve.ramp_result import BRANCHES, TestResult
+from dzdesign.identify.valve.recorded_drop import RecordedDrop, drop_in_words
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.side_model import BoundsBasis, Reference, SideModel
 
@@ -139,6 +140,7 @@ def _side_model(
     rows = range(len(described))
     level = group.noise_level / L_MIN
     return SideModel(
+        recorded_drop=_recorded_drop(described),
         tests=tuple(_test_result(group, knees, row, curves[guard], options, units) for row in rows),
         reference=Reference(
             dp_MPa=None if dp0 is None else dp0 / MPA,
@@ -169,6 +171,12 @@ def _side_model(
         else None,
         active_constraints=knees.active + certified[guard].active,
     )
+
+
+def _recorded_drop(described: tuple[DescribedTest, ...]) -> RecordedDrop | None:
+    """Return which columns made the pressure drop, and with which sign; None where it was declared or is unknown."""
+    columns = tuple(dict.fromkeys(each for item in described for each in item.test.dp_from[0]))
+    return RecordedDrop(columns=columns, sign=described[0].test.dp_sign) if columns else None
 
 
 def _refuse_unlike_repeats(between: BetweenRamps, threshold: Threshold) -> None:
@@ -213,7 +221,9 @@ def _test_result(
     return TestResult(
         source=item.test.source,
         dp_MPa=None if item.dp is None else item.dp / MPA,
-        dp_from="declared" if item.test.dp_is_declared else item.test.dp_from[0] or None,
+        dp_from="declared"
+        if item.test.dp_is_declared
+        else drop_in_words(item.test.dp_from[0], item.test.dp_sign) or None,
         **_thresholds(item, knees, row),
         straight_rising=rising.line.window if rising else None,
         straight_falling=falling.line.window if falling else None,

@@ -15,6 +15,7 @@ from dzdesign.design.designing import design
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.recorded_drop import DropColumns, RecordedDrop
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
@@ -210,3 +211,55 @@ class TestQualityGate:
 def test_the_pressure_of_a_side_is_read_where_it_is_shut(recordings):
     for test in identify(recordings).sides["negative"].tests:
         assert test.dp_MPa * MPA == pytest.approx(MPA * round(test.dp_MPa))
+
+
+TWO_SENSORS = DropColumns(quantities=("pA", "pB"), labels=("Druck A", "Druck B"))
+OF_THE_EDGE = DropColumns(quantities=("pP", "pB"), labels=("Druck P", "Druck B"))
+
+
+class TestDirectionOfThePressureDrop:
+    """Recorded below zero at negative commands: the drop of a side is positive, and its direction is not lost."""
+
+    def side(self, columns=TWO_SENSORS, **changes):
+        recorded = {"dp_from": ((TWO_SENSORS,), (columns,)), "signed_dp": True} | changes
+        signed, dp_from = recorded["signed_dp"], recorded["dp_from"]
+        tests = [replace(bipolar(dp, Truth(), Truth(), signed_dp=signed), dp_from=dp_from) for dp in (1.0, 2.0)]
+        return identify(tests, IdentifyOptions(meter_lag=0.0)).sides
+
+    @pytest.mark.parametrize(("signed_dp", "sign", "words"), [
+        (True, -1, "Druck B - Druck A"), (False, 1, "Druck A - Druck B"),
+    ])  # fmt: skip
+    def test_it_is_kept_with_each_side(self, signed_dp, sign, words):
+        sides = self.side(signed_dp=signed_dp)
+        assert sides["positive"].recorded_drop == RecordedDrop(columns=(TWO_SENSORS,), sign=1)
+        found = sides["negative"]
+        assert found.recorded_drop == RecordedDrop(columns=(TWO_SENSORS,), sign=sign)
+        assert {test.dp_from for test in found.tests} == {words}
+        assert [test.dp_MPa for test in found.tests] == pytest.approx([1.0, 2.0])
+
+    def test_a_signed_column_is_said_to_be_reversed(self):
+        dp = DropColumns(quantities=("dP",), labels=("dP_MPa",))
+        assert {test.dp_from for test in self.side(dp)["negative"].tests} == {"-(dP_MPa)"}
+
+    def test_the_drop_of_an_edge_s_own_ports_has_no_sign_to_change(self, wording):
+        tests = [replace(bipolar(1.0, Truth(), Truth(), signed_dp=True), dp_from=((), (OF_THE_EDGE,)))]
+        found = identify(tests)
+        (warning,) = [warning for warning in found.warnings if warning.code == "side-refused"]
+        assert list(found.sides) == ["positive"]
+        wording.of_test(warning.text)
+
+    def test_two_directions_on_one_side_are_refused(self, wording):
+        tests = [bipolar(dp, Truth(), Truth(), signed_dp=dp == 1.0) for dp in (1.0, 2.0)]
+        found = identify(tests)
+        (warning,) = [warning for warning in found.warnings if warning.code == "side-refused"]
+        assert list(found.sides) == ["positive"]
+        wording.of_test(warning.text)
+
+    def test_two_directions_in_one_recording_are_refused(self, wording):
+        one, other = (bipolar(dp, Truth(), Truth(), signed_dp=True) for dp in (1.0, 2.0))
+        joined = {name: np.concatenate([getattr(one, name)] * 2 + [getattr(other, name)]) for name in ("u", "q", "dp")}
+        joined["dp"][2 * one.dp.size :] = np.abs(other.dp)
+        time = np.arange(joined["u"].size) * (one.time[1] - one.time[0])
+        found = identify([replace(one, time=time, **joined)])
+        (warning,) = [warning for warning in found.warnings if warning.code == "side-refused"]
+        wording.of_test(warning.text)

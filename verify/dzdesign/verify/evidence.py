@@ -222,6 +222,9 @@ class Evidence(Artefact):
         about("Current loop of a current-controlled drive; null for a duty-controlled one, or if it did not run."),
     ]
     mutants: Annotated[MutationScore | None, about("Mutation test of the C, if --mutate was given.")]
+    not_covered: Annotated[
+        Names, about("What the verdict does not cover, such as an identified side that the output does not drive.")
+    ] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "holds", all(check.holds for check in self.all_checks))
@@ -247,14 +250,14 @@ class Evidence(Artefact):
 
     @property
     def reservation(self) -> str:
-        """What a good verdict does not cover: thresholds not compared with ramp tests. Empty if all were compared.
+        """What a good verdict does not cover, as part of its sentence: a side, or thresholds without ramp tests.
 
         For a lot setting, the recordings belong to one of its valves.
         """
-        if not any(check.id == RAMPS.id and check.holds for check in self.checks):
-            return AS_STATED
         others = max((each.lot.valves for each in self.inputs if each.lot), default=1) - 1
-        return f"of the lot's other {others} valves {AS_STATED}" if others else ""
+        compared = any(check.id == RAMPS.id and check.holds for check in self.checks)
+        stated = AS_STATED if not compared else f"of the lot's other {others} valves {AS_STATED}" if others else ""
+        return "; ".join(filter(None, [stated, *self.not_covered]))
 
     def with_checks(self, *checks: Check) -> "Evidence":
         """Return the evidence with further requirements."""

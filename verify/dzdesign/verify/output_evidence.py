@@ -52,6 +52,10 @@ class OutputEvidence(Artefact):
     ]
     inputs: Annotated[tuple[TriedInputs, ...], about("Inputs that were tried.")]
     versions: Annotated[Mapping[str, str], about("Version of each tool that a check used.")]
+    not_covered: Annotated[
+        tuple[str, ...],
+        about("What the verdict does not cover, such as an identified side that the output does not drive."),
+    ] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "holds", all(check.holds for check in self.checks))
@@ -63,10 +67,10 @@ class OutputEvidence(Artefact):
         unknown = [check.name for check in self.checks if check.holds is None]
         parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
         parts += [f"{NOT_CHECKED}: {', '.join(unknown)}"] if unknown else []
-        words = "; ".join(parts) or "Every requirement holds."
-        if parts or any(check.id == RAMPS.id for check in self.checks):
-            return words
-        return f"{words.removesuffix('.')}; {AS_STATED}."
+        if parts:
+            return "; ".join(parts)
+        stated = [] if any(check.id == RAMPS.id for check in self.checks) else [AS_STATED]
+        return "; ".join(["Every requirement holds", *stated, *self.not_covered]) + "."
 
     def with_checks(self, *checks: Check) -> "OutputEvidence":
         """Return the evidence with further requirements."""

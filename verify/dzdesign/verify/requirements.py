@@ -85,6 +85,12 @@ RAMPS = Requirement(
     title="the ramp tests give this valve",
     how="`verify --ramps` with the recordings that valve.json was made from",
 )
+#: Checked by the front door too, of a firmware for both signs: it reads the recordings.
+PRESSURE_INPUTS = Requirement(
+    id="pressure-inputs",
+    title="the pressure inputs, wired as recorded, give the recorded pressure drop",
+    how="`verify --ramps` with the recordings that valve.json was made from",
+)
 BOARD_FILES = Requirement(id="board-files", title="your board files compile")
 #: Of a firmware in block form.
 OWN_BLOCK = Requirement(

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.requirements import (
     ALWAYS,
@@ -11,6 +12,7 @@ from dzdesign.verify.requirements import (
     OPTIONAL,
     OWN_PLANT,
     POPULATION,
+    PRESSURE_INPUTS,
     SERIES,
     Requirement,
 )
@@ -40,8 +42,15 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         untried.append(POPULATION)
     if evidence.monte_carlo is None:
         untried.append(SERIES)
+    if len(evidence.inputs) > 1 and PRESSURE_INPUTS.id not in tried:
+        untried.append(PRESSURE_INPUTS)
     optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())
     return tuple(untried + [each for each in optional if each.id not in tried])
+
+
+def label_of_untried(requirement: Requirement) -> str:
+    """Return the words for a requirement that was not tried: only what every `verify` checks was to be."""
+    return NOT_CHECKED if requirement.id in {each.id for each in ALWAYS} else NOT_ASKED_FOR
 
 
 def not_tried(evidence: Evidence) -> tuple[str, ...]:

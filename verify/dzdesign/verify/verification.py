@@ -11,6 +11,7 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.design.pressure_inputs.not_covered import not_covered
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
@@ -142,6 +143,7 @@ def verify(
         monte_carlo=loop.monte_carlo,
         current_loop=current.result and replace(current.result, valve=loop.valve_at_corners),
         mutants=None,
+        not_covered=not_covered(compensator),
     )
     return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=compensator if law.holds else None)
 

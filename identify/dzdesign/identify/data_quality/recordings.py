@@ -7,6 +7,7 @@ from dzdesign.identify.data_quality.recording_order import about_order
 from dzdesign.identify.reading.clock import ASSUMED_MS
 from dzdesign.identify.reading.metering_edge import EDGES
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.recorded_drop import drop_in_words
 
 #: Files that a text lists.
 NAMED_FILES = 3
@@ -24,7 +25,8 @@ def _about_one(test: RampTest) -> Iterator[Finding]:
     if test.side_without_dp:
         edges = EDGES[1 if test.side_without_dp == "positive" else -1]
         reason = (
-            f"{''.join(test.dp_from)} is the pressure drop of the other side's edge; name columns of "
+            f"{drop_in_words([*test.dp_from[0], *test.dp_from[1]])} is the pressure drop of the other side's edge; "
+            "name columns of "
             f"{' or '.join(' and '.join(edge) for edge in edges)} too, or of dP"
         )
         yield warn("side-refused", test.source, side=test.side_without_dp, reason=reason)

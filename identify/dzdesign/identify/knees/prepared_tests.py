@@ -23,6 +23,7 @@ from dzdesign.identify.knees.refusals import (
     refuse_a_shut_valve,
     refuse_a_wrong_pressure,
     refuse_an_impossible_knee,
+    refuse_two_directions,
 )
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import despiked
@@ -46,6 +47,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     InputError
         For a test that holds no ramp or no flow, and for tests that can't stand beside one another.
     """
+    refuse_two_directions(tests)
     rest = find_rest_flows(tests, options.u_max)
     tests = [replace(test, q=test.q - flow) for test, flow in zip(tests, rest.flows, strict=True)]
     tests = with_clock_of_series(tests)
@@ -101,7 +103,7 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
         if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in found):
             raise _no_ramp(test)
         for ramp in found:
-            refuse_a_wrong_pressure(name_of_ramp(ramp), ramp.dp)
+            refuse_a_wrong_pressure(name_of_ramp(ramp), ramp.dp, ramp.test.dp_sign)
         for item in pool_ramps(found) if top >= FULL_SWEEP * max(tops) else ():  # a fragment may well see no flow
             refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
         ramps += found

@@ -12,6 +12,8 @@ from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, largest_flow
 from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.recorded_drop import DropSign
 
 #: A flow that rises with the command has readings between these shares of the largest where its mean is between them.
 MIDDLE = (0.15, 0.45)
@@ -23,8 +25,21 @@ FEWEST_IN_THE_MIDDLE, WIDEST_JUMP = 0.25, 0.05
 EXTRAPOLATED = 0.1
 
 
-def refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
-    """Refuse a pressure drop (Pa; None if it is unknown) that is not a valve's: a wrong unit, or swapped ports."""
+def refuse_two_directions(tests: Sequence[RampTest]) -> None:
+    """Refuse recordings of one side of which some have a pressure drop above zero and others one below it."""
+    found = {test.dp_sign: test.source for test in tests if test.dp is not None and not test.dp_is_declared}
+    if len(found) > 1:
+        raise InputError(
+            f"the pressure drop was recorded above zero in '{found[1]}' and below it in '{found[-1]}', expected one "
+            "direction at all commands of one sign; correct the sign of dP, or swap pA and pB in one of them"
+        )
+
+
+def refuse_a_wrong_pressure(source: str, dp: float | None, sign: DropSign = 1) -> None:
+    """Refuse a pressure drop (Pa; None if it is unknown) that is not a valve's: a wrong unit, or swapped ports.
+
+    `sign` is that of the side's recorded pressure drop.
+    """
     if dp is None:
         return
     if 0 < dp < SMALLEST_DP or dp > LARGEST_DP:
@@ -36,6 +51,15 @@ def refuse_a_wrong_pressure(source: str, dp: float | None) -> None:
                 dp=dp / MPA,
                 least=SMALLEST_DP / MPA,
                 most=LARGEST_DP / MPA,
+            )
+        )
+    if dp <= 0 and sign < 0:
+        raise InputError(
+            worded(
+                "'{source}': the pressure drop is {dp:.3f MPa} as recorded, expected below zero as elsewhere in the "
+                "recording at commands of that sign; correct the sign of dP, or leave out that part",
+                source=source,
+                dp=-dp / MPA,
             )
         )
     if dp <= 0:

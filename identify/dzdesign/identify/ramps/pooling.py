@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.splitting import Ramp
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.left_out import LeftOut
+from dzdesign.identify.valve.recorded_drop import DropColumns
 
 #: Ramps whose pressure drops differ by less than this share are one test.
 SAME_PRESSURE = 0.02
@@ -64,6 +66,7 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         q=q,
         dp=dp,
         dp_from=_different_columns(group),
+        dp_sign=first.dp_sign,
         dp_is_declared=any(ramp.test.dp_is_declared for ramp in group),
     )
     return PooledTest(
@@ -76,10 +79,10 @@ def _pooled(group: list[Ramp]) -> PooledTest:
     )
 
 
-def _different_columns(group: list[Ramp]) -> tuple[str, str]:
+def _different_columns(group: list[Ramp]) -> tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]:
     """Return which columns make the pressure drop, at positive and negative commands; of several recordings all."""
     positive, negative = (
-        " or ".join(dict.fromkeys(each)) for each in zip(*(r.test.dp_from for r in group), strict=True)
+        tuple(dict.fromkeys(chain.from_iterable(each))) for each in zip(*(r.test.dp_from for r in group), strict=True)
     )
     return positive, negative
 

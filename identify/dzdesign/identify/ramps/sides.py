@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.identify.ramps.command import despiked
+from dzdesign.identify.reading.metering_edge import OF_EITHER_SIGN
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.recorded_drop import DropSign
 
 #: A recording shows a side if its command goes that far into it, over u_max.
 SMALLEST_SWEEP = 0.1
@@ -23,7 +25,7 @@ def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[Ra
         # What shows neither side is refused with the positive one.
         if both[0 if sign > 0 else 1] or (sign > 0 and not any(both)):
             one = _without_the_other(test, sign, u_max) if all(both) else test
-            found.append(_mirrored(one) if sign < 0 else one)
+            found.append(_mirrored(one, u_max) if sign < 0 else one)
     return found
 
 
@@ -32,11 +34,16 @@ def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:
     return test.part(sign * test.u >= -AT_REST * u_max)
 
 
-def _mirrored(test: RampTest) -> RampTest:
-    """Return a recording with its command reversed; flow and pressure drop too, where they change sign with it."""
+def _mirrored(test: RampTest, u_max: float) -> RampTest:
+    """Return a recording with its command reversed; flow and pressure drop too, where they change sign with it.
+
+    The pressure drop of two ports of an edge has no sign to change: below zero, it is refused.
+    """
     open_ = test.u <= 0.8 * test.u.min()
     q = -test.q if np.median(test.q[open_]) < 0 else test.q
-    dp = test.dp
-    if dp is not None and np.median(dp[open_]) < 0:
-        dp = np.abs(dp)  # at rest it may still have the other side's sign
-    return replace(test, u=-test.u, q=q, dp=dp, dp_from=test.dp_from[::-1])
+    dp, dp_from = test.dp, test.dp_from[::-1]
+    sign: DropSign = 1
+    if dp is not None and np.median(dp[open_]) < 0 and all(each.quantities in OF_EITHER_SIGN for each in dp_from[0]):
+        at_rest = np.abs(test.u) <= AT_REST * u_max  # there it may still have the other side's sign
+        dp, sign = np.where(at_rest, np.abs(dp), -dp), -1
+    return replace(test, u=-test.u, q=q, dp=dp, dp_from=dp_from, dp_sign=sign)

@@ -12,13 +12,19 @@ from typing import final
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.valve.recorded_drop import DropColumns, DropQuantity
 
 #: Pressures of a valve's ports, as columns are called.
-PORTS = ("pP", "pA", "pB", "pT")
+PORTS: tuple[DropQuantity, ...] = ("pP", "pA", "pB", "pT")
 #: Sign of the command -> its edges, inlet first, each from the port ahead to the port behind.
-EDGES = {1: (("pP", "pA"), ("pB", "pT")), -1: (("pP", "pB"), ("pA", "pT"))}
-#: Sensors named A and B alone stand upstream of the edge and behind it, whatever the command's sign.
-AHEAD_AND_BEHIND = ("pA", "pB")
+EDGES: Mapping[int, tuple[tuple[DropQuantity, DropQuantity], ...]] = {
+    1: (("pP", "pA"), ("pB", "pT")),
+    -1: (("pP", "pB"), ("pA", "pT")),
+}
+#: Sensors A and B alone measure one pressure drop, A minus B. Either may be the higher one at negative commands.
+TWO_SENSORS: tuple[DropQuantity, DropQuantity] = ("pA", "pB")
+#: What may change its sign with the command: the drop of two ports of an edge runs from the port ahead.
+OF_EITHER_SIGN: tuple[tuple[DropQuantity, ...], ...] = (("dP",), TWO_SENSORS)
 #: Commands within this share of u_max are at rest: noise about zero does not turn the valve round.
 AT_REST = 0.01
 #: A recording shows a side if so many samples of its command go that far into it, over u_max.
@@ -33,11 +39,11 @@ class MeteringEdge:
     None where nothing makes it at that sign; `ambiguous` where both edges could be meant.
     """
 
-    positive: tuple[str, ...] | None = None
-    negative: tuple[str, ...] | None = None
+    positive: tuple[DropQuantity, ...] | None = None
+    negative: tuple[DropQuantity, ...] | None = None
     ambiguous: bool = False
 
-    def at(self, sign: int) -> tuple[str, ...] | None:
+    def at(self, sign: int) -> tuple[DropQuantity, ...] | None:
         """Return the quantities for a sign of the command."""
         return self.positive if sign > 0 else self.negative
 
@@ -62,10 +68,11 @@ class MeteringEdge:
             return both[0]
         return np.where(_side_of_samples(u, u_max) > 0, *both)
 
-    def in_words(self, labels: Mapping[str, str]) -> tuple[str, str]:
-        """Return which columns make it, such as ``pP_MPa - pA_MPa``, at positive and negative commands."""
+    def columns(self, labels: Mapping[str, str]) -> tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]:
+        """Return which columns make it at positive and at negative commands; empty where none does."""
         positive, negative = (
-            " - ".join(labels[name] for name in self.at(sign) or ()) if self.quantities else "" for sign in (1, -1)
+            (DropColumns(quantities=names, labels=tuple(labels[name] for name in names)),) if names else ()
+            for names in (self.positive, self.negative)
         )
         return positive, negative
 
@@ -85,8 +92,8 @@ def metering_edge(quantities: Collection[str]) -> MeteringEdge:
     known = set(quantities) & set(PORTS)
     if known == set(PORTS):
         return MeteringEdge(ambiguous=True)
-    if known == set(AHEAD_AND_BEHIND):
-        return MeteringEdge(positive=AHEAD_AND_BEHIND, negative=AHEAD_AND_BEHIND)
+    if known == set(TWO_SENSORS):
+        return MeteringEdge(positive=TWO_SENSORS, negative=TWO_SENSORS)
     positive, negative = (next((edge for edge in EDGES[sign] if known >= set(edge)), None) for sign in (1, -1))
     return MeteringEdge(positive=positive, negative=negative)
 

@@ -30,6 +30,7 @@ from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.reading.thinning import thin
 from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.reading.units_of_columns import units_of_columns
+from dzdesign.identify.valve.recorded_drop import DropColumns
 
 #: Fewest complete rows in which two branches with a threshold could stand.
 MIN_ROWS = 20
@@ -117,7 +118,7 @@ class _Recording:
     may_count_ms: bool
     no_values: str
     stamp: Start | None
-    dp_from: tuple[str, str]
+    dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]
     side_without_dp: str
     units: Mapping[Quantity, tuple[Unit, ...]]
 
@@ -196,7 +197,7 @@ def _read_recording(
         may_count_ms=sample_rate is None and not is_clock and may_count_ms(rows[0], longest_step=np.inf),
         no_values=describe_placeholders(placeholders),
         stamp=table.started(found["time"].label) if sample_rate is None else None,
-        dp_from=edge.in_words(labels),
+        dp_from=edge.columns(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
         units=units_of_columns(table.path, found, u_max),
     )

@@ -8,6 +8,7 @@ import numpy as np
 from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.valve.left_out import LeftOut
+from dzdesign.identify.valve.recorded_drop import DropColumns, DropSign
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,9 +23,10 @@ class RampTest:
         Time in s, command in V, flow in m³/s; rows with a missing value are left out.
     dp : (N,) array or None
         Pressure drop in Pa, or None if it is unknown.
-    dp_from : tuple of str
-        Which columns make the pressure drop at positive and at negative commands, such as ``pP_MPa - pA_MPa``; empty
-        where none does.
+    dp_from : pair of tuples of DropColumns
+        Which columns make the pressure drop at positive and at negative commands; empty where none does.
+    dp_sign : int
+        -1 if `dp` was recorded below zero and is given here above it, as a side of a valve has it; 1 if not.
     side_without_dp : str
         Side whose metering edge has no pressure drop, "positive" or "negative": its samples were left out.
     dp_is_declared : bool
@@ -45,7 +47,8 @@ class RampTest:
     u: np.ndarray
     q: np.ndarray
     dp: np.ndarray | None
-    dp_from: tuple[str, str] = ("", "")
+    dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]] = ((), ())
+    dp_sign: DropSign = 1
     side_without_dp: str = ""
     dp_is_declared: bool = False
     rows_read: int = 0

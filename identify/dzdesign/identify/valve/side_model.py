@@ -22,6 +22,7 @@ from dzdesign.identify.valve.quantity_types import (
     VoltageError,
 )
 from dzdesign.identify.valve.ramp_result import TestResult
+from dzdesign.identify.valve.recorded_drop import RecordedDrop
 from dzdesign.identify.valve.repeatability import Repeatability
 from dzdesign.identify.valve.staircase import Direction
 
@@ -100,6 +101,10 @@ class SideModel:
 
     tests: Annotated[
         tuple[TestResult, ...], Meta(description="Ramp tests in ascending order of pressure drop.", min_length=1)
+    ]
+    recorded_drop: Annotated[
+        RecordedDrop | None,
+        Meta(description="Origin and sign of the recorded pressure drop; null if it was declared or is unknown."),
     ]
     reference: Annotated[Reference, Meta(description="Reference point of the law.")]
     k_x_max_over_u_max: Annotated[

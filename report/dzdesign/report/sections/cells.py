@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.verdicts import verdict_words
+from dzdesign.core.verdicts import NOT_CHECKED, verdict_words
 
 #: The sign beside a verdict, so that its colour is not its only carrier, and its kind.
 VERDICTS = {True: ("✓", "good"), False: ("✗", "bad"), None: ("?", "open")}
@@ -132,6 +132,11 @@ def counted(count: int, noun: str) -> str:
     ('1 ramp test', '6 ramp tests')
     """
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def unasked(words: str) -> Cell:
+    """Return what stands in place of a verdict on what was not tried."""
+    return Cell(text=f"{VERDICTS[None][0]} {words}", kind="open" if words == NOT_CHECKED else "")
 
 
 def verdict(holds: bool | None) -> Cell:

@@ -22,6 +22,7 @@ from dzdesign.report.sections.cells import (
     number,
     recorded,
     table_of,
+    unasked,
     verdict,
     whole,
 )
@@ -29,7 +30,7 @@ from dzdesign.report.sections.current_loop import current_tables
 from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, input_map_name, read_curves, zero_command_name
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, PressureResult, ScenarioResult, Spread
-from dzdesign.verify.untried import untried_requirements
+from dzdesign.verify.untried import label_of_untried, untried_requirements
 
 #: Parameters of a plant that count where its edge does not.
 COIL_AND_SPOOL = (
@@ -241,7 +242,9 @@ def checks_section(evidence: Evidence | None) -> Section:
     tried = [(verdict(check.holds), word(check.name), check.text) for check in evidence.checks]
     untried = untried_requirements(evidence)
     how = [word(f"to try it: {each.how}") for each in untried]
-    rows = [*tried, *((verdict(None), word(each.title), text) for each, text in zip(untried, how, strict=True))]
+    labels = [unasked(label_of_untried(each)) for each in untried]
+    titles = [word(each.title) for each in untried]
+    rows = [*tried, *zip(labels, titles, how, strict=True)]
     table = table_of(
         f"{len(tried)} requirements tried, {len(untried)} not",
         rows,

@@ -20,11 +20,7 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
         source = f"{warning.source}: " if warning.source else ""
         end = ", which it was (--accept)" if warning.code in codes else ""
         warnings.append(f"[{warning.code}] {source}{warning.text}{end}")
-    signals = (
-        signals_in_words(compensator.signals, float(compensator.u_max_V), compensator.valve.recorded_units)
-        if compensator
-        else []
-    )
+    signals = signals_in_words(compensator) if compensator else []
     return Section(
         groups=(
             ("Warnings of the recordings", tuple(warnings) or (("None.",) if valve else ())),

@@ -49,7 +49,7 @@ def _faults(lines: list[str], count: int, compensator: Compensator) -> Iterator[
         return
     if len(lines) - 1 != count:
         yield f"{VECTORS_NAME} has {len(lines) - 1} rows, the manifest says {count}"
-    answers = [_answer(ExactLaw(compensator, sign)) for sign in signs]
+    answers = [exact_answer(ExactLaw(compensator, sign)) for sign in signs]
     for place, line in enumerate(lines[1:], start=2):
         values = tuple(map(int, line.split(","))) if ROW.fullmatch(line) else ()
         if len(values) != 3 + 3 * len(signs):
@@ -60,7 +60,17 @@ def _faults(lines: list[str], count: int, compensator: Compensator) -> Iterator[
             yield f"{VECTORS_NAME}: line {place} has {values[3:]} for the codes {values[:3]}, expected {expected}"
 
 
-def _answer(exact: ExactLaw) -> Answer:
+def exact_answers(compensator: Compensator) -> Callable[[int, np.ndarray], np.ndarray]:
+    """Return what the exact law gives for codes of one sign (N, 3): compare value and status (N, 2)."""
+
+    def answers(sign: int, codes: np.ndarray) -> np.ndarray:
+        answer = exact_answer(ExactLaw(compensator, sign))
+        return np.array([answer(*map(int, row))[:2] for row in codes])
+
+    return answers
+
+
+def exact_answer(exact: ExactLaw) -> Answer:
     """Return the law of one sign: compare value, status and beta over 2^15 of any three codes."""
     (a_low, a_high), (b_low, b_high) = exact.a.valid_codes, exact.b.valid_codes
 

@@ -11,6 +11,7 @@ from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.pressure_inputs.not_covered import not_covered
 from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
@@ -126,6 +127,7 @@ def verify_output(
             ),
             inputs=tuple(tried for each in found for tried in each.inputs),
             versions={tool: version for each in found for tool, version in each.versions.items()},
+            not_covered=not_covered(compensator),
         )
     )
 

@@ -1,0 +1,98 @@
+"""Pressures as recorded, wired to the compiled core: the recorded drop of each side is what it reads."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from dzdesign.codegen.project import generate, target_named
+from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.recorded_drop import DropColumns
+from dzdesign.verify.exhaustive.recorded_inputs import recorded_inputs_follow
+from dzdesign.verify.exhaustive.stored_vectors import exact_answers
+from dzdesign.verify.toolchain.compiled_core import core_answers
+from tests.support.golden_firmware import FULL
+from tests.support.synthetic import needs_compiler
+
+AB = DropColumns(quantities=("pA", "pB"), labels=("Druck A", "Druck B"))
+DP = DropColumns(quantities=("dP",), labels=("dP",))
+P_A, P_B = (DropColumns(quantities=("pP", port), labels=("Druck P", f"Druck {port[1]}")) for port in ("pA", "pB"))
+
+
+@pytest.fixture(scope="module")
+def valve():
+    return read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
+
+
+def designed(valve, choice, **texts):
+    """Return a compensator whose direction is declared, of a valve that says nothing of it."""
+    silent = replace(valve, sides={name: replace(side, recorded_drop=None) for name, side in valve.sides.items()})
+    given = {"command_signal": "-10..10 V x 0.15 + 1.5 V", "negative_dp": choice} | texts
+    return design(silent, options_of(given, target_named("f28335").inputs()))
+
+
+def recorded(*, sign, columns=(AB, AB)):
+    """Recordings of both sides; at negative commands the drop has that sign."""
+    u = np.concatenate([np.linspace(0, 10, 50), np.linspace(0, -10, 50)])
+    return [
+        RampTest(
+            source=f"ramp_{dp:g}.csv", sha256="0" * 64, time=np.arange(u.size) / 10, u=u.copy(), q=u.copy(),
+            dp=np.where(u < 0, sign, 1) * dp * 1e6, dp_from=tuple((each,) for each in columns),
+        )
+        for dp in (1.0, 3.0, 5.0)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("choice", ["same", "swapped"])
+@pytest.mark.parametrize("columns", [AB, DP], ids=["two sensors", "signed dP"])
+def test_only_the_recorded_direction_is_read(valve, sign, choice, columns):
+    compensator = designed(valve, choice)
+    check = recorded_inputs_follow(compensator, recorded(sign=sign, columns=(columns,) * 2), exact_answers(compensator))
+    magnitude = choice == "swapped" and columns is DP and sign > 0
+    assert check.holds is ((choice == "swapped") == (sign < 0) or magnitude)
+    assert ("taken as declared" in check.text) is magnitude
+
+
+def test_a_permanent_fault_is_said_of_its_recording(valve, wording):
+    compensator = designed(valve, "same")
+    check = recorded_inputs_follow(compensator, recorded(sign=-1), exact_answers(compensator))
+    wording.of_test(check.text)
+
+
+@pytest.mark.parametrize("choice", ["same", "swapped"])
+def test_three_sensors_are_no_pair(valve, choice, wording):
+    compensator = designed(valve, choice)
+    check = recorded_inputs_follow(compensator, recorded(sign=1, columns=(P_A, P_B)), exact_answers(compensator))
+    assert check.holds is False
+    wording("recorded inputs: three sensors", check.text)
+
+
+def test_switched_inputs_are_the_machine_s(valve, wording):
+    compensator = designed(valve, "wired")
+    check = recorded_inputs_follow(compensator, recorded(sign=1, columns=(P_A, P_B)), exact_answers(compensator))
+    assert check.holds
+    wording.of_test(check.text)
+
+
+@needs_compiler
+@pytest.mark.parametrize("texts", [{}, {"pressure_b": "0.5..4.5 V x 0.6 = 160 bar", "accept": "broken-sensor"}])
+def test_the_compiled_core_is_what_answers(valve, texts, tmp_path):
+    compensator = designed(valve, "swapped", **texts)
+    made = generate(compensator, "f28335")
+    write_folder(tmp_path / "firmware", made.contents, made.manifest)
+    answers = partial(core_answers, tmp_path / "firmware")
+    assert recorded_inputs_follow(compensator, recorded(sign=-1), answers).holds
+    core = tmp_path / "firmware" / "core" / "dz_comp_negative.c"
+    text = core.read_text()
+    seeded = text.replace("b - a", "a - b")
+    assert seeded != text
+    core.write_text(seeded)
+    check = recorded_inputs_follow(compensator, recorded(sign=-1), answers)
+    assert check.holds is False and "negative commands" in check.text and "status 8" in check.text
