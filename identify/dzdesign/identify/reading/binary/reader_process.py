@@ -23,6 +23,7 @@ import msgspec
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.processes.running import ended_with_this_process
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.identify.reading.binary.reader_server import MOST_FOUND, Answer, ListedColumn, Request
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, unreadable
@@ -110,6 +111,7 @@ class ReaderProcess:
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-c", START, *(entry for entry in sys.path if entry)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, **few},
+            process_group=0 if os.name == "posix" else None,
         )  # fmt: skip
 
     def ask(self, request: Request, patience: float) -> tuple[Answer, list[np.ndarray]]:
@@ -125,19 +127,26 @@ class ReaderProcess:
         watch.daemon = True
         watch.start()
         try:
-            with contextlib.suppress(BrokenPipeError):
-                questions.write(msgspec.json.encode(request) + b"\n")
-                questions.flush()
-            answer = msgspec.json.decode(answers.readline(), type=Answer)
-            arrays = [np.frombuffer(answers.read(8 * size)) for size in answer.sizes]
-            if tuple(array.size for array in arrays) != answer.sizes:
-                raise ValueError("half of an answer")
-            return answer, arrays
+            with ended_with_this_process(self.process.pid):  # idle, it ends with its pipe; busy, it would read on
+                return self._exchange(request, questions, answers)
         except (msgspec.DecodeError, ValueError) as error:  # or none
             late = not watch.is_alive()
             raise EOFError(f"reading takes more than {patience:.0f} s" if late else self._end()) from error
         finally:
             watch.cancel()
+
+    def _exchange(
+        self, request: Request, questions: IO[bytes], answers: IO[bytes]
+    ) -> tuple[Answer, list[np.ndarray]]:
+        """Return the answer; a `ValueError` is half of one, or none."""
+        with contextlib.suppress(BrokenPipeError):
+            questions.write(msgspec.json.encode(request) + b"\n")
+            questions.flush()
+        answer = msgspec.json.decode(answers.readline(), type=Answer)
+        arrays = [np.frombuffer(answers.read(8 * size)) for size in answer.sizes]
+        if tuple(array.size for array in arrays) != answer.sizes:
+            raise ValueError("half of an answer")
+        return answer, arrays
 
     def _pipes(self) -> tuple[IO[bytes], IO[bytes]]:
         if self.process.stdin is None or self.process.stdout is None:
