@@ -128,7 +128,7 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
             if side.k_V_mm is not None
             else ""
         ),
-        "trend with dP: can't be said from one ramp test"
+        "trend with dP: unknown, as all tests have one pressure drop"
         if side.trend_change_V is None or side.trend_change_se_V is None
         else f"trend with dP: {side.trend} ({units.number(1e3 * side.trend_change_V, '+.1f mV')} ± "
         f"{units.text(1e3 * side.trend_change_se_V, '.1f mV')} over the tested range, {chance(side.trend_p or 0.0)})",
@@ -146,7 +146,7 @@ def _guarded(side: "SideModel", units: "RecordedUnits") -> str:
     if declared := side.zero_flow_in_words(units):
         return f"(the command that passes the flow allowed at zero); below, {declared}"
     none = side.none_in_words(side.certificate.guard, units)
-    return f"(the knee, or the tail's zero where the edge is soft); {none}"
+    return f"(the knee, or for a soft edge the command at which the tail ends); {none}"
 
 
 def _betas(side: "SideModel", units: "RecordedUnits") -> str:

@@ -211,7 +211,8 @@ def _why_none(table: Table, quantity: str, candidates: list[str]) -> str:
     if candidates and quantity != "dP":
         return f"{both} could each be it, by their units"
     if candidates:
-        ports = f' If one stands on either side: --columns "pA={candidates[0]}, pB={candidates[1]}"'
+        option = f'--columns "pA={candidates[0]}, pB={candidates[-1]}"'
+        ports = f" If one is ahead of the metering edge and one behind it: {option}"
         return f"{both}: a pressure, but is it the drop, pA or pB?{ports if len(candidates) == 2 else ''}"
     currents = [label for label in table.labels if measures(_unit_of(table, label), "current")]
     if quantity == "dP":

@@ -95,7 +95,8 @@ def _trend(name: str, side: SideModel, units: RecordedUnits) -> str:
         "command from the knee to full stroke as a share of full command"
     )
     if side.trend is None or side.trend_change_V is None or side.trend_change_se_V is None or side.trend_p is None:
-        return f"{stroke}; how the threshold moves with the pressure drop can't be said from one ramp test."
+        unknown = "how the threshold moves with the pressure drop is unknown, as all tests have one pressure drop"
+        return f"{stroke}; {unknown}."
     change = units.number(1e3 * side.trend_change_V, "+.1f mV")
     error = units.text(1e3 * side.trend_change_se_V, ".1f mV")
     return (
