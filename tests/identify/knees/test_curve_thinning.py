@@ -95,7 +95,8 @@ def test_the_supplys_sag_is_kept():
     ramp = synthetic_ramp(2.0, Truth(sag=0.3, noise=0.02))
     (test,) = identify([ramp]).positive.tests
     dp = np.array(test.recorded.dp_at_flow_MPa)
-    assert dp[0] == pytest.approx(2.0, abs=0.005) and dp[-1] == pytest.approx(1.4, abs=0.02)
+    at_full = 2.0 * (1 - 0.3 * (4.6 / 4.7) ** 2)  # this valve's falling branch begins with more flow than rising ends
+    assert dp[0] == pytest.approx(2.0, abs=0.005) and dp[-1] == pytest.approx(at_full, abs=0.02)
     assert np.all(np.diff(dp) < 0)
 
 
