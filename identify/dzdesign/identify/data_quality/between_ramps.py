@@ -45,7 +45,7 @@ def _about_premises(
     if alike:
         where = "at all pressure drops together, and most of all here," if alike.everywhere else "here"
         sd = {"sd_mV": 1e3 * alike.sd, "noise_mV": 1e3 * alike.of_noise}
-        yield warn("alike-repeats", tests[alike.test].test.source, where=where, **sd)
+        yield warn("alike-repeats", tests[alike.test].test.source, "", where=where, **sd)
     if largest and found.origin == "repeats":
         yield warn(
             "unequal-scatter",

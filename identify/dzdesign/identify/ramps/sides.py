@@ -32,11 +32,20 @@ def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:
     return test.part(sign * test.u >= -AT_REST * u_max)
 
 
+def flow_is_negative(test: RampTest) -> bool:
+    """Tell whether the flow of a recording is negative where its command is at its most negative."""
+    return bool(np.median(test.q[_most_negative(test)]) < 0)
+
+
+def _most_negative(test: RampTest) -> np.ndarray:
+    rows: np.ndarray = test.u <= 0.8 * test.u.min()
+    return rows
+
+
 def _mirrored(test: RampTest) -> RampTest:
     """Return a recording with its command reversed; flow and pressure drop too, where they change sign with it."""
-    open_ = test.u <= 0.8 * test.u.min()
-    q = -test.q if np.median(test.q[open_]) < 0 else test.q
+    q = -test.q if flow_is_negative(test) else test.q
     dp = test.dp
-    if dp is not None and np.median(dp[open_]) < 0:
+    if dp is not None and np.median(dp[_most_negative(test)]) < 0:
         dp = np.abs(dp)  # at rest it may still have the other side's sign
     return replace(test, u=-test.u, q=q, dp=dp, dp_from=test.dp_from[::-1])
