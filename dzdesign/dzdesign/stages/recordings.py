@@ -144,7 +144,10 @@ def _with_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None, 
         look = propose_columns(path, chosen, skip_rows, time_is_declared=rate is not None)
     except InputError:
         return ""
-    return f'. By the units of its columns: --columns "{look.to_paste}"' if look.to_paste else ""
+    if not look.to_paste:
+        return ""
+    unknown = " (LABEL: the one that you know)" if "=LABEL:" in look.to_paste else ""
+    return f'. By the units of its columns: --columns "{look.to_paste}"{unknown}'
 
 
 def expand(patterns: Paths) -> list[Path]:

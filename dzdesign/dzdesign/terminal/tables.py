@@ -70,7 +70,8 @@ def _left_out_lines(valve: "ValveModel") -> list[str]:
         if spans:
             most = max(_covered(each) for each in spans.values())
             which = f"'{next(iter(spans))}'" if len(spans) == 1 else f"{len(spans)} recordings"
-            lines.append(f"left out of {which}: {'' if len(spans) == 1 else 'up to '}{most:.1f} s, {words} (listed by -v)")
+            most_of = "" if len(spans) == 1 else "up to "
+            lines.append(f"left out of {which}: {most_of}{most:.1f} s, {words} (listed by -v)")
     return lines
 
 

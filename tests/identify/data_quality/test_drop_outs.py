@@ -27,6 +27,11 @@ def away(test, start, end, flow=0.0):
     return replace(test, q=q)
 
 
+def every_20th(test):
+    """Return a recording with few rows on a ramp, as of a quick one."""
+    return test.part(slice(None, None, 20))
+
+
 def series(spoil):
     """Return three ramps at each of two pressure drops, one of them with a drop-out."""
     tests = [ramp(seed, dp_MPa) for dp_MPa in (1.0, 4.0) for seed in range(3)]
@@ -77,6 +82,7 @@ def test_what_may_be_the_valve_stays():
         "steps of the flow": replace(ramp(noise=0.0), q=np.round(ramp(noise=0.0).q / L_MIN) * L_MIN),
         "no noise": ramp(noise=0.0),
         "saturation": ramp(noise=0.0, saturation=8.0),
+        "saturation on a quick ramp": every_20th(ramp(noise=0.0, saturation=8.0)),
         "a square wave": replace(held, u=square, q=np.where(square > 5, 20.0, 0.0) * L_MIN),
         "a supply that is away": replace(supply, dp=gone),
         "two rows": away(ramp(), 17.001, 17.05),

@@ -13,12 +13,15 @@ import numpy as np
 
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.reading.ramp_test import RampTest
 
 #: Shares of the largest flow: below the one a reading is none, above the other there is flow beside it for certain.
 NONE, FLOW = 0.05, 0.2
 #: Flow for certain is that many times the least reading of flow, which may be the meter's floor.
 ABOVE_FLOOR = 1.5
+#: Flow for certain is more than so many standard deviations of its steps from row to row.
+NOISES = 4.0
 #: Fewest rows of a stretch: shorter ones are spikes, which means over many rows do not show.
 FEWEST = 3
 #: Rows on either side that tell the flow beside a stretch.
@@ -28,7 +31,7 @@ SAME_COMMAND = 0.02
 #: A pressure drop below this share of that beside the stretch: the supply is away, and not the meter.
 SUPPLY = 0.5
 #: A flow that stands still does so for so many rows, and so many times as long as it usually does; then it jumps by
-#: this share of the largest, and by so many of its steps.
+#: this share of the largest, and by so many of the steps that follow.
 STILL, LONGER, JUMP, STEPS = 6, 5.0, 0.02, 5.0
 #: Stretches that a text lists.
 NAMED = 3
@@ -81,18 +84,25 @@ def _drop_outs(test: RampTest) -> Iterator[_DropOut]:
         return
     flows = test.q[test.q > NONE * largest]
     least = max(FLOW * largest, ABOVE_FLOOR * float(np.quantile(flows, 0.01)))
+    if least <= NOISES * robust_sigma(np.diff(test.q)):
+        return  # no flow stands out of the noise
     for start, stop in _runs(test.q <= NONE * largest):
         beside = _beside(test.q, start, stop)
         if stop - start >= FEWEST and min(beside) >= least and _is_the_meters(test, start, stop):
             yield _DropOut(start=start, stop=stop, still=False, beside=min(beside))
     runs = [(start, stop + 1) for start, stop in _runs(np.diff(test.q) == 0) if test.q[start] >= least]
-    usual = float(np.median([stop - start for start, stop in runs])) if runs else 0.0
-    step = _step(test.q)
-    for start, stop in runs:
-        before, after = _beside(test.q, start, stop)
-        jumps = abs(after - test.q[start]) > max(JUMP * largest, STEPS * step) and min(before, after) >= least
-        if stop - start >= max(STILL, LONGER * usual) and jumps and _is_the_meters(test, start, stop):
-            yield _DropOut(start=start, stop=stop, still=True, beside=after)
+    lengths = np.array([stop - start for start, stop in runs])
+    for number, (start, stop) in enumerate(runs):
+        others = np.delete(lengths, number)
+        usual = float(np.median(others)) if others.size else 1.0
+        if stop - start < max(STILL, LONGER * usual) or stop + BESIDE > test.q.size:
+            continue
+        # A flow that a supply or a meter holds down goes on from there without a jump.
+        after = test.q[stop : stop + BESIDE]
+        least_jump = max(JUMP * largest, STEPS * float(np.median(np.abs(np.diff(after)))))
+        jumps = abs(float(after[0] - test.q[start])) > least_jump and min(_beside(test.q, start, stop)) >= least
+        if jumps and _is_the_meters(test, start, stop):
+            yield _DropOut(start=start, stop=stop, still=True, beside=float(np.median(after)))
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
@@ -120,9 +130,3 @@ def _is_the_meters(test: RampTest, start: int, stop: int) -> bool:
         return True
     usual = min(float(np.median(test.dp[side])) for side in sides)
     return float(np.median(test.dp[start:stop])) >= SUPPLY * usual
-
-
-def _step(q: np.ndarray) -> float:
-    """Return the least difference of two readings, beyond rounding."""
-    gaps = np.diff(np.unique(q))
-    return float(gaps[gaps > 1e-9 * np.abs(q).max()].min(initial=np.inf))

@@ -1,4 +1,4 @@
-"""What is to be said of the flow meter of all recordings, once for both sides: its zero error, and a flow without sign."""
+"""What is to be said of the flow meter once, for all recordings and both sides: its zero error, a flow without sign."""
 
 from collections.abc import Iterator, Mapping, Sequence
 

@@ -73,11 +73,17 @@ class ProposedColumns:
 
     @property
     def to_paste(self) -> str:
-        """What --columns may say, of all that is known or the only one it can be; empty where that is nothing."""
+        """What --columns may say, of all that is known or the only one it can be; empty where that is nothing.
+
+        LABEL stands for a label that is not known.
+        """
         known = {name: column for name, column in (self.known | self.proposed).items() if name not in self.unclear}
         labels = {name: known[name].label for name in ("time", "u", *PORTS, "dP", "Q") if name in known}
         if not any(name in labels for name in PRESSURES):
             labels |= _two_ports(self.pressures)
+        if not labels:
+            return ""
+        labels |= {name: f"LABEL:{EXAMPLE_UNITS[name]}" for name in ("u", "Q") if name not in labels}
         return ", ".join(f"{name}={label}" for name, label in labels.items() if label)
 
     @property
