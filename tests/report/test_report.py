@@ -635,7 +635,7 @@ def test_of_how_many_runs_a_figure_is_the_worst(sides, said):
         side="positive", dp_MPa=1.0, dead_zone_opening=0.5, dead_zone_closing=0.5, residual_opening=0.1,
         residual_closing=0.1, reading_flow_L_min=0.6, reading_opening_without=0.5, reading_closing_without=0.5,
         reading_opening=0.1, reading_closing=0.1, ideal_line=0.04, unseen_below_L_min=None, flow_miss=0.0,
-        leak_L_min=0.0, allowed_at_zero_L_min=None, q_zero_L_min=0.0, q_zero_without_beta_L_min=0.0,
+        flow_miss_at=0.0, leak_L_min=0.0, allowed_at_zero_L_min=None, q_zero_L_min=0.0, q_zero_without_beta_L_min=0.0,
         q_max_direct_L_min=1.0, q_max_L_min=1.0,
     )  # fmt: skip
     runs = [replace(one, side=side, dp_MPa=1.0 + n) for side, count in sides.items() for n in range(count)]

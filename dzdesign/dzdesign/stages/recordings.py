@@ -111,7 +111,7 @@ def read_recordings(
     Refuses a file that can't be read, or has no pressure drop where [dp] names those of others. `what` is for the bar;
     `names` are those of the recordings, one a file, where they are not those of the files.
     """
-    from dzdesign.identify.reading.column_labels import parse_columns
+    from dzdesign.identify.reading.column_labels import MissingColumnError, parse_columns
     from dzdesign.identify.reading.ramp_files import read_ramp_file
     from dzdesign.identify.reading.units_of_columns import unit_of_pressure
 
@@ -123,14 +123,31 @@ def read_recordings(
     tests = []
     for path, name in with_bar(list(zip(paths, names, strict=True)), what):
         declared = _declared_dp(name, dp)
-        test = read_ramp_file(
-            path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
-            sample_rate=rate, skip_rows=skipped,
-        )  # fmt: skip
+        try:
+            test = read_ramp_file(
+                path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
+                sample_rate=rate, skip_rows=skipped,
+            )  # fmt: skip
+        except MissingColumnError as error:
+            raise InputError(f"{error}{_with_columns(path, chosen, skipped, rate)}") from error
         units = test.units if declared is None else {**test.units, **unit_of_pressure(declared[0])}
         tests.append(replace(test, source=name, units=units))
     _refuse_unnamed(tests, dp)
     return tests
+
+
+def _with_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None, rate: float | None) -> str:
+    """Return the option --columns that a file without known labels may need; nothing where its columns tell none."""
+    from dzdesign.identify.reading.proposed_columns import propose_columns
+
+    try:
+        look = propose_columns(path, chosen, skip_rows, time_is_declared=rate is not None)
+    except InputError:
+        return ""
+    if not look.to_paste:
+        return ""
+    unknown = " (LABEL: the one that you know)" if "=LABEL:" in look.to_paste else ""
+    return f'. By the units of its columns: --columns "{look.to_paste}"{unknown}'
 
 
 def expand(patterns: Paths) -> list[Path]:

@@ -1,6 +1,7 @@
 """Results as tables on stdout, by rich; plain where stdout is no terminal."""
 
 import json
+import math
 import os
 import re
 from typing import TYPE_CHECKING
@@ -46,12 +47,42 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
     put_line(console, meter_line(valve.meter.floor_L_min, valve.meter.lag_in_words(), valve.recorded_units))
+    for line in _left_out_lines(valve):
+        put_line(console, line)
     if valve.dither is not None:
         put_line(console, f"recorded under {valve.dither_in_words}: all of this is of the dithered valve")
     put_units(console, valve.recorded_units, "valve.json")
     for warning in valve.warnings:
         source = f"{warning.source}: " if warning.source else ""
         put_line(console, f"warning [{warning.code}] {source}{warning.text}")
+
+
+def _left_out_lines(valve: "ValveModel") -> list[str]:
+    """Say what no threshold was found from, a line for each reason but the engineer's own; `-v` has each stretch."""
+    from dzdesign.identify.valve.left_out import REASONS
+
+    parts = {part for side in valve.sides.values() for test in side.tests for part in test.left_out}
+    lines = []
+    for reason, words in REASONS.items():
+        spans: dict[str, list[tuple[float, float]]] = {}
+        for part in sorted(parts, key=lambda part: part.from_s):
+            if part.reason == reason != "option":
+                spans.setdefault(part.recording, []).append((part.from_s, part.to_s))
+        if spans:
+            most = max(_covered(each) for each in spans.values())
+            which = f"'{next(iter(spans))}'" if len(spans) == 1 else f"{len(spans)} recordings"
+            most_of = "" if len(spans) == 1 else "up to "
+            lines.append(f"left out of {which}: {most_of}{most:.1f} s, {words} (listed by -v)")
+    return lines
+
+
+def _covered(spans: "Sequence[tuple[float, float]]") -> float:
+    """Return how long some spans of time are together, in the order of their beginnings; two sides may share one."""
+    total, reached = 0.0, -math.inf
+    for start, end in spans:
+        total += max(end - max(start, reached), 0.0)
+        reached = max(reached, end)
+    return total
 
 
 def put_units(console: "Console", units: "RecordedUnits", file: str) -> None:

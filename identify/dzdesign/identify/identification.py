@@ -13,8 +13,10 @@ from dzdesign.core.worded import in_units
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
 from dzdesign.identify.data_quality.clipped_meter import without_clipping
+from dzdesign.identify.data_quality.drop_outs import without_drop_outs
 from dzdesign.identify.data_quality.pressures import about_mixed_pressures, about_single_pressures
 from dzdesign.identify.data_quality.recordings import about_recordings
+from dzdesign.identify.data_quality.whole_meter import about_whole_meter
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.dithered_command import without_dither
 from dzdesign.identify.ramps.sides import tests_of_side
@@ -98,6 +100,7 @@ def identify_sides(
             (
                 *(item.in_units(units) for item in about_recordings(tests)),
                 *([warn("two-sides").in_units(units)] if len(sides) > 1 else []),
+                *(item.in_units(units) for item in about_whole_meter(sides, tests, options.u_max)),
                 *warnings,
             )
         ),
@@ -126,6 +129,7 @@ def _each_side(
         in_side = units.of_side(name)
         mixed = about_mixed_pressures(of_side)
         pressures = (*mixed, *about_single_pressures(of_side, mixed))
+        of_side, dropped = without_drop_outs(of_side)
         of_side, side_options, clipped = without_clipping(of_side, options)
         try:
             sides[name] = identify_side(of_side, side_options, in_side, by_hand)
@@ -139,5 +143,5 @@ def _each_side(
             continue
         prefix = f"{name} side: " if len(sides) > 1 else ""
         found = [item for item in sides[name].warnings if not mixed or item.code not in EXPLAINED_BY_MIXED_PRESSURES]
-        warnings += [item.of_side(prefix).in_units(in_side) for item in (*pressures, *clipped, *found)]
+        warnings += [item.of_side(prefix).in_units(in_side) for item in (*pressures, *dropped, *clipped, *found)]
     return sides, warnings

@@ -439,7 +439,7 @@ class TestOrder:
 
     def test_a_place_that_nobody_fills_is_an_error(self):
         with pytest.raises(KeyError, match="zero_L_min"):
-            warn("meter-zero", "ramp.csv", leak="")
+            warn("meter-zero", "ramp.csv", "one", leak="")
 
     def test_an_unknown_one_comes_last(self):
         two = [Warning_(code=code, text="", source=None) for code in ("unheard-of", "thinned")]

@@ -81,7 +81,8 @@ class TestZero:
     def test_the_same_at_every_pressure_it_stays_the_meters(self, zero):
         valve = identify(recordings(0.0, zero=zero), OPTIONS)
         assert all(test.leak_L_min == 0 for test in valve.positive.tests)
-        assert len(warned(valve, "meter-zero")) == len(PRESSURES) and not warned(valve, "leak")
+        (warning,) = warned(valve, "meter-zero")  # one for all recordings
+        assert warning.source is None and not warned(valve, "leak")
         assert valve.positive.tests[0].u_guard_lower_V > CLOSING - 0.02
 
     @pytest.mark.parametrize("zeros", [(0.1, -0.2, 0.1), (0.5, 0.3, 0.1)])

@@ -160,3 +160,24 @@ def test_a_knee_outside_the_command_that_was_swept_is_refused(way):
     flow = np.where(bent, 6.0 * np.sqrt(np.clip(test.u - 1.0, 0, None)) * L_MIN, test.q)
     with pytest.raises(InputError, match=rf"synthetic_1.* {way} .*-\d+\.\d\d V.* 0\.00 to 10\.00 V.*knee-window"):
         identify([dataclasses.replace(test, q=flow)], IdentifyOptions(knee_window=(0.9, 0.98)))
+
+
+class TestPressureOnItsWay:
+    """A pump that starts with the ramp: the rising branch is run at another pressure drop than the falling one."""
+
+    @staticmethod
+    def recorded(dp_MPa, settles_s=60.0):
+        truth = Truth(slope=4.0 * dp_MPa**0.5)
+        test = synthetic_ramp(dp_MPa, truth, ramp_s=50.0, source=f"late_{dp_MPa:g}.csv")
+        share = np.clip(test.time / settles_s, 0.01, 1) ** 2
+        return dataclasses.replace(test, dp=test.dp * share, q=test.q * np.sqrt(share))
+
+    def test_the_refusal_says_so_and_when_it_settled(self, wording):
+        tests = [self.recorded(1.0), self.recorded(4.0)]
+        with wording.refusal(InputError):
+            identify(tests)
+
+    def test_a_branch_that_nobody_recorded_is_another_matter(self):
+        one = synthetic_ramp(1.0, Truth(), falling=False)
+        with pytest.raises(InputError, match="record every pressure drop up and down"):
+            identify([one, synthetic_ramp(4.0, Truth(slope=8.0))])

@@ -263,3 +263,25 @@ class TestDirectionOfThePressureDrop:
         found = identify([replace(one, time=time, **joined)])
         (warning,) = [warning for warning in found.warnings if warning.code == "side-refused"]
         wording.of_test(warning.text)
+
+
+class TestOneMeterForBothSides:
+    """What the meter does is said once, with its own sign."""
+
+    TRUTHS = (Truth(slope=4.0), Truth(knee_rising=5.0, slope=3.0))
+
+    def warnings(self, code, zero=0.0, **recorded):
+        tests = [bipolar(dp, *self.TRUTHS, **recorded) for dp in PRESSURES]
+        found = identify([replace(test, q=test.q + zero * L_MIN) for test in tests])
+        return [warning for warning in found.warnings if warning.code == code]
+
+    @pytest.mark.parametrize("zero", [-0.3, 0.3])
+    def test_a_zero_error_is_said_once(self, zero, wording):
+        (warning,) = self.warnings("meter-zero", zero)
+        assert warning.source is None
+        wording(f"flow meter: zero error of {zero:+.1f} on both sides", warning.text)
+
+    def test_a_flow_without_sign_is_said_once(self, wording):
+        (warning,) = self.warnings("unsigned-flow", signed_flow=False)
+        wording("flow meter: no sign at negative commands", warning.text)
+        assert not self.warnings("unsigned-flow")

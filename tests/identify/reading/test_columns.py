@@ -127,3 +127,35 @@ def test_a_list_of_pressure_drops_is_for_simulate_a_table_for_identify(bench):
     assert parse(["identify", "plain.csv", "--config", "options.toml"]).arguments.dp is None
     Path("options.toml").write_text("[dp]\n'a.csv' = '1 MPa'")
     assert parse(["simulate", "--config", "options.toml"]).arguments.dp == ()
+
+
+class TestToPaste:
+    """A file whose labels are not known: the refusal prints the option that reads it."""
+
+    GERMAN = "Zeit [s],Sollwert [V],Druck A [bar],Druck B [bar],Durchfluss [l/min]"
+
+    @pytest.fixture
+    def german(self, bench):
+        rows = ramp()
+        ports = 10 * (rows[:, 2] + 0.2), np.full(len(rows), 2.0)
+        (bench / "german.csv").write_text(csv(np.column_stack([rows[:, :2], *ports, rows[:, 3]]), self.GERMAN))
+        return bench / "german.csv"
+
+    def test_what_it_prints_reads_the_file(self, german, capsys, wording):
+        assert main(["identify", "german.csv", "-o", "none.json"]) == 2
+        line = capsys.readouterr().err
+        wording("columns: the option to paste", line)
+        option = line.partition('--columns "')[2].partition('"')[0]
+        assert main(["identify", "german.csv", "--columns", option, "-o", "valve.json"]) == 0
+        edges = json.loads(Path("valve.json").read_text())["sides"]["positive"]["tests"][0]
+        assert edges["dp_MPa"] == pytest.approx(1.0, rel=0.01)
+
+    def test_a_label_that_nothing_tells_is_left_to_the_engineer(self, german, capsys):
+        german.write_text(german.read_text().replace("Sollwert [V]", "AO0"))
+        assert main(["identify", "german.csv", "-o", "none.json"]) == 2
+        assert "u=LABEL:V" in capsys.readouterr().err
+
+    def test_two_pressures_that_are_not_a_and_b_are_not_guessed(self, german, capsys):
+        german.write_text(german.read_text().replace("Druck A", "Druck vor").replace("Druck B", "Druck nach"))
+        assert main(["identify", "german.csv", "-o", "none.json"]) == 2
+        assert "Durchfluss [l/min]" in (line := capsys.readouterr().err) and "pA=" not in line

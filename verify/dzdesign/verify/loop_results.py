@@ -70,6 +70,9 @@ class PressureResult:
             le=1e6,
         ),
     ]
+    flow_miss_at: Annotated[
+        float, quantity("1", "Command share at which this deviation is largest, the middle of 1 %.", ge=0, le=1)
+    ]
     q_max_direct_L_min: Annotated[Flow, about("Largest flow without the compensator.")]
     q_max_L_min: Annotated[Flow, about("Largest flow with the compensator.")]
 

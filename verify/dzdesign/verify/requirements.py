@@ -62,7 +62,7 @@ FALLBACK = Requirement(id="fallback", title="codes outside their signal's valid 
 VECTORS = Requirement(id="vectors", title="the test vectors equal the exactly rounded law")
 DRIVE = Requirement(id="drive", title="the drive follows its model")
 PLANT_OPENS = Requirement(id="plant-opens", title="the plant of the closed loop opens")
-PLANT_IS_THE_VALVE = Requirement(id="plant-is-the-valve", title="the plant opens where the identified valve does")
+PLANT_IS_THE_VALVE = Requirement(id="plant-is-the-valve", title="the plant agrees with the identified valve")
 ZERO_FLOW = Requirement(id="zero-flow", title="no flow at zero command in the closed loop")
 ZERO_FLOW_AFTER_SCENARIOS = Requirement(
     id="zero-flow-after-scenarios", title="no flow at zero command after any scenario"

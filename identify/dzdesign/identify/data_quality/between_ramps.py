@@ -44,8 +44,13 @@ def _about_premises(
     largest, outlying, alike = checks.largest, checks.outlying, checks.alike
     if alike:
         where = "at all pressure drops together, and most of all here," if alike.everywhere else "here"
-        sd = {"sd_mV": 1e3 * alike.sd, "noise_mV": 1e3 * alike.of_noise}
-        yield warn("alike-repeats", tests[alike.test].test.source, where=where, **sd)
+        yield warn(
+            "alike-repeats",
+            tests[alike.test].test.source,
+            where=where,
+            sd_mV=1e3 * alike.sd,
+            noise_mV=1e3 * alike.of_noise,
+        )
     if largest and found.origin == "repeats":
         yield warn(
             "unequal-scatter",

@@ -1,6 +1,6 @@
 """What is weak in the flow meter's readings: its steps, its lag, its noise, what it reads at rest."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -27,19 +27,12 @@ READINGS_A_LEVEL = 5
 
 def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Finding]:
     """Yield the warnings about the flow meter, of one side."""
-    yield from _about_zeros(group.zero_L_min)
     yield from _about_a_leak(side)
     yield from _about_the_zero_flow(side, group)
     yield from _about_the_noise_level(side, options)
     yield from _about_steps(side, group.tests, options)
     yield from _about_the_lag(group, options)
     yield from _about_lag_and_order(side, group)
-
-
-def _about_zeros(zero_L_min: Mapping[str, float]) -> Iterator[Finding]:
-    leak = "; if it is a leak, the valve passes it whatever the compensator does"
-    for source, zero in zero_L_min.items():
-        yield warn("meter-zero", source, zero_L_min=zero, leak=leak if zero > 0 else "")
 
 
 def _about_a_leak(side: SideModel) -> Iterator[Finding]:

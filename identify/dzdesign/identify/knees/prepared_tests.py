@@ -16,6 +16,7 @@ from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTest
 from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
+from dzdesign.identify.knees.mixed_branches import refuse_mixed_branches
 from dzdesign.identify.knees.profile import flow_at_top
 from dzdesign.identify.knees.readings_at_rest import find_rest_flows
 from dzdesign.identify.knees.refusals import (
@@ -60,7 +61,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
     described = _described(pooled, floor, lag, options)
-    _refuse_mixed_branches(described)
+    refuse_mixed_branches(described, tests)
     between = [_between_ramps(described, column, options) for column in (0, 1)]
     if any(np.any(shift != 0) for found in between if found for shift in found.shifts):
         moved = [_with_ramps_together(item, row, between) for row, item in enumerate(pooled)]
@@ -196,19 +197,3 @@ def _describe(item: PooledTest, shapes: Iterator[BranchShape]) -> DescribedTest:
 def _in_order_of_pressure(pooled: list[PooledTest]) -> list[PooledTest]:
     """Sort by pressure drop; what was read of all ramps together may fall together with the next test's by a hair."""
     return sorted(pooled, key=lambda item: (nominal_dp(item.test) or 0.0, item.test.source))
-
-
-def _refuse_mixed_branches(described: list[DescribedTest]) -> None:
-    """Refuse tests of which some have a branch that others lack: they can't be compared."""
-    for column, name in ((0, "rising"), (1, "falling")):
-        lacking = [item for item in described if item.shapes[column] is None]
-        if lacking and len(lacking) < len(described):
-            by_option = next((part for part in lacking[0].left_out if part.reason == "option"), None)
-            remedy = (
-                "record every pressure drop up and down, or leave that file out"
-                if by_option is None
-                else f"--from and --to leave out {by_option.from_s:.1f} to {by_option.to_s:.1f} s, which holds the "
-                "branch; choose seconds before and after a whole ramp, or leave that file out"
-            )
-            source = lacking[0].test.source
-            raise InputError(f"'{source}' has no {name} branch while other ramp tests have one; {remedy}")

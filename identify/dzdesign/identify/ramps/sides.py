@@ -34,16 +34,26 @@ def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:
     return test.part(sign * test.u >= -AT_REST * u_max)
 
 
+def flow_is_negative(test: RampTest) -> bool:
+    """Tell whether the flow of a recording is negative where its command is at its most negative."""
+    return bool(np.median(test.q[_most_negative(test)]) < 0)
+
+
+def _most_negative(test: RampTest) -> np.ndarray:
+    rows: np.ndarray = test.u <= 0.8 * test.u.min()
+    return rows
+
+
 def _mirrored(test: RampTest, u_max: float) -> RampTest:
     """Return a recording with its command reversed; flow and pressure drop too, where they change sign with it.
 
     The pressure drop of two ports of an edge has no sign to change: below zero, it is refused.
     """
-    open_ = test.u <= 0.8 * test.u.min()
-    q = -test.q if np.median(test.q[open_]) < 0 else test.q
+    q = -test.q if flow_is_negative(test) else test.q
     dp, dp_from = test.dp, test.dp_from[::-1]
     sign: DropSign = 1
-    if dp is not None and np.median(dp[open_]) < 0 and all(each.quantities in OF_EITHER_SIGN for each in dp_from[0]):
+    below_zero = dp is not None and np.median(dp[_most_negative(test)]) < 0
+    if dp is not None and below_zero and all(each.quantities in OF_EITHER_SIGN for each in dp_from[0]):
         at_rest = np.abs(test.u) <= AT_REST * u_max  # there it may still have the other side's sign
         dp, sign = np.where(at_rest, np.abs(dp), -dp), -1
     return replace(test, u=-test.u, q=q, dp=dp, dp_from=dp_from, dp_sign=sign)

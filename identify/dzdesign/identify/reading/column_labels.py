@@ -50,6 +50,10 @@ class Column:
     stated: str = ""
 
 
+class MissingColumnError(InputError):
+    """A table has no column of a quantity that a ramp test needs."""
+
+
 def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     """Read what ``--columns`` or the table ``columns`` of the options says: quantity -> label in the file.
 
@@ -265,7 +269,7 @@ def names_a_quantity(unit: str) -> bool:
     return unit.lower() in PER_CENT or any(measures(unit, quantity) for quantity in QUANTITIES)
 
 
-def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> InputError:
+def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> MissingColumnError:
     """Return the error that names the columns found, and the one that may have been meant."""
     unused = [label for label in table.labels[:MOST_MEANT] if split_label(label)[0] not in columns]
     bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
@@ -275,7 +279,7 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> In
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
     rate = ', or --sample-rate "100 Hz"' if quantity == "time" else ""
-    return InputError(
+    return MissingColumnError(
         f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}; "
         f"expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}"
     )

@@ -4,7 +4,7 @@ The reader's own recognition goes first; a quantity whose label it does not know
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,9 +72,39 @@ class ProposedColumns:
     command_range: str = ""
 
     @property
+    def to_paste(self) -> str:
+        """What --columns may say, of all that is known or the only one it can be; empty where that is nothing.
+
+        LABEL stands for a label that is not known.
+        """
+        known = {name: column for name, column in (self.known | self.proposed).items() if name not in self.unclear}
+        labels = {name: known[name].label for name in ("time", "u", *PORTS, "dP", "Q") if name in known}
+        if not any(name in labels for name in PRESSURES):
+            labels |= _two_ports(self.pressures)
+        if not labels:
+            return ""
+        labels |= {name: f"LABEL:{EXAMPLE_UNITS[name]}" for name in ("u", "Q") if name not in labels}
+        return ", ".join(f"{name}={label}" for name, label in labels.items() if label)
+
+    @property
     def has_dp(self) -> bool:
         """Whether columns that are known make the pressure drop."""
         return bool(metering_edge(self.known).quantities)
+
+
+def _two_ports(labels: Iterable[str]) -> dict[str, str]:
+    """Return the working ports where the labels are alike but for an A and a B, such as ``Druck A [bar]``."""
+    both = list(labels)
+    if len(both) != 2:
+        return {}
+    return next(
+        (
+            {"pA": one, "pB": other}
+            for one, other in (both, both[::-1])
+            if one != other and re.sub(r"(?<![^\W_])A(?![^\W_])", "B", one) == other
+        ),
+        {},
+    )
 
 
 def propose_columns(

@@ -53,6 +53,7 @@ def compare_at_pressure(
     leak, reading = loop.leak_L_min(dp_MPa), reading_flow_L_min
     level = leak + FLOW_SHARE * float(direct.q_L_min.max())
     largest = float(with_core.q_mean_L_min.max())
+    miss, miss_at = largest_miss(direct, loop.u_max_V, recorded)
     result = PressureResult(
         side=side,
         dp_MPa=dp_MPa,
@@ -71,7 +72,8 @@ def compare_at_pressure(
         allowed_at_zero_L_min=loop.allowed_at_zero_L_min(dp_MPa),
         q_zero_L_min=float(with_core.q_largest_L_min[-1]),
         q_zero_without_beta_L_min=float(without_beta.q_largest_L_min[-1]),
-        flow_miss=largest_miss(direct, loop.u_max_V, recorded),
+        flow_miss=miss,
+        flow_miss_at=miss_at,
         q_max_direct_L_min=float(direct.q_L_min.max()),
         q_max_L_min=largest,
     )
@@ -83,13 +85,17 @@ def dead_zone(run: LoopRun, level: float, *, rising: bool) -> float:
     return dead_zone_at(level, run.command, run.q_mean_L_min, rising=rising)
 
 
-def largest_miss(run: LoopRun, u_max_V: float, recorded: RecordedCurve) -> float:
-    """Return by how much the mean flow per bin of command departs from the recorded one, over the largest of these."""
+def largest_miss(run: LoopRun, u_max_V: float, recorded: RecordedCurve) -> tuple[float, float]:
+    """Return by how much the mean flow per bin of command departs from the recorded one, and at which command share.
+
+    It is over the largest recorded flow; the command is the middle of the bin.
+    """
     bins = np.minimum((run.command / BIN).astype(int), round(1 / BIN) - 1)
     top = int(np.argmax(run.command))
-    misses = [0.0]
+    worst, place = 0.0, 0
     for branch, part in ((recorded.opening, slice(0, top + 1)), (recorded.closing, slice(top + 1, None))):
         miss = run.q_mean_L_min[part] - branch.flow_at(u_max_V * run.command[part])
-        count = np.bincount(bins[part])
-        misses.append(float(np.abs(np.bincount(bins[part], weights=miss)[count > 0] / count[count > 0]).max()))
-    return max(misses) / recorded.q_max_L_min
+        means = np.abs(np.bincount(bins[part], weights=miss)) / np.maximum(np.bincount(bins[part]), 1)
+        if means.size and means.max() > worst:
+            worst, place = float(means.max()), int(np.argmax(means))
+    return worst / recorded.q_max_L_min, (place + 0.5) * BIN
