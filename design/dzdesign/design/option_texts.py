@@ -77,7 +77,8 @@ def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
         sample_Hz=target.sample_Hz,
         tick_Hz=target.tick_Hz,
         command=command,
-        **sensors,
+        pressure_a=sensors["pressure_a"],
+        pressure_b=sensors["pressure_b"],
     )
     current = current_request(text, target)
     return DesignOptions(
