@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from dzdesign.core.errors import RequirementError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.firmware.compilation import compiles_strictly
-from dzdesign.verify.toolchain.host_compiler import environment, find_compilers, keeps_warnings
+from dzdesign.verify.toolchain.host_compiler import build_folder, built, environment, find_compilers, keeps_warnings
 from dzdesign.verify.toolchain.machines import HOST
 from tests.support.synthetic import needs_compiler
 
@@ -39,11 +39,32 @@ def test_what_a_quiet_compiler_takes_is_not_checked(tmp_path, of_words, words):
     assert check.holds is None and "-w out of $CC" in check.text
 
 
-@pytest.mark.parametrize("words", ["true", "echo x", "{cc} -fsyntax-only"])
-def test_a_compiler_that_writes_nothing_is_named(of_words, words):
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("true", "wrote nothing"),
+        ("echo x", "wrote nothing"),
+        ("{cc} -fsyntax-only", "wrote nothing"),
+        ("sleep", "does not compile"),
+        ("{cc} --no-such-option", "does not compile"),
+        ("/nonexistent", "no such program"),
+        ("no-such-program -x", "no such program"),
+        ('{cc} "', "No closing quotation"),
+    ],
+)
+def test_what_is_no_compiler_is_named_and_not_blamed_on_the_firmware(of_words, words, reason):
     of_words(words)
-    with pytest.raises(RequirementError, match=r"was not compiled: .* wrote nothing; set \$CC"):
+    with pytest.raises(InputError, match=rf"^\$CC is .*{reason}"):
         HOST.compile("one.c", SOURCES, HOST.core_flags, "the core")
+
+
+def test_a_compiler_that_writes_nothing_is_named():
+    with pytest.raises(RequirementError, match=r"was not compiled: .* wrote nothing; set \$CC"):
+        built("one.o", ["true", "-c", "one.c"], SOURCES, "the core")
+
+
+def test_what_a_killed_compiler_leaves_goes_with_the_folder_of_the_process():
+    assert environment()["TMPDIR"] == str(build_folder())
 
 
 @pytest.mark.parametrize("variable", ["CPATH", "C_INCLUDE_PATH"])

@@ -8,8 +8,10 @@ import logging
 import os
 import shlex
 import subprocess
+import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from threading import Lock
 
@@ -32,6 +34,8 @@ LIKE_OTHERS = ("-g0", "-mcpu=baseline", "-fno-sanitize=undefined")
 
 #: C that every compiler must refuse with `STRICT`; one that takes it was told to keep its warnings to itself.
 NARROWS = "short dz_narrows(int value);\nshort dz_narrows(int value) { return value; }\n"
+#: C that every compiler takes.
+TINY = "int main(void) { return 0; }\n"
 #: Variables by which gcc and clang take other headers or options than those of the command.
 REDIRECTING = ("CPATH", "C_INCLUDE_PATH", "CCC_OVERRIDE_OPTIONS")
 
@@ -49,6 +53,8 @@ def find_compilers() -> tuple[str, ...]:
     Each as a person would write it: a path, or with $CC words such as ``ccache gcc``.
     """
     wanted = (_found(name) for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name)
+    if (named := os.environ.get("CC")) and not _found(named):
+        raise InputError(f"$CC is {named!r}, and there is no such program; correct or unset it")
     found = tuple(dict.fromkeys(compiler for compiler in wanted if compiler))
     return found or ((zig,) if (zig := find_zig()) else ())
 
@@ -102,11 +108,12 @@ def environment() -> dict[str, str]:
         "ZIG_GLOBAL_CACHE_DIR": str(kept if may_write else build_folder() / "zig"),
         "ZIG_LOCAL_CACHE_DIR": str(build_folder() / "zig"),
     }
-    return {**ours, **{name: value for name, value in os.environ.items() if name not in REDIRECTING}}
+    others = {name: value for name, value in os.environ.items() if name not in REDIRECTING}
+    return {**ours, **others, "TMPDIR": str(build_folder())}  # what a compiler that is killed leaves goes with ours
 
 
 def host_compiler() -> str:
-    """Return the C compiler to use; where there is none, an `InputError` says what to do."""
+    """Return the C compiler to use; where there is none that makes a program, an `InputError` says what to do."""
     compilers = find_compilers()
     if not compilers:
         raise InputError(
@@ -114,7 +121,27 @@ def host_compiler() -> str:
             "`pip install dzdesign[zig]` into this environment, `apt install gcc`, `xcode-select --install`, or on "
             "Windows `winget install LLVM.LLVM`; `dzdesign doctor` says what is there"
         )
+    _check_that_it_compiles(compilers[0], os.environ.get("PATH", ""))
     return compilers[0]
+
+
+@cache
+def _check_that_it_compiles(compiler: str, path: str) -> None:
+    """Refuse a compiler that makes no program of C; else firmware would be blamed for it. `path` may change it."""
+    with tempfile.TemporaryDirectory(dir=build_folder(), ignore_cleanup_errors=True) as folder:
+        place = Path(folder)
+        (place / "tiny.c").write_text(TINY, encoding="utf-8")
+        try:
+            build([*words_of(compiler), "tiny.c", "-o", "tiny.exe"], "a tiny program", place)
+            reason = "" if (place / "tiny.exe").is_file() else "it ended well and wrote nothing"
+        except RequirementError as error:
+            reason = str(error)
+    if reason:
+        named = "$CC" if os.environ.get("CC") else "the C compiler found first"
+        raise InputError(
+            f"{named} is {compiler!r}, which makes no program of C ({reason}); set $CC to a C compiler, without options "
+            "by which it does not compile or link"
+        )
 
 
 def run_compiler(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
