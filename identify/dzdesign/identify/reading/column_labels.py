@@ -19,7 +19,7 @@ COLUMN_NAMES = {
     "pp": "pP", "pa": "pA", "pb": "pB", "pt": "pT",
     "q": "Q", "flow": "Q",
 }  # fmt: skip
-PRESSURES = ("dP", *PORTS)
+PRESSURES: tuple[str, ...] = ("dP", *PORTS)
 QUANTITY_OF_COLUMN = {"time": "time", "u": "voltage", **dict.fromkeys(PRESSURES, "pressure"), "Q": "flow"}
 #: How a column is best named, for the messages.
 EXAMPLE_UNITS = {"time": "s", "u": "V", **dict.fromkeys(PRESSURES, "MPa"), "Q": "L/min"}
