@@ -90,7 +90,7 @@ def test_c_and_readme_say_what_is_certified(example_valve, machine, target):
         header = " ".join(files["core/dz_comp.h"].replace("\n *", " ").split())
         assert of in header and said in header
         readme = next(text for path, text in files.items() if path.endswith("README.md"))
-        assert f"The certificate is of {compensator.certified_of}:" in readme
+        assert f"The certificate covers {compensator.certified_of}:" in readme
 
 
 def test_without_a_machine_the_budget_is_that_of_the_recording(example_compensator):

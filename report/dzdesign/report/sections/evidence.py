@@ -224,7 +224,7 @@ def series_table(series: MonteCarlo | None, units: RecordedUnits) -> Table | Non
         return units.number(value, ".2f L/min")
 
     return table_of(
-        "Series of plants: median (1 to 99 %). No requirement: the certificate is of the tests' valve",
+        "Series of plants: median (1 to 99 %). No requirement: the certificate covers the tested valve",
         series.pressures,
         ("side", lambda one: word(one.side)),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
