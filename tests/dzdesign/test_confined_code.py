@@ -22,7 +22,8 @@ ATTACKS = {
     "an abort": ("abort();", "ended with signal 6"),
     "a good exit": ("exit(0);", "ended with exit status 0"),
     "a hundred gigabytes": (
-        "for (int i = 0; i < 99; i++) {\n        volatile char *one = malloc(1000000000ul);\n        one[0] = 1;\n    }",
+        "for (int i = 0; i < 99; i++) {\n        volatile char *one = malloc(1000000000ul);\n"
+        "        one[0] = 1;\n    }",
         "ended with signal 11",
     ),
     "another answer": (
