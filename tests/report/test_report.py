@@ -344,7 +344,7 @@ def test_what_was_not_tried_is_said(copied):
     assert report.kind == "good"
     said = report.html[report.html.index('class="verdict good"') : report.html.index('<dl class="numbers">')]
     command = '<code>verify <span class="tied">--plant</span></code>'
-    assert f"closed loop with a plant of the machine&#39;s own: {command}" in said
+    assert f"the closed loop holds with the machine&#39;s plant: {command}" in said
     assert "load steps" not in said  # of recordings at several pressure drops
     assert "machine code of other processors" in said
 
