@@ -52,6 +52,6 @@ def test_numbers_texts_and_prose_with_many_points_are_read():
 
 
 def test_a_number_of_too_many_digits_is_said_without_advice_for_programmers():
-    with pytest.raises(InputError, match="limit .4300 digits.") as raised:
+    with pytest.raises(InputError, match="4300 digits") as raised:
         read_toml(b"a = " + b"9" * 5000, "a.toml", "lines")
     assert "sys." not in str(raised.value)
