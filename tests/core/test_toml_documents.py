@@ -49,3 +49,9 @@ def test_numbers_texts_and_prose_with_many_points_are_read():
     text = f'x = [{numbers}]\ny = "{prose}"\n[machine]\nsupply.least = 18.0\n'
     found = read_toml(text.encode(), "options.toml", "options", str)
     assert found["x"] == ["0.1"] * 100 and found["machine"] == {"supply": {"least": "18.0"}}
+
+
+def test_a_number_of_too_many_digits_is_said_without_advice_for_programmers():
+    with pytest.raises(InputError, match="4300 digits") as raised:
+        read_toml(b"a = " + b"9" * 5000, "a.toml", "lines")
+    assert "sys." not in str(raised.value)

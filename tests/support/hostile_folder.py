@@ -33,6 +33,7 @@ NAMES = (
     "{{7*7}}", "{% raw %}", "${HOME}", "%s%n", "$(touch CANARY)", "`touch CANARY`", ";touch CANARY;", "|touch CANARY",
     "<img src=x onerror=alert(1)>", "<script>alert(1)<", "=cmd|' C calc'!A0", "@SUM(1+1)", "+1+1", "-rf", "--config",
     "a\nb", "\x1b[2J\x1b]0;title\x07", "\u202egpj", "'; DROP TABLE valves", "%2e%2e", "CON", "x" * 200,
+    "a *) END_FUNCTION (* ??", "\u2028\x85b",
 )  # fmt: skip
 #: A library of CasADi's, which it looks for in folders.
 LIBRARIES = ("libcasadi_nlpsol_ipopt.so", "libcasadi_conic_daqp.so", "libgcc_s.so.1")

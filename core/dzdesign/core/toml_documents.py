@@ -29,4 +29,5 @@ def read_toml(
             raise ValueError(f"row {row} has a key of more than {MOST_PARTS} parts")
         return tomllib.loads(text, parse_float=parse_float)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"'{source}' is not TOML: {error}; expected {expected}") from error
+        reason = str(error).partition("; use sys.")[0]  # Python's advice to a programmer
+        raise InputError(f"'{source}' is not TOML: {reason}; expected {expected}") from error

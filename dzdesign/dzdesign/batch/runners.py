@@ -2,11 +2,13 @@
 
 import logging
 import os
+import signal
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from itertools import count, islice
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
@@ -73,7 +75,31 @@ def _in_processes(tasks: Iterable[Task], jobs: int, work: Work) -> Iterator[Outc
         processes |= {"initializer": end_with, "initargs": (os.getpid(),)}
     with _safe_path(), parallel_config(n_jobs=jobs, **processes):
         pool = Parallel(return_as="generator_unordered", pre_dispatch=AHEAD * jobs, batch_size=1)
-        yield from pool(delayed(work)(task) for task in tasks)
+        with _interrupts_kept_waiting() if jobs > 1 else nullcontext():
+            outcomes = pool(delayed(work)(task) for task in tasks)
+        yield from outcomes
+
+
+@contextmanager
+def _interrupts_kept_waiting() -> Iterator[None]:
+    """Let processes that are started meanwhile hear no Ctrl-C, which is for this one: as they start it is a traceback.
+
+    The helpers of joblib, which allow it again as they start, are started before.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    from joblib.externals.loky.backend import resource_tracker as loky_tracker
+
+    resource_tracker.ensure_running()
+    loky_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

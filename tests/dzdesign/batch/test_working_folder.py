@@ -11,6 +11,7 @@ import pytest
 from many_valves import recordings
 
 from dzdesign.batch.parent_watch import end_with
+from dzdesign.batch.runners import _in_processes
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import MOST_DOCUMENT, read_recording
 
@@ -70,6 +71,14 @@ def is_there(process: int) -> bool:
         return False
     stat = Path(f"/proc/{process}/stat")  # a zombie has ended
     return not (stat.is_file() and stat.read_text().rpartition(")")[2].split()[0] == "Z")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are of POSIX")
+def test_an_interrupt_is_for_the_command_and_for_no_worker():
+    """A worker that heard it as it starts would write pages of its own."""
+    found = list(_in_processes(range(2), 2, lambda _: signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())))
+    assert found == [True, True]
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 def test_watching_a_parent_that_lives_ends_nothing():

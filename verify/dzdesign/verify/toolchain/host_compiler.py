@@ -113,7 +113,7 @@ def environment() -> dict[str, str]:
 
 
 def host_compiler() -> str:
-    """Return the C compiler to use; where there is none that makes a program, an `InputError` says what to do."""
+    """Return the C compiler to use; where there is none, or $CC is none, an `InputError` says what to do."""
     compilers = find_compilers()
     if not compilers:
         raise InputError(
@@ -121,13 +121,14 @@ def host_compiler() -> str:
             "`pip install dzdesign[zig]` into this environment, `apt install gcc`, `xcode-select --install`, or on "
             "Windows `winget install LLVM.LLVM`; `dzdesign doctor` says what is there"
         )
-    _check_that_it_compiles(compilers[0], os.environ.get("PATH", ""))
+    if os.environ.get("CC"):
+        _check_that_it_compiles(compilers[0], os.environ.get("PATH", ""))
     return compilers[0]
 
 
 @cache
 def _check_that_it_compiles(compiler: str, path: str) -> None:
-    """Refuse a compiler that makes no program of C; else firmware would be blamed for it. `path` may change it."""
+    """Refuse a $CC that makes no program of C, for which firmware would be blamed; `path` may make it another one."""
     with tempfile.TemporaryDirectory(dir=build_folder(), ignore_cleanup_errors=True) as folder:
         place = Path(folder)
         (place / "tiny.c").write_text(TINY, encoding="utf-8")
@@ -137,10 +138,9 @@ def _check_that_it_compiles(compiler: str, path: str) -> None:
         except RequirementError as error:
             reason = str(error)
     if reason:
-        named = "$CC" if os.environ.get("CC") else "the C compiler found first"
         raise InputError(
-            f"{named} is {compiler!r}, which makes no program of C ({reason}); set $CC to a C compiler, without options "
-            "by which it does not compile or link"
+            f"$CC is {compiler!r}, which makes no program of C ({reason}); set it to a C compiler, without options by "
+            "which it does not compile or link, or unset it"
         )
 
 
