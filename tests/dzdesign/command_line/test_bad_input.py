@@ -149,7 +149,7 @@ def test_a_copy_is_no_repetition(refusal, bench):
 
 
 def test_a_recording_that_was_saved_again_is_no_repetition(refusal, bench, wording):
-    """Other encoding, other line ends, no comments and fewer decimals leave the same samples."""
+    """In another encoding, with other line ends, without comments and with fewer decimals, it has the same samples."""
     lines = [line for line in (bench / "a.csv").read_text().splitlines() if not line.startswith("#")]
     rows = [",".join(f"{float(cell):.3f}" for cell in line.split(",")) for line in lines[1:]]
     (bench / "again.csv").write_bytes(b"\xef\xbb\xbf" + "\r\n".join([lines[0], *rows, ""]).encode())

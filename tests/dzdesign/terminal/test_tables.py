@@ -1,7 +1,10 @@
 """What a page prints of a valve: names of recordings that fit in a column, the meter's lag with its tolerance."""
 
+from dataclasses import replace
+
 import pytest
 
+from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.model import lag_in_words
 from dzdesign.report.sections.valve import valve_sections
 from dzdesign.terminal.tables import print_valve, short_source
@@ -44,3 +47,22 @@ def test_page_and_report_have_it(example_valve, capsys):
     assert "±" in words or "at most" in words
     assert words in capsys.readouterr().out
     assert any(words in str(line) for line in valve_sections(example_valve, None)["data"].lines)
+
+
+def test_what_was_left_out_is_a_line_for_each_reason(example_valve, capsys):
+    """Both sides of a recording name the same seconds, which count once; what the engineer left out is not said."""
+    side = example_valve.positive
+    stretches = [(4.0, "pressure"), (4.9, "pressure"), (9.0, "option"), (2.0, "partial")]
+    parts = [
+        LeftOut(recording=f"r{number}.csv", from_s=0.0, to_s=end, reason=reason, dp_MPa=None)
+        for number, (end, reason) in enumerate(stretches)
+    ]
+    tests = (replace(side.tests[0], left_out=tuple(parts)), *side.tests[1:])
+    one = replace(side, tests=tests)
+    other = replace(side, tests=(replace(side.tests[0], left_out=(replace(parts[1], to_s=4.5),)), *side.tests[1:]))
+    print_valve(replace(example_valve, sides={"positive": one, "negative": other}))
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("left out")]
+    assert lines == [
+        "left out of 2 recordings: up to 4.9 s, the pressure drop is not the ramp's (listed by -v)",
+        "left out of 'r3.csv': 2.0 s, the command stays below half of its largest (listed by -v)",
+    ]

@@ -166,7 +166,7 @@ class TestPressureOnItsWay:
     """A pump that starts with the ramp: the rising branch is run at another pressure drop than the falling one."""
 
     @staticmethod
-    def recorded(dp_MPa, settles_s=60.0):
+    def recorded(dp_MPa, settles_s=30.0):
         truth = Truth(slope=4.0 * dp_MPa**0.5)
         test = synthetic_ramp(dp_MPa, truth, ramp_s=50.0, source=f"late_{dp_MPa:g}.csv")
         share = np.clip(test.time / settles_s, 0.01, 1) ** 2
