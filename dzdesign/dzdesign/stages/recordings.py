@@ -129,7 +129,8 @@ def read_recordings(
                 sample_rate=rate, skip_rows=skipped,
             )  # fmt: skip
         except MissingColumnError as error:
-            raise InputError(f"{error}{_with_columns(path, chosen, skipped, rate)}") from error
+            option = _with_columns(path, chosen, skipped, rate)
+            raise InputError(f"{error.what}{option}" if option else str(error)) from error
         units = test.units if declared is None else {**test.units, **unit_of_pressure(declared[0])}
         tests.append(replace(test, source=name, units=units))
     _refuse_unnamed(tests, dp)
@@ -147,7 +148,7 @@ def _with_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None, 
     if not look.to_paste:
         return ""
     unknown = " (LABEL: the one that you know)" if "=LABEL:" in look.to_paste else ""
-    return f'. By the units of its columns: --columns "{look.to_paste}"{unknown}'
+    return f'; by their units, give --columns "{look.to_paste}"{unknown}'
 
 
 def expand(patterns: Paths) -> list[Path]:

@@ -77,6 +77,7 @@ def identify_sides(
     tests = [without_dither(test, dither, options.u_max) for test in tests]
     sides, warnings = _each_side(tests, options, units, low_flow)
     lag = next(iter(sides.values())).described.lag
+    zeros = {name: side.described.zero_L_min for name, side in sides.items()}
     # In whatever order they came: those of the pressure drops, then those of a side that was refused, then tables.
     files = dict.fromkeys(file for side in sides.values() for item in side.described.tests for file in item.files)
     files |= dict.fromkeys(sorted((test.source, test.sha256) for test in tests))
@@ -100,7 +101,7 @@ def identify_sides(
             (
                 *(item.in_units(units) for item in about_recordings(tests)),
                 *([warn("two-sides").in_units(units)] if len(sides) > 1 else []),
-                *(item.in_units(units) for item in about_whole_meter(sides, tests, options.u_max)),
+                *(item.in_units(units) for item in about_whole_meter(zeros, tests, options.u_max)),
                 *warnings,
             )
         ),

@@ -154,3 +154,10 @@ def test_a_few_coarse_readings_that_agree_say_nothing():
 def test_a_second_run_of_a_simulation_without_noise_is_no_repeat():
     one, other = (recorded(np.random.default_rng(5), noise=0.0, scatter=0.0) for _ in range(2))
     assert find_copy([ramp_test("one", one), ramp_test("other", other)]) is not None
+
+
+def test_the_same_ramp_at_another_level_pressure_drop_is_no_copy():
+    """A unit or a sign that is wrong in one of two files is for another refusal to say."""
+    time, u, q, dp = recorded(np.random.default_rng(6), noise=0.0)
+    for other in (-dp, 10 * dp):
+        assert find_copy([ramp_test("one", (time, u, q, dp)), ramp_test("other", (time, u, q, other))]) is None

@@ -6,30 +6,32 @@ from dzdesign.core.worded import worded
 from dzdesign.identify.data_quality.catalogue import Finding, warn
 from dzdesign.identify.ramps.sides import flow_is_negative, tests_of_side
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.results import SideIdentification
 from dzdesign.identify.valve.model import SIDES
 
 
 def about_whole_meter(
-    sides: Mapping[str, SideIdentification], tests: Sequence[RampTest], u_max: float
+    zeros_of_sides: Mapping[str, Mapping[str, float]], tests: Sequence[RampTest], u_max: float
 ) -> Iterator[Finding]:
-    """Yield what is to be said; `tests` are all recordings."""
+    """Yield what is to be said; `tests` are all recordings.
+
+    `zeros_of_sides` have for each side that was identified source -> flow at zero command, L/min, where it is not zero.
+    """
     negative = [test for test in tests if tests_of_side([test], SIDES["negative"], u_max)]
     unsigned = [test.source for test in negative if not flow_is_negative(test)]
-    yield from _about_zeros(sides, unsigned, len(tests))
-    if unsigned and "negative" in sides:
+    yield from _about_zeros(zeros_of_sides, unsigned, len(tests))
+    if unsigned and "negative" in zeros_of_sides:
         which = "the recording" if len(tests) == 1 else f"{len(unsigned)} of {len(negative)} recordings"
         yield warn("unsigned-flow", None, which=which)
 
 
 def _about_zeros(
-    sides: Mapping[str, SideIdentification], unsigned: Sequence[str], recordings: int
+    zeros_of_sides: Mapping[str, Mapping[str, float]], unsigned: Sequence[str], recordings: int
 ) -> Iterator[Finding]:
     """Say of all recordings together what the meter reads at zero command, with its own sign."""
     zeros: dict[str, float] = {}
     leaks = False
-    for name, side in sides.items():
-        for source, zero in side.described.zero_L_min.items():
+    for name, of_side in zeros_of_sides.items():
+        for source, zero in of_side.items():
             own = zero if source in unsigned else SIDES[name] * zero
             zeros[source] = own if source not in zeros else (zeros[source] + own) / 2
             leaks = leaks or zero > 0

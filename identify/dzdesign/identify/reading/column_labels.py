@@ -51,7 +51,11 @@ class Column:
 
 
 class MissingColumnError(InputError):
-    """A table has no column of a quantity that a ramp test needs."""
+    """A table has no column of a quantity that a ramp test needs; `what` says so, without what to do."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(what + remedy)
+        self.what = what
 
 
 def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
@@ -280,8 +284,8 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> Mi
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
     rate = ', or --sample-rate "100 Hz"' if quantity == "time" else ""
     return MissingColumnError(
-        f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}; "
-        f"expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}"
+        f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}",
+        f"; expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}",
     )
 
 

@@ -34,6 +34,8 @@ FIRST_LOOK, FIRST_FEWEST, FIRST_AGREE = 256, 5, 0.9
 SAME_STEP, ROUNDING = 1e-3, 1e-7
 #: Share of a step that what agrees may lie off it.
 MARGIN = 1e-3
+#: Share by which two level channels of one recording differ at most.
+LEVEL = 0.01
 #: Shares of the largest command between which it goes on a ramp.
 LOW, HIGH = 0.25, 0.75
 
@@ -125,7 +127,7 @@ def _step(channel: np.ndarray) -> float:
 
 def _both_ways(early: _Trace, late: _Trace) -> list[tuple[_Trace, _Trace]]:
     """Return which of two recordings is compared with the other, interpolated at its times: the shorter one first."""
-    if not (early.dt > 0 and late.dt > 0):
+    if not (early.dt > 0 and late.dt > 0) or len(early.channels) != len(late.channels):
         return []
     ways = [(early, late), (late, early)]
     if late.time.size > early.time.size:
@@ -185,12 +187,12 @@ def _agrees(known: _Trace, compared: _Trace, shift: float | np.ndarray, rows: np
     after = np.clip(np.searchsorted(known.time, time), 1, known.time.size - 1)
     nearest = after - (time - known.time[after - 1] < known.time[after] - time)
     same = np.ones(time.shape, dtype=bool)
-    for number, (one, other) in enumerate(list(zip(known.channels, compared.channels, strict=False))[:channels]):
+    for number, one in enumerate(known.channels[:channels]):
+        other = compared.channels[number]
         step = max(known.steps[number], compared.steps[number])
-        if step == 0:  # both are level, and how they were rounded is not known
-            continue
-        # What was rounded lies within half a step; a pressure drop is the difference of two such columns.
-        tolerance = (0.5 + MARGIN) * step * (2 if number == 2 else 1)
+        # What was rounded lies within half a step; a pressure drop is the difference of two such columns. Where both are
+        # level it is not known how they were rounded.
+        tolerance = (0.5 + MARGIN) * step * (2 if number == 2 else 1) if step else LEVEL * float(np.abs(other).max())
         between = np.interp(time, known.time, one)
         same &= np.minimum(np.abs(one[nearest] - other[rows]), np.abs(between - other[rows])) <= tolerance
     return same
