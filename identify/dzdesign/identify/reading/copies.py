@@ -190,8 +190,8 @@ def _agrees(known: _Trace, compared: _Trace, shift: float | np.ndarray, rows: np
     for number, one in enumerate(known.channels[:channels]):
         other = compared.channels[number]
         step = max(known.steps[number], compared.steps[number])
-        # What was rounded lies within half a step; a pressure drop is the difference of two such columns. Where both are
-        # level it is not known how they were rounded.
+        # What was rounded lies within half a step; a pressure drop is the difference of two such columns. Of two level
+        # ones it is not known how they were rounded.
         tolerance = (0.5 + MARGIN) * step * (2 if number == 2 else 1) if step else LEVEL * float(np.abs(other).max())
         between = np.interp(time, known.time, one)
         same &= np.minimum(np.abs(one[nearest] - other[rows]), np.abs(between - other[rows])) <= tolerance
