@@ -79,7 +79,7 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
  * below; `failed` is all ones for pressures that must not be used, else 0. */
 uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
 
-/* Returns the status of the inputs, an OR of DZ_STATUS_..., or 0: all valid, and no pressure drop above the tested ones. */
+/* Returns the status of the inputs, an OR of DZ_STATUS_...; 0: all are valid, no pressure drop is above the tests. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* Returns the beta that dz_comp() uses at these pressures, times 2^15, rounded down: for a display, not for control. */

@@ -31,7 +31,7 @@
 
 /* State of the compensator: one for each valve, set by dz_drive_init().
  * Options of this firmware: Zero band. Interlock.
- * A fault acts at once: without a valid command the valve is de-energised, and implausible pressures select the smallest
+ * A fault acts at once: without a valid command the valve is de-energised; implausible pressures select the smallest
  * beta. It ends after 5 valid samples in a row; a command must be zero in these.
  */
 struct dz_drive

@@ -32,7 +32,7 @@
 /* State of the compensator: one for each valve, set by dz_drive_init(). Which functions are on, the
  * block says: zero band, inverse play, ramps, dither, interlock, latched faults.
  *
- * A fault acts at once: without a valid command the valve is de-energised, and implausible pressures select the smallest
+ * A fault acts at once: without a valid command the valve is de-energised; implausible pressures select the smallest
  * beta. It ends after the block's fault_samples valid samples in a row; with an interlock a command must be
  * zero in these. With latched faults it stays after as many faulty ones, until dz_drive_init().
  */

@@ -31,7 +31,7 @@
 
 /* State of the compensator: one for each valve, set by dz_drive_init().
  * Options of this firmware: two solenoids. Zero band. Ramps. Dither. Interlock. Latched faults.
- * A fault acts at once: without a valid command the valve is de-energised, and implausible pressures select the smallest
+ * A fault acts at once: without a valid command the valve is de-energised; implausible pressures select the smallest
  * beta. It ends after 3 valid samples in a row; a command must be zero in these.
  * After 3 faulty ones before that it stays until dz_drive_init().
  */

@@ -96,7 +96,7 @@ uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
 uint32_t dz_comp_checked_negative(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
 
-/* Returns the status of the inputs, an OR of DZ_STATUS_..., or 0: all valid, and no pressure drop above the tested ones. */
+/* Returns the status of the inputs, an OR of DZ_STATUS_...; 0: all are valid, no pressure drop is above the tests. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* The same with the pressure drop of negative commands. */
