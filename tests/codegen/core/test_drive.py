@@ -86,7 +86,8 @@ def options_named(name: str) -> DesignOptions:
         "everything": full,
         "two solenoids alone": DesignOptions(signals=full.signals, **FOLLOWS_AT_ONCE),
         "turned, same pressures": replace(
-            full, signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), swapped=False)
+            full, signals=replace(full.signals, command=turned("-10..10 V x 0.15 + 1.5 V"), swapped=False),
+            negative_dp="wired",
         ),
         "one solenoid alone": plain,
         "one solenoid, ramps": replace(plain, ramp_up_s=(0.3, 0.0), ramp_down_s=(0.9, 0.0)),

@@ -445,7 +445,8 @@ def test_their_folders_stand_in_the_valve_file_and_may_stand_in_dp(ramp_file, tm
     _, *rows = ramp_file.read_text().splitlines()
     for number, folder in enumerate(("one", "two")):
         Path(folder).mkdir()
-        bare = [",".join((row.split(",")[0], row.split(",")[1], row.split(",")[3])) for row in rows[number:]]
+        cells = [row.split(",") for row in rows]
+        bare = [f"{time},{u},{(1 + number) * float(q):.6f}" for time, u, _, q in cells]  # more flow at more pressure
         Path(folder, "ramp.csv").write_text("\n".join(["time_s,u_V,Q_Lmin", *bare]))
     Path("dz.toml").write_text('[dp]\n"one/ramp.csv" = "1 MPa"\n"two/*" = "40 bar"\n')
     assert main(["-q", "identify", "one/ramp.csv", "two/ramp.csv", "--config", "dz.toml", "--json"]) == 0

@@ -67,5 +67,5 @@ def test_another_heading_is_refused(old, new):
 
 
 def test_the_line_is_said():
-    with pytest.raises(InputError, match=r"dz_comp\.m, line 8: pi is not"):
+    with pytest.raises(InputError, match=r"dz_comp\.m, line 8: pi is outside"):
         read_functions(GOOD.replace("compare = uint16(x)", "compare = pi"), "dz_comp.m")
