@@ -25,6 +25,7 @@ from dzdesign.identify.fitting.casadi_problems import (
 )
 from dzdesign.identify.fitting.constrained_fits import KneeFit, expected_errors, hessian_of_cost
 from dzdesign.identify.knees.branch_shape import BranchShape
+from dzdesign.identify.knees.profile import FEWEST_OF_RAMP
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -169,9 +170,10 @@ class _LargestFlow:
 
 
 def _largest_flow(placed: Sequence[tuple[int, int, BranchShape]], reference: int) -> _LargestFlow:
-    of_dp0 = {column: index for index, (row, column, _) in enumerate(placed) if row == reference}
-    index = of_dp0[min(of_dp0)]  # a falling branch begins with the flat stretch of the hysteresis
-    shape = placed[index][2]
+    at_dp0 = [(index, shape) for index, (row, _, shape) in enumerate(placed) if row == reference]
+    index, shape = at_dp0[0]  # the rising branch where there is one: `largest_at_top` says why
+    if shape.prepared.recorded[0].size < FEWEST_OF_RAMP:
+        index, shape = max(at_dp0, key=lambda each: each[1].y_max)
     return _LargestFlow(flow=shape.y_max, flow_se=_top_error(shape), weights=np.eye(len(placed))[index])
 
 

@@ -17,7 +17,7 @@ from dzdesign.identify.knees.gated_line import prepare_branch
 from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.mixed_branches import refuse_mixed_branches
-from dzdesign.identify.knees.profile import flow_at_top
+from dzdesign.identify.knees.profile import largest_at_top
 from dzdesign.identify.knees.readings_at_rest import find_rest_flows
 from dzdesign.identify.knees.refusals import (
     refuse_a_jump,
@@ -181,12 +181,11 @@ def _with_ramps_together(item: PooledTest, row: int, between: Sequence[BetweenRa
 def _describe(item: PooledTest, shapes: Iterator[BranchShape]) -> DescribedTest:
     """Put a test together; `shapes` gives those of its branches next."""
     rising, falling = (next(shapes) if branch else None for branch in item.branches)
-    first_branch = next(shape for shape in (rising, falling) if shape)  # as `largest_flow` has it
     return DescribedTest(
         test=item.test,
         dp=nominal_dp(item.test),
         shapes=(rising, falling),
-        q_max=flow_at_top(*first_branch.prepared.recorded),
+        q_max=largest_at_top([shape.prepared.recorded for shape in (rising, falling) if shape]),
         ramps=item.ramps,
         when=item.when,
         files=item.files,

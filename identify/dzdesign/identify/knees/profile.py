@@ -14,6 +14,8 @@ TOP_GATE, SMALLEST_MISS = 6.0, 0.05
 #: A step between two points of a profile is a hole, rows that are missing, beyond so many usual steps, and this share
 #: of u_max.
 USUAL_STEPS, SMALLEST_HOLE = 4.0, 2e-3
+#: A profile of fewer points has one a level, as a staircase test gives.
+FEWEST_OF_RAMP = 200
 
 
 def smooth_profile(u: np.ndarray, y: np.ndarray, u_max: float) -> tuple[np.ndarray, np.ndarray]:
@@ -21,7 +23,7 @@ def smooth_profile(u: np.ndarray, y: np.ndarray, u_max: float) -> tuple[np.ndarr
     index, n = bin_index(u, u_max)
     u_mean = np.bincount(index, weights=u) / n
     y_mean = np.bincount(index, weights=y) / n
-    if n.size < 200:  # one level a step, as a staircase test gives: nothing to smooth over
+    if n.size < FEWEST_OF_RAMP:  # nothing to smooth over
         return u_mean, y_mean
     padded = np.pad(y_mean, 2, mode="edge")
     return u_mean, np.partition(np.lib.stride_tricks.sliding_window_view(padded, 5), 2, axis=1)[:, 2]
@@ -60,13 +62,18 @@ def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[f
 
 
 def largest_flow(branches: Sequence[Branch | None], u_max: float) -> float:
-    """Return the largest flow of a test as recorded, m³/s: that of its first branch, the rising one where it has one.
+    """Return the largest flow of a test as recorded, m³/s; see `largest_at_top`."""
+    return largest_at_top([smooth_profile(branch.u, branch.q, u_max) for branch in branches if branch])
 
-    A falling branch begins with a stretch as flat as the hysteresis is wide: a line through its top reads more than
-    flowed.
+
+def largest_at_top(profiles: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Return the largest flow of profiles, the rising branch's first: that of the rising one, of a ramp.
+
+    A falling ramp begins with a stretch as flat as the hysteresis is wide: a line through its top reads more than
+    flowed. A staircase has none, but its rising branch ends in a step that the meter may still follow.
     """
-    first = next(branch for branch in branches if branch)
-    return flow_at_top(*smooth_profile(first.u, first.q, u_max))
+    ramp = profiles[0][0].size >= FEWEST_OF_RAMP
+    return max(flow_at_top(*profile) for profile in (profiles[:1] if ramp else profiles))
 
 
 def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:
