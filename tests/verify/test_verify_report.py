@@ -107,7 +107,7 @@ def test_files_that_verify_calls_changed_have_its_verdict_and_no_other(copied):
     assert not holds and "DOES NOT HOLD: 1 of" in html and "DO NOT BELONG" not in html
     assert "firmware/f28335/main.c was changed since it was generated" in html
     head = html[html.index('class="verdict bad"') : html.index('<dl class="numbers">')]
-    assert "Not checked" in head and "verify --plant" in head  # of a red verdict, too
+    assert "Optional checks not run" in head and "verify --plant" in head  # of a red verdict, too
 
 
 def test_folders_of_one_name_are_kept_apart(copied, tmp_path):
@@ -169,7 +169,7 @@ def test_a_valve_file_that_was_replaced_is_said_first(copied):
     check = valve_follows(copied / "firmware", compensator)
     assert check.holds and "valve.json" not in check.name
     assert check.text.startswith(f"valve.json beside the firmware is ANOTHER valve, SHA-256 {digest}, and not used; ")
-    assert check.text.endswith(f"the SHA-256 {stated} in made_from")
+    assert check.text.endswith(f"has the SHA-256 {stated} that made_from states")
     shutil.rmtree(copied / "evidence")
     report = report_of_folder(copied / "firmware")
     assert any(line.startswith(f"valve.json has the SHA-256 {digest}, but the compen") for line in report.missing)
