@@ -49,7 +49,8 @@ def two_solenoids() -> Compensator:
     """Return a design with ramps, dither and transition for both solenoids; plain sensors, as the model has them."""
     valve = read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
     ramps = {"ramp_up_s": (0.02, 0.03), "ramp_down_s": (0.01, 0.0)}
-    return design(valve, full_options(signals=Signals(command=BOTH, compare_max=TARGET.compare_max), **ramps))
+    signals = Signals(command=BOTH, compare_max=TARGET.compare_max)
+    return design(valve, full_options(signals=signals, negative_dp="wired", **ramps))
 
 
 MADE: dict[str, Callable[[], Compensator]] = {
