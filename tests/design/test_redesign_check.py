@@ -263,4 +263,4 @@ def test_a_lot_setting_is_bounded_by_its_valve(common):
     other = edited(document, ("signals", "command", "full_code"), lambda _: 3000)
     assert "'signals.command.full_code' is" in refusal(other)
     own = {**document, "lot": [], "lot_sha256": None}
-    assert "follows from its valve and its options" in refusal(own)
+    assert "'sides.positive.drive_range_over_u_max' is" in refusal(own)
