@@ -72,7 +72,7 @@ def test_both_signs():
     content = BOTH_SIDES.read_bytes()
     signals = Signals()
     command = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "command"), _converter(signals), inverted=False)
-    options = DesignOptions(transition=Fraction(0), signals=_with_command(signals, command))
+    options = DesignOptions(transition=Fraction(0), signals=_with_command(signals, command), negative_dp="recorded")
     each = designed(read_artefact(content, ValveModel, "valve.json"), options)
     common = lot_setting({"a": each, "b": each}).compensator
     assert (common.positive, common.negative) == (each.positive, each.negative)

@@ -148,7 +148,9 @@ def _with_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None, 
     if not look.to_paste:
         return ""
     unknown = " (LABEL: the one that you know)" if "=LABEL:" in look.to_paste else ""
-    return f'; by their units, give --columns "{look.to_paste}"{unknown}'
+    timeless = rate is None and "time" not in look.known | look.proposed
+    clock = ', and --sample-rate "100 Hz" (the rate of your logger)' if timeless else ""
+    return f'; by their units, give --columns "{look.to_paste}"{unknown}{clock}'
 
 
 def expand(patterns: Paths) -> list[Path]:

@@ -188,7 +188,7 @@ def test_a_batch_json_that_contradicts_itself_is_refused(change, copied, wording
 def test_every_valve_not_calibrated_has_its_reason_and_what_to_do(made):
     text = " ".join(Page((made / "report.html").read_text(encoding="utf-8")).text.split())
     assert "valve 'V0001' has no recording" in text and "expected files such as ramp_1MPa.csv" in text
-    assert "'ramp_dP1.csv' has no column of Q" in text and "expected names with units such as" in text
+    assert "'ramp_dP1.csv' has no column of Q" in text and "Q=LABEL:L/min" in text
 
 
 def test_what_the_setting_would_cost_without_those_that_hold_it_down(made):

@@ -277,7 +277,7 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> Mi
     """Return the error that names the columns found, and the one that may have been meant."""
     unused = [label for label in table.labels[:MOST_MEANT] if split_label(label)[0] not in columns]
     bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
-    spellings = [name for name, its in COLUMN_NAMES.items() if its == quantity]
+    spellings = [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]  # T_degC is no time
     meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]
     kind = QUANTITY_OF_COLUMN[quantity]
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
