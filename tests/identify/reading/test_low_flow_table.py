@@ -80,6 +80,7 @@ def test_a_little_less_than_none_within_its_error_is_none(tmp_path):
         "no unit": ["u_V,dP_MPa,Q,Q_error [mL/min],branch", ROW],
         "another unit": ["u_V,dP_MPa,Q [mm],Q_error [mL/min],branch", ROW],
         "a cell too few": [HEADER, "5.1,3,12,3"],
+        "a million columns": [HEADER + "," * 999_995, ROW],
         "no number": [HEADER, "5.1,3,a few,3,closing"],
         "a number without an end": [HEADER, "5.1,3,inf,3,closing"],
         "an error of zero": [HEADER, "5.1,3,12,0,closing"],

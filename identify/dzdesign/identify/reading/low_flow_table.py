@@ -17,8 +17,8 @@ from dzdesign.identify.reading.scaling import scaling_of
 from dzdesign.identify.reading.text.encoding import read_text
 from dzdesign.identify.valve.low_flow import Branch, LowFlow
 
-#: Rows that nobody measures by hand in greater number, and characters of a cell that a message quotes.
-MOST_ROWS, QUOTED = 1000, 40
+#: Rows and columns that no table made by hand exceeds, and characters of a cell that a message quotes.
+MOST_ROWS, MOST_COLUMNS, QUOTED = 1000, 100, 40
 #: The columns, as they are best named.
 EXAMPLE = "u_V,dP_MPa,Q [mL/min],Q_error [mL/min],branch"
 #: Words for the branch on which a command was reached.
@@ -67,15 +67,18 @@ def read_low_flow(path: Path, u_max: float, name: str = "") -> LowFlowTable:
     if not kept:
         raise InputError(f"'{path}' is empty, expected a table of low flows with a header such as {EXAMPLE}")
     separator = next((mark for mark in ";\t," if mark in kept[0][1]), ",")
+    width = kept[0][1].count(separator) + 1
+    if width > MOST_COLUMNS:
+        raise InputError(f"'{path}' has {width} columns, expected at most {MOST_COLUMNS}, such as {EXAMPLE}")
     columns = _columns(path, [cell.strip(' \t"') for cell in kept[0][1].split(separator)])
     if not 1 < len(kept) <= MOST_ROWS + 1:
         raise InputError(f"'{path}' has {len(kept) - 1} rows, expected 1 to {MOST_ROWS} of flows measured one by one")
     source = name or path.name.encode(errors="replace").decode()
     typed = []
     for number, line in kept[1:]:
+        if (found := line.count(separator) + 1) != width:
+            raise InputError(f"'{path}' row {number} has {found} cells, expected {width} as its header")
         cells = [cell.strip(' \t"') for cell in line.split(separator)]
-        if len(cells) != len(kept[0][1].split(separator)):
-            raise InputError(f"'{path}' row {number} has {len(cells)} cells, expected as many as its header")
         typed.append(_Row(path, number, cells, columns, u_max))
     _refuse_two_marks(typed)
     rows = [row.reading(source) for row in typed]
