@@ -137,21 +137,13 @@ def test_a_lag_that_is_not_known_well_asks_for_slow_ramps():
     assert fast < slow
 
 
-@pytest.mark.parametrize(
-    ("minutes", "name", "truth"),
-    [
-        (10, "plan", PlannedBench()),
-        (10, "no repeats", PlannedBench()),
-        (15, "plan", PlannedBench(scatter=0.005, noise=0.3)),
-    ],
-    ids=["repeats", "no repeats", "little scatter"],
-)
 @pytest.mark.slow
-def test_valves_recorded_as_planned_come_out_as_predicted(minutes, name, truth):
+def test_valves_recorded_as_planned_come_out_as_predicted():
+    """One bench here; benchmarks/identify tries eight, with 200 valves each."""
+    truth = PlannedBench(scatter=0.005, noise=0.3)
     bench = replace(BENCH, noise=truth.noise * L_MIN)
-    plan = plan_series(expected(truth), bench, request(minutes))
-    planned = {"plan": plan.chosen, **plan.alternatives}[name]
-    assert achieved(planned, truth, 30, 11) == pytest.approx(planned.prediction.loss, rel=AGREEMENT)
+    planned = plan_series(expected(truth), bench, request(15)).chosen
+    assert achieved(planned, truth, 15, 11) == pytest.approx(planned.prediction.loss, rel=AGREEMENT)
 
 
 @pytest.mark.slow
