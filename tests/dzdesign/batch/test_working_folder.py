@@ -26,8 +26,10 @@ end_with(os.getppid())
 print(os.getpid(), process_folder(), flush=True)
 time.sleep(600)
 """
+#: Under `nohup` a hangup would end nothing.
 PARENT = f"""
-import subprocess, sys, time
+import signal, subprocess, sys, time
+signal.signal(getattr(signal, "SIGHUP", signal.SIGTERM), signal.SIG_DFL)
 subprocess.Popen([sys.executable, "-c", {CHILD!r}])
 time.sleep(600)
 """
