@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-#: It asks a reader that does not answer.
+#: It asks a reader that does not answer; under `nohup` a hangup would end nothing.
 ASKING = """
 import os, signal
+signal.signal(getattr(signal, "SIGHUP", signal.SIGTERM), signal.SIG_DFL)
 from dzdesign.identify.reading.binary.reader_process import ReaderProcess
 from dzdesign.identify.reading.binary.reader_server import Request
 reader = ReaderProcess()
