@@ -52,7 +52,7 @@ def residual(example: Example) -> "Figure":
     command = np.arange(0, 500)
     drive = 10 * np.array([float(compensator.drive(int(each), code)) for each in command])
     share = 100 * command / 4095
-    axes.plot(share, drive, color=BLUE, lw=2, label="drive of the law, 1 MPa")
+    axes.plot(share, drive, color=BLUE, lw=2, label="output of the law, 1 MPa")
     for height, colour, name in (
         (test.u_knee_rising_V, SKY, "valve opens"),
         (test.u_knee_falling_V, ORANGE, "valve closes"),
@@ -71,7 +71,7 @@ def residual(example: Example) -> "Figure":
     span(axes, 0, closes, 5.115, "")
     note(axes, f"residual on closing: {closes:.1f} %", (closes + 0.12, 5.115), ha="left")
     note(axes, "offset at zero command", (5.2, 5.152), (0.05, drive[0]), ha="left")
-    axes.set(xlabel="command (% of full)", ylabel="drive (V)", xlim=(0, 12), ylim=(5.05, 5.62))
+    axes.set(xlabel="command (% of full)", ylabel="output (V)", xlim=(0, 12), ylim=(5.05, 5.62))
     axes.legend(loc="upper left")
     return figure
 
@@ -98,7 +98,7 @@ def transition(example: Example) -> "Figure":
     axes.axvline(100 * example.compensator.zero_band_codes / 4095, color=GREY, ls=":", lw=1.2)
     axes.axvline(end, color=GREY, ls=":", lw=1.2)
     note(axes, f"transition's end: code {codes},\n{end:.2f} % of command", (1.55, 5.27), (end, 5.3))
-    axes.set(xlabel="command (% of full)", ylabel="drive at 1 MPa (V)", xlim=(0, 3.17))
+    axes.set(xlabel="command (% of full)", ylabel="output at 1 MPa (V)", xlim=(0, 3.17))
     axes.legend(loc="upper left", bbox_to_anchor=(0.27, 0.95))
     return figure
 
@@ -144,7 +144,7 @@ def every_input(example: Example) -> "Figure":
     differences = np.linspace(-widest, widest, 64).astype(int)
     values = np.array([[compensator.compare(int(u), int(dp)) for u in commands] for dp in differences])
     drawn = axes.pcolormesh(commands, differences, values, cmap="cividis", shading="nearest", rasterized=True)
-    figure.colorbar(drawn, label="compare value (60000: full drive)")
+    figure.colorbar(drawn, label="compare value (60000: full output)")
     tested = [int(compensator.signals.dp_code(Fraction(end))) for end in example.side.valid_dp_MPa]
     for code in tested:
         axes.axhline(code, color="white", lw=1.2, ls="--")

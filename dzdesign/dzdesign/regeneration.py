@@ -58,7 +58,8 @@ def regenerated(folder: Path, include: Sequence[Path] = ()) -> "Check":
     if meaning.faults:
         text = f"{'; '.join(meaning.faults)}; headers of yours may not change generated C: correct them"
         return REGENERATED.check(holds=False, text=text)
-    text = f"generated again for {manifest.target}: {len(compared)} files and the manifest are the same, byte for byte"
+    same = f"the manifest and {len(compared)} other files are the same, byte for byte"
+    text = f"generated again for {manifest.target}: {same}"
     if meaning.compared:
         text += f"; with your headers {', '.join(meaning.compared)} compile to the same code"
     return REGENERATED.check(holds=True, text=text)
@@ -130,7 +131,7 @@ def output_regenerated(folder: Path, again: OutputAgain | None = None) -> "Check
         found = f"otherwise than generated now: {', '.join(sorted(others))}"
         return REGENERATED.check(holds=False, text=f"{found}; make the output again with `dzdesign codegen`")
     count = len(output.contents)
-    text = f"generated again for {manifest.target}: {count} files and the manifest are the same, byte for byte"
+    text = f"generated again for {manifest.target}: the manifest and {count} other files are the same, byte for byte"
     return REGENERATED.check(holds=True, text=text)
 
 

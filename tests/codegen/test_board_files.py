@@ -227,7 +227,7 @@ def test_a_vendors_header_is_named_and_found_by_an_option(cortex, tmp_path, caps
     assert main(["verify", str(cortex), "-o", str(evidence)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     why = "stm32_chip.h, which cortex_m4/dz_board.c includes, was not found in the firmware; verify --include DIR"
-    assert f"NOT ASKED FOR your board files compile: {why}" in said
+    assert f"NOT RUN (optional) your board files compile: {why}" in said
     assert "stm32_chip.h, which" in (evidence / REPORT_NAME).read_text(encoding="utf-8")
     headers = [tmp_path / "device", tmp_path / "cmsis"]
     for folder, text in zip(headers, ['#include "core_cm4.h"\n', "int narrow(long x);\n"], strict=True):
@@ -346,7 +346,7 @@ def test_verify_holds_and_says_that_it_was_not_checked(cortex, tmp_path):
     assert result.holds and result.evidence.changed_board_files == ("cortex_m4/dz_board.c",)
     said = "cortex_m4/dz_board.c, which is yours and was changed: review it, and try it on the machine"
     assert said in not_tried(result.evidence)
-    assert "NOT ASKED FOR  cortex_m4/dz_board.c, which is yours" in str(result)
+    assert "NOT RUN (optional)  cortex_m4/dz_board.c, which is yours" in str(result)
     manifest = evidence_manifest(result.evidence)
     write_folder(tmp_path / "evidence", with_report(evidence_files(result), cortex, tmp_path / "evidence"), manifest)
     html = (tmp_path / "evidence" / REPORT_NAME).read_text(encoding="utf-8")

@@ -106,7 +106,7 @@ class TestDrive:
         drive, _ = core_of(made)(10.0)
         if curve.premise == "monotone":
             (line,) = (each for each in made.costs if each.startswith("above"))
-            assert "not certified" in line
+            assert "Not certified" in line
         else:
             assert drive > closing_V(valve, 10.0, -30 * M)
             (line,) = (each for each in made.costs if each.startswith("above"))

@@ -208,7 +208,7 @@ def test_print_sums_a_result_up(example_valve, example_compensator, example_firm
         assert re.search(r" +".join(map(re.escape, numbers.split())), text)
     assert "trend with dP: decreasing" in text and "warning [simulated] " in text
     for outside in ("below 0.50 MPa", "above 5.00 MPa"):
-        assert f"cost: {outside} the offset" in str(example_compensator)
+        assert f"note: {outside} the offset" in str(example_compensator)
     assert str(example_compensator).startswith("Compensator for f28335, law paper, of a valve of 10 V\n")
     assert "core/dz_comp.c" in str(example_firmware)
     for result in (example_valve, example_compensator, example_firmware):

@@ -132,9 +132,9 @@ def _check(key: str, place: str, limit: float, reading: Reading, units: Recorded
         # A symmetry has a sign, and a meter's zero error gives one to the flow at zero command.
         size = abs(value) if key in ("symmetry", "flow_at_zero") else value
         holds = size <= limit
-        error = f" ± {number(reading.se)}" if reading.se is not None else ""
+        error = f" (standard error {number(reading.se)})" if reading.se is not None else ""
         missed = f", {number(size - limit)} more than the limit of {number(limit)}"
-        text = f"{number(value)}{error}" + ("" if holds else missed)
+        text = f"{number(value)}{error}" + (f", limit {number(limit)}" if holds else missed)
     elif bound is not None:
         holds = True if bound <= limit else None
         hope = "" if holds else f"; only a limit of {number(bound)} or more could be checked"

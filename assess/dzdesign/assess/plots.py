@@ -1,4 +1,4 @@
-"""Plots of an assessment: flow over command at each pressure drop, without and with the compensator."""
+"""Plots of an assessment: flow against command at each pressure drop, without and with the compensator."""
 
 from typing import TYPE_CHECKING
 
@@ -33,7 +33,7 @@ def _figure(pair: CurvePair, item: PressureAssessment, comparison: Comparison) -
     options, units = comparison.options, comparison.units
     reading_flow = units.convert(item.reading_flow_L_min, "L/min")
     sources = "; ".join(f"{name}: {curves.source}" for name, curves in pair.sets.items())
-    figure = new_figure(5.0, f"Flow over command, {item.place(units)}", sources)
+    figure = new_figure(5.0, f"Flow against command, {item.place(units)}", sources)
     axes = figure.subplots()
     for name, curves in pair.sets.items():
         u_max, readings = options.of_set(name).u_max, item.readings(name)

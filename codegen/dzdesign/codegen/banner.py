@@ -65,7 +65,7 @@ class Banner:
             of = f"{self.lot.carrier} identified from" if self.lot else "Valve identified from"
             lines.append(f"{of}: {printable_list(self.recordings)}")
         if self.simulated:
-            lines.append("SIMULATED recordings: an example, not of a measured valve. Not for a machine.")
+            lines.append("SIMULATED recordings: an example. No real valve was measured. Not for a machine.")
         return tuple(lines)
 
 

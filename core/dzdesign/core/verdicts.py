@@ -2,7 +2,9 @@
 
 HOLDS, DOES_NOT_HOLD, NOT_CHECKED = "HOLDS", "DOES NOT HOLD", "NOT CHECKED"
 #: Of a check that is made on request: without one nothing is open.
-NOT_ASKED_FOR = "NOT ASKED FOR"
+NOT_ASKED_FOR = "NOT RUN (optional)"
+#: Of a finding that stands beside a requirement, and on which its verdict does not depend.
+NOT_REQUIRED = "NOT REQUIRED"
 
 
 def verdict_words(holds: bool | None) -> str:

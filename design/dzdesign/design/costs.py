@@ -25,9 +25,12 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
         lines += [label + line for line in _cost_of_side(compensator, side, sign)]
     units = valve.recorded_units
     lines.append(
-        f"a pressure difference below -{compensator.reverse_codes} codes counts as a failed sensor and selects the "
-        "smallest beta"
-        + (", which leaves no offset" if compensator.positive.certificate.released_from_MPa is not None else "")
+        f"a pressure difference below -{compensator.reverse_codes} codes counts as a sensor fault"
+        + (
+            " and selects the smallest beta"
+            if compensator.positive.certificate.released_from_MPa is None
+            else ". The offset is then zero, and the full dead zone is back"
+        )
     )
     if compensator.reading_flow_L_min < (least := default_reading_flow(valve)):
         lines.append(
@@ -102,8 +105,8 @@ def _cost_of_side(compensator: Compensator, side: SideModel, sign: int) -> list[
     lines.append(above_in_words(compensator.above, certificate, side, units.of_side(SIDE_NAMES[sign])))
     if compensator.machine is None:  # else the budget says more
         lines.append(
-            f"the table's offset stays {units.text(1e3 * certificate.mean_loss_V, '.2f mV')} under the certified curve "
-            f"on average, {units.text(1e3 * certificate.largest_loss_V, '.2f mV')} at most"
+            f"rounding and the beta table keep the offset {units.text(1e3 * certificate.mean_loss_V, '.2f mV')} below "
+            f"the certified offset on average, {units.text(1e3 * certificate.largest_loss_V, '.2f mV')} at most"
             f"{_of_which_dither(compensator)}"
         )
     guard = certificate.guard
@@ -162,18 +165,19 @@ def _cost_of_dither(compensator: Compensator) -> str:
 def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     """Say which commands count as zero, or what a wrong zero does where none but zero itself does."""
     span, error = compensator.signals.command.span(1), compensator.command_error
-    declared = f"declared error {error.offset_codes} + {error.noise_codes} codes"
+    declared = f"converter error: {error.offset_codes} codes of offset, {error.noise_codes} of noise"
     if not compensator.transition_codes:
         return [
             f"no transition, so no zero band: a zero command that reads {error.zero_band_codes} codes too high "
-            f"({declared}) lifts the drive by {compensator.valve.recorded_units.text(_lift_V(compensator), '.3f dV')}, "
+            f"({declared}) raises the output by "
+            f"{compensator.valve.recorded_units.text(_lift_V(compensator), '.3f dV')}, "
             "which the certificate does not count"
         ]
     leave, end = compensator.drive_functions.leave_zero_codes, compensator.transition_end
     return [
         f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero "
-        f"({declared}); the drive leaves rest above {leave} codes ({leave / span:.2%}), and up to {end} "
-        f"({end / span:.2%}) it runs from the {compensator.positive.certificate.guard} to the opening threshold"
+        f"({declared}). The output rises only above {leave} codes ({leave / span:.2%}). At {end} codes "
+        f"({end / span:.2%}) it reaches the opening threshold"
     ]
 
 

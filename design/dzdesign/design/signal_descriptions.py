@@ -9,14 +9,15 @@ def signals_in_words(compensator: Compensator) -> list[str]:
     """Return one line for the command, one for each sensor, and what the sensors are in the recordings."""
     signals, u_max_V, units = compensator.signals, float(compensator.u_max_V), compensator.valve.recorded_units
     command = signals.command
-    text = f"command: code {command.zero_code} is zero, {command.full_code} is {units.text(u_max_V, 'g V')}"
+    text = f"command: ADC code {command.zero_code} is zero, {command.full_code} is {units.text(u_max_V, 'g V')}"
     if command.negative_full_code is not None:
         text += f", {command.negative_full_code} is {units.text(-u_max_V, 'g V')}"
-    lines = [f"{text}; {_valid(command.valid_codes)}"]
+    lines = [f"{text}; {_valid(command.valid_codes, signals.code_max, 'fault')}"]
     for name, sensor in _sensors(signals).items():
         lines.append(
-            f"pressure {name}: code {sensor.zero_code} is zero pressure, {sensor.full_code} is "
-            f"{units.text(float(sensor.span_MPa), 'g MPa')}; {_valid(sensor.valid_codes)}"
+            f"pressure {name}: ADC code {sensor.zero_code} is zero pressure, {sensor.full_code} is "
+            f"{units.text(float(sensor.span_MPa), 'g MPa')}; "
+            f"{_valid(sensor.valid_codes, signals.code_max, 'sensor fault')}"
         )
     return [*lines, *wiring_in_words(compensator)]
 
@@ -46,5 +47,7 @@ def _sensors(signals: Signals) -> dict[str, PressureSignal]:
     return {"A": signals.pressure_a, "B": signals.pressure_b}
 
 
-def _valid(codes: tuple[int, int]) -> str:
-    return f"{codes[0]} to {codes[1]} are valid"
+def _valid(codes: tuple[int, int], code_max: int, fault: str) -> str:
+    if codes == (0, code_max):
+        return f"no code is a {fault}"
+    return f"a code outside {codes[0]} to {codes[1]} is a {fault}"

@@ -33,7 +33,7 @@ COMMANDS = {
     "demo": Command(SETUP, "run the whole chain on the bundled example"),
     "simulate": Command(SETUP, "simulate ramp tests of a valve; the files are marked as simulated"),
     "monitor": Command(SETUP, "record the telemetry of a running firmware as a ramp file"),
-    "load": Command(SETUP, "load a calibration block into a drive over its serial line"),
+    "load": Command(SETUP, "load a calibration block into an amplifier over its serial line"),
     "doctor": Command(SETUP, "list compilers, simulators and packages, and how to install what is missing"),
     "schema": Command(SETUP, "print the JSON Schema of an artefact: its keys, their meaning and units"),
     "completion": Command(SETUP, "print the script with which a shell completes commands and options"),

@@ -19,6 +19,7 @@ def run(arguments: Arguments, json: bool) -> int:
         print_json(compensator)
     else:
         print_compensator(compensator)
-        print_choices(hysteresis_choices(compensator), dithered=compensator.valve.dither is not None)
+        read_at = compensator.valve.recorded_units.text(compensator.reading_flow_L_min, ".2f L/min")
+        print_choices(hysteresis_choices(compensator), read_at, dithered=compensator.valve.dither is not None)
         print(one_line(f"Written: {arguments.output}"))
     return 0

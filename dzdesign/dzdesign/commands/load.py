@@ -103,7 +103,7 @@ def run(arguments: Arguments, json: bool) -> int:
             print(f"Replaced: the block of serial number {one_line(before.serial) or 'none'}")
     if arguments.serial not in (None, drive.serial):
         raise RequirementError(
-            f"the drive on {arguments.port} holds the block of serial number {quoted(drive.serial)}, expected "
+            f"the amplifier on {arguments.port} holds the block of serial number {quoted(drive.serial)}, expected "
             f"{quoted(arguments.serial)} of --serial; load the block of this valve"
         )
     return 0
@@ -124,8 +124,8 @@ def _asked(session: "LoadSession", port: str, baud: float) -> "Drive":
         return session.query()
     except NoReplyError as error:
         raise InputError(
-            f"'{port}' at {baud:g} bit/s: {error}; check the wiring of GPIO28 and GPIO29, --baud, and that the drive "
-            "runs a firmware of `codegen --calibration block`"
+            f"'{port}' at {baud:g} bit/s: {error}; check the wiring of GPIO28 and GPIO29, --baud, and that the "
+            "amplifier runs a firmware of `codegen --calibration block`"
         ) from error
 
 
@@ -134,18 +134,18 @@ def _load(session: "LoadSession", block: _Block, drive: "Drive", port: str) -> "
     from dzdesign.codegen.loading.session import NoReplyError, RefusedError
 
     _check_fit(block, drive)
-    say(f"loading {block.source} into the drive on {port}")
+    say(f"loading {block.source} into the amplifier on {port}")
     requests = session.loading(block.octets, block.numbers.crc32, block.origin)
     try:
         for _ in with_bar(requests, f"loading {block.source}", session.requests_of(block.octets)):
             pass
         return _verified(session, block)
     except RefusedError as error:
-        raise RequirementError(f"the drive refuses {block.source}: {error}{_advice(error)}") from error
+        raise RequirementError(f"the amplifier refuses {block.source}: {error}{_advice(error)}") from error
     except NoReplyError as error:
         raise RequirementError(
-            f"the drive on {port} stopped answering ({error}); it holds its old block, or all of the new one if only "
-            f"the last answer was lost: `dzdesign load --port {port}` asks"
+            f"the amplifier on {port} stopped answering ({error}); it holds its old block, or all of the new one if "
+            f"only the last answer was lost: `dzdesign load --port {port}` asks"
         ) from error
     except KeyboardInterrupt:
         with contextlib.suppress(DzdesignError):
@@ -160,7 +160,7 @@ def _check_fit(block: _Block, drive: "Drive") -> None:
     ours, state = block.numbers, drive.state
     if (ours.layout, ours.length) != (state.layout, state.length):
         raise InputError(
-            f"{block.source} has layout {ours.layout} in {ours.length} words, the drive's firmware takes layout "
+            f"{block.source} has layout {ours.layout} in {ours.length} words, the amplifier's firmware takes layout "
             f"{state.layout} in {state.length}; firmware and dzdesign must be of one version"
         )
     if ours.shape != state.shape:
@@ -172,8 +172,8 @@ def _check_fit(block: _Block, drive: "Drive") -> None:
     for name, what in COMPILED_FOR.items():
         if (block_has := getattr(ours, name)) != (drive_has := getattr(state, name)):
             raise InputError(
-                f"{block.source} is for firmware with {what} {block_has}, the drive's has {drive_has}; design it again "
-                "for the drive's target with `dzdesign design --target`"
+                f"{block.source} is for firmware with {what} {block_has}, the amplifier's has {drive_has}; design it "
+                "again for the amplifier's target with `dzdesign design --target`"
             )
 
 
@@ -182,7 +182,7 @@ def _verified(session: "LoadSession", block: _Block) -> "Drive":
     drive = session.query()
     if (drive.state.crc, drive.state.origin) != (block.numbers.crc32, block.origin) or drive.state.block > 1:
         raise RequirementError(
-            f"after loading the drive uses a block of CRC-32 {drive.state.crc:08x}, expected "
+            f"after loading the amplifier uses a block of CRC-32 {drive.state.crc:08x}, expected "
             f"{block.numbers.crc32:08x} of {block.source}; load it again"
         )
     return drive
@@ -196,13 +196,13 @@ def _advice(error: Any) -> str:
     if error.reason == Reason.DRIVING:
         return "; a block is loaded at rest only: wait until the ramp has run out, or hold the trip input low"
     if error.reason == Reason.COMMAND:
-        return "; bring it to zero, as this block and the drive's count zero, and load again"
+        return "; bring it to zero, as this block and the amplifier's count zero, and load again"
     if error.reason == Reason.CHECK:
         found = [text for place, text in enumerate(FINDINGS.values()) if error.detail >> place & 1]
-        return f" ({'; '.join(found) or 'for no reason that this dzdesign knows'}); the drive keeps its old block"
+        return f" ({'; '.join(found) or 'for no reason that this dzdesign knows'}); the amplifier keeps its old block"
     if error.reason == Reason.STORE:
-        return "; the drive keeps its old block; see the functions of dz_store.c in its firmware"
-    return "; the drive keeps its old block; load it again"
+        return "; the amplifier keeps its old block; see the functions of dz_store.c in its firmware"
+    return "; the amplifier keeps its old block; load it again"
 
 
 def _place(drive: "Drive") -> str:

@@ -146,7 +146,8 @@ def _other_firmware(frame: "Frame", recording: "Recording") -> str:
     from dzdesign.codegen.telemetry.frame import STATUS_BITS, STATUS_CALIBRATION
 
     if frame.status & STATUS_CALIBRATION:  # such a drive names no compensator, whatever is given
-        text = f"the drive reports '{STATUS_BITS[STATUS_CALIBRATION]}' (status {STATUS_CALIBRATION}): its output is off"
+        bit = STATUS_BITS[STATUS_CALIBRATION]
+        text = f"the amplifier reports '{bit}' (status {STATUS_CALIBRATION}): its output is off"
         if recording.frames:
             return text
         raise InputError(f"{text}; load its valve's block, `dzdesign load BLOCK --port ...`, and record then")

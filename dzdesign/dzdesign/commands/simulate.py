@@ -17,5 +17,6 @@ def run(arguments: Arguments, json: bool) -> int:
     if json:
         print_json(made.manifest)
     else:
-        print(one_line(f"Written: {len(made.files)} simulated ramp tests in {arguments.output}"))
+        tests = "test" if len(made.files) == 1 else "tests"
+        print(one_line(f"Written: {len(made.files)} simulated ramp {tests} in folder '{arguments.output}'"))
     return 0

@@ -33,5 +33,5 @@ def run(arguments: Arguments, json: bool) -> int:
     else:
         print_output_verification(verification)
         to_read = OutputEvidence.FILE_NAME
-    print(one_line(f"Evidence: {output}, to be read: {output / to_read}"))
+    print(one_line(f"Evidence written to {output}; start with {output / to_read}"))
     return 0 if verification.holds else 1

@@ -55,7 +55,7 @@ class AssessArguments(RampArguments):
     after_u_max: Annotated[Text, Option("U", RECORDINGS, example="10 V", read=quantity("voltage"))] = None
     """Full command of the recordings with the compensator (default: as --u-max)."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
-    """Folder for plots of flow over command, in SVG."""
+    """Folder for plots of flow against command, in SVG."""
 
 
 def assess(arguments: AssessArguments) -> "Assessment":

@@ -66,9 +66,9 @@ class IdentifyChoices(RampArguments):
     """Standard deviation of the threshold from ramp to ramp, in percent of full command, such as "0.1 %" (default:
     measured on repeated ramps, otherwise 0.25 %)."""
     curve: Annotated[Text, Option("PREMISE", FIT, choices=PREMISES)] = None
-    """Premise about the threshold between the tests. line: straight over the pressure drop. smooth: curvature at most
-    M. monotone: it runs one way. The default is smooth where a curvature is declared or three or more pressure drops
-    support it, and monotone otherwise."""
+    """Premise about the threshold between the tests. line: a straight line against the pressure drop. smooth:
+    curvature at most M. monotone: it runs one way. The default is smooth where a curvature is declared or three or more
+    pressure drops support it, and monotone otherwise."""
     curvature: Annotated[Text, Option("M", FIT, example="20 mV/MPa^2", read=quantity("curvature"))] = None
     """Bound M of the premise smooth, such as "20 mV/MPa^2" (default: estimated from the tests). It bounds the
     threshold's second divided difference, kinks included."""
@@ -104,7 +104,7 @@ class IdentifyArguments(IdentifyChoices):
     """End time on a recording's clock; later rows are left out. In the options file also a table [to]."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
     """Folder for plots in SVG and PNG. They show the flow at each pressure drop with knees, onsets and residuals, and
-    thresholds, bounds and beta over dP."""
+    thresholds, bounds and beta against dP."""
 
 
 def identify_options(choices: IdentifyChoices) -> "IdentifyOptions":

@@ -63,9 +63,9 @@ def _table_of(item: "PressureAssessment", units: "RecordedUnits") -> Table:
     from dzdesign.assess.quantities import QUANTITIES
 
     where = "pressure drop unknown" if item.dp_MPa is None else units.text(item.dp_MPa, ".2f MPa")
-    reading, rated = (units.text(flow, ".3g L/min") for flow in (item.reading_flow_L_min, item.rated_flow_L_min))
-    flows = f"reading flow {reading}, rated flow {rated}"
-    rows = Table(f"{where}, {item.side} commands; {flows}", "quantity", "unit", "before", "after", "change", "± s.e.")
+    reading = units.text(item.reading_flow_L_min, ".3g L/min")
+    titles = ("quantity", "unit", "before", "after", "change", "s.e. of change")
+    rows = Table(f"{where}, {item.side} commands; dead zones read at {reading}", *titles)
     for key, found in item.quantities.items():
         quantity, change, both = QUANTITIES[key], found.change, (found.before, found.after)
         if key == "symmetry" and all(reading is None or reading.value is None for reading in both):

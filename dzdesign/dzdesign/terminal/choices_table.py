@@ -11,19 +11,19 @@ if TYPE_CHECKING:
     from dzdesign.design.hysteresis_choices import HysteresisChoice
 
 DITHER = (
-    "A dither also reduces the hysteresis, but moves the thresholds: record the ramps under it, identify them with "
-    "--dithered, and give --dither here."
+    "Dither also reduces the hysteresis, but it shifts the thresholds. Record the ramps with dither, and use identify "
+    "--dithered and design --dither."
 )
-HEADING = "Remaining dead zone and hysteresis in command, worst of all tests (onset: also between tests)"
+HEADING = "Remaining dead zone and hysteresis in % of full command, largest over all tests"
 #: Of the inverse play where it is recommended: the table is of the recorded sweeps.
 PLAY = (
-    "The width of the inverse play comes from full sweeps, which do not show the hysteresis of small loops. If that is "
-    "smaller, small loops are over-compensated by up to the play's width; try them on the machine."
+    "The play (backlash inverse) subtracts the hysteresis measured on full sweeps. Small command cycles may have less "
+    "hysteresis, and are then over-compensated by up to the play's width. Try small cycles on the machine."
 )
 
 
 def print_choices(
-    choices: "Sequence[HysteresisChoice]", *, dithered: bool = False, console: "Console | None" = None
+    choices: "Sequence[HysteresisChoice]", read_at: str, *, dithered: bool = False, console: "Console | None" = None
 ) -> None:
     """Print the choices, nothing where there are none; the recommended one is marked.
 
@@ -38,10 +38,10 @@ def print_choices(
 
     columns: dict[str, Callable[[HysteresisChoice], str]] = {
         "choice": lambda each: each.given + (" (recommended)" if each.recommended else ""),
-        "dead zone on opening, onset": lambda each: share(each.onset),
-        "at the reading flow": lambda each: share(each.reading),
+        "opening dead zone, to knee": lambda each: share(each.onset),
+        f"opening dead zone, to {read_at}": lambda each: share(each.reading),
         "hysteresis, mean": lambda each: share(each.hysteresis),
-        "largest": lambda each: share(each.largest),
+        "hysteresis, largest": lambda each: share(each.largest),
     }
     put_rows(console, HEADING, choices, columns)
     for each in choices:

@@ -24,14 +24,18 @@ def print_costs_at_tests(compensator: "Compensator", console: "Console | None" =
         side = SIDE_NAMES[sign]
         units, costs = compensator.valve.recorded_units.of_side(side), costs_at_tests(compensator, sign)
         read_at = units.text(compensator.reading_flow_L_min, ".2f L/min")
-        title = f"Remaining dead zone in command: at the onset (knee) and read at {read_at}"
+        title = (
+            "Remaining dead zone in % of full command: where the output reaches the valve's knee, and where the flow "
+            f"reaches {read_at}"
+        )
         title += "" if compensator.negative is None else f", {side} side"
-        columns = _columns(units, transition=compensator.transition_codes > 0, machine=compensator.machine is not None)
+        transition, machine = compensator.transition_codes > 0, compensator.machine is not None
+        columns = _columns(units, read_at, transition=transition, machine=machine)
         put_rows(console, title, costs, columns)
 
 
 def _columns(
-    units: "RecordedUnits", *, transition: bool, machine: bool
+    units: "RecordedUnits", read_at: str, *, transition: bool, machine: bool
 ) -> "dict[str, Callable[[CostAtTest], str]]":
     def share(value: float | None) -> str:
         return "-" if value is None else f"{value:.2%}"
@@ -45,19 +49,19 @@ def _columns(
     columns: dict[str, Callable[[CostAtTest], str]] = {
         f"dP ({units.label('MPa')})": lambda each: units.number(each.dp_MPa, ".2f MPa"),
         f"offset ({units.label('V')})": lambda each: units.number(each.offset_V, ".3f V"),
-        "onset: opening": lambda each: onset(each, "opening"),
-        "onset: closing": lambda each: onset(each, "closing"),
+        "to knee: opening": lambda each: onset(each, "opening"),
+        "to knee: closing": lambda each: onset(each, "closing"),
         "opening at the machine's other end": lambda each: (
             "never" if each.last_opening is not None and each.last_opening > 1 else share(each.last_opening)
         ),
-        "read: opening": lambda each: share(each.read.get("opening")),
-        "read: closing": lambda each: share(each.read.get("closing")),
-        "ideal line": lambda each: share(each.ideal),
+        f"to {read_at}: opening": lambda each: share(each.read.get("opening")),
+        f"to {read_at}: closing": lambda each: share(each.read.get("closing")),
+        f"to {read_at}: ideal": lambda each: share(each.ideal),
     }
     if not machine:
         del columns["opening at the machine's other end"]
     if transition:
-        columns[f"flow on closing at transition's end ({units.label('L/min')})"] = lambda each: (
+        columns[f"closing flow at transition's end ({units.label('L/min')})"] = lambda each: (
             "-" if each.at_end_L_min is None else units.number(each.at_end_L_min, ".2f L/min")
         )
-    return columns | {"drive at full command": lambda each: each.drive_text()}
+    return columns | {"largest output": lambda each: each.drive_text()}

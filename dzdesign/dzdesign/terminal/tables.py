@@ -6,6 +6,7 @@ import os
 import re
 from typing import TYPE_CHECKING
 
+from dzdesign.core.folder_contents import MANIFEST_NAME
 from dzdesign.core.units import chance
 from dzdesign.terminal.page import new_console, put_line, put_rows
 
@@ -42,7 +43,7 @@ def print_valve(valve: "ValveModel", console: "Console | None" = None) -> None:
         title = f"Thresholds ({units.label('V')})" + ("" if len(valve.sides) == 1 else f", {name} side")
         _put_thresholds(console, side, title, units)
         at = "" if len(valve.sides) == 1 else f" at {name} commands"
-        for line in (f"pressure drop{at}: {_made_of(side)}", *_side_lines(side, units)):
+        for line in (f"source of the pressure drop{at}: {_made_of(side)}", *_side_lines(side, units)):
             put_line(console, line)
     if "positive" not in valve.sides:
         console.print("positive commands: not tested")
@@ -139,21 +140,22 @@ def short_source(source: str, ramps: "Sequence[str]") -> str:
 
 def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
     dp0 = side.reference.dp_MPa
-    at = "" if dp0 is None else f" at dP0 = {units.text(dp0, '.3f MPa')}"
+    at, reference = ("", "") if dp0 is None else (" at dP0", f" at the reference pressure drop {_dp0(dp0, units)}")
+    limits = "the bounds" if len(side.tests) < 2 else "the bounds and by the premise between tests"
     certificate = side.certificate
     return (
-        f"bound: {100 * certificate.confidence:.6g}% lower bound, for all tests together, of the {certificate.guard} "
-        f"threshold {_guarded(side, units)}",
-        f"from ramp to ramp: {certificate.repeatability.in_words(units)}",
-        f"identified: u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
-        f"{units.text(side.reference.u_min_se_V, '.4f dV')}{at}, the knee on {certificate.guard}{_betas(side, units)}",
-        f"certified: an offset of {units.text(side.curve.u_min0_V, '.4f V')}{at}, the largest under the bounds; more "
-        "tests can raise it",
-        f"premise: {side.premise_in_words(units)}",
+        f"bound: lower bound of the {certificate.guard} threshold; all bounds hold together with "
+        f"{100 * certificate.confidence:.6g}% confidence. The threshold is {_guarded(side)}",
+        _none(side, units),
+        f"scatter between ramps: {certificate.repeatability.in_words(units)}",
+        f"identified: {certificate.guard} knee u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
+        f"{units.text(side.reference.u_min_se_V, '.4f dV')}{reference}{_betas(side, units)}",
+        f"certified: the output at zero command (offset) may be {units.text(side.curve.u_min0_V, '.4f V')}{at}. It is "
+        f"limited by {limits}; more tests can raise it",
+        side.premise_in_words(units),
         *_premise_lines(side),
-        f"drive range of the valve k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f}: "
-        "command from the knee to full stroke, as a share of full command; that of the law starts at its "
-        "own u_min0"
+        f"drive range of the valve: k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f} "
+        "of full command, from the knee to full stroke. The law has its own u_min0, so its drive range differs"
         + (
             f"; k = {units.number(side.k_V_mm, '.4f V/mm')} ± {units.text(side.k_V_mm_se or 0.0, '.4f V/mm')}"
             if side.k_V_mm is not None
@@ -166,18 +168,28 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
     )
 
 
+def _dp0(dp0_MPa: float, units: "RecordedUnits") -> str:
+    return f"dP0 = {units.text(dp0_MPa, '.3f MPa')}"
+
+
 def _made_of(side: "SideModel") -> str:
     """Say which columns make the pressure drop, the pressure ahead first, and what is below zero as recorded."""
     made_of = ", ".join(dict.fromkeys(test.dp_from or "not recorded" for test in side.tests))
     return made_of + (" (recorded below zero)" if side.recorded_drop and side.recorded_drop.sign < 0 else "")
 
 
-def _guarded(side: "SideModel", units: "RecordedUnits") -> str:
-    """Say which threshold is bounded, and what counts as no flow."""
+def _guarded(side: "SideModel") -> str:
+    """Say which threshold is bounded."""
+    if side.zero_flow_L_min is not None:
+        return "the command that passes the flow allowed at zero"
+    return "the knee, or the end of the tail if the edge is soft"
+
+
+def _none(side: "SideModel", units: "RecordedUnits") -> str:
+    """Say what counts as no flow, or what may flow below the bound."""
     if declared := side.zero_flow_in_words(units):
-        return f"(the command that passes the flow allowed at zero); below, {declared}"
-    none = side.none_in_words(side.certificate.guard, units)
-    return f"(the knee, or for a soft edge the command at which the tail ends); {none}"
+        return f"below the bound, {declared}"
+    return side.none_in_words(side.certificate.guard, units)
 
 
 def _betas(side: "SideModel", units: "RecordedUnits") -> str:
@@ -203,12 +215,12 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
-    what = "largest dead zone on opening, between the tests too, without a transition, by --curve"
-    return (f"{what}: {', '.join(words)}",)
+    what = "largest opening dead zone over the tested pressures, without a transition, by premise (--curve)"
+    return (f"{what}: {', '.join(words)}. A transition (see design) reduces it",)
 
 
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
-    """Print the law, the certificate and what the choices cost."""
+    """Print the law, the certificate, what the choices cost and where it ends."""
     from dzdesign.derivation.law import law
     from dzdesign.design.costs import design_warnings, lines_of_tests
     from dzdesign.design.signal_descriptions import signals_in_words
@@ -218,7 +230,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
 
     chosen, units = law(compensator.law), compensator.valve.recorded_units
     lines = [
-        f"law {chosen.name} {chosen.equation}: u_O = {chosen.output}",
+        f"law: '{chosen.name}', Eq. {chosen.equation}: output u_O = {chosen.output}, at command u_i",
         *signals_in_words(compensator),
     ]
     for sign in compensator.signals.signs:
@@ -227,10 +239,10 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         low, high = (float(end) for end in certificate.dp_MPa)
         label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
         lines += [
-            f"{label}drive range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} "
-            f"(from {side.start} to full flow), u_min0/u_max at dP0 = {_rational(side.u_min0_over_u_max)}, "
-            f"both as shares of full command; beta(dP): linear between {len(side.beta)} nodes, each a "
-            f"whole number of 1/{compensator.beta_denominator}",
+            f"{label}the law's line: u_min0/u_max = {_rational(side.u_min0_over_u_max)} at dP0 ({side.start}), drive "
+            f"range k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full flow)",
+            f"{label}beta table: {len(side.beta)} nodes, linear between them, "
+            f"resolution 1/{compensator.beta_denominator}",
             f"{label}certificate of {compensator.certified_of}: the offset stays below the "
             f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
             f"{units.span(low, high, '.3f MPa')}, at every pressure code; "
@@ -252,7 +264,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         print_budgets(compensator, console)
     for line in compensator.costs:
         if line not in elsewhere:
-            put_line(console, f"cost: {line}")
+            put_line(console, f"note: {line}")
 
 
 def print_firmware(firmware: "Firmware", console: "Console | None" = None, folder: str = "") -> None:
@@ -260,19 +272,20 @@ def print_firmware(firmware: "Firmware", console: "Console | None" = None, folde
     console = console or new_console()
     valves = len(json.loads(firmware.files["compensator.json"])["lot"])
     common = f", lot setting of {valves} valves" if valves else ""
-    place = f", in {folder}" if folder else ""
-    put_line(console, f"Firmware for {firmware.manifest.target}, law {firmware.manifest.law}{common}{place}:")
-    for name in firmware.contents:
+    place = f", in folder '{folder}'" if folder else ""
+    manifest = firmware.manifest
+    put_line(console, f"Firmware for target {manifest.target} with law '{manifest.law}'{common}{place}:")
+    for name in (*firmware.contents, MANIFEST_NAME):
         put_line(console, f"  {name}")
 
 
 def print_output(output: "Output", console: "Console | None" = None, folder: str = "") -> None:
     """Print the files of an output other than a C firmware, and in which folder they are."""
     console = console or new_console()
-    place = f", in {folder}" if folder else ""
+    place = f", in folder '{folder}'" if folder else ""
     settings = output.manifest.settings_in_words
-    put_line(console, f"Output for {output.manifest.target}{settings}, law {output.manifest.law}{place}:")
-    for name in output.contents:
+    put_line(console, f"Output for {output.manifest.target}{settings}, law '{output.manifest.law}'{place}:")
+    for name in (*output.contents, MANIFEST_NAME):
         put_line(console, f"  {name}")
 
 

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.core.verdicts import NOT_ASKED_FOR, verdict_words
+from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_REQUIRED, verdict_words
 from dzdesign.terminal.page import new_console, put_line, put_rows, volts
 
 if TYPE_CHECKING:
@@ -29,7 +29,10 @@ def print_verification(verification: "Verification", console: "Console | None" =
 
     console = console or new_console()
     for check in verification.evidence.checks:
-        put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
+        text, *not_required = check.text.split(f"; {NOT_REQUIRED}  ")
+        put_line(console, f"{verdict_words(check.holds)}  {check.name}: {text}")
+        for line in not_required:
+            put_line(console, f"{NOT_REQUIRED}  {line}")
     for each in untried_requirements(verification.evidence):
         put_line(console, f"{label_of_untried(each)}  {each.title}: {each.how}".replace("`", ""))
     units = verification.derived.valve.recorded_units if verification.derived else AS_COMPUTED
@@ -61,18 +64,19 @@ def _put_closed_loop(console: "Console", verification: "Verification", units: "R
     both = len({loop.result.side for loop in verification.loops}) > 1
     columns: dict[str, Callable[[PressureResult], str]] = {
         f"dP ({pressure})": lambda loop: (f"{loop.side} " if both else "") + units.number(loop.dp_MPa, ".2f MPa"),
-        "without: opening": lambda loop: _percent(loop.dead_zone_opening),
-        "without: closing": lambda loop: _percent(loop.dead_zone_closing),
-        "with: opening": lambda loop: _percent(loop.residual_opening),
-        "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, units),
-        "Q at zero, beta": lambda loop: loop.in_words(loop.q_zero_L_min, units),
-        "Q max without": lambda loop: units.number(loop.q_max_direct_L_min, ".1f L/min"),
-        f"Q max with ({flow})": lambda loop: units.number(loop.q_max_L_min, ".1f L/min"),
+        "uncompensated: opening": lambda loop: _percent(loop.dead_zone_opening),
+        "uncompensated: closing": lambda loop: _percent(loop.dead_zone_closing),
+        "compensated: opening": lambda loop: _percent(loop.residual_opening),
+        "compensated: closing": lambda loop: _percent(loop.residual_closing),
+        "Q at zero, constant offset": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, units),
+        "Q at zero": lambda loop: loop.in_words(loop.q_zero_L_min, units),
+        "Q max, uncompensated": lambda loop: units.number(loop.q_max_direct_L_min, ".1f L/min"),
+        "Q max, compensated": lambda loop: units.number(loop.q_max_L_min, ".1f L/min"),
     }
     hidden = verification.loops[0].result.unseen_below_L_min is not None
     onset = "onset of flow" + (" (the first flow seen, continued to none)" if hidden else "")
-    title = f"Closed loop (plant: {plant}); dead zones in per cent of full command, at the {onset}"
+    title = f"Closed loop: the C on the simulated valve ({plant}); dead zones in % of full command, at the {onset}"
+    title += f"; flow Q in {flow}"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
     backs = ", ".join(units.text(each, ".2f MPa") for each in verification.evidence.closed_loop.back_MPa)
     put_line(console, f"Pressure behind the edge: {backs}; ramps at the highest, failing sensors at each.")
@@ -89,10 +93,10 @@ def _put_readings(
     results = [loop.result for loop in verification.loops]
     columns: dict[str, Callable[[PressureResult], str]] = {
         **where,
-        "without: opening": lambda loop: _percent(loop.reading_opening_without),
-        "without: closing": lambda loop: _percent(loop.reading_closing_without),
-        "with: opening": lambda loop: _percent(loop.reading_opening),
-        "with: closing": lambda loop: _percent(loop.reading_closing),
+        "uncompensated: opening": lambda loop: _percent(loop.reading_opening_without),
+        "uncompensated: closing": lambda loop: _percent(loop.reading_closing_without),
+        "compensated: opening": lambda loop: _percent(loop.reading_opening),
+        "compensated: closing": lambda loop: _percent(loop.reading_closing),
         "ideal line": lambda loop: _percent(loop.ideal_line),
     }
     flow = units.text(results[0].reading_flow_L_min, ".2f L/min")
@@ -201,13 +205,14 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     columns: dict[str, Callable[[PressureResult], str]] = {
         "dP (MPa)": lambda loop: f"{loop.dp_MPa:.2f}",
         "threshold open/close (V)": thresholds,
-        "dead zone without": lambda loop: _percent(loop.dead_zone_opening),
-        "with: opening": lambda loop: _percent(loop.residual_opening),
-        "with: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero without beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
-        "with beta (L/min)": lambda loop: loop.in_words(loop.q_zero_L_min, AS_COMPUTED),
+        "uncompensated: opening": lambda loop: _percent(loop.dead_zone_opening),
+        "compensated: opening": lambda loop: _percent(loop.residual_opening),
+        "compensated: closing": lambda loop: _percent(loop.residual_closing),
+        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
+        "Q at zero": lambda loop: loop.in_words(loop.q_zero_L_min, AS_COMPUTED),
     }
-    console, title = new_console(), "Simulated example valve, 0-10 V ramps in closed loop with the generated C"
+    console = new_console()
+    title = "Simulated example valve, 0-10 V ramps in closed loop with the generated C; flow Q in L/min"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
     reference = valve.positive.reference.dp_MPa
     put_line(

@@ -39,7 +39,7 @@ def _cautions(chain: Chain) -> Iterator[str]:
     if compensator:
         yield reach_of_certificate(compensator)
     if valve and valve.simulated:
-        yield "SIMULATED recordings: this is an example, not of a measured valve."
+        yield "SIMULATED recordings: this is an example. No real valve was measured."
     if valve and compensator:
         for name in valve.sides.keys() - laws_of(compensator).keys():
             yield f"The {name} side was identified, and is NOT in this firmware: its command has one sign."
@@ -85,7 +85,7 @@ def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headlin
         text = f"{NOT_CHECKED} in full: {len(unknown)} of {len(checks)} requirements are open"
         return Headline(kind="open", text=text, reasons=reasons)
     of = f"; the certificate covers {compensator.certified_of}" if compensator else ""
-    return Headline(kind="good", text=f"Every requirement holds, all {len(checks)} that were tried{of}")
+    return Headline(kind="good", text=f"All {len(checks)} requirements that were checked hold{of}")
 
 
 def _limits(chain: Chain) -> list[Check]:
@@ -221,7 +221,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
     return Figure(
         label=f"Certificate of {compensator.certified_of}",
         value=f"{100 * worst.confidence:g} %",
-        note=f"confidence that the drive at zero command stays below the {worst.guard} threshold "
+        note=f"confidence that the output at zero command stays below the {worst.guard} threshold "
         f"{units.span(low, high, '.2f MPa')}; smallest margin "
         + (
             f"{units.text(least, '.3f mV')}, of the C's output under the threshold's lower bound"

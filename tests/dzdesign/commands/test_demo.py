@@ -57,8 +57,8 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys):
     out = capsys.readouterr().out
     for words in (
         "threshold open/close",
-        "dead zone without",
-        "Q at zero without beta",
+        "uncompensated: opening",
+        "Q at zero, no beta",
         f"Inputs checked: {INPUTS}, wrong: 0",
     ):
         assert words in out
@@ -68,8 +68,8 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys):
     rows = re.findall(r"^ +\d\.\d\d +\d\.\d{3} / \d\.\d{3} +([\d.]+) % +([\d.]+) %", out, re.MULTILINE)
     without, left = zip(*(map(float, row) for row in rows), strict=True)
     assert len(rows) == 6 and all(45 < share < 55 for share in without) and {round(share) for share in left} == {1}
-    assert "Without it, half of the command does nothing" in readme and "it is about 1 % of command" in readme
-    assert f"pair of command code and pressure-difference code, {round(INPUTS / 1e6)} million" in readme
+    assert "the first half of the command gives no flow" in readme and "it is about 1 % of full command" in readme
+    assert f"all {round(INPUTS / 1e6)} million pairs of command and pressure-difference ADC codes" in readme
 
 
 @needs_compiler

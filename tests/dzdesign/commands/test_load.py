@@ -170,11 +170,11 @@ def test_a_block_that_the_drive_must_not_have_is_refused_and_nothing_changes(dri
     status, _, error = load(capsys, other_shape, "--port", drive.port)
     assert status == 2 and "two solenoids" in error
     for change, said in (
-        ({"compare_max": 40_000}, "compare value 40000, the drive's has 60000"),
-        ({"code_max": 1023}, "1023, the drive's has 4095"),
-        ({"sample_Hz": 1000}, "1000, the drive's has 1250"),
-        ({"tick_Hz": 5000}, "5000, the drive's has 2500"),
-        ({"beta_step": 128}, "128, the drive's has 64"),
+        ({"compare_max": 40_000}, "compare value 40000, the amplifier's has 60000"),
+        ({"code_max": 1023}, "1023, the amplifier's has 4095"),
+        ({"sample_Hz": 1000}, "1000, the amplifier's has 1250"),
+        ({"tick_Hz": 5000}, "5000, the amplifier's has 2500"),
+        ({"beta_step": 128}, "128, the amplifier's has 64"),
     ):
         other = block_file(tmp_path, pack(replace(unpack(NEW), **change)))
         status, _, error = load(capsys, other, "--port", drive.port)

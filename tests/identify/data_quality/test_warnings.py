@@ -169,7 +169,7 @@ class TestBranchOrder:
         assert main(["codegen", "valve.json", "--target", "host"]) == 2 and not (tmp_path / "firmware").exists()
         assert main(["design", "valve.json", "--accept", "branch-ordr"]) == 2
         assert main(["design", "valve.json", "--accept", "branch-order"]) == 0
-        assert "cost: accepted, branch-order" in capsys.readouterr().out
+        assert "note: accepted, branch-order" in capsys.readouterr().out
         assert main(["codegen", "valve.json", "--target", "host", "--config", "options.toml"]) == 0
 
     def test_only_what_stops_a_design_can_be_accepted(self, wording):

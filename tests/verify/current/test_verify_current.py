@@ -86,7 +86,7 @@ def test_a_drive_by_duty_has_no_such_requirement(example_compensator, tmp_path):
     assert current_checks(tmp_path, example_compensator, silent).checks == ()
 
 
-#: What is edited in dz_current.c, and the requirements that must see it (the files as generated always do).
+#: What is edited in dz_current.c, and the requirements that must see it (the comparison of the files always does).
 EDITS = {
     "a gain a thousandth too large": (
         ("(error * PROPORTIONAL)", "(error * (PROPORTIONAL + 6u))"),

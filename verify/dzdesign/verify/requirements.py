@@ -38,7 +38,7 @@ class Requirement:
         return Check(id=self.id, name=name or self.title, holds=holds, text=text)
 
 
-FILES = Requirement(id="files-as-generated", title="files as generated")
+FILES = Requirement(id="files-as-generated", title="the generated files are unchanged")
 MANIFEST = Requirement(id="manifest", title="the manifest describes the firmware")
 #: Of an output other than a C firmware.
 OUTPUT_MANIFEST = Requirement(id="output-manifest", title="the manifest states what the output was made from")
@@ -52,7 +52,7 @@ COMPILES = Requirement(id="compiles", title="compiles without warnings")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
 MONOTONE = Requirement(id="monotone", title="within range and monotone")
 ZERO_COMMAND = Requirement(id="over-compensation", title="no over-compensation on the tested interval")
-ABOVE_TESTS = Requirement(id="above-tests", title="the drive at zero command above the tests matches the certificate")
+ABOVE_TESTS = Requirement(id="above-tests", title="the output at zero command above the tests matches the certificate")
 LOT = Requirement(id="over-compensation-of-lot", title="no over-compensation of any valve in the lot")
 PRESSURE_DIFFERENCE = Requirement(
     id="pressure-difference", title="depends on the pressures only through their difference"
@@ -65,7 +65,7 @@ PLANT_OPENS = Requirement(id="plant-opens", title="the plant of the closed loop 
 PLANT_IS_THE_VALVE = Requirement(id="plant-is-the-valve", title="the plant agrees with the identified valve")
 ZERO_FLOW = Requirement(id="zero-flow", title="no flow at zero command in the closed loop")
 ZERO_FLOW_AFTER_SCENARIOS = Requirement(
-    id="zero-flow-after-scenarios", title="no flow at zero command after any scenario"
+    id="zero-flow-after-scenarios", title="no flow at zero command after any required scenario"
 )
 NATIVE_PLANT = Requirement(id="native-plant", title="the plant of the closed loop agrees with CasADi's integrator")
 CERTIFICATE = Requirement(id="certificate", title="the certificate follows from the valve")
@@ -127,8 +127,8 @@ MATLAB_INPUTS = Requirement(
 )
 POPULATION = Requirement(
     id="population",
-    title="no machine drawn from the budget passes flow at zero command",
-    how="`verify --tolerances` with machines = 10000, of a declared machine",
+    title="no flow at zero command for random machines within the tolerances",
+    how="`verify --tolerances` with machines = 10000, for a declared machine",
 )
 OWN_PLANT = Requirement(
     id="own-plant", title="the closed loop holds with the machine's plant", how="`verify --plant`"
@@ -165,6 +165,6 @@ ALWAYS = (
 #: What every `verify` checks beside it where the drive is by current.
 OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS, CURRENT_VALVE)
 #: What a verdict adds where the ramp tests were not there.
-AS_STATED = "thresholds taken as stated"
+AS_STATED = "thresholds not checked against the recordings"
 #: What is checked if it is asked for.
 OPTIONAL = (RAMPS, MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)

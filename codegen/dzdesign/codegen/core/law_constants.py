@@ -14,7 +14,7 @@ from dzdesign.design.signals import SIDE_NAMES
 
 HERE = "codegen/dzdesign/codegen/core/integer_form.py"
 #: Of the numerators over a power of two, by design/dzdesign/design/designing.py.
-KAPPA_ROUNDING, U_MIN0_ROUNDING = "rounded to nearest", "rounded down with half a count to spare"
+KAPPA_ROUNDING, U_MIN0_ROUNDING = "rounded to nearest", "rounded down with a margin of half a PWM count"
 #: What every coefficient of the sum over the law's own contains.
 SCALED = ("signals.compare_max", "signals.command", "beta_denominator", "beta_step_codes")
 
@@ -104,7 +104,7 @@ class LawConstants:
         equation = equation_of(chosen)
         kappa, u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
         kappa_key, u_min0_key = f"{self.key}.drive_range_over_u_max", f"{self.key}.u_min0_over_u_max"
-        u_min0_text = f"u_min0/u_max = {u_min0}, {U_MIN0_ROUNDING}"
+        u_min0_text = f"u_min0/u_max = {u_min0}; that fraction was {U_MIN0_ROUNDING}"
         transition = ("transition_codes",) if c.transition_codes else ()
         found = []
         size = ", its size" if self.narrow and form.slope < 0 else ""

@@ -80,7 +80,7 @@ REASON_TEXTS: dict[int, str] = {
     Reason.NO_LOAD: "no load is under way",
     Reason.SEQUENCE: "another sequence number, or another place in the block, was due",
     Reason.LENGTH: "the length is not that of a block of this firmware, or of this request",
-    Reason.DRIVING: "the drive still drives: its ramp has not run out",
+    Reason.DRIVING: "the amplifier still drives: its ramp has not run out",
     Reason.COMMAND: "the command is not zero",
     Reason.STORE: "the memory did not take the words",
     Reason.CRC: "the block's CRC-32 is not the one that was announced",

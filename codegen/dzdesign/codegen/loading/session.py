@@ -81,7 +81,7 @@ class LoadSession:
         found = frame.drive_state()
         if found is None:
             raise NoReplyError(
-                f"the drive answers {len(frame.payload)} octets that this dzdesign does not know; "
+                f"the amplifier answers {len(frame.payload)} octets that this dzdesign does not know; "
                 "firmware and dzdesign must be of one version"
             )
         return Drive(state=found[0], serial=found[1])

@@ -142,19 +142,19 @@ def above_in_words(choice: Above, certificate: Certificate, side: SideModel, uni
             "falls, flow at zero command is possible"
         )
     released = certificate.released_from_MPa
-    text = f"above {last} the offset is lowered with the continued bound"
+    text = f"above {last} the offset falls with the continued bound"
     if choice == "release":
         text = f"above {last} the offset is released"
     if released is not None:
         at = units.text(float(released), ".3g MPa")
-        text += f", which reaches zero at {at}; beyond, the dead zone is back and the command alone drives the valve"
+        text += f" and is zero from {at} on. There the full dead zone is back"
     holds_to = certificate.holds_to_MPa
     if curve.above is None:
-        return f"{text}; not certified: a single test gives no slope"
+        return f"{text}. Not certified: a single test gives no slope"
     rests = curve.above.in_words(curve.premise, side.trend or "flat", units)
-    return f"{text}; {rests}" + (
-        f", up to {units.text(float(holds_to), '.3g MPa')}" if holds_to > certificate.dp_MPa[1] else ""
-    )
+    if holds_to > certificate.dp_MPa[1]:
+        return f"{text}. Up to {units.text(float(holds_to), '.3g MPa')} this is {rests}"
+    return f"{text}. {rests[0].upper()}{rests[1:]}"
 
 
 def below_in_words(certificate: Certificate, side: SideModel, units: RecordedUnits) -> str:
@@ -164,5 +164,5 @@ def below_in_words(certificate: Certificate, side: SideModel, units: RecordedUni
     if side.trend == "increasing":
         return f"{text}: the threshold grows with the pressure drop, so flow at zero command is possible there"
     if side.trend == "decreasing":
-        return f"{text}; a threshold that keeps growing towards zero pressure drop stays above it"
+        return f"{text}. A threshold that keeps rising towards zero pressure drop stays above this offset"
     return text

@@ -211,17 +211,18 @@ class CertifiedCurve:
         p_value = None if check is None else check.lack_of_fit_p
         tested = "which these tests can't contradict" if p_value is None else f"lack of fit p = {p_value:.2g}"
         if self.premise == "line":
-            return f"Premise line: the threshold is straight over the pressure drop ({tested})"
+            return f"Premise line: the threshold is a straight line against the pressure drop ({tested})"
         if self.premise == "smooth":
+            known = f"declared, {tested}"
             if self.curvature_is == "estimated":
-                tested = "from the same tests, so they do not test it"
+                known = "estimated from these tests, so they do not prove it"
             bends = [1e3 * value for value in self.curvature_V_MPa2]
             inner, ends = min(bends), (bends[0], bends[-1])
             first, last = (units.number(end, ".3g mV/MPa²") for end in ends)
-            at_ends = f", {first} and {last} in the first and last interval" if max(ends) > inner else ""
+            at_ends = f", in the first interval {first}, in the last {last}" if max(ends) > inner else ""
             return (
-                f"Premise smooth: between two tests the threshold sags at most M h²/8 below the chord of its bounds, "
-                f"M = {units.text(inner, '.3g mV/MPa²')} ({self.curvature_is}{at_ends}; {tested})"
+                "Premise smooth: between two tests h apart, the threshold lies at most M h²/8 below the straight line "
+                f"between their bounds, M = {units.text(inner, '.3g mV/MPa²')}{at_ends} ({known})"
             )
         return (
             "Premise monotone: between two tests the bound is the lower one's, on the premise that the threshold runs "

@@ -56,17 +56,17 @@ class Repeatability:
     def in_words(self, units: RecordedUnits) -> str:
         """Return by how much the guarded threshold scatters from ramp to ramp, and drifts, and how that is known."""
         how = {
-            "repeats": f"measured on repeats, {self.degrees_of_freedom or 0:.0f} degrees of freedom",
+            "repeats": f"from repeated ramps, {self.degrees_of_freedom or 0:.0f} degrees of freedom",
             "declared": "declared",
             "assumed": "assumed, for want of repeats",
         }
         drift = (
-            f"drift from the first ramp to the last {units.number(1e3 * self.drift_V, '+.1f mV')} ± "
+            f"drift from the first ramp to the last: {units.number(1e3 * self.drift_V, '+.1f mV')} ± "
             f"{units.text(1e3 * self.drift_se_V, '.1f mV')}"
             if self.drift_V is not None and self.drift_se_V is not None
             else f"no drift in the model ({self.no_drift})"
         )
         return (
-            f"standard deviation {units.text(1e3 * self.sd_V, '.1f mV')} ({how[self.origin]}), in the bound for the "
-            f"next closing or opening; {drift}"
+            f"standard deviation {units.text(1e3 * self.sd_V, '.1f mV')} ({how[self.origin]}), included in "
+            f"the bounds; {drift}"
         )

@@ -1,4 +1,4 @@
-"""Flow over command without and with the compensator, of both sides: what the first page draws.
+"""Flow against command without and with the compensator, of both sides: what the first page draws.
 
 An assessment of recordings leads. Without one, the curves without the compensator are those that valve.json recorded,
 and those with it are of the simulated closed loop.

@@ -1,4 +1,4 @@
-"""Flow over command without and with the compensator, both sides on one axis: the figure of the first page."""
+"""Flow against command without and with the compensator, both sides on one axis: the figure of the first page."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -36,7 +36,7 @@ LEFT_ROOM = 16
 
 
 def characteristic_figure(curves: Sequence[CharacteristicCurve], units: RecordedUnits) -> ReportFigure | None:
-    """Draw flow over command at every pressure drop; None without any curve."""
+    """Draw flow against command at every pressure drop; None without any curve."""
     curves = [curve for curve in curves if curve.branches]
     if not curves:
         return None
@@ -140,7 +140,7 @@ def _legend(figure: "Figure", axes: "Axes", curves: Sequence[CharacteristicCurve
 
 def _caption(curves: Sequence[CharacteristicCurve]) -> str:
     sides = {curve.side for curve in curves}
-    lines = [word("Flow over command, opening and closing, at every pressure drop.")]
+    lines = [word("Flow against command, opening and closing, at every pressure drop.")]
     if len(sides) == 1:
         none = "negative" if "positive" in sides else "positive"
         lines.append(word(f"No {none} commands were tested."))
@@ -156,7 +156,7 @@ def _description(curves: Sequence[CharacteristicCurve], units: RecordedUnits) ->
         if ends:
             flows = f"{units.number(min(ends), '.1f L/min')} to {units.text(max(ends), '.1f L/min')}"
             parts.append(f"{words} the flow at full command is {flows}")
-    return f"Flow over command, {len(curves)} curves: {'; '.join(parts)}."
+    return f"Flow against command, {len(curves)} curves: {'; '.join(parts)}."
 
 
 def _csv(curves: Sequence[CharacteristicCurve]) -> str:

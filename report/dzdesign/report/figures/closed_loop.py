@@ -1,4 +1,4 @@
-"""Figures of the closed loop: flow over command, and the dead zone before and after."""
+"""Figures of the closed loop: flow against command, and the dead zone before and after."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -31,7 +31,7 @@ NEAR_ZERO = 15.0
 def loop_figure(
     curves: Curves, side: str, both: bool, units: RecordedUnits, unseen_below_L_min: float | None = None
 ) -> ReportFigure:
-    """Draw flow over command without and with the compensator, whole and near zero, from closed_loop_<side>.csv.
+    """Draw flow against command without and with the compensator, whole and near zero, from closed_loop_<side>.csv.
 
     Below `unseen_below_L_min` nothing of the flow was recorded: the lines go on there as the first flows do.
     """
@@ -53,7 +53,7 @@ def loop_figure(
         f"loop-{side}",
         f"Closed loop: a ramp up and down, the generated C driving the simulated valve{side_words(side, both)}. Of "
         f"two branches the one at lower commands is closing; what lies between is the valve's hysteresis.{hidden}",
-        f"Flow over command at {len(ends)} pressure drops. First flow on the ramp up: without the "
+        f"Flow against command at {len(ends)} pressure drops. First flow on the ramp up: without the "
         f"compensator at {_percents(starts['without'])}, with it at {_percents(starts['with'])} of full command.",
         curves.text,
     )
@@ -114,7 +114,7 @@ def _first_flow(curves: Curves, column: str) -> float:
 def dead_zone_figure(
     pressures: Sequence[PressureResult], side: str, both: bool, units: RecordedUnits
 ) -> ReportFigure:
-    """Draw the dead zone of one side on both branches over the pressure drop, before and after."""
+    """Draw the dead zone of one side on both branches against the pressure drop, before and after."""
     figure, axes = titled_axes(3.0, side, both, legend_rows=1)
     dp = [each.dp_MPa for each in pressures]
     lines = {

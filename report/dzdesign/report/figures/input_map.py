@@ -1,4 +1,4 @@
-"""The map of the C's output over command and pressure drop, with what is wrong or falls back."""
+"""The map of the C's output against command and pressure drop, with what is wrong or falls back."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ OTHER_SIGN = 8.0
 def map_figure(
     curves: Curves, zero: Curves | None, compensator: Compensator, inputs: InputCheck
 ) -> ReportFigure:
-    """Draw what the core gives over command and pressure drop, and where it falls back or is wrong.
+    """Draw what the core gives against command and pressure drop, and where it falls back or is wrong.
 
     From input_map_<side>.csv and, for where the valve is over-compensated, zero_command_<side>.csv.
     """
@@ -54,8 +54,8 @@ def map_figure(
         "Hatched: a command or a pressure drop that can't be, where the C falls back to the safe value. "
         "Red crosses: points where it is not "
         f"the exactly rounded law; on this grid {wrong}, of all pairs {whole(inputs.wrong)}. Strip at zero "
-        f"command: green where the drive is below the threshold's bound, red and hatched where not ({over} codes).",
-        f"Map of the output over command and pressure drop. {whole(inputs.inputs)} pairs checked, "
+        f"command: green where the output is below the threshold's bound, red and hatched where not ({over} codes).",
+        f"Map of the output against command and pressure drop. {whole(inputs.inputs)} pairs checked, "
         f"{whole(inputs.wrong)} wrong. On the drawn grid {wrong} of {grid.output.size} points are wrong, "
         f"{fallen} fall back to the safe value; {over} codes are over-compensated at zero command.",
         curves.text,

@@ -11,7 +11,7 @@ from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 
 def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
-    """Draw the compensator's output over the command at the ends of the tested interval, and the threshold's bound."""
+    """Draw the output against the command at the ends of the tested interval, and the threshold's bound."""
     exact = ExactLaw(compensator, SIGNS[name])
     u_max, certificate = float(compensator.u_max_V), laws_of(compensator)[name].certificate
     units = compensator.valve.recorded_units.of_side(name)

@@ -61,14 +61,14 @@ def lines_figure(side: SideModel, name: str, both: bool, units: RecordedUnits) -
         + side_words(name, both)
         + ". Samples and residuals are drawn by dzdesign identify --plots: the recordings are not part of an "
         "artefact folder.",
-        f"Straight lines of flow over command of {counted(len(side.tests), 'pressure drop')}; they meet zero "
+        f"Straight lines of flow against command of {counted(len(side.tests), 'pressure drop')}; they meet zero "
         f"flow at the knees, {span([row[2] for row in rows], '.3f V', units)}.",
         csv_text(("dp_MPa", "branch", "knee_V", "from_V", "to_V", "from_L_min", "to_L_min"), rows),
     )
 
 
 def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units: RecordedUnits) -> ReportFigure:
-    """Draw the thresholds over the pressure drop, and what is certified of the guarded one."""
+    """Draw the thresholds against the pressure drop, and what is certified of the guarded one."""
     curve = side.certified[guard]
     several = len(side.tests) > 1
     pieces = curve.bound(side.trend or "flat").pieces if several else ()
@@ -79,15 +79,15 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units:
     return to_report_figure(
         figure,
         f"thresholds-{name}",
-        f"Thresholds over the pressure drop{side_words(name, both)}. The {guard} threshold is guarded: the "
-        "drive at zero command stays below "
+        f"Thresholds against the pressure drop{side_words(name, both)}. The {guard} threshold is guarded: the "
+        "output at zero command stays below "
         + (
             f"the {BOUND_NAMES[curve.premise]}, which is what the bounds of all tests together certify between the "
             f"tests too. {curve.premise_in_words(units)}."
             if several
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."
         ),
-        f"Thresholds over the pressure drop: the {guard} threshold lies at "
+        f"Thresholds against the pressure drop: the {guard} threshold lies at "
         f"{span(curve.u_threshold_V, '.3f V', units)}, its lower bound at {span(curve.u_lower_V, '.3f V', units)}, the "
         f"largest certified offset at {span(curve.u_offset_V, '.3f V', units)}.",
         csv_text(
@@ -144,7 +144,7 @@ def beta_figure(
     return to_report_figure(
         figure,
         f"beta-{name}",
-        f"β over the pressure drop{side_words(name, both)}: the identified thresholds over that at dP0, u_min0 = "
+        f"β against the pressure drop{side_words(name, both)}: the identified thresholds over that at dP0, u_min0 = "
         f"{units.text(u_min0, '.4f V')} (Eq. 5), with their error; and over the same u_min0 what is certified of the "
         f"{guard} threshold, under which the law puts out its offset at zero command." + _about_the_table(compensator),
         f"Identified beta lies between {low:.4f} and {high:.4f} over {span(dp, '.2f MPa', units)}, the largest "

@@ -1,4 +1,4 @@
-"""The drive at zero command under the threshold's lower bound."""
+"""The output at zero command under the threshold's lower bound."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from dzdesign.report.figures.figure import LIGHT, Curves, ReportFigure, legend_b
 
 
 def zero_figure(curves: Curves, side: str, guard: str, units: RecordedUnits) -> ReportFigure:
-    """Draw the drive at zero command under the threshold's lower bound, at every code of the tested interval.
+    """Draw the output at zero command under the threshold's lower bound, at every code of the tested interval.
 
     From zero_command_<side>.csv.
     """
@@ -36,10 +36,10 @@ def zero_figure(curves: Curves, side: str, guard: str, units: RecordedUnits) -> 
     return to_report_figure(
         figure,
         f"zero-{side}",
-        f"Zero command, {side} side, where it matters most: the drive against what is certified, at "
+        f"Zero command, {side} side, where it matters most: the output against what is certified, at "
         "every code of the tested interval. Ringed: the smallest margin. What is certified outside the interval stands "
         "beside the law.",
-        f"At {int(above.sum())} of {dp.size} codes of the pressure drop the drive at zero command lies above the "
+        f"At {int(above.sum())} of {dp.size} codes of the pressure drop the output at zero command lies above the "
         f"threshold's lower bound; the smallest margin is {margin} at {at}.",
         curves.text,
     )

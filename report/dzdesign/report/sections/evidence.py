@@ -124,8 +124,8 @@ def _plant_line(loop: ClosedLoopResult) -> str:
     if loop.plant:
         return f"{line}."
     return (
-        f"{line}: between two tests its thresholds run straight over the pressure drop, and below the noise level, "
-        "where the recordings show no flow, nothing is known of it. What it does in time is the default plant's."
+        f"{line}: between two tests its thresholds are straight lines against the pressure drop, and below the noise "
+        "level, where the recordings show no flow, nothing is known of it. What it does in time is the default plant's."
     )
 
 

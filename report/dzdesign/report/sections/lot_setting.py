@@ -30,7 +30,7 @@ NUMBERS = ("least_percent", "least_dp_MPa", "most_percent", "most_dp_MPa")
 class LotCost:
     """What a lot setting costs one valve on one side, in percent of command, at the pressure drops of its tests.
 
-    The command that passes before the drive reaches the valve's own lower bound.
+    The command that passes before the output reaches the valve's own lower bound.
     """
 
     valve: str
@@ -119,7 +119,7 @@ def _cost(costs: tuple[LotCost, ...], units: RecordedUnits) -> Figure:
     return Figure(
         label=label,
         value=f"{least.least_percent:.1f} to {most.most_percent:.1f} %",
-        note=f"of command passes before the drive reaches a valve's own lower bound: least {least.valve} at "
+        note=f"of command passes before the output reaches a valve's own lower bound: least {least.valve} at "
         f"{units.text(least.least_dp_MPa, '.2f MPa')}, most {most.valve} at {units.text(most.most_dp_MPa, '.2f MPa')}; "
         "each stands under The lot",
     )
@@ -163,7 +163,7 @@ def lot_section(compensator: Compensator) -> Section:
             f"One setting for {count} valves, each with bounds of its own; lot SHA-256 {compensator.lot_sha256}.",
             f"All else in this report that is of one valve (recordings, thresholds, β, certificate, closed loop) is of "
             f"{carrier_of(compensator)}, the carrier.",
-            "Cost: the share of the command that passes before the drive reaches the valve's own lower bound, at its "
+            "Cost: the share of the command that passes before the output reaches the valve's own lower bound, at its "
             "tested pressure drops, in the exact law. How much more that is than with a setting of its own stands in "
             "the report of dzdesign batch.",
         ),

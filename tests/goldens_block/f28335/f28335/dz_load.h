@@ -24,7 +24,7 @@
 #define DZ_LOAD_REASON_NO_LOAD 2u /* no load is under way */
 #define DZ_LOAD_REASON_SEQUENCE 3u /* another sequence number, or another place in the block, was due */
 #define DZ_LOAD_REASON_LENGTH 4u /* the length is not that of a block of this firmware, or of this request */
-#define DZ_LOAD_REASON_DRIVING 5u /* the drive still drives: its ramp has not run out */
+#define DZ_LOAD_REASON_DRIVING 5u /* the amplifier still drives: its ramp has not run out */
 #define DZ_LOAD_REASON_COMMAND 6u /* the command is not zero */
 #define DZ_LOAD_REASON_STORE 7u /* the memory did not take the words */
 #define DZ_LOAD_REASON_CRC 8u /* the block's CRC-32 is not the one that was announced */

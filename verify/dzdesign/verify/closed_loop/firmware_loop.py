@@ -28,7 +28,7 @@ Watch = Callable[[Iterable[Any], int], Iterable[Any]]
 #: Runs side by side.
 WORKERS = 2
 #: How the evidence calls the plant where none was given.
-STAND_IN = "the recorded flow over command, moved by the default plant's coil and spool"
+STAND_IN = "the recorded flow against command, moved by the default plant's coil and spool"
 SIGNS: dict[Side, int] = {"positive": 1, "negative": -1}
 #: Pressures downstream of the edge where none were given, MPa: a port open to the tank, and a pipe's back pressure.
 BACKS_MPA = (0.0, 1.0)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.verdicts import NOT_REQUIRED
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -213,13 +214,16 @@ def shut_after_scenarios(
     """
     required = [each for each in scenarios if each.must_shut]
     worst = max(required, key=_zero_flow)
-    text = f"{len(required)} runs of {len({each.name for each in required})} scenarios: "
-    text += f"{_flow(worst, worst.q_zero_L_min, units)} ({worst.name}, at {_at(worst, units)}){_allowed(worst, units)}"
+    text = f"{len(required)} runs of {len({each.name for each in required})} scenarios, "
+    text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}; tested at {_at(worst, units)})"
+    text += _allowed(worst, units)
     for reason in dict.fromkeys(each.not_required for each in scenarios if not each.must_shut):
         others = [each for each in scenarios if each.not_required == reason]
         most = max(others, key=_zero_flow)
-        text += f"; not required ({reason}): {_flow(most, most.q_zero_L_min, units)} ({most.name}, at "
-        text += f"{_at(most, units)}, the highest of {len({each.name for each in others})})"
+        count = len({each.name for each in others})
+        text += f"; {NOT_REQUIRED}  {reason}: {count} scenario{'' if count == 1 else 's'}, "
+        text += f"{_flow(most, most.q_zero_L_min, units)} at zero command (worst: {most.name}; tested "
+        text += f"at {_at(most, units)})"
         if reason == NO_CORE_CAN_KNOW and any(each.name.startswith(OPEN_CIRCUITS) for each in others):
             text += "; signals with a live zero and headroom above the span would reveal the failed sensor"
     if not plant_given and not any(each.is_load_step for each in scenarios):

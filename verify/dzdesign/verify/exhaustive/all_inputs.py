@@ -82,14 +82,14 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
         (
             requirements.MONOTONE,
             inputs.out_of_range + inputs.not_monotone_in_u + inputs.not_monotone_in_dp,
-            f"{inputs.out_of_range} values out of range, {inputs.not_monotone_in_u} decreases with rising command, "
-            f"{inputs.not_monotone_in_dp} steps over dP against the law's direction",
+            f"{inputs.out_of_range} values out of range, {inputs.not_monotone_in_u} falls with rising command, "
+            f"{inputs.not_monotone_in_dp} steps in the wrong direction with dP",
         ),
         (
             requirements.ZERO_COMMAND,
             inputs.over_compensated,
-            f"drive above the threshold's lower bound at {inputs.over_compensated} pressure codes; smallest margin of "
-            f"the C's compare values {margin}",
+            f"{inputs.over_compensated or 'no'} pressure codes with the output above the lower bound of the threshold; "
+            f"smallest margin of the C's output below it {margin}",
         ),
         (
             requirements.PRESSURE_DIFFERENCE,

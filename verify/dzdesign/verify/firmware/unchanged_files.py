@@ -25,7 +25,7 @@ def files_unchanged(folder: Path, manifest: FirmwareManifest) -> Check:
     built = _cmake_trees(folder, manifest)
     if fault := _fault(manifest, [name for name in differing if name not in manifest.board], added, user):
         return requirements.FILES.check(holds=False, text=fault)
-    text = f"{len(manifest.files) - len(filled_in) - len(projects)} files as generated"
+    text = f"{len(manifest.files) - len(filled_in) - len(projects)} files compared"
     if projects:
         text += f"; you changed {', '.join(projects)}, whose generated parts are compared with a new generation"
     if filled_in:

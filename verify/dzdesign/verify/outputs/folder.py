@@ -46,7 +46,7 @@ def files_unchanged(folder: Path, manifest: OutputManifest) -> Check:
     ]
     if changed:
         return FILES.check(holds=False, text=f"changed or missing: {and_more(changed, MOST_NAMED)}")
-    return FILES.check(holds=True, text=f"{len(manifest.files)} files as generated")
+    return FILES.check(holds=True, text=f"{len(manifest.files)} files compared")
 
 
 def manifest_follows(folder: Path, manifest: OutputManifest, compensator: Compensator) -> Check:
