@@ -150,12 +150,12 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         f"scatter between ramps: {certificate.repeatability.in_words(units)}",
         f"identified: {certificate.guard} knee u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
         f"{units.text(side.reference.u_min_se_V, '.4f dV')}{reference}{_betas(side, units)}",
-        f"certified: the output at zero command (offset) may be {units.text(side.curve.u_min0_V, '.4f V')}{at}. It is "
+        f"certified: largest output at zero command (offset) {units.text(side.curve.u_min0_V, '.4f V')}{at}. It is "
         f"limited by {limits}; more tests can raise it",
         side.premise_in_words(units),
         *_premise_lines(side),
-        f"drive range of the valve: k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f} "
-        "of full command, from the knee to full stroke. The law has its own u_min0, so its drive range differs"
+        f"drive range of the valve (knee to full stroke): k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± "
+        f"{side.k_x_max_over_u_max_se:.4f} of full command, from largest flow and slope{at}. The law has its own u_min0, so its drive range differs"
         + (
             f"; k = {units.number(side.k_V_mm, '.4f V/mm')} ± {units.text(side.k_V_mm_se or 0.0, '.4f V/mm')}"
             if side.k_V_mm is not None
