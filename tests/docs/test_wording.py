@@ -61,8 +61,8 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, capsys):
     print_valve(example_valve)
     valve = capsys.readouterr().out
     number = r"0\.\d{4} ± 0\.\d{4}"
-    valves_range = rf"drive range of the valve: k x_max/u_max = {number} of full command"
-    assert re.search(f"{valves_range}, from the knee to full stroke", valve)
+    valves_range = rf"drive range of the valve \(knee to full stroke\): k x_max/u_max = {number} of full command"
+    assert re.search(f"{valves_range}, from largest flow and slope at dP0", valve)
     hiding = {"pressure_a": "0..3 V", "accept": "broken-sensor"}
     example_compensator = design_valve(example_valve, options_of(hiding, target_named("f28335").inputs()))
     print_compensator(example_compensator)
@@ -70,7 +70,8 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, capsys):
     # What the signals hide is no cost among others: it comes first.
     first = design.index("warning: of sensor A a broken wire")
     assert first < design.index("law: 'paper', Eq. (18)") < design.index("note: ") and "note: of sensor" not in design
-    travel = r"at dP0 \(the opening threshold\), drive range k x_max/u_max = \d+/\d+ = 0\.\d{5} \(from there to"
+    travel = r"at dP0 \(the opening threshold plus its error\), drive range k x_max/u_max = "
+    travel += r"\d+/\d+ = 0\.\d{5} \(from there to"
     assert re.search(travel, design)
     nodes = len(example_compensator.positive.beta)
     assert f"beta table: {nodes} nodes, linear between them, resolution 1/32768" in design

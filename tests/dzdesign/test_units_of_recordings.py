@@ -163,7 +163,7 @@ def test_verify_speaks_of_what_was_recorded(folder, printed):
     assert run("codegen", compensator, "--target", "host", "-o", firmware)[0] == 0
     status, text = run("verify", firmware, "-o", folder / "evidence")
     assert status == 0 and not numbers_as_computed(text), (status, numbers_as_computed(text))
-    for unit in ("dP (bar)", "(gpm)", " mA", "10.0 bar", "sensors frozen at 10.0 bar"):
+    for unit in ("dP (bar)", "(gpm)", " mA", "10.0 bar", "pressure readings stuck at 10.0 bar"):
         assert unit in text, unit
     page = (folder / "evidence" / "report.html").read_text(encoding="utf-8")
     assert "CONTRADICTS ITSELF" not in page and "requirements that were checked hold" in page

@@ -177,7 +177,7 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     return [
         f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero "
         f"({declared}). The output rises only above {leave} codes ({leave / span:.2%}). At {end} codes "
-        f"({end / span:.2%}) it reaches the opening threshold"
+        f"({end / span:.2%}) the transition ends, at the opening threshold plus its error"
     ]
 
 

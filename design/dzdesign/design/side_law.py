@@ -121,7 +121,7 @@ class SideLaw:
     @property
     def start(self) -> str:
         """Meaning of `u_min0` in words; with a transition the certified offset lies below it."""
-        return "the certified offset" if self.transition_beta is None else "the opening threshold"
+        return "the certified offset" if self.transition_beta is None else "the opening threshold plus its error"
 
     def __post_init__(self) -> None:
         if not 0 < self.u_min0_over_u_max < 1:

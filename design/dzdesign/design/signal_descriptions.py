@@ -49,5 +49,5 @@ def _sensors(signals: Signals) -> dict[str, PressureSignal]:
 
 def _valid(codes: tuple[int, int], code_max: int, fault: str) -> str:
     if codes == (0, code_max):
-        return f"no code is a {fault}"
+        return "every code is valid"
     return f"a code outside {codes[0]} to {codes[1]} is a {fault}"

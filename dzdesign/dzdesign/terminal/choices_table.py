@@ -11,14 +11,14 @@ if TYPE_CHECKING:
     from dzdesign.design.hysteresis_choices import HysteresisChoice
 
 DITHER = (
-    "Dither also reduces the hysteresis, but it shifts the thresholds. Record the ramps with dither, and use identify "
-    "--dithered and design --dither."
+    "Dither also reduces the hysteresis, but it shifts the thresholds. If the amplifier uses dither, record the ramps "
+    "with it, and use identify --dithered and design --dither."
 )
 HEADING = "Remaining dead zone and hysteresis in % of full command, largest over all tests"
 #: Of the inverse play where it is recommended: the table is of the recorded sweeps.
 PLAY = (
-    "The play (backlash inverse) subtracts the hysteresis measured on full sweeps. Small command cycles may have less "
-    "hysteresis, and are then over-compensated by up to the play's width. Try small cycles on the machine."
+    "The play (backlash inverse) subtracts the hysteresis measured on full sweeps. In small command cycles the "
+    "hysteresis may be smaller. The play then subtracts up to its full width too much. Try small cycles on the machine."
 )
 
 

@@ -61,7 +61,7 @@ def _columns(
     if not machine:
         del columns["opening at the machine's other end"]
     if transition:
-        columns[f"closing flow at transition's end ({units.label('L/min')})"] = lambda each: (
+        columns[f"flow at transition's end, closing ({units.label('L/min')})"] = lambda each: (
             "-" if each.at_end_L_min is None else units.number(each.at_end_L_min, ".2f L/min")
         )
     return columns | {"largest output": lambda each: each.drive_text()}

@@ -150,12 +150,12 @@ def _side_lines(side: "SideModel", units: "RecordedUnits") -> tuple[str, ...]:
         f"scatter between ramps: {certificate.repeatability.in_words(units)}",
         f"identified: {certificate.guard} knee u_min0 = {units.number(side.reference.u_min_V, '.4f V')} ± "
         f"{units.text(side.reference.u_min_se_V, '.4f dV')}{reference}{_betas(side, units)}",
-        f"certified: the output at zero command (offset) may be {units.text(side.curve.u_min0_V, '.4f V')}{at}. It is "
+        f"certified: largest output at zero command (offset) {units.text(side.curve.u_min0_V, '.4f V')}{at}. It is "
         f"limited by {limits}; more tests can raise it",
         side.premise_in_words(units),
         *_premise_lines(side),
-        f"drive range of the valve: k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± {side.k_x_max_over_u_max_se:.4f} "
-        "of full command, from the knee to full stroke. The law has its own u_min0, so its drive range differs"
+        f"drive range of the valve (knee to full stroke): k x_max/u_max = {side.k_x_max_over_u_max:.4f} ± "
+        f"{side.k_x_max_over_u_max_se:.4f} of full command, from largest flow and slope{at}"
         + (
             f"; k = {units.number(side.k_V_mm, '.4f V/mm')} ± {units.text(side.k_V_mm_se or 0.0, '.4f V/mm')}"
             if side.k_V_mm is not None
@@ -182,7 +182,7 @@ def _guarded(side: "SideModel") -> str:
     """Say which threshold is bounded."""
     if side.zero_flow_L_min is not None:
         return "the command that passes the flow allowed at zero"
-    return "the knee, or the end of the tail if the edge is soft"
+    return "the knee, or, if the port opens gradually, the command where the flow below the knee ends"
 
 
 def _none(side: "SideModel", units: "RecordedUnits") -> str:
@@ -215,7 +215,8 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
-    what = "largest opening dead zone over the tested pressures, without a transition, by premise (--curve)"
+    what = "for each premise that --curve can select, largest opening dead zone over the tested pressures without a "
+    what += "transition"
     return (f"{what}: {', '.join(words)}. A transition (see design) reduces it",)
 
 
@@ -243,7 +244,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
             f"range k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full flow)",
             f"{label}beta table: {len(side.beta)} nodes, linear between them, "
             f"resolution 1/{compensator.beta_denominator}",
-            f"{label}certificate of {compensator.certified_of}: the offset stays below the "
+            f"{label}certificate (covers {compensator.certified_of}): the offset stays below the "
             f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "
             f"{units.span(low, high, '.3f MPa')}, at every pressure code; "
             + (

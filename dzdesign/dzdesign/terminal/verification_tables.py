@@ -75,8 +75,8 @@ def _put_closed_loop(console: "Console", verification: "Verification", units: "R
     }
     hidden = verification.loops[0].result.unseen_below_L_min is not None
     onset = "onset of flow" + (" (the first flow seen, continued to none)" if hidden else "")
-    title = f"Closed loop: the C on the simulated valve ({plant}); dead zones in % of full command, at the {onset}"
-    title += f"; flow Q in {flow}"
+    title = f"Closed loop: the C code with the simulated valve ({plant}); dead zones in % of full command, "
+    title += f"at the {onset}; flow Q in {flow}"
     put_rows(console, title, [loop.result for loop in verification.loops], columns)
     backs = ", ".join(units.text(each, ".2f MPa") for each in verification.evidence.closed_loop.back_MPa)
     put_line(console, f"Pressure behind the edge: {backs}; ramps at the highest, failing sensors at each.")

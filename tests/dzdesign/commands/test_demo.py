@@ -68,8 +68,10 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys):
     rows = re.findall(r"^ +\d\.\d\d +\d\.\d{3} / \d\.\d{3} +([\d.]+) % +([\d.]+) %", out, re.MULTILINE)
     without, left = zip(*(map(float, row) for row in rows), strict=True)
     assert len(rows) == 6 and all(45 < share < 55 for share in without) and {round(share) for share in left} == {1}
-    assert "the first half of the command gives no flow" in readme and "it is about 1 % of full command" in readme
-    assert f"all {round(INPUTS / 1e6)} million pairs of command and pressure-difference ADC codes" in readme
+    assert "the first half of the command gives no flow" in readme
+    assert "flow starts at about 1 % of full command" in readme
+    pairs = f"all {round(INPUTS / 1e6)} million pairs of a command code and a difference of two pressure codes"
+    assert pairs in readme
 
 
 @needs_compiler

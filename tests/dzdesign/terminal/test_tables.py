@@ -31,9 +31,9 @@ def test_names_of_one_test_are_shortened(names, short):
 @pytest.mark.parametrize(
     ("longer", "shorter", "words"),
     [
-        (0.05, 0.05, ", may be wrong by ± 0.05 s"),
-        (0.02, 0.01, ", may be wrong by 0.02 s longer or 0.01 s shorter"),
-        (0.2, 0.0, ", may be wrong by 0.2 s longer"),
+        (0.05, 0.05, ", uncertain by ± 0.05 s"),
+        (0.02, 0.01, ", uncertain by 0.02 s longer or 0.01 s shorter"),
+        (0.2, 0.0, ", uncertain by 0.2 s longer"),
         (0.0, 0.0, ""),
     ],
 )

@@ -279,7 +279,8 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     assert main(["verify", "firmware"]) == 1  # what was not checked is no evidence
     out = capsys.readouterr().out
     assert "DOES NOT HOLD" not in out
-    held = "HOLDS  no over-compensation on the tested interval: no pressure codes with the output above the lower bound"
+    held = "HOLDS  no over-compensation in the tested pressure range: the output at zero command lies above the "
+    held += "threshold's lower bound at no pressure code"
     assert held in out
     assert "NOT CHECKED  no flow at zero command in the closed loop: the guard is the mean threshold" in out
     # A core whose offset is that of the opening threshold, under a certificate of the mean: seen.
@@ -295,7 +296,7 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     assert main(["verify", "wrong"]) == 1
     out = capsys.readouterr().out
     assert "DOES NOT HOLD  the certificate follows from the valve" in out
-    assert "DOES NOT HOLD  no over-compensation on the tested interval" in out
+    assert "DOES NOT HOLD  no over-compensation in the tested pressure range" in out
 
 
 def test_a_beta_beyond_its_table_is_refused_and_another_dp0_helps():

@@ -51,7 +51,7 @@ STATES = Requirement(id="st-states", title="status, side and rest state match th
 COMPILES = Requirement(id="compiles", title="compiles without warnings")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
 MONOTONE = Requirement(id="monotone", title="within range and monotone")
-ZERO_COMMAND = Requirement(id="over-compensation", title="no over-compensation on the tested interval")
+ZERO_COMMAND = Requirement(id="over-compensation", title="no over-compensation in the tested pressure range")
 ABOVE_TESTS = Requirement(id="above-tests", title="the output at zero command above the tests matches the certificate")
 LOT = Requirement(id="over-compensation-of-lot", title="no over-compensation of any valve in the lot")
 PRESSURE_DIFFERENCE = Requirement(
@@ -128,7 +128,7 @@ MATLAB_INPUTS = Requirement(
 POPULATION = Requirement(
     id="population",
     title="no flow at zero command for random machines within the tolerances",
-    how="`verify --tolerances` with machines = 10000, for a declared machine",
+    how="`verify --tolerances FILE`, with machines = 10000 in FILE and a declared machine",
 )
 OWN_PLANT = Requirement(
     id="own-plant", title="the closed loop holds with the machine's plant", how="`verify --plant`"

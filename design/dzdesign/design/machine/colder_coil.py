@@ -57,6 +57,6 @@ def colder_coil_in_words(compensator: Compensator, sign: int) -> str:
     return (
         "the certificate covers the recording only: no machine is declared. Without current control, a coil at "
         f"{REFERENCE_C - COLDER_K} degC instead of {REFERENCE_C} degC lowers the threshold by {lowered}. At zero "
-        f"command the valve then passes {flow} at {units.text(found.dp_MPa, '.2f MPa')}. Declare --coil-temperature "
-        "and --supply, --amplifier, or --drive current"
+        f"command the valve then passes {flow} at {units.text(found.dp_MPa, '.2f MPa')}. Declare one of: "
+        "--coil-temperature with --supply; --amplifier; --drive current"
     )

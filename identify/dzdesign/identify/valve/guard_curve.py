@@ -217,9 +217,9 @@ class CertifiedCurve:
             if self.curvature_is == "estimated":
                 known = "estimated from these tests, so they do not prove it"
             bends = [1e3 * value for value in self.curvature_V_MPa2]
-            inner, ends = min(bends), (bends[0], bends[-1])
-            first, last = (units.number(end, ".3g mV/MPa²") for end in ends)
-            at_ends = f", in the first interval {first}, in the last {last}" if max(ends) > inner else ""
+            inner, ends = min(bends), {"first": bends[0], "last": bends[-1]}
+            larger = [f"{units.number(end, '.3g mV/MPa²')} in the {name}" for name, end in ends.items() if end > inner]
+            at_ends = f", but {' and '.join(larger)} interval" if larger else ""
             return (
                 "Premise smooth: between two tests h apart, the threshold lies at most M h²/8 below the straight line "
                 f"between their bounds, M = {units.text(inner, '.3g mV/MPa²')}{at_ends} ({known})"

@@ -60,13 +60,13 @@ def lag_in_words(seconds: float, origin: LagOrigin, *, longer: float = 0.0, shor
     Examples
     --------
     >>> lag_in_words(0.1, "declared", longer=0.05, shorter=0.05), lag_in_words(0.0, "unknown", longer=0.2)
-    ('lag 0.1 s (declared), may be wrong by ± 0.05 s', 'lag 0 s (none declared), may be wrong by 0.2 s longer')
+    ('lag 0.1 s (declared), uncertain by ± 0.05 s', 'lag 0 s (none declared), uncertain by 0.2 s longer')
     """
     ways = {"longer": longer, "shorter": shorter}
     alike = f"{longer:.2g}" == f"{shorter:.2g}"
     each = [f"{value:.2g} s {way}" for way, value in ways.items() if value > 0]
     wrong_by = f"± {longer:.2g} s" if alike and longer > 0 else " or ".join(each)
-    return f"lag {seconds:.3g} s ({KNOWN_BY[origin]})" + (f", may be wrong by {wrong_by}" if wrong_by else "")
+    return f"lag {seconds:.3g} s ({KNOWN_BY[origin]})" + (f", uncertain by {wrong_by}" if wrong_by else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -289,8 +289,8 @@ class SideModel:
             by_hand, meter = units.text(unseen, ".3g L/min"), units.text(level, ".2f L/min")
             return f"flow below {by_hand} (the low-flow readings; the meter shows it from {meter} on) counts as none"
         flow = units.text(level, ".2f L/min")
-        by = "the largest of meter floor, resolution of averaged readings and 0.5 % of the largest flow"
-        return f"flow below {flow} ({by}) counts as none"
+        by = "the largest of meter floor, noise of averages and 0.5 % of the largest flow"
+        return f"flow below {flow} counts as none ({by})"
 
     @property
     def curve(self) -> CertifiedCurve:

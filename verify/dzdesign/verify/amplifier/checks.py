@@ -13,7 +13,7 @@ from dzdesign.verify.requirements import Check, Requirement
 HOW = "`export`, `verify`"
 READ_BACK = Requirement(id="amplifier-read-back", title="the file is read back", how=HOW)
 SAFE = Requirement(
-    id="amplifier-over-compensation", title="no over-compensation at zero command on the tested interval",
+    id="amplifier-over-compensation", title="no over-compensation at zero command in the tested pressure range",
     how=HOW,
 )  # fmt: skip
 DEAD_ZONES = Requirement(

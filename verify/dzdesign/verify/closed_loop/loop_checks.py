@@ -10,6 +10,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.verify.closed_loop.dead_zone import BIN
+from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.recorded_agreement import check_recorded
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
@@ -26,6 +27,11 @@ from dzdesign.verify.requirements import (
 
 #: How the names of a sensor's failures begin that signals with a live zero would show.
 OPEN_CIRCUITS = tuple(f"sensor {name} {fails}" for name in "AB" for fails in ("breaks", "is shorted"))
+#: What was tried, by the reason why it is not required.
+TRIED = {
+    NO_CORE_CAN_KNOW: "disturbances that the firmware cannot detect",
+    NOT_DECLARED: "coil and supply of an undeclared machine",
+}
 #: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
 SAME_THRESHOLD = 0.03
 #: Share of a test's largest flow by which a stand-in's mean flow in a bin of command may differ from the recorded one.
@@ -152,13 +158,20 @@ def no_flow_at_zero(ramps: Sequence[PressureResult], compensator: Compensator, *
             text="no falling branch was recorded, so the closing threshold is unknown; it lies below the opening "
             "threshold, and flow at zero command after closing is to be expected. Record the falling branch",
         )
+    after_closing = f"{_flow(worst, worst.q_zero_L_min, units)} after closing (at {_at(worst, units)})"
+    if _all_shut(ramps):
+        after_closing = f"{units.text(0.0, '.4g L/min')} after closing, at every pressure drop tried"
     return ZERO_FLOW.check(
         holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN,
-        text=f"{_flow(worst, worst.q_zero_L_min, units)} after closing (at {_at(worst, units)}), "
-        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min, units)} without beta{_allowed(worst, units)}"
-        f"{_leak(ramps, units)}",
+        text=f"{after_closing}{_allowed(worst, units)}{_leak(ramps, units)}; for comparison, a constant offset passes "
+        f"{_flow(leakiest, leakiest.q_zero_without_beta_L_min, units)}",
         name=_name(ZERO_FLOW, worst),
     )
+
+
+def _all_shut(results: Sequence[PressureResult] | Sequence[ScenarioResult]) -> bool:
+    """Tell whether nothing at all passes at zero in any of them, so that none is the worst."""
+    return not any(each.q_zero_L_min or each.unseen_below_L_min for each in results)
 
 
 def _zero_flow(result: PressureResult | ScenarioResult) -> tuple[float, float]:
@@ -215,13 +228,16 @@ def shut_after_scenarios(
     required = [each for each in scenarios if each.must_shut]
     worst = max(required, key=_zero_flow)
     text = f"{len(required)} runs of {len({each.name for each in required})} scenarios, "
-    text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}; tested at {_at(worst, units)})"
+    if _all_shut(required):
+        text += f"{units.text(0.0, '.4g L/min')} in each"
+    else:
+        text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}; tested at {_at(worst, units)})"
     text += _allowed(worst, units)
     for reason in dict.fromkeys(each.not_required for each in scenarios if not each.must_shut):
         others = [each for each in scenarios if each.not_required == reason]
         most = max(others, key=_zero_flow)
         count = len({each.name for each in others})
-        text += f"; {NOT_REQUIRED}  {reason}: {count} scenario{'' if count == 1 else 's'}, "
+        text += f"; {NOT_REQUIRED}  {TRIED.get(reason, reason)}: {count} scenario{'' if count == 1 else 's'}, "
         text += f"{_flow(most, most.q_zero_L_min, units)} at zero command (worst: {most.name}; tested "
         text += f"at {_at(most, units)})"
         if reason == NO_CORE_CAN_KNOW and any(each.name.startswith(OPEN_CIRCUITS) for each in others):

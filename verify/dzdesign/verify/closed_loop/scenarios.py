@@ -102,7 +102,7 @@ def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """Both sensors freeze, then the pressure drop rises. The codes are sound: what it costs is shown, not required."""
     low, high = tested_MPa
     first, then = (scene.units.text(dp_MPa, ".2f MPa") for dp_MPa in tested_MPa)
-    name = f"sensors frozen at {first}, then {then}"
+    name = f"pressure readings stuck at {first} while the pressure drop is {then}"
     run, _ = _changed_in_mid_ramp(scene, scene.loop.channels.pressure_codes(low, scene.back_MPa), high)
     return scene.result(name, run, not_required=NO_CORE_CAN_KNOW, end_MPa=high)
 

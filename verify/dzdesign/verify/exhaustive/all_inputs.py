@@ -88,8 +88,9 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
         (
             requirements.ZERO_COMMAND,
             inputs.over_compensated,
-            f"{inputs.over_compensated or 'no'} pressure codes with the output above the lower bound of the threshold; "
-            f"smallest margin of the C's output below it {margin}",
+            "the output at zero command lies above the threshold's lower bound at "
+            f"{inputs.over_compensated or 'no'} pressure code{'s' if inputs.over_compensated > 1 else ''}; "
+            f"smallest distance of the C's output below it {margin}",
         ),
         (
             requirements.PRESSURE_DIFFERENCE,
