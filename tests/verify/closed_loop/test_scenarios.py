@@ -76,7 +76,7 @@ def test_a_load_step_may_open_the_valve_for_a_moment_and_never_for_good(firmware
 
 
 def test_sensors_that_freeze_are_no_failure_that_a_core_can_see(results):
-    (frozen,) = [result for name, result in results.items() if "frozen" in name]
+    (frozen,) = [result for name, result in results.items() if "readings stuck" in name]
     assert not frozen.must_shut and frozen.q_zero_L_min > 0.3
 
 
@@ -120,7 +120,7 @@ def test_verification_fails_where_a_scenario_leaves_the_valve_open(example_compe
 def test_a_stand_in_of_several_pressure_drops_gets_load_steps(firmware):
     found = verify(firmware, sequence=QUICK)
     names = [each.name for each in found.evidence.scenarios]
-    assert sum("load step" in name for name in names) == 2 * 6 and sum("frozen" in name for name in names) == 6
+    assert sum("load step" in name for name in names) == 2 * 6 and sum("readings stuck" in name for name in names) == 6
 
 
 SPREADS = {"preload_N": (0.01, "uniform"), "rho_kg_m3": (0.02, "normal")}
