@@ -34,9 +34,9 @@ def test_what_the_sweeps_cannot_tell_of_a_play_is_said_where_it_is_recommended(e
     found = choices(example_valve)
     assert "play" in next(each.given for each in found if each.recommended)
     print_choices(found, "0.60 L/min")
-    assert "Small command cycles" in capsys.readouterr().out
+    assert "small command cycles" in capsys.readouterr().out
     print_choices([each for each in found if "play" not in each.given], "0.60 L/min")
-    assert "Small command cycles" not in capsys.readouterr().out
+    assert "small command cycles" not in capsys.readouterr().out
 
 
 def test_the_dead_zone_between_the_tests_counts():
