@@ -29,10 +29,9 @@ def print_verification(verification: "Verification", console: "Console | None" =
 
     console = console or new_console()
     for check in verification.evidence.checks:
-        text, *not_required = check.text.split(f"; {NOT_REQUIRED}  ")
-        put_line(console, f"{verdict_words(check.holds)}  {check.name}: {text}")
-        for line in not_required:
-            put_line(console, f"{NOT_REQUIRED}  {line}")
+        put_line(console, f"{verdict_words(check.holds)}  {check.name}: {check.text}")
+        for found in check.not_required:
+            put_line(console, f"{NOT_REQUIRED}  {found}")
     for each in untried_requirements(verification.evidence):
         put_line(console, f"{label_of_untried(each)}  {each.title}: {each.how}".replace("`", ""))
     units = verification.derived.valve.recorded_units if verification.derived else AS_COMPUTED
@@ -208,7 +207,7 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
         "uncompensated: opening": lambda loop: _percent(loop.dead_zone_opening),
         "compensated: opening": lambda loop: _percent(loop.residual_opening),
         "compensated: closing": lambda loop: _percent(loop.residual_closing),
-        "Q at zero, no beta": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
+        "Q at zero, constant offset": lambda loop: loop.in_words(loop.q_zero_without_beta_L_min, AS_COMPUTED),
         "Q at zero": lambda loop: loop.in_words(loop.q_zero_L_min, AS_COMPUTED),
     }
     console = new_console()

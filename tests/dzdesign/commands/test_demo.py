@@ -58,7 +58,7 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys):
     for words in (
         "threshold open/close",
         "uncompensated: opening",
-        "Q at zero, no beta",
+        "Q at zero, constant offset",
         f"Inputs checked: {INPUTS}, wrong: 0",
     ):
         assert words in out

@@ -20,6 +20,9 @@ class Check:
         bool | None, Meta(description=f"True: {HOLDS}; false: {DOES_NOT_HOLD}; null: {NOT_CHECKED}, it could not be.")
     ]
     text: Annotated[str, Meta(description="Finding, with its figures.")]
+    not_required: Annotated[
+        tuple[str, ...], Meta(description="Findings beside the requirement, on which its verdict does not depend.")
+    ] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,9 +36,9 @@ class Requirement:
     #: What to do to have it checked; a command stands in backticks.
     how: str = "`verify`"
 
-    def check(self, *, holds: bool | None, text: str, name: str = "") -> Check:
+    def check(self, *, holds: bool | None, text: str, name: str = "", not_required: tuple[str, ...] = ()) -> Check:
         """Return the result of a check; `name` says which part was tried, such as one processor's machine code."""
-        return Check(id=self.id, name=name or self.title, holds=holds, text=text)
+        return Check(id=self.id, name=name or self.title, holds=holds, text=text, not_required=not_required)
 
 
 FILES = Requirement(id="files-as-generated", title="the generated files are unchanged")
@@ -135,7 +138,7 @@ OWN_PLANT = Requirement(
 )
 #: Of a stand-in that was recorded at one pressure drop nothing is known at another.
 LOAD_STEPS = Requirement(
-    id="load-steps", title="load steps and frozen sensors were tried in the closed loop", how="`verify --plant`"
+    id="load-steps", title="load steps and stuck readings were tried in the closed loop", how="`verify --plant`"
 )
 SERIES = Requirement(
     id="series", title="the closed loop holds for a series of plants", how="`verify --plant` with `--tolerances`"

@@ -25,7 +25,7 @@ from dzdesign.identify.fitting.casadi_problems import (
 )
 from dzdesign.identify.fitting.constrained_fits import KneeFit, expected_errors, hessian_of_cost
 from dzdesign.identify.knees.branch_shape import BranchShape
-from dzdesign.identify.knees.profile import FEWEST_OF_RAMP
+from dzdesign.identify.knees.profile import read_at_top
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -171,9 +171,8 @@ class _LargestFlow:
 
 def _largest_flow(placed: Sequence[tuple[int, int, BranchShape]], reference: int) -> _LargestFlow:
     at_dp0 = [(index, shape) for index, (row, _, shape) in enumerate(placed) if row == reference]
-    index, shape = at_dp0[0]  # the rising branch where there is one: `largest_at_top` says why
-    if shape.prepared.recorded[0].size < FEWEST_OF_RAMP:
-        index, shape = max(at_dp0, key=lambda each: each[1].y_max)
+    readers = at_dp0[: read_at_top(at_dp0[0][1].prepared.recorded[0].size)]
+    index, shape = max(readers, key=lambda each: each[1].y_max)
     return _LargestFlow(flow=shape.y_max, flow_se=_top_error(shape), weights=np.eye(len(placed))[index])
 
 

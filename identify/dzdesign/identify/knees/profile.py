@@ -67,13 +67,17 @@ def largest_flow(branches: Sequence[Branch | None], u_max: float) -> float:
 
 
 def largest_at_top(profiles: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
-    """Return the largest flow of profiles, the rising branch's first: that of the rising one, of a ramp.
+    """Return the largest flow of profiles, the rising branch's first, m³/s: that of those that `read_at_top`."""
+    return max(flow_at_top(*profile) for profile in profiles[: read_at_top(profiles[0][0].size)])
+
+
+def read_at_top(points: int) -> int | None:
+    """Return how many branches, the rising one first, tell the largest flow; None: each. `points` are the first's.
 
     A falling ramp begins with a stretch as flat as the hysteresis is wide: a line through its top reads more than
     flowed. A staircase has none, but its rising branch ends in a step that the meter may still follow.
     """
-    ramp = profiles[0][0].size >= FEWEST_OF_RAMP
-    return max(flow_at_top(*profile) for profile in (profiles[:1] if ramp else profiles))
+    return 1 if points >= FEWEST_OF_RAMP else None
 
 
 def flow_at_top(u_profile: np.ndarray, y_profile: np.ndarray) -> float:

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.verdicts import NOT_CHECKED
+from dzdesign.core.verdicts import NOT_CHECKED, NOT_REQUIRED
 from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.closed_loop import dead_zone_figure, loop_figure
@@ -239,14 +239,21 @@ def checks_section(evidence: Evidence | None) -> Section:
     """Return the section with every requirement."""
     if evidence is None:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
-    tried = [(verdict(check.holds), word(check.name), check.text) for check in evidence.checks]
+    tried = [
+        row
+        for check in evidence.checks
+        for row in (
+            (verdict(check.holds), word(check.name), check.text),
+            *((unasked(NOT_REQUIRED), word(check.name), found) for found in check.not_required),
+        )
+    ]
     untried = untried_requirements(evidence)
     how = [word(f"to try it: {each.how}") for each in untried]
     labels = [unasked(label_of_untried(each)) for each in untried]
     titles = [word(each.title) for each in untried]
     rows = [*tried, *zip(labels, titles, how, strict=True)]
     table = table_of(
-        f"{len(tried)} requirements tried, {len(untried)} not",
+        f"{len(evidence.checks)} requirements tried, {len(untried)} not",
         rows,
         ("verdict", lambda row: row[0]),
         ("requirement", lambda row: row[1]),

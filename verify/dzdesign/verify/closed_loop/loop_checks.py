@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.core.verdicts import NOT_REQUIRED
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -233,22 +232,29 @@ def shut_after_scenarios(
     else:
         text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}; tested at {_at(worst, units)})"
     text += _allowed(worst, units)
+    if not plant_given and not any(each.is_load_step for each in scenarios):
+        text += "; load steps and stuck readings were not tried: they need ramps at two pressure drops, or --plant"
+    requirement, beside = ZERO_FLOW_AFTER_SCENARIOS, _not_required(scenarios, units)
+    if zero_flow.holds is None:
+        return requirement.check(holds=None, text=f"{text}; see the ramps", not_required=beside)
+    return requirement.check(
+        holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN, text=text, name=_name(requirement, worst), not_required=beside
+    )
+
+
+def _not_required(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> tuple[str, ...]:
+    """Say what passes at zero command after scenarios in which no flow is not required: a sentence for each reason."""
+    found = []
     for reason in dict.fromkeys(each.not_required for each in scenarios if not each.must_shut):
         others = [each for each in scenarios if each.not_required == reason]
-        most = max(others, key=_zero_flow)
-        count = len({each.name for each in others})
-        text += f"; {NOT_REQUIRED}  {TRIED.get(reason, reason)}: {count} scenario{'' if count == 1 else 's'}, "
+        most, count = max(others, key=_zero_flow), len({each.name for each in others})
+        text = f"{TRIED.get(reason, reason)}: {count} scenario{'' if count == 1 else 's'}, "
         text += f"{_flow(most, most.q_zero_L_min, units)} at zero command (worst: {most.name}; tested "
         text += f"at {_at(most, units)})"
         if reason == NO_CORE_CAN_KNOW and any(each.name.startswith(OPEN_CIRCUITS) for each in others):
             text += "; signals with a live zero and headroom above the span would reveal the failed sensor"
-    if not plant_given and not any(each.is_load_step for each in scenarios):
-        text += "; load steps and frozen sensors were not tried: they need ramps at two pressure drops, or --plant"
-    if zero_flow.holds is None:
-        return ZERO_FLOW_AFTER_SCENARIOS.check(holds=None, text=f"{text}; see the ramps")
-    return ZERO_FLOW_AFTER_SCENARIOS.check(
-        holds=worst.q_beyond_L_min <= NO_FLOW_L_MIN, text=text, name=_name(ZERO_FLOW_AFTER_SCENARIOS, worst)
-    )
+        found.append(text)
+    return tuple(found)
 
 
 def of_population(population: Population, zero_flow: Check, units: RecordedUnits) -> Check:

@@ -33,7 +33,7 @@ def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
     if scene.tested_MPa:
         yield _load_step_at_zero(scene, scene.tested_MPa)
         yield _load_step_in_motion(scene, scene.tested_MPa)
-        yield _frozen_sensors(scene, scene.tested_MPa)
+        yield _stuck_readings(scene, scene.tested_MPa)
         yield _above_the_tests(scene, scene.tested_MPa)
     yield from sensor_failures(scene)
     yield _noise_at_zero(scene)
@@ -98,7 +98,7 @@ def _load_step_in_motion(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     return scene.result("load step in the middle of a ramp", run, figures=figures, end_MPa=then_MPa)
 
 
-def _frozen_sensors(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
+def _stuck_readings(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     """Both sensors freeze, then the pressure drop rises. The codes are sound: what it costs is shown, not required."""
     low, high = tested_MPa
     first, then = (scene.units.text(dp_MPa, ".2f MPa") for dp_MPa in tested_MPa)
