@@ -57,6 +57,42 @@ def test_folders_of_a_killed_process_go_with_the_next_and_those_of_a_living_one_
     assert not list(place.iterdir())
 
 
+DIES = """
+import os, signal, sys
+from dzdesign.core.scratch import scratch_folder
+count = int(sys.argv[1])
+def counted(call):
+    def ends(*words, **options):
+        global count
+        count -= 1
+        if count == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return call(*words, **options)
+    return ends
+with scratch_folder() as folder:
+    for name in ("a", "b", "c"):
+        (folder / name).mkdir()
+        (folder / name / "big.o").write_text("x")
+    (folder / "made.txt").write_text("x")
+    os.unlink, os.rmdir = counted(os.unlink), counted(os.rmdir)
+print("left", count)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such kill")
+def test_a_folder_goes_with_the_next_wherever_its_removal_was_killed(place):
+    ends = []
+    for call in range(1, 12):
+        words = [sys.executable, "-c", DIES, str(call)]
+        ends.append(subprocess.run(words, env={**os.environ, "TMPDIR": str(place)}, check=False).returncode)
+        assert list(place.iterdir()) or ends[-1] == 0
+        scratch._remove_abandoned.cache_clear()
+        with scratch_folder():
+            pass
+        assert not list(place.iterdir()), call
+    assert ends.count(-9) >= 8 and ends[-1] == 0
+
+
 def test_a_users_folder_of_such_a_name_stays(place):
     (place / f"{PREFIX}mylot").mkdir()
     (place / f"{PREFIX}mylot/precious.csv").write_text("1")

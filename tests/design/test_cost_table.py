@@ -6,9 +6,12 @@ from fractions import Fraction
 
 import pytest
 
+from dzdesign.codegen.project import DEFAULT_TARGET, target_named
 from dzdesign.core.recorded_units import FlowUnit, PressureUnit, RecordedUnits
 from dzdesign.design.costs import lines_of_tests
+from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.terminal.tables import print_compensator
 
@@ -40,3 +43,14 @@ def test_the_table_has_every_number_of_the_lines(example_valve, capsys, options,
         assert sorted(numbers) == sorted(NUMBER.findall(row)), row
     title = f"and where the flow reaches {level} {units.label('L/min')}"
     assert title in " ".join(printed.split()) and f"dP ({units.label('MPa')})" in printed
+
+
+@pytest.mark.parametrize("hysteresis", ["keep", "play"])
+def test_the_flow_at_the_transitions_end_is_that_of_the_falling_command(example_valve, hysteresis):
+    """It lies above the reading flow just where that flow passes at the transition's end already, with a play too."""
+    made = design(example_valve, options_of({"hysteresis": hysteresis}, target_named(DEFAULT_TARGET).inputs()))
+    end = made.transition_end / made.signals.command.span(1)
+    costs = costs_at_tests(made, 1)
+    for cost in costs:
+        assert (cost.at_end_L_min > cost.reading_flow_L_min) == (cost.read["closing"] < end)
+    assert any(cost.at_end_L_min > 0.3 for cost in costs) == (hysteresis == "keep")

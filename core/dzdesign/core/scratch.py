@@ -85,9 +85,26 @@ def _remove(folder: Path) -> None:
         return
     if os.name != "posix":
         unlock()
-    shutil.rmtree(folder, ignore_errors=True)
+    _remove_whole(folder)
     if os.name == "posix":
         unlock()
+
+
+def _remove_whole(folder: Path) -> None:
+    """Remove a folder as far as it can be, its mark last: one that is left half removed is known by it."""
+    with contextlib.suppress(OSError):
+        with os.scandir(folder) as entries:
+            inside = [entry for entry in entries if entry.name != MARK]
+        for entry in inside:
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry, ignore_errors=True)
+            else:
+                with contextlib.suppress(OSError):
+                    os.unlink(entry)
+        if set(os.listdir(folder)) <= {MARK}:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(folder / MARK)
+            os.rmdir(folder)
 
 
 @cache
@@ -105,12 +122,17 @@ def _remove_if_abandoned(folder: Path, *, hidden: bool) -> None:
         os.unlink(folder / MARK)  # an error while its process lives, or where there is none
         shutil.rmtree(folder, ignore_errors=True)
         return
-    found = os.lstat(folder / MARK)
+    try:
+        found = os.lstat(folder / MARK)
+    except FileNotFoundError:  # killed between the mark and the folder; one in which anything lies stays
+        if not hidden:
+            os.rmdir(folder)
+        return
     if found.st_uid != os.getuid() or (hidden and time.time() - found.st_mtime < ABANDONED_S):
         return
     lock = _lock(folder)
     if lock is not None:
-        shutil.rmtree(folder, ignore_errors=True)
+        _remove_whole(folder)
         os.close(lock)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.law_corners import corners_of
+from dzdesign.design.law_corners import LawCorners, corners_of
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
 from dzdesign.identify.valve.reading_flow import ideal_line
@@ -83,7 +83,7 @@ def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> Cost
     above = {name: offset_V - knee for name, knee in knees.items() if knee is not None and knee < offset_V}
     at_end = None
     if corners.end and test.u_knee_falling_V is not None:
-        at_end = test.slope_L_min_V * max(corners.at_end * u_max - test.u_knee_falling_V, 0.0)
+        at_end = test.slope_L_min_V * max(_falling(compensator, corners, sign).at_end * u_max - test.u_knee_falling_V, 0.0)
     limit = compensator.drive_functions.compare_limit / compensator.signals.compare_max
     opens = max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max)
     if limit <= opens:
@@ -172,15 +172,19 @@ def _code_of(compensator: Compensator, test: TestResult) -> int:
     return round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
 
 
+def _falling(compensator: Compensator, corners: LawCorners, sign: int) -> LawCorners:
+    """Return the corners of a falling command, which an inverse play lowers by its width."""
+    nodes = compensator.drive_functions.play_counts[0 if sign > 0 else 1] or (0,)
+    return corners.lowered(nodes[0] / compensator.signals.compare_max, nodes[-1] / compensator.signals.compare_max)
+
+
 def _commands_at(
     compensator: Compensator, dp_code: int, sign: int, thresholds_V: Mapping[str, float | None]
 ) -> dict[str, float]:
     """Return the command at which the drive reaches each threshold that there is, at a difference of pressure codes."""
     corners = corners_of(compensator, dp_code, sign)
     shares = {name: at / float(compensator.u_max_V) for name, at in thresholds_V.items() if at is not None}
-    nodes = compensator.drive_functions.play_counts[0 if sign > 0 else 1] or (0,)
-    widths = (nodes[0] / compensator.signals.compare_max, nodes[-1] / compensator.signals.compare_max)
-    branches = {"opening": corners, "closing": corners.lowered(*widths)}
+    branches = {"opening": corners, "closing": _falling(compensator, corners, sign)}
     found = {name: max(branches[name].command_at(at), 0.0) for name, at in shares.items()}
     if "opening" in found:  # from rest the drive leaves the zero band at its outer end
         found["opening"] = max(found["opening"], corners.leaves)
