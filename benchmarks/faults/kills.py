@@ -1,6 +1,7 @@
 """Kills: commands that are ended at random times leave whole artefacts, no process and, after the next run, no folder.
 
-Linux: the processes of a command are found by their session.
+Linux: the processes of a command are found by the folder for temporary files in their environment. Some have a session
+of their own.
 """
 
 import contextlib
@@ -92,7 +93,7 @@ def _one(
         process.send_signal(SIGNALS[number % len(SIGNALS)])
     process.wait()
     end = time.monotonic() + PATIENCE_S
-    while (left := _processes_of(process.pid)) and time.monotonic() < end:
+    while (left := _processes_of(temporary)) and time.monotonic() < end:
         time.sleep(0.05)
     state = judged(place, old, new, job)
     _run(job.new, place, temporary)
@@ -112,13 +113,13 @@ def _is_writing(place: Path) -> bool:
     return any(name.startswith(UNPLACED) for _, folders, files in os.walk(place) for name in (*folders, *files))
 
 
-def _processes_of(session: int) -> list[int]:
-    """Return the processes of a session that have not ended."""
+def _processes_of(temporary: Path) -> list[int]:
+    """Return the processes with that folder for temporary files; one that has ended has no environment any more."""
+    named = f"TMPDIR={temporary}".encode()
     found = []
     for path in Path("/proc").iterdir():
         if path.name.isdigit():
             with contextlib.suppress(OSError):
-                state, _, _, of_session = (path / "stat").read_text().rpartition(")")[2].split()[:4]
-                if int(of_session) == session and state != "Z":
+                if named in (path / "environ").read_bytes().split(b"\0"):
                     found.append(int(path.name))
     return found

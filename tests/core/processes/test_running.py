@@ -80,3 +80,23 @@ def test_a_program_that_has_ended_is_not_looked_for_any_more(tmp_path):
     words += "print([sign for sign, _ in told])"
     done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "['+', '-']"
+
+
+FIRST = """
+import os, signal, subprocess, sys
+from dzdesign.core.processes import running
+started = subprocess.Popen
+def dies(command, **options):
+    process = started(command, **options)
+    if command[-1] != running.WATCH:  # the program has begun, and nothing more was done
+        os.kill(os.getpid(), signal.SIGKILL)
+    print("watch", flush=True)
+    return process
+subprocess.Popen = dies
+running.run_program([sys.executable, "-c", ""], timeout=60)
+"""
+
+
+def test_no_program_begins_before_the_watch():
+    done = subprocess.run([sys.executable, "-c", FIRST], capture_output=True, text=True, check=False)
+    assert done.stdout == "watch\n" and done.returncode == -signal.SIGKILL

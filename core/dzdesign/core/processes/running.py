@@ -57,6 +57,7 @@ def run_program(
             command, cwd=cwd, env=env, timeout=timeout, check=False, capture_output=True, text=True, errors="replace",
             stdin=subprocess.DEVNULL,
         )  # fmt: skip
+    start_watch()
     process = subprocess.Popen(
         command, cwd=cwd, env=env, text=True, errors="replace", process_group=0,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -70,6 +71,13 @@ def run_program(
             process.communicate()
             raise
     return subprocess.CompletedProcess(command, process.returncode, out, err)
+
+
+def start_watch() -> None:
+    """Start the watch of this process, if it has none; called before a program, so that none runs without one."""
+    if os.name == "posix":
+        with contextlib.suppress(OSError), _starting:
+            _watch_of(os.getpid())
 
 
 @contextlib.contextmanager

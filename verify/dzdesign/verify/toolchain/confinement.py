@@ -25,7 +25,7 @@ from typing import IO
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.programs import program_environment, with_full_name
-from dzdesign.core.processes.running import ended_with_this_process
+from dzdesign.core.processes.running import ended_with_this_process, start_watch
 from dzdesign.verify.toolchain.host_compiler import build_folder, built, host_compiler, words_of
 
 LAUNCHER = "confined"
@@ -92,6 +92,7 @@ def _status(
 ) -> int:
     """Run a program in a folder until it ends or its time is up, and return its exit status."""
     out, err = streams
+    start_watch()
     try:
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=out, stderr=err, cwd=place, env=environment,

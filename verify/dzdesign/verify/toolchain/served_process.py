@@ -16,7 +16,7 @@ from pathlib import Path
 from threading import Timer
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.processes.running import ended_with_this_process
+from dzdesign.core.processes.running import ended_with_this_process, start_watch
 from dzdesign.verify.toolchain.confinement import (
     MOST_MEMORY,
     end_program,
@@ -57,6 +57,7 @@ class ServedProcess:
         asks, answers, theirs = _pipes(stack) if sys.platform != "win32" else (-1, -1, ())
         numbers, streams = tuple(map(str, theirs)), (subprocess.DEVNULL if theirs else subprocess.PIPE)
         command = [*limits(LIFETIME_S, MOST_MEMORY, None), str(program), *numbers]
+        start_watch()
         try:
             with (self._folder / "err").open("wb") as err:
                 self._process = subprocess.Popen(
