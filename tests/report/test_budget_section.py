@@ -76,15 +76,15 @@ def test_the_words_name_the_sum_and_its_largest_component(machine):
     budget = machine.positive.budget
     words = taken_off(budget, AS_COMPUTED)
     assert f"{max(budget.combined_mV):.0f} mV" in words and "supply (default)" in words
-    assert "the recording and the declared machine" in reach_of_certificate(machine)
+    assert "the valve as recorded and the declared machine" in reach_of_certificate(machine)
 
 
 @pytest.mark.parametrize("target", ["f28335", "f280049c", "cortex-m4", "avr", "host"])
 def test_c_and_readme_say_what_is_certified(example_valve, machine, target):
     bare, declared = designed(example_valve, {}, target), designed(example_valve, DECLARED, target)
     for compensator, of, said in (
-        (bare, "Certificate of the recording: ", "No machine was declared"),
-        (declared, "Certificate of the recording and the declared machine: ", "supply (default)"),
+        (bare, "Certificate of the valve as recorded: ", "No machine was declared"),
+        (declared, "Certificate of the valve as recorded and the declared machine: ", "supply (default)"),
     ):
         files = generate(compensator, target, to_json_bytes(compensator)).files
         header = " ".join(files["core/dz_comp.h"].replace("\n *", " ").split())

@@ -80,8 +80,8 @@ def test_the_verdict_and_the_numbers_that_matter_come_first(html, reported_demo)
     loops, identified = evidence["closed_loop"]["pressures"], json.loads((reported_demo / "valve.json").read_bytes())
     head = html[: html.index('<section id="characteristic">')]
     checked = f"All {len(evidence['checks'])} requirements that were checked hold"
-    assert f"{checked}; the certificate covers the recording; {AS_STATED}<" in head
-    assert "no machine was declared" in head and "Certificate of the recording<" in head
+    assert f"{checked}; the certificate covers the valve as recorded; {AS_STATED}<" in head
+    assert "no machine was declared" in head and "Certificate of the valve as recorded<" in head
     # Recorded, not simulated, without the compensator: as in the table of the characteristic.
     before = 10 * max(each["u_onset_rising_V"] for each in identified["sides"]["positive"]["tests"])
     after = 100 * max(each["residual_opening"] for each in loops)
@@ -344,7 +344,7 @@ def test_what_was_not_tried_is_said(copied):
     assert report.kind == "good"
     said = report.html[report.html.index('class="verdict good"') : report.html.index('<dl class="numbers">')]
     command = '<code>verify <span class="tied">--plant</span></code>'
-    assert f"the closed loop holds with the machine&#39;s plant: {command}" in said
+    assert f"the closed-loop requirements hold with the machine&#39;s plant: {command}" in said
     assert "load steps" not in said  # of recordings at several pressure drops
     assert "machine code of other processors" in said
 

@@ -101,8 +101,8 @@ class Compensator(ShownInNotebooks, Artefact):
     machine: Annotated[
         Machine | None,
         Meta(
-            description="Declared differences between machine and bench. Null: the certificate covers the recording "
-            "only, without coil, supply, sensors, converter, oil or ageing."
+            description="Declared differences between machine and bench. Null: the certificate covers the valve as "
+            "recorded, without coil, supply, sensors, converter, oil or ageing."
         ),
     ] = None
     costs: Annotated[tuple[str, ...], Meta(description="Cost of each safe choice, in words.")]
@@ -203,8 +203,8 @@ class Compensator(ShownInNotebooks, Artefact):
 
     @property
     def certified_of(self) -> str:
-        """What the certificate covers: the recording alone, or the recording and the declared machine."""
-        return "the recording" if self.machine is None else "the recording and the declared machine"
+        """What the certificate covers: the valve as recorded, alone or with the declared machine."""
+        return "the valve as recorded" if self.machine is None else "the valve as recorded and the declared machine"
 
     @property
     def valve_json_sha256(self) -> str:

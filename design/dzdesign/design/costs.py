@@ -176,8 +176,8 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     leave, end = compensator.drive_functions.leave_zero_codes, compensator.transition_end
     return [
         f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero "
-        f"({declared}). The output rises only above {leave} codes ({leave / span:.2%}). At {end} codes "
-        f"({end / span:.2%}) the transition ends, at the opening threshold plus its error"
+        f"({declared}). A rising command leaves this band only above {leave} codes ({leave / span:.2%}). At "
+        f"{end} codes ({end / span:.2%}) the transition ends, at the opening threshold plus its error"
     ]
 
 

@@ -83,7 +83,8 @@ def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> Cost
     above = {name: offset_V - knee for name, knee in knees.items() if knee is not None and knee < offset_V}
     at_end = None
     if corners.end and test.u_knee_falling_V is not None:
-        at_end = test.slope_L_min_V * max(_falling(compensator, corners, sign).at_end * u_max - test.u_knee_falling_V, 0.0)
+        at_end_V = _falling(compensator, corners, sign).at_end * u_max
+        at_end = test.slope_L_min_V * max(at_end_V - test.u_knee_falling_V, 0.0)
     limit = compensator.drive_functions.compare_limit / compensator.signals.compare_max
     opens = max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max)
     if limit <= opens:

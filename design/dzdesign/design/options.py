@@ -78,7 +78,7 @@ class DesignOptions:
     current : CurrentRequest or None
         Coil, supply and sensor of a current-controlled drive. None: the law's output is the PWM's duty.
     machine : Machine or None
-        Declared differences between machine and bench. None: the certificate covers the recording only.
+        Declared differences between machine and bench. None: the certificate covers only the valve as recorded.
     request : DesignRequest or None
         Target and option texts from which these options were read, to be kept in compensator.json.
     """

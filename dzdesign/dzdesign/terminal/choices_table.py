@@ -14,11 +14,12 @@ DITHER = (
     "Dither also reduces the hysteresis, but it shifts the thresholds. If the amplifier uses dither, record the ramps "
     "with it, and use identify --dithered and design --dither."
 )
-HEADING = "Remaining dead zone and hysteresis in % of full command, largest over all tests"
+HEADING = "Remaining dead zone and hysteresis in % of full command, largest of all tests; to the knee also between them"
 #: Of the inverse play where it is recommended: the table is of the recorded sweeps.
 PLAY = (
     "The play (backlash inverse) subtracts the hysteresis measured on full sweeps. In small command cycles the "
-    "hysteresis may be smaller. The play then subtracts up to its full width too much. Try small cycles on the machine."
+    "hysteresis may be smaller. The play may then subtract too much, up to its full width. Try small cycles on the "
+    "machine."
 )
 
 

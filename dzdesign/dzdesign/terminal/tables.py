@@ -215,9 +215,15 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
-    what = "for each premise that --curve can select, largest opening dead zone over the tested pressures without a "
-    what += "transition"
+    what = "largest opening dead zone at the tests, without a transition, for each premise of --curve"
     return (f"{what}: {', '.join(words)}. A transition (see design) reduces it",)
+
+
+def _tables(compensator: "Compensator", nodes: int) -> str:
+    """Say how many tables of beta there are: the line and the offset have one each where a transition parts them."""
+    if compensator.transition_codes:
+        return f"beta tables: {nodes} nodes each, for the line and for the offset"
+    return f"beta table: {nodes} nodes"
 
 
 def print_compensator(compensator: "Compensator", console: "Console | None" = None) -> None:
@@ -241,8 +247,8 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
         lines += [
             f"{label}the law's line: u_min0/u_max = {_rational(side.u_min0_over_u_max)} at dP0 ({side.start}), drive "
-            f"range k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full flow)",
-            f"{label}beta table: {len(side.beta)} nodes, linear between them, "
+            f"range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full flow)",
+            f"{label}{_tables(compensator, len(side.beta))}, linear between them, "
             f"resolution 1/{compensator.beta_denominator}",
             f"{label}certificate (covers {compensator.certified_of}): the offset stays below the "
             f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold "

@@ -134,14 +134,16 @@ POPULATION = Requirement(
     how="`verify --tolerances FILE`, with machines = 10000 in FILE and a declared machine",
 )
 OWN_PLANT = Requirement(
-    id="own-plant", title="the closed loop holds with the machine's plant", how="`verify --plant`"
+    id="own-plant", title="the closed-loop requirements hold with the machine's plant", how="`verify --plant`"
 )
 #: Of a stand-in that was recorded at one pressure drop nothing is known at another.
 LOAD_STEPS = Requirement(
     id="load-steps", title="load steps and stuck readings were tried in the closed loop", how="`verify --plant`"
 )
 SERIES = Requirement(
-    id="series", title="the closed loop holds for a series of plants", how="`verify --plant` with `--tolerances`"
+    id="series",
+    title="the closed-loop requirements hold for a series of plants",
+    how="`verify --plant` with `--tolerances`",
 )
 CURRENT_STATES = Requirement(id="current-controller", title="the current controller equals its exact model")
 CURRENT_MARGINS = Requirement(id="current-margins", title="the current loop is stable at every corner")

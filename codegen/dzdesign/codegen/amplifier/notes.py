@@ -64,7 +64,7 @@ def _of_zero_command(setting: AmplifierSetting, compensator: Compensator) -> lis
 def _of_the_machine(compensator: Compensator) -> list[str]:
     """Return what the budget leaves out of an amplifier that controls the current."""
     if compensator.machine is None:
-        covered = "the certificate covers the recording only"
+        covered = "the certificate covers only the valve as recorded"
         return [f"{covered}: design with --amplifier to include the amplifier's error and the oil"]
     if compensator.machine.drive != "amplifier":
         drive = compensator.machine.drive

@@ -55,7 +55,7 @@ def colder_coil_in_words(compensator: Compensator, sign: int) -> str:
     lowered = units.text(1e3 * found.lowered_V, ".0f mV")
     flow = units.text(found.flow_L_min, ".2f L/min") if found.seen else "less than the recordings show"
     return (
-        "the certificate covers the recording only: no machine is declared. Without current control, a coil at "
+        "the certificate covers only the valve as recorded: no machine is declared. Without current control, a coil at "
         f"{REFERENCE_C - COLDER_K} degC instead of {REFERENCE_C} degC lowers the threshold by {lowered}. At zero "
         f"command the valve then passes {flow} at {units.text(found.dp_MPa, '.2f MPa')}. Declare one of: "
         "--coil-temperature with --supply; --amplifier; --drive current"

@@ -10,8 +10,8 @@ def reach_of_certificate(compensator: Compensator) -> str:
     """Return a sentence on what the certificate counts of a machine, or that it counts nothing of one."""
     if compensator.machine is None:
         return (
-            "The certificate covers the recording: no machine was declared, so coil temperature, supply, pressure "
-            "sensors, oil and ageing are not counted."
+            "The certificate covers the valve as recorded: no machine was declared, so coil temperature, supply, "
+            "pressure sensors, oil and ageing are not counted."
         )
     parts = []
     for sign in compensator.signals.signs:
@@ -19,7 +19,7 @@ def reach_of_certificate(compensator: Compensator) -> str:
         side = "" if compensator.negative is None else f"{name} commands: "
         if budget is not None:
             parts.append(side + taken_off(budget, compensator.valve.recorded_units.of_side(name)))
-    return f"The certificate covers the recording and the declared machine: {'; '.join(parts)}."
+    return f"The certificate covers the valve as recorded and the declared machine: {'; '.join(parts)}."
 
 
 def taken_off(budget: Budget, units: RecordedUnits) -> str:

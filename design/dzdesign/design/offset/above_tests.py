@@ -153,7 +153,7 @@ def above_in_words(choice: Above, certificate: Certificate, side: SideModel, uni
         return f"{text}. Not certified: a single test gives no slope"
     rests = curve.above.in_words(curve.premise, side.trend or "flat", units)
     if holds_to > certificate.dp_MPa[1]:
-        return f"{text}. Up to {units.text(float(holds_to), '.3g MPa')} this is {rests}"
+        return f"{text}. Up to {units.text(float(holds_to), '.3g MPa')} this offset is {rests}"
     return f"{text}. {rests[0].upper()}{rests[1:]}"
 
 

@@ -186,7 +186,7 @@ def _lowered(
 def _open_below(row: LowFlow, branch: Branch, threshold: float, least: float) -> Worded:
     return worded(
         "{source} shows at least {flow:.3g L/min} at {u:.4g V} and {at:.3g MPa}. This command lies below the threshold "
-        "on {branch} from the ramps, {threshold:.4g V}, and a flow of up to {least:.3g L/min} counts as none; add a "
+        "on {branch} from the ramps, {threshold:.4g V}, and a flow of up to {least:.3g L/min} counts as no flow; add a "
         "row of {branch} at a lower command with no more flow than that, or declare the allowed flow by --zero-flow",
         source=row.source, flow=row.at_least_L_min, u=row.u_V, at=row.dp_MPa, branch=IN_WORDS[branch],
         threshold=threshold, least=least,

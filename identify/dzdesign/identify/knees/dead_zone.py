@@ -53,7 +53,7 @@ def look_into_dead_zone(
     read, line : PreparedBranch, GatedLine
         The branch and its straight part.
     least : float
-        Flow that counts as none whatever the noise (the meter's floor, no useful flow), m³/s.
+        Flow that counts as no flow whatever the noise (the meter's floor, no useful flow), m³/s.
     level : float
         Flow from which a single reading is flow, m³/s: the noise level where averages tell nothing.
     noise : float

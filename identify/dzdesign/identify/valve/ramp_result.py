@@ -107,7 +107,7 @@ class TestResult:
     noise_level_L_min: Annotated[
         Flow,
         Meta(
-            description="Noise level: a flow below it counts as none. It is the largest of the meter's floor, the "
+            description="Noise level: a flow below it counts as no flow. It is the largest of the meter's floor, the "
             "resolution of averages over the dead zone, and 0.5 % of the largest flow or the declared "
             "level."
         ),

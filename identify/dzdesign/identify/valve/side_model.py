@@ -77,7 +77,7 @@ class BoundsBasis:
     level_L_min: Annotated[
         Flow,
         Meta(
-            description="Largest noise level of the tests; a flow below it counts as none."
+            description="Largest noise level of the tests; a flow below it counts as no flow."
         ),
     ]
     zero_flow_L_min: Annotated[
@@ -283,14 +283,14 @@ class SideModel:
         return basis.unseen_below_L_min if guard == basis.guard else basis.level_L_min
 
     def none_in_words(self, guard: str, units: RecordedUnits) -> str:
-        """Say which flow at a guard's bounds counts as none, and by what."""
+        """Say which flow at a guard's bounds counts as no flow, and by what."""
         unseen, level = self.unseen_below_L_min(guard), self.certificate.level_L_min
         if unseen < level:
             by_hand, meter = units.text(unseen, ".3g L/min"), units.text(level, ".2f L/min")
-            return f"flow below {by_hand} (the low-flow readings; the meter shows it from {meter} on) counts as none"
+            return f"flow below {by_hand} (the low-flow readings; the meter shows it from {meter} on) counts as no flow"
         flow = units.text(level, ".2f L/min")
         by = "the largest of meter floor, noise of averages and 0.5 % of the largest flow"
-        return f"flow below {flow} counts as none ({by})"
+        return f"flow below {flow} counts as no flow ({by})"
 
     @property
     def curve(self) -> CertifiedCurve:

@@ -44,7 +44,7 @@ class LotBudget:
     certified_of: Annotated[
         tuple[str, ...],
         Meta(
-            description="What the certificates cover: the recording alone, or the recording and the declared machine. "
+            description="What the certificates cover: the valve as recorded, alone or with the declared machine. "
             "Each that occurs."
         ),
     ]

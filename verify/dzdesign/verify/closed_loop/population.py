@@ -112,7 +112,7 @@ def threshold_band(scene: Scene, tested_MPa: Sequence[float]) -> ThresholdBand:
     tested = np.array(sorted(tested_MPa))
     inner = [np.linspace(low, high, NODES, endpoint=False) for low, high in pairwise(tested)]
     dp = np.concatenate([*inner, tested[-1:]])
-    # What flows without a drive counts as none, and so does what was declared as allowed.
+    # What flows without a drive counts as no flow, and so does what was declared as allowed.
     none = np.array([_no_flow(scene, one) for one in dp])
     low, high = np.zeros(dp.size), np.ones(dp.size)
     for _ in range(HALVINGS):

@@ -30,7 +30,7 @@ def certificate_follows(compensator: Compensator) -> Check:
     certificate = compensator.positive.certificate
     valves = len(compensator.lot)
     common = f"of {valves} valves the one in compensator.json: " if valves else ""
-    text = f"{common}the offset was again proved to lie below the {100 * certificate.confidence:.6g}% lower bound of "
+    text = f"{common}repeated: the offset lies below the {100 * certificate.confidence:.6g}% lower bound of "
     low, high = map(float, certificate.dp_MPa)
     tested = compensator.valve.recorded_units.span(low, high, ".2f MPa")
     text += f"the {certificate.guard} threshold {tested}, at every pressure-difference code"
@@ -73,8 +73,8 @@ def valve_follows(folder: Path, compensator: Compensator) -> Check:
         if each.valve != valve
     )
     if stated == compensator.valve_sha256:  # as `identify` writes it: no file is needed
-        text = f"the valve in compensator.json, written as `identify` writes it, has the SHA-256 {stated} that its "
-        text += "entry made_from states"
+        text = f"written as `identify` writes it, the valve in compensator.json has the SHA-256 {stated}, as "
+        text += "stated under made_from"
         return VALVE.check(holds=True, text=other + text)
     for each in around:
         if each.sha256 == stated:

@@ -153,7 +153,7 @@ def native_plant_check(
     flow = max(found, key=lambda each: each.flow_difference)
     unlike = sum(each.unlike_compare_values for each in found)
     text = (
-        f"over {sum(each.seconds for each in found):.2g} s with the same compiled core, the results differ from "
+        f"over {sum(each.seconds for each in found):.2g} s with the same compiled core, spool and flow differ from "
         f"CasADi's CVODES by at most {position.position_difference:.1e} of the stroke ({_where(position, units)}) and "
         f"{flow.flow_difference:.1e} of the largest flow ({_where(flow, units)}); allowed: {MOST_APART:.0e}; the spool "
         f"met its stops {sum(each.impacts for each in found)} times in both"
