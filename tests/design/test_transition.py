@@ -97,7 +97,7 @@ def test_a_declared_error_is_rounded_up_to_codes():
 @pytest.mark.slow
 @needs_compiler
 def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(with_transition, example_folder, tmp_path):
-    """The issue's goal in the closed loop with hysteresis, PWM resolved: the plant is the one of the recordings."""
+    """The goal in the closed loop with hysteresis, PWM resolved: the plant is the one of the recordings."""
     from dzdesign.codegen.project import generate
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.verification import verify

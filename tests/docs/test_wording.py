@@ -74,8 +74,8 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, capsys):
     travel += r"\d+/\d+ = 0\.\d{5} \(from there to"
     assert re.search(travel, design)
     nodes = len(example_compensator.positive.beta)
-    tables = f"beta tables: {nodes} nodes each, for the line and for the offset, linear between them, resolution 1/32768"
-    assert tables in design
+    tables = f"beta tables: {nodes} nodes each, for the line and for the offset, linear between them, resolution "
+    assert f"{tables}1/32768" in design
     assert re.search(valves_range, html_of(example_valve))
 
 

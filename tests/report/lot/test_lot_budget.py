@@ -39,7 +39,7 @@ def test_a_lot_without_a_machine_says_so_and_a_mixed_one_says_both(lot, example_
     bare = lot_budget({"a": example_compensator})
     assert "no machine was declared" in lot_budget_lines(bare)[0]
     (line,) = lot_budget_lines(lot_budget(lot))
-    assert line == "The certificates are of the valve as recorded and the declared machine."
+    assert line == "The certificates cover the valve as recorded and the declared machine."
     mixed = lot_budget({**lot, "c": example_compensator})
     assert len(mixed.certified_of) == 2 and "of some valves" in lot_budget_lines(mixed)[0]
     assert lot_budget({}) is None and lot_budget_lines(None) == () and lot_budget_table(None, AS_COMPUTED) is None

@@ -83,11 +83,11 @@ def lot_budget_lines(budget: LotBudget | None) -> tuple[str, ...]:
     if budget is None:
         return ()
     if len(budget.certified_of) > 1:
-        return (f"The certificates are of some valves of {', of others of '.join(budget.certified_of)}.",)
+        return (f"The certificates cover, of some valves, {', of others '.join(budget.certified_of)}.",)
     if any("machine" in each for each in budget.certified_of):
-        return (f"The certificates are of {budget.certified_of[0]}.",)
+        return (f"The certificates cover {budget.certified_of[0]}.",)
     return (
-        "The certificates are of the recordings: no machine was declared, so coil temperature, supply, pressure "
+        "The certificates cover the valves as recorded: no machine was declared, so coil temperature, supply, pressure "
         "sensors, oil and ageing are not counted.",
     )
 

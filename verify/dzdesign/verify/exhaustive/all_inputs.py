@@ -88,9 +88,13 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
         (
             requirements.ZERO_COMMAND,
             inputs.over_compensated,
-            "the output at zero command lies above the threshold's lower bound at "
-            f"{inputs.over_compensated or 'no'} pressure code{'s' if inputs.over_compensated > 1 else ''}; "
-            f"smallest distance of the C's output below it {margin}",
+            (
+                "the output at zero command lies above the threshold's lower bound at "
+                f"{inputs.over_compensated} pressure code{'s' if inputs.over_compensated > 1 else ''}"
+                if inputs.over_compensated
+                else "at every pressure code the output at zero command stays below the threshold's lower bound"
+            )
+            + f"; smallest margin of the C's output {margin}",
         ),
         (
             requirements.PRESSURE_DIFFERENCE,

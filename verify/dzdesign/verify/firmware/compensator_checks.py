@@ -30,10 +30,10 @@ def certificate_follows(compensator: Compensator) -> Check:
     certificate = compensator.positive.certificate
     valves = len(compensator.lot)
     common = f"of {valves} valves the one in compensator.json: " if valves else ""
-    text = f"{common}repeated: the offset lies below the {100 * certificate.confidence:.6g}% lower bound of "
+    text = f"{common}the proof was repeated: the offset lies below the {100 * certificate.confidence:.6g}% "
     low, high = map(float, certificate.dp_MPa)
     tested = compensator.valve.recorded_units.span(low, high, ".2f MPa")
-    text += f"the {certificate.guard} threshold {tested}, at every pressure-difference code"
+    text += f"lower bound of the {certificate.guard} threshold {tested}, at every pressure-difference code"
     return CERTIFICATE.check(holds=True, text=text)
 
 
