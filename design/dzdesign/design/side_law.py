@@ -85,7 +85,7 @@ class SideLaw:
         Fraction,
         quantity(
             "1",
-            "Ratio k x_max / u_max of the law: command range from its u_min0 to full flow, over full "
+            "Ratio k x_max / u_max of the law: command range from its u_min0 to full output, over full "
             "command. In valve.json the range starts at the knee.",
         ),
     ]
@@ -94,7 +94,7 @@ class SideLaw:
         quantity(
             "1",
             "Threshold u_min0 of the law at dP0, over full command. It is the offset. With a transition it "
-            "is the opening threshold plus its error, where the law's line after the transition starts.",
+            "is the opening threshold plus its error: the law's line, extended to zero command.",
         ),
     ]
     beta: Annotated[

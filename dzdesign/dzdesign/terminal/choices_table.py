@@ -14,7 +14,9 @@ DITHER = (
     "Dither also reduces the hysteresis, but it shifts the thresholds. If the amplifier uses dither, record the ramps "
     "with it, and use identify --dithered and design --dither."
 )
-HEADING = "Remaining dead zone and hysteresis in % of full command, largest of all tests; to the knee also between them"
+HEADING = (
+    "Remaining dead zone and hysteresis in % of full command, largest at the tests; to the knee, also between the tests"
+)
 #: Of the inverse play where it is recommended: the table is of the recorded sweeps.
 PLAY = (
     "The play (backlash inverse) subtracts the hysteresis measured on full sweeps. In small command cycles the "

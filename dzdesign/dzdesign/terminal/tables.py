@@ -182,7 +182,7 @@ def _guarded(side: "SideModel") -> str:
     """Say which threshold is bounded."""
     if side.zero_flow_L_min is not None:
         return "the command that passes the flow allowed at zero"
-    return "the knee, or, if the port opens gradually, the command where the flow below the knee ends"
+    return "the knee, or, if the port opens gradually, the command at which the small flow below the knee reaches zero"
 
 
 def _none(side: "SideModel", units: "RecordedUnits") -> str:
@@ -247,7 +247,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
         label = "" if compensator.negative is None else "positive: " if sign > 0 else "negative: "
         lines += [
             f"{label}the law's line: u_min0/u_max = {_rational(side.u_min0_over_u_max)} at dP0 ({side.start}), drive "
-            f"range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full flow)",
+            f"range of the law k x_max/u_max = {_rational(side.drive_range_over_u_max)} (from there to full output)",
             f"{label}{_tables(compensator, len(side.beta))}, linear between them, "
             f"resolution 1/{compensator.beta_denominator}",
             f"{label}certificate (covers {compensator.certified_of}): the offset stays below the "

@@ -40,8 +40,8 @@ SPREAD_FIGURES: tuple[FigureKind, ...] = (
     (
         "law",
         ("offset_V", "k_x_max_over_u_max", "beta_at_highest_dp"),
-        "What the laws of the valves differ in: the offset at dP0, which lies under the threshold's bound; the travel "
-        "k x_max/u_max from the threshold to full flow; β at the highest tested pressure drop.",
+        "What the laws of the valves differ in: the offset at dP0, which lies under the threshold's bound; the drive "
+        "range k x_max/u_max from the threshold to full flow; β at the highest tested pressure drop.",
         False,
     ),
 )

@@ -28,7 +28,7 @@ def law_section(compensator: Compensator | None) -> Section:
         kappa, u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
         lines.append(
             f"{name.capitalize()} commands: drive range of the law k x_max/u_max = {_exact(kappa)}, from "
-            f"{side.start} to full flow; the valve's, {valve.sides[name].k_x_max_over_u_max:.4f}, counts from the "
+            f"{side.start} to full output; the valve's, {valve.sides[name].k_x_max_over_u_max:.4f}, counts from the "
             f"knee; u_min0/u_max at dP0 = {_exact(u_min0)}, both as shares of full command; β is straight "
             f"between {len(side.beta)} nodes, {compensator.beta_step_codes} pressure codes apart, each a "
             f"whole number of 1/{compensator.beta_denominator}."

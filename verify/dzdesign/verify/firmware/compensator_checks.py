@@ -73,8 +73,8 @@ def valve_follows(folder: Path, compensator: Compensator) -> Check:
         if each.valve != valve
     )
     if stated == compensator.valve_sha256:  # as `identify` writes it: no file is needed
-        text = f"written as `identify` writes it, the valve in compensator.json has the SHA-256 {stated}, as "
-        text += "stated under made_from"
+        text = "the valve in compensator.json, written in the format of `identify`, has the SHA-256 that made_from "
+        text += f"states: {stated}"
         return VALVE.check(holds=True, text=other + text)
     for each in around:
         if each.sha256 == stated:
