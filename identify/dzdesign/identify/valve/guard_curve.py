@@ -219,7 +219,7 @@ class CertifiedCurve:
             bends = [1e3 * value for value in self.curvature_V_MPa2]
             inner, ends = min(bends), {"first": bends[0], "last": bends[-1]}
             larger = [f"{units.number(end, '.3g mV/MPa²')} in the {name}" for name, end in ends.items() if end > inner]
-            at_ends = f", but {' and '.join(larger)} interval, where only one test can show a bend" if larger else ""
+            at_ends = f", but {' and '.join(larger)} interval" if larger else ""
             return (
                 "Premise smooth: between two tests h apart, the threshold lies at most M h²/8 below the straight line "
                 f"between their bounds, M = {units.text(inner, '.3g mV/MPa²')}{at_ends} ({known})"

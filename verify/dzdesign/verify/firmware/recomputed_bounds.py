@@ -59,7 +59,7 @@ def bounds_follow(compensator: Compensator) -> Check:
         text = f"{faults[0]}{more}; a number of valve.json was edited: make it again with `dzdesign identify`"
         return BOUNDS.check(holds=False, text=text)
     text = (
-        f"{count} bounds (at the tests and at pressure drops above them, for each threshold that may be protected) "
+        f"{count} bounds (at the tests and at pressure drops above them, for each choice of --guard) "
         "follow from the thresholds, errors and budgets in valve.json; these inputs were not checked here; largest "
     )
     return BOUNDS.check(holds=True, text=f"{text}difference {units.text(1e3 * largest, '.2g mV')}")
