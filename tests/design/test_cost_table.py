@@ -11,6 +11,8 @@ from dzdesign.core.recorded_units import FlowUnit, PressureUnit, RecordedUnits
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.designing import design
+from dzdesign.design.fixed.characteristic import Characteristic
+from dzdesign.design.fixed.dead_zones import dead_zones
 from dzdesign.design.option_texts import options_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.terminal.tables import print_compensator
@@ -53,5 +55,8 @@ def test_the_flow_at_the_transitions_end_is_that_of_the_falling_command(example_
         end, costs = made.transition_end / made.signals.command.span(1), costs_at_tests(made, 1)
         assert all((one.at_end_L_min > one.reading_flow_L_min) == (one.read["closing"] < end) for one in costs)
         flows.append([one.at_end_L_min for one in costs])
+        # What stands beside a fixed setting is the same flow.
+        fixed = Characteristic(rest=Fraction(0), nodes=((Fraction(0), Fraction(1, 2)), (Fraction(1), Fraction(1))))
+        assert [row.law_end_L_min for row in dead_zones(made, fixed)] == pytest.approx(flows[-1], rel=1e-12)
     kept, with_play = flows
     assert all(less < 0.5 * more for more, less in zip(kept, with_play, strict=True))

@@ -151,7 +151,7 @@ def test_a_price_is_what_a_design_without_the_component_gains(example_valve):
 
 
 def test_without_a_machine_the_certificate_is_of_the_recording(example_compensator):
-    assert example_compensator.machine is None and example_compensator.certified_of == "the recording"
+    assert example_compensator.machine is None and example_compensator.certified_of == "the valve as recorded"
     assert {line.component for line in example_compensator.positive.budget.lines} == {
         "recording",
         "rounding of pressures",

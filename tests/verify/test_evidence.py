@@ -14,6 +14,7 @@ from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify import requirements
 from dzdesign.verify.contradictions import contradictions
 from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.requirements import ALWAYS, AS_STATED, FROM_INPUTS, OPTIONAL, RAMPS, Requirement
 from dzdesign.verify.untried import not_tried, untried_requirements
 from tests.support.evidence import EVIDENCE, read_evidence
@@ -45,6 +46,19 @@ def test_a_check_that_stands_twice_or_that_nobody_knows_adds_nothing_to_what_was
         assert added in contradictions(plain.with_checks(added), None)
     other = replace(plain, tool=Tool(name="dzdesign", version="0.0.9"))  # it may have had requirements of its own
     assert contradictions(other.with_checks(replace(first, id="safe", name="certified")), None) == ()
+
+
+@needs_compiler
+def test_findings_that_are_not_required_follow_from_the_scenarios(reported_demo):
+    found, compensator = read_evidence(reported_demo / "evidence"), read_compensator(reported_demo / "firmware")
+    assert contradictions(found, compensator) == ()
+    place = [check.id for check in found.checks].index(requirements.ZERO_FLOW_AFTER_SCENARIOS.id)
+    stated = found.checks[place].not_required
+    assert len(stated) == 2
+    for at, forged in ((place, ()), (place, ("nothing flows", stated[1])), (0, ("nothing flows",))):
+        checks = list(found.checks)
+        checks[at] = replace(checks[at], not_required=forged)
+        assert contradictions(replace(found, checks=tuple(checks)), compensator) == (checks[at],)
 
 
 def test_of_a_lot_setting_the_recordings_of_one_valve_leave_the_others_as_stated():

@@ -7,6 +7,7 @@ import atexit
 import contextlib
 import os
 import shutil
+import stat
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +18,8 @@ from dzdesign.core.errors import InputError
 
 #: How the folders are called, in the system's folder for temporary files. A folder is hidden until its lock is held.
 PREFIX, HIDDEN = "dzdesign-run-", ".dzdesign-run-"
+#: How one is called from the moment that its mark goes.
+GONE = ".dzdesign-gone-"
 #: A hidden folder of this age was left by a process that was killed before it held the lock.
 ABANDONED_S = 60.0
 #: File by which a folder is known as made here; without it none is ever removed. Windows locks no folder, but deletes
@@ -91,20 +94,38 @@ def _remove(folder: Path) -> None:
 
 
 def _remove_whole(folder: Path) -> None:
-    """Remove a folder as far as it can be, its mark last: one that is left half removed is known by it."""
+    """Remove a folder as far as it can be, its mark last: one that is left half removed is known by it.
+
+    Without its mark an empty folder is known by its name, which no other than one that is removed here has.
+    """
     with contextlib.suppress(OSError):
-        with os.scandir(folder) as entries:
-            inside = [entry for entry in entries if entry.name != MARK]
-        for entry in inside:
-            if entry.is_dir(follow_symlinks=False):
-                shutil.rmtree(entry, ignore_errors=True)
-            else:
-                with contextlib.suppress(OSError):
-                    os.unlink(entry)
-        if set(os.listdir(folder)) <= {MARK}:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(folder / MARK)
-            os.rmdir(folder)
+        if os.name != "posix":
+            _remove_inside(folder, None)
+            shutil.rmtree(folder, ignore_errors=True)
+            return
+        place = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        try:
+            _remove_inside(folder, place)
+            if set(os.listdir(place)) <= {MARK}:
+                gone = folder.with_name(GONE + folder.name.rpartition("-")[2])
+                os.rename(folder, gone)
+                with contextlib.suppress(FileNotFoundError):
+                    os.unlink(MARK, dir_fd=place)
+                os.rmdir(gone)
+        finally:
+            os.close(place)
+
+
+def _remove_inside(folder: Path, place: int | None) -> None:
+    """Remove what lies in a folder but its mark; through its descriptor where there are such: no link leads away."""
+    for name in os.listdir(folder if place is None else place):
+        if name == MARK:
+            continue
+        entry = name if place is not None else folder / name
+        try:
+            os.unlink(entry, dir_fd=place)
+        except OSError:  # a folder
+            shutil.rmtree(entry, ignore_errors=True, dir_fd=place)
 
 
 @cache
@@ -112,23 +133,24 @@ def _remove_abandoned() -> None:
     """Remove the folders of processes that were killed; what can't be looked at or removed is left."""
     with contextlib.suppress(OSError), os.scandir(tempfile.gettempdir()) as entries:
         for entry in entries:
-            if entry.name.startswith((PREFIX, HIDDEN)):
+            if entry.name.startswith((PREFIX, HIDDEN, GONE)):
                 with contextlib.suppress(OSError):
-                    _remove_if_abandoned(Path(entry.path), hidden=entry.name.startswith(HIDDEN))
+                    _remove_if_abandoned(Path(entry.path))
 
 
-def _remove_if_abandoned(folder: Path, *, hidden: bool) -> None:
+def _remove_if_abandoned(folder: Path) -> None:
     if os.name != "posix":
         os.unlink(folder / MARK)  # an error while its process lives, or where there is none
         shutil.rmtree(folder, ignore_errors=True)
         return
-    try:
-        found = os.lstat(folder / MARK)
-    except FileNotFoundError:  # killed between the mark and the folder; one in which anything lies stays
-        if not hidden:
-            os.rmdir(folder)
+    found, marked = os.lstat(folder), os.path.lexists(folder / MARK)
+    if found.st_uid != os.getuid() or not stat.S_ISDIR(found.st_mode):
         return
-    if found.st_uid != os.getuid() or (hidden and time.time() - found.st_mtime < ABANDONED_S):
+    young = folder.name.startswith(HIDDEN) and time.time() - found.st_mtime < ABANDONED_S
+    if young or (not marked and folder.name.startswith(PREFIX)):
+        return
+    if not marked:  # killed before the mark was made, or after it was removed; one in which anything lies stays
+        os.rmdir(folder)
         return
     lock = _lock(folder)
     if lock is not None:

@@ -83,7 +83,7 @@ def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> Cost
     above = {name: offset_V - knee for name, knee in knees.items() if knee is not None and knee < offset_V}
     at_end = None
     if corners.end and test.u_knee_falling_V is not None:
-        at_end_V = _falling(compensator, corners, sign).at_end * u_max
+        at_end_V = falling_corners(compensator, _code_of(compensator, test), sign).at_end * u_max
         at_end = test.slope_L_min_V * max(at_end_V - test.u_knee_falling_V, 0.0)
     limit = compensator.drive_functions.compare_limit / compensator.signals.compare_max
     opens = max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max)
@@ -173,10 +173,16 @@ def _code_of(compensator: Compensator, test: TestResult) -> int:
     return round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
 
 
-def _falling(compensator: Compensator, corners: LawCorners, sign: int) -> LawCorners:
-    """Return the corners of a falling command, which an inverse play lowers by its width."""
-    nodes = compensator.drive_functions.play_counts[0 if sign > 0 else 1] or (0,)
-    return corners.lowered(nodes[0] / compensator.signals.compare_max, nodes[-1] / compensator.signals.compare_max)
+def falling_corners(compensator: Compensator, dp_code: int, sign: int) -> LawCorners:
+    """Return the law's corners for a falling command, which an inverse play lowers by its width."""
+    corners, functions = corners_of(compensator, dp_code, sign), compensator.drive_functions
+    nodes = functions.play_counts[0 if sign > 0 else 1]
+    if not nodes:
+        return corners
+    codes = (compensator.transition_end, compensator.signals.command.span(sign))
+    widths = np.interp(codes, np.arange(len(nodes)) * functions.play_step_codes, nodes)
+    at_end, at_full = (float(width) / compensator.signals.compare_max for width in widths)
+    return corners.lowered(at_end, at_full)
 
 
 def _commands_at(
@@ -185,7 +191,7 @@ def _commands_at(
     """Return the command at which the drive reaches each threshold that there is, at a difference of pressure codes."""
     corners = corners_of(compensator, dp_code, sign)
     shares = {name: at / float(compensator.u_max_V) for name, at in thresholds_V.items() if at is not None}
-    branches = {"opening": corners, "closing": _falling(compensator, corners, sign)}
+    branches = {"opening": corners, "closing": falling_corners(compensator, dp_code, sign)}
     found = {name: max(branches[name].command_at(at), 0.0) for name, at in shares.items()}
     if "opening" in found:  # from rest the drive leaves the zero band at its outer end
         found["opening"] = max(found["opening"], corners.leaves)

@@ -257,6 +257,6 @@ def test_notes_say_what_is_not_certified(designs):
         name: " ".join(notes_of(amplifier_setting(compensator, device_named("west")), compensator))
         for name, compensator in designs.items()
     }
-    assert "above 5.00 MPa" in notes["one solenoid"] and "recording only" in notes["one solenoid"]
+    assert "above 5.00 MPa" in notes["one solenoid"] and "only the valve as recorded" in notes["one solenoid"]
     assert "below 1.00 MPa" in notes["two solenoids"] and "dither" in notes["two solenoids"]
-    assert "recording only" not in notes["a budget"]
+    assert "only the valve as recorded" not in notes["a budget"]

@@ -21,6 +21,7 @@ from dzdesign.verify.requirements import (
     OF_CURRENT,
     POPULATION,
     ZERO_COMMAND,
+    ZERO_FLOW_AFTER_SCENARIOS,
     Check,
 )
 
@@ -55,11 +56,12 @@ def contradictions(evidence: Evidence, compensator: Compensator | None) -> tuple
 
     def key(check: Check) -> tuple[object, ...]:  # another version may word it otherwise, and units be another valve's
         worded_alike = evidence.tool == THIS_TOOL and (compensator is not None or check.id != ZERO_COMMAND.id)
-        return (check.id, check.name, check.holds, check.text if worded_alike else "")
+        return (check.id, check.name, check.holds, *((check.text, check.not_required) if worded_alike else ()))
 
     ids, derived = {kind.id for kind in kinds}, {key(check) for check in follow}
     found = [each for each in evidence.checks if each.holds and each.id in ids and key(each) not in derived]
     if evidence.tool == THIS_TOOL:
         tried = Counter((each.id, each.name) for each in evidence.checks)
         found += [each for each in evidence.checks if each.id not in KNOWN_IDS or tried[each.id, each.name] > 1]
+        found += [each for each in evidence.checks if each.not_required and each.id != ZERO_FLOW_AFTER_SCENARIOS.id]
     return tuple(found)

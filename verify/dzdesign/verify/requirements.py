@@ -138,7 +138,9 @@ OWN_PLANT = Requirement(
 )
 #: Of a stand-in that was recorded at one pressure drop nothing is known at another.
 LOAD_STEPS = Requirement(
-    id="load-steps", title="load steps and stuck readings were tried in the closed loop", how="`verify --plant`"
+    id="load-steps",
+    title="load steps, and readings stuck during one, were tried in the closed loop",
+    how="`verify --plant`",
 )
 SERIES = Requirement(
     id="series",

@@ -1,7 +1,8 @@
-"""Programs that this process starts and waits for end with it, however it ends: no kill leaves a compiler or emulator.
+"""Programs that this process starts and waits for end with it, however it ends.
 
 On POSIX a watch, a process of its own, is told of each program; it holds a pipe, which ends with this process, and then
-ends the programs with all that they have started. Windows has no such groups: there a program runs to its end.
+ends the programs with all that they have started. A kill within the millisecond between a program's start and that
+word leaves it. Windows has no such groups: there a program runs to its end.
 """
 
 import contextlib
@@ -12,7 +13,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from threading import Lock
+from threading import RLock
 
 from dzdesign.core.processes.programs import program_environment, with_full_name
 
@@ -30,7 +31,8 @@ for group in groups:
     except OSError:
         pass
 """
-_starting = Lock()
+#: Taken again by a thread that has it, if the garbage collector ends a program there.
+_starting = RLock()
 
 
 def run_program(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import remaining_dead_zone
+from dzdesign.design.costs_at_tests import falling_corners, remaining_dead_zone
 from dzdesign.design.fixed.characteristic import Characteristic
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -36,8 +36,8 @@ def _at_test(compensator: Compensator, characteristic: Characteristic, test: Tes
     end_code, signals = compensator.transition_end, compensator.signals
     dp_code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
-    by_law = compensator.drive(signals.command.zero_code + signals.command.direction(sign) * end_code, dp_code, sign)
-    by_fixed = characteristic.drive(Fraction(end_code, signals.command.span(sign)))
+    by_law = falling_corners(compensator, dp_code, sign).at_end
+    by_fixed = float(characteristic.drive(Fraction(end_code, signals.command.span(sign))))
     return FixedDeadZone(
         side=SIDE_NAMES[sign],
         dp_MPa=test.dp_MPa or 0.0,
@@ -57,8 +57,8 @@ def _left(characteristic: Characteristic, knee: Fraction) -> float:
     return float("inf") if found is None else float(found)
 
 
-def _flow_at_end(compensator: Compensator, test: TestResult, drive: Fraction) -> float | None:
+def _flow_at_end(compensator: Compensator, test: TestResult, drive: float) -> float | None:
     """Return the flow on closing that a drive makes, as the straight part of the test has it, L/min."""
     if not compensator.transition_end or test.u_knee_falling_V is None:
         return None
-    return test.slope_L_min_V * max(float(drive * compensator.u_max_V) - test.u_knee_falling_V, 0.0)
+    return test.slope_L_min_V * max(drive * float(compensator.u_max_V) - test.u_knee_falling_V, 0.0)

@@ -152,7 +152,7 @@ def above_in_words(choice: Above, certificate: Certificate, side: SideModel, uni
     if curve.above is None:
         return f"{text}. Not certified: a single test gives no slope"
     rests = curve.above.in_words(curve.premise, side.trend or "flat", units)
-    if released is not None and holds_to >= released:  # beyond, no offset is left to be certified
+    if released is not None and holds_to >= released > certificate.dp_MPa[1]:  # no offset is left beyond
         return f"{text}. Up to there this offset is {rests}"
     if holds_to > certificate.dp_MPa[1]:
         return f"{text}. Up to {units.text(float(holds_to), '.3g MPa')} this offset is {rests}"

@@ -244,7 +244,7 @@ def checks_section(evidence: Evidence | None) -> Section:
         for check in evidence.checks
         for row in (
             (verdict(check.holds), word(check.name), check.text),
-            *((unasked(NOT_REQUIRED), word(check.name), found) for found in check.not_required),
+            *((word(NOT_REQUIRED), word(check.name), found) for found in check.not_required),
         )
     ]
     untried = untried_requirements(evidence)

@@ -230,11 +230,12 @@ def shut_after_scenarios(
     if _all_shut(required):
         text += f"{units.text(0.0, '.4g L/min')} in each"
     else:
-        text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}; in the ramp that starts at "
+        text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}; in the runs for "
         text += f"{_at(worst, units)})"
     text += _allowed(worst, units)
     if not plant_given and not any(each.is_load_step for each in scenarios):
-        text += "; load steps and stuck readings were not tried: they need ramps at two pressure drops, or --plant"
+        text += "; load steps, and readings stuck during one, were not tried: they need ramps at two pressure drops, "
+        text += "or --plant"
     requirement, beside = ZERO_FLOW_AFTER_SCENARIOS, _not_required(scenarios, units)
     if zero_flow.holds is None:
         return requirement.check(holds=None, text=f"{text}; see the ramps", not_required=beside)
@@ -251,7 +252,7 @@ def _not_required(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> 
         most, count = max(others, key=_zero_flow), len({each.name for each in others})
         text = f"{TRIED.get(reason, reason)}: {count} scenario{'' if count == 1 else 's'}, "
         text += f"{_flow(most, most.q_zero_L_min, units)} at zero command (worst: {most.name}; in "
-        text += f"the ramp that starts at {_at(most, units)})"
+        text += f"the runs for {_at(most, units)})"
         if reason == NO_CORE_CAN_KNOW and any(each.name.startswith(OPEN_CIRCUITS) for each in others):
             text += "; signals with a live zero and headroom above the span would reveal the failed sensor"
         found.append(text)

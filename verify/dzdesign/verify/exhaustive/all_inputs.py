@@ -92,7 +92,8 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
                 "the output at zero command lies above the threshold's lower bound at "
                 f"{inputs.over_compensated} pressure code{'s' if inputs.over_compensated > 1 else ''}"
                 if inputs.over_compensated
-                else "at every pressure code the output at zero command stays below the threshold's lower bound"
+                else "at every pressure code of the tests the output at zero command stays below the threshold's lower "
+                "bound"
             )
             + f"; smallest margin of the C's output {margin}",
         ),

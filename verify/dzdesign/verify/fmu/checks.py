@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from math import floor
 from pathlib import Path
@@ -103,7 +104,7 @@ def every_input(core: FmuCore, compensator: Compensator, sign: int) -> InputChec
 
 def named(check: Check, prefix: str) -> Check:
     """Return a check with the version of FMI before its name."""
-    return Check(id=check.id, name=prefix + check.name, holds=check.holds, text=check.text)
+    return replace(check, name=prefix + check.name)
 
 
 def _tried(name: str, inputs: InputCheck) -> TriedInputs:

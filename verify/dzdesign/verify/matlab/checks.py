@@ -1,6 +1,7 @@
 """Checks of a folder for MATLAB: the function's text, every input of it in Octave, and of the C beside it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from dzdesign.core.artefact_files import read_bytes, sha256_of
@@ -107,7 +108,7 @@ def judged_in_octave(octave: str, name: str, text: bytes, asked: AskedCodes) -> 
 
 def _named(check: Check, prefix: str) -> Check:
     """Return a check with the file that it is of before its name."""
-    return Check(id=check.id, name=prefix + check.name, holds=check.holds, text=check.text)
+    return replace(check, name=prefix + check.name)
 
 
 def _tried(name: str, inputs: InputCheck) -> TriedInputs:

@@ -106,14 +106,14 @@ def _status(
         late.set()
         process.kill()
 
-    timer = Timer(timeout_s, end_late)  # a wait with a time limit would look every 50 ms
-    timer.start()
-    try:
-        with ended_with_this_process(process.pid):
+    with ended_with_this_process(process.pid):
+        timer = Timer(timeout_s, end_late)  # a wait with a time limit would look every 50 ms
+        timer.start()
+        try:
             status = process.wait()
-    finally:
-        timer.cancel()
-        end_program(process)
+        finally:
+            timer.cancel()
+            end_program(process)
     if late.is_set():
         raise RequirementError(f"{what} did not end within {timeout_s:g} s")
     return status
