@@ -350,7 +350,8 @@ def test_what_was_not_tried_is_said(copied):
 
     def with_plant(evidence):
         evidence["closed_loop"].update(plant={**asdict(Plant()), "K_a": 1.0}, plant_sha256="5" * 64, dynamics=None)
-        evidence["checks"].append({"id": "machine-code", "name": "machine code of the AVR", "holds": True, "text": ""})
+        of_avr = {"id": "machine-code", "name": "machine code of AVR", "holds": True, "text": "", "not_required": []}
+        evidence["checks"].append(of_avr)
         removed = "the drive follows its model"
         evidence["checks"] = [one for one in evidence["checks"] if one["name"] != removed]
         evidence["holds"] = False  # for that one

@@ -113,7 +113,7 @@ class TestThreeTests:
 
     def test_a_curvature_that_the_tests_gave_is_not_called_tested(self):
         curve = identify(ramps(lambda dp: 5.6 - 0.06 * dp, (1.0, 3.0, 5.0)), replace(QUIET, curve="smooth"))
-        assert "do not prove it" in curve.positive.curve.premise_in_words(AS_COMPUTED)
+        assert "not proved by them" in curve.positive.curve.premise_in_words(AS_COMPUTED)
 
     def test_its_second_difference_counts_whatever_its_sign(self):
         dp = np.array([1.0, 3.0, 5.0])
