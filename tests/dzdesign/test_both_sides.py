@@ -35,7 +35,7 @@ def designed(valve, **texts):
 
 
 def test_a_verdict_says_what_it_does_not_cover(valve):
-    both = {"command_signal": "-10..10 V x 0.15 + 1.5 V"}
+    both = {"command_signal": "-10..10 V x 0.12 + 1.5 V"}
     assert not_covered(designed(valve)) == (ONE_SIDE,)
     assert not_covered(designed(valve, **both)) == ()
     silent = replace(valve, sides={name: replace(side, recorded_drop=None) for name, side in valve.sides.items()})
@@ -88,8 +88,8 @@ def test_identify_says_the_direction_and_what_to_type_next(tmp_path, monkeypatch
     drop = "pB_MPa - pA_MPa (recorded below zero)" if signed else "pA_MPa - pB_MPa"
     assert f"pressure drop at negative commands: {drop}\n" in out
     (command,) = [line.strip() for line in out.splitlines() if line.startswith("  dzdesign design")]
-    assert command == 'dzdesign design valve.json --command-signal "-10..10 V x 0.15 + 1.5 V"'
-    assert main(["design", "valve.json", "--command-signal", "-10..10 V x 0.15 + 1.5 V"]) == 0
+    assert command == 'dzdesign design valve.json --command-signal "-10..10 V x 0.12 + 1.5 V"'
+    assert main(["design", "valve.json", "--command-signal", "-10..10 V x 0.12 + 1.5 V"]) == 0
     way = "B minus A" if signed else "A minus B"
     assert f"negative commands: the pressure drop is {way}, as recorded" in " ".join(capsys.readouterr().out.split())
     assert main(["init", "*.csv"]) == 0
@@ -97,6 +97,12 @@ def test_identify_says_the_direction_and_what_to_type_next(tmp_path, monkeypatch
     assert '\n# command-signal = "-10..10 V' in options and '\nnegative-dp = "recorded"\n' in options
     # As written, it is no contradiction to a command of one sign.
     assert main(["design", "valve.json", "--config", "dzdesign.toml"]) == 0
+    # Nor to the design that it was made for: one file is for all commands.
+    assert main(["codegen", "compensator.json", "--config", "dzdesign.toml", "--target", "host"]) == 0
+    capsys.readouterr()
+    with_swapped = ["codegen", "compensator.json", "--config", "dzdesign.toml", "--negative-dp", "swapped"]
+    assert main([*with_swapped, "--target", "host"]) == 2
+    assert "--negative-dp is 'swapped', but 'compensator.json' was designed with 'recorded'" in capsys.readouterr().err
 
 
 def test_what_nobody_asked_for_is_not_called_unchecked():

@@ -608,8 +608,8 @@ def test_an_assumed_repeatability_stands_beside_the_certificate(html, tmp_path):
     page = report_of_folder(tmp_path).html
     heads = [text[: text.index('<section id="data">')] for text in (page, html)]
     certificate, of_repeats = (head[head.index("Certificate") :] for head in heads)
-    assert "repeats to 25 mV" in certificate and "(no-repeats)" in certificate
-    assert "no-repeats" not in of_repeats
+    assert "repeats to 25 mV" in certificate and "(assumed-scatter)" in certificate
+    assert "assumed-scatter" not in of_repeats
     assert "from ramp to ramp: standard deviation 25.0 mV (assumed" in page
     assert "degrees of freedom), included in the bounds" in html
 

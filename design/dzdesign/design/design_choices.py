@@ -58,7 +58,7 @@ class DesignChoices(MachineChoices, CurrentChoices):
     close above its opening threshold. broken-sensor: a failure of a pressure signal raises the offset undetected."""
     command_signal: Annotated[Text, Option("S", CONNECTIONS, example="0..10 V x 0.3")] = None
     """Signal of the command at the converter: range, shunt, attenuator, offset and represented command (default: 0 to
-    10 V over the converter's whole range). Examples with both signs are "-10..10 V x 0.15 + 1.5 V" and "4..20 mA on 150
+    10 V over the converter's whole range). Examples with both signs are "-10..10 V x 0.12 + 1.5 V" and "4..20 mA on 150
     ohm = -10..10 V"."""
     polarity: Annotated[Text, Option("P", CONNECTIONS, "normal", choices=POLARITIES)] = None
     """Polarity of the command. normal: more signal is more command. inverted: more signal is less command."""

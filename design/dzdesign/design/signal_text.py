@@ -14,7 +14,7 @@ BELOW_LIVE_ZERO = Fraction(9, 10)
 ABOVE_SPAN = Fraction(21, 20)
 #: Largest current of a sound 4 to 20 mA, A, which a shunt leaves room for; shunts come in steps of this, ohm.
 LARGEST_A, SHUNT_STEP_OHM = Fraction(21, 1000), 10
-EXAMPLE = "'0..10 V x 0.3', '-10..10 V x 0.15 + 1.5 V' or '4..20 mA on 150 ohm = 25 MPa'"
+EXAMPLE = "'0..10 V x 0.3', '-10..10 V x 0.12 + 1.5 V' or '4..20 mA on 150 ohm = 25 MPa'"
 COMMAND_EXAMPLE = "'4..20 mA on 150 ohm = -10..10 V'"
 
 

@@ -47,6 +47,8 @@ def parse(argv: list[str]) -> Invocation:
         key = argument.name
         if argument.option.by_entry and (key in given or key in values):
             given[key] = merged_entries(argument.flag, values.get(key), given.get(key, []))
+        elif key == "columns" and key in given and key in values:
+            given[key] = merged_columns(options_file, values[key], given[key])
         elif key in from_file:
             value = values[key]
             given[key] = [value] if argument.is_repeatable and isinstance(value, str) else value
@@ -101,6 +103,20 @@ def _meant_values(path: str, declared: tuple[Argument, ...]) -> dict[str, Value]
 def _is_meant(value: Value, argument: Argument) -> bool:
     """Tell whether a value of the file is for this command: `dp` is a list for simulate, a table for identify."""
     return argument.is_table if isinstance(value, dict) else argument.is_repeatable or isinstance(value, str)
+
+
+def merged_columns(path: str, of_file: Value, given: str) -> dict[str, str]:
+    """Return the columns of the command line on top of those of the options file; pressures replace all pressures."""
+    from dzdesign.identify.reading.column_labels import PRESSURES, parse_columns
+
+    named = parse_columns(given)
+    try:
+        kept = parse_columns(of_file if isinstance(of_file, dict) else str(of_file))
+    except InputError as error:
+        raise InputError(f"'{path}': {error}") from error
+    if any(quantity in PRESSURES for quantity in named):
+        kept = {quantity: label for quantity, label in kept.items() if quantity not in PRESSURES}
+    return kept | named
 
 
 def merged_entries(flag: str, value: Value | None, entries: list[str]) -> dict[str, str]:

@@ -24,6 +24,6 @@ def run(arguments: Arguments, json: bool) -> int:
         plots = f", plots in {arguments.plots}" if arguments.plots else ""
         print(one_line(f"Written: {arguments.output}{plots}"))
         if len(valve.sides) == 2:
-            print("Next, for commands of both signs; state the signal at your converter:")
-            print(one_line(f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.15 + 1.5 V"'))
+            print("Next, for commands of both signs; state the signal at your converter (and --config, if you use it):")
+            print(one_line(f'  dzdesign design {arguments.output} --command-signal "-10..10 V x 0.12 + 1.5 V"'))
     return 0

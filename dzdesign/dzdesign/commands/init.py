@@ -13,6 +13,7 @@ from dzdesign.terminal.questions import may_ask
 
 Arguments = InitArguments
 EXAMPLES = ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml")
+NOT_LOOKED_AT = "Until that is settled, full command, sides and meter are not looked at; init with the option does so."
 #: Names of recordings that are repeated in the command to give next.
 MOST_NAMES = 3
 #: A name or a pattern in which no shell finds anything but a name or a pattern.
@@ -35,6 +36,8 @@ def run(arguments: Arguments, json: bool) -> int:
         return 1 if proposal.opens else 0
     for line in (*(() if asked else proposal.seen), *(f"open: {line}" for line in proposal.opens)):
         print(one_line(line))
+    if proposal.opens and proposal.u_seen_V is None:
+        print(NOT_LOOKED_AT)
     ramps = [os.fspath(path) for path in paths_of(arguments.ramps)]
     names = " ".join(map(_word, ramps)) if 0 < len(ramps) <= MOST_NAMES else "RAMP..."
     print(f"Written: {one_line(output)}" + ("; fill in what is open, then" if proposal.opens else "; read it, then"))

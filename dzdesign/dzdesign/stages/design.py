@@ -58,7 +58,7 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
         command = options.request.options["command_signal"] if options.request else ""
         raise InputError(
             f"{useless[0]} is for a command of both signs, but {command!r} has one; leave it out, or give "
-            "a --command-signal such as '-10..10 V x 0.15 + 1.5 V'"
+            "a --command-signal such as '-10..10 V x 0.12 + 1.5 V'"
         )
     return options
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.core.artefact_files import check_folder_may_be_written, parse_document, read_bytes
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import percent, quantity, whole_number
 from dzdesign.core.options import OUTPUTS, AnyPath, Option, Text, flag_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
@@ -181,11 +181,20 @@ def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensato
 
 
 def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> "Compensator":
-    """Return a compensator whose numbers follow from its valve and options; refuse other options for it."""
+    """Return a compensator whose numbers follow from its valve and options; refuse options that it was not given.
+
+    Its own may be given again, as by the options file of all commands.
+    """
     from dzdesign.design.redesign_check import prove_derived
 
-    for option in (flag_of(name) for name in DEFAULTS if getattr(choices, name) is not None):
-        raise InputError(f"{option} is an option of the design, and {source} is designed; use `dzdesign design`")
+    designed = compensator.options or {}
+    for name in DEFAULTS:
+        given = getattr(choices, name)
+        if given is not None and given != designed.get(name):
+            raise InputError(
+                f"{flag_of(name)} is {quoted(given)}, but {source} was designed with {quoted(designed.get(name, ''))}; "
+                "leave the option out, or run `dzdesign design` again"
+            )
     try:
         prove_derived(compensator)
     except InputError as error:

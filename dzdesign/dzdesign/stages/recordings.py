@@ -134,7 +134,22 @@ def read_recordings(
         units = test.units if declared is None else {**test.units, **unit_of_pressure(declared[0])}
         tests.append(replace(test, source=name, units=units))
     _refuse_unnamed(tests, dp)
+    if dp is None and len(tests) > 1:
+        for path, test in zip(paths, tests, strict=True):
+            if test.dp is None and (why := _unclear_pressures(path, chosen, skipped)):
+                raise InputError(f"'{test.source}' has no column of dP: {why}")
     return tests
+
+
+def _unclear_pressures(path: Path, chosen: Mapping[str, str], skip_rows: int | None) -> str:
+    """Return which columns may make the drop that a recording lacks, with what to declare; nothing if none may."""
+    from dzdesign.identify.reading.proposed_columns import propose_columns
+
+    look = propose_columns(path, chosen, skip_rows, time_is_declared=True)
+    if look.unclear.get("dP") or "dP" not in look.proposed:
+        return look.unclear.get("dP", "")
+    label = look.proposed["dP"].label
+    return f"'{label}' is the only column in a unit of pressure; if it is the drop, give --columns \"dP={label}\""
 
 
 def _with_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None, rate: float | None) -> str:

@@ -120,7 +120,8 @@ def _each_side(
 ) -> tuple[dict[str, SideIdentification], list[Warning_]]:
     """Identify each side that was recorded; warnings and a refusal are in the units of the recordings."""
     sides: dict[str, SideIdentification] = {}
-    warnings: list[Warning_] = []
+    refused: list[Warning_] = []
+    warnings: dict[str, list[Warning_]] = {}
     for name, sign in SIDES.items():
         of_side, by_hand = tests_of_side(tests, sign, options.u_max), readings_of_side(low_flow, sign)
         if not of_side:
@@ -140,9 +141,22 @@ def _each_side(
             reason = in_units(error, in_side) + cause
             if not sides:
                 raise InputError(reason) from error
-            warnings.append(warn("side-refused", side=name, reason=reason).in_units(in_side))
+            refused.append(warn("side-refused", side=name, reason=reason).in_units(in_side))
             continue
-        prefix = f"{name} side: " if len(sides) > 1 else ""
         found = [item for item in sides[name].warnings if not mixed or item.code not in EXPLAINED_BY_MIXED_PRESSURES]
-        warnings += [item.of_side(prefix).in_units(in_side) for item in (*pressures, *dropped, *clipped, *found)]
-    return sides, warnings
+        warnings[name] = [item.in_units(in_side) for item in (*pressures, *dropped, *clipped, *found)]
+    return sides, refused + _by_side(warnings)
+
+
+def _by_side(warnings: Mapping[str, list[Warning_]]) -> list[Warning_]:
+    """Return the warnings of all sides; of two sides each says which it is about, and what both give stands once."""
+    if len(warnings) == 1:
+        return list(*warnings.values())
+    said: dict[Warning_, set[str]] = {}
+    for name, of_side in warnings.items():
+        for warning in of_side:
+            said.setdefault(warning, set()).add(name)
+    return [
+        replace(warning, text=f"{f'{name} side' if not others else 'both sides'}: {warning.text}")
+        for warning, (name, *others) in said.items()
+    ]

@@ -239,7 +239,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
 
 
 def _premise(compensator: Compensator) -> str:
-    """Return what is assumed of the valve's repeatability, where no repeated ramps show it; the warning's own code."""
+    """Return what is assumed of the repeatability, where too few repeated ramps show it; the warning's own code."""
     sides = [compensator.valve.sides[name] for name in laws_of(compensator)]
     assumed = [side.certificate.repeatability for side in sides]
     largest = max((1e3 * each.sd_V for each in assumed if each.origin == "assumed"), default=None)
@@ -248,7 +248,7 @@ def _premise(compensator: Compensator) -> str:
     shown = compensator.valve.recorded_units.text(largest, ".3g mV")
     return (
         f". It holds only if the valve repeats to {shown} (standard deviation from ramp to ramp), which is "
-        "assumed: no repeated ramps show it (no-repeats)"
+        "assumed: too few repeated ramps show it (assumed-scatter)"
     )
 
 

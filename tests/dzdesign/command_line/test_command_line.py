@@ -348,6 +348,22 @@ def test_a_near_miss_is_named(line, hint, ramp_file, tmp_path, monkeypatch, caps
     assert sorted(path.name for path in tmp_path.iterdir()) == ["firmware", "ramp.csv", "ramps"]
 
 
+def test_columns_of_the_command_line_stand_on_top_of_those_of_the_file(tmp_path):
+    file = tmp_path / "dz.toml"
+    file.write_text('[columns]\ntime = "Zeit"\nu = "AO0:V"\npA = "p1:bar"\npB = "p2:bar"\n')
+
+    def merged(text):
+        return parse(["identify", "a.csv", "--config", str(file), "--columns", text]).arguments.columns
+
+    ports = {"pA": "p1:bar", "pB": "p2:bar"}
+    assert merged("Q=flow:L/min") == {"time": "Zeit", "u": "AO0:V", **ports, "Q": "flow:L/min"}
+    assert merged("u=AO1:V") == {"time": "Zeit", "u": "AO1:V", **ports}
+    assert merged("dP=p3:bar") == {"time": "Zeit", "u": "AO0:V", "dP": "p3:bar"}  # not beside two ports
+    file.write_text('[columns]\nspeed = "x"\n')
+    with pytest.raises(InputError, match=r"dz\.toml': --columns names 'speed'"):
+        merged("u=AO1:V")
+
+
 @pytest.mark.parametrize(
     ("unit", "quantity", "meant"),
     [("megapascl", "pressure", "megapascal"), ("L/mim", "flow", "L/min"), ("litre/minutte", "flow", "litre/minute"),

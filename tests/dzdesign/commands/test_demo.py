@@ -34,7 +34,7 @@ def test_demo_leaves_every_artefact_with_its_origin(demo):
     evidence = json.loads((demo / "evidence" / "verification.json").read_text())
     assert valve["schema"] == "dzdesign.valve/1" and len(valve["made_from"]) == 18
     # The example shows how to record: nothing is left open that a bench can do about.
-    assert not {warning["code"] for warning in valve["warnings"]} & {"no-repeats", "few-repeats", "order", "drift"}
+    assert not {warning["code"] for warning in valve["warnings"]} & {"assumed-scatter", "few-repeats", "order", "drift"}
     assert compensator["made_from"][0]["source"] == "valve.json"
     assert evidence["holds"] is True
     (again,) = [check for check in evidence["checks"] if check["id"] == RAMPS.id]

@@ -259,6 +259,35 @@ def test_a_pressure_whose_label_says_which_is_open_without_a_unit(here, capsys, 
     assert "at 1 MPa" in capsys.readouterr().out
 
 
+def test_of_two_pressures_the_file_has_the_lines_and_identify_says_what_to_declare(here, capsys):
+    for pressure in (1.0, 4.0):
+        time, u, dp, q = columns_of(pressure, rate_Hz=10)
+        labels = "Zeit [s],u_V,Druck 1 [bar],Druck 2 [bar],Q_Lmin"
+        write(f"r{pressure:g}.csv", labels, time, u, 10 * dp + 5, 0 * dp + 5, q)
+    assert main(["init", "r*.csv"]) == 1
+    said, text = capsys.readouterr().out, Path("dzdesign.toml").read_text()
+    assert '# pA = "Druck 1 [bar]"\n# pB = "Druck 2 [bar]"\n' in text
+    assert "Until that is settled, full command" in said
+    declared = "pA=Druck 1 [bar], pB=Druck 2 [bar]"
+    assert main(["identify", "r*.csv", "--config", "dzdesign.toml"]) == 2
+    assert f'--columns "{declared}"' in capsys.readouterr().err
+    # On top of the columns in the file, which has that of the time.
+    assert 'time = "Zeit [s]"' in text
+    assert main(["identify", "r*.csv", "--config", "dzdesign.toml", "--columns", declared]) == 0
+    Path("dzdesign.toml").write_text(text.replace("# pA", "pA").replace("# pB", "pB"))
+    assert main(["identify", "r*.csv", "--config", "dzdesign.toml"]) == 0
+
+
+def test_one_column_in_a_unit_of_pressure_is_named_where_recordings_have_no_drop(here, capsys):
+    for pressure in (1.0, 4.0):
+        time, u, dp, q = columns_of(pressure, rate_Hz=10)
+        write(f"r{pressure:g}.csv", "t_s,u_V,Druck [bar],Q_Lmin", time, u, 10 * dp, q)
+    assert main(["identify", "r*.csv"]) == 2
+    said = capsys.readouterr().err
+    assert "'r1.csv' has no column of dP" in said and '--columns "dP=Druck [bar]"' in said
+    assert main(["identify", "r*.csv", "--columns", "dP=Druck [bar]"]) == 0
+
+
 def test_a_pressure_from_a_name_is_said_and_units_as_people_write_them(here, capsys):
     time, u, _, q = columns_of(4.0)
     write("ramp_4MPa.csv", "t_s,u_V,Q_Lmin", time, u, q)

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.identify.valve.left_out import LeftOut
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.identify.valve.left_out import LeftOut, left_out_in_words
 from dzdesign.identify.valve.model import lag_in_words
 from dzdesign.report.sections.valve import valve_sections
 from dzdesign.terminal.tables import print_valve, short_source
@@ -47,6 +48,17 @@ def test_page_and_report_have_it(example_valve, capsys):
     assert "±" in words or "longer" in words
     assert words in capsys.readouterr().out
     assert any(words in str(line) for line in valve_sections(example_valve, None)["data"].lines)
+
+
+def test_many_parts_of_one_reason_share_a_line_of_the_log():
+    part = LeftOut(recording="a.csv", from_s=0.0, to_s=0.1, reason="pressure", dp_MPa=(0.0, 0.2))
+    single = replace(part, recording="b.csv", reason="partial", dp_MPa=None)
+    parts = [replace(part, from_s=float(second), to_s=second + 0.1) for second in range(200)]
+    assert list(left_out_in_words([*parts, single], AS_COMPUTED)) == [
+        "'a.csv', 200 parts of 0.0 to 199.1 s left out: the pressure drop is not the ramp's (0 to 0.2 MPa)",
+        "'b.csv', 0.0 to 0.1 s left out: the command stays below half of its largest",
+    ]
+    assert len(list(left_out_in_words(parts[:3], AS_COMPUTED))) == 3
 
 
 def test_what_was_left_out_is_a_line_for_each_reason(example_valve, capsys):

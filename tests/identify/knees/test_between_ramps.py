@@ -88,7 +88,7 @@ class TestScatter:
         assert low < degrees * (repeatability.sd_V / 0.02) ** 2 < high
         # At 99 % for four tests at once the next one lies 3 standard deviations and more under the mean.
         assert (bounds(taken.tests) < [closes_at(dp) - 3 * 0.02 for dp in PRESSURES]).all()
-        assert not codes(taken.tests) & {"no-repeats", "few-repeats", "order", "repeatability"}
+        assert not codes(taken.tests) & {"assumed-scatter", "few-repeats", "order", "repeatability"}
 
     def test_the_knee_is_that_of_all_ramps_however_they_scatter(self):
         taken = series(shuffled(2), scatter=0.05, seed=2)
@@ -155,7 +155,7 @@ class TestWithoutRepeats:
         assumed, declared = found(tests), found(tests, repeatability=1e-3)
         assert (assumed.origin, assumed.sd_V, assumed.degrees_of_freedom) == ("assumed", 0.025, None)
         assert (declared.origin, declared.sd_V) == ("declared", pytest.approx(0.01))
-        assert "no-repeats" in codes(tests) and "no-repeats" not in codes(tests, repeatability=1e-3)
+        assert "assumed-scatter" in codes(tests) and "assumed-scatter" not in codes(tests, repeatability=1e-3)
         assert (bounds(tests) < bounds(tests, repeatability=1e-3)).all()
         assert (bounds(tests, repeatability=1e-3) < bounds(tests, repeatability=0.0) - 0.02).all()
 
@@ -163,9 +163,19 @@ class TestWithoutRepeats:
         """One difference may be small by chance, so a small one raises no bound; a large one can't be by chance."""
         near, other = series((0, 0), dated=False).tests
         far = replace(other, u=other.u + 0.15)
-        assert found([near, other]).origin == "assumed" and "no-repeats" in codes([near, other])
+        assert found([near, other]).origin == "assumed" and "assumed-scatter" in codes([near, other])
         assert found([near, far]).sd_V == pytest.approx(0.15 / math.sqrt(2), rel=0.05)
-        assert "few-repeats" in codes([near, far]) and "no-repeats" not in codes([near, far])
+        assert "few-repeats" in codes([near, far]) and "assumed-scatter" not in codes([near, far])
+
+    def test_the_drift_takes_a_difference_and_that_is_said(self, wording):
+        """Two pressure drops, two ramps each: enough without the order, too few with it."""
+        twice = {"pressures": (1.0, 5.0), "scatter": 1e-3}
+        assert found(series((0, 1, 1, 0), dated=False, **twice).tests).origin == "repeats"
+        tests = series((0, 1, 1, 0), **twice).tests
+        assert found(tests).origin == "assumed" and found(tests).drift_V is not None
+        warnings = identify(tests, IdentifyOptions(**EXACT_LAG)).warnings
+        (said,) = [each.text for each in warnings if each.code == "assumed-scatter"]
+        wording("between ramps: the drift takes a difference", said)
 
     def test_a_ramp_unlike_its_repeat_is_named_where_no_bound_follows(self, wording):
         *tests, last = series((0, 1, 2, 3, 0), dated=False).tests

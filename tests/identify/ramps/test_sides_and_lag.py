@@ -84,6 +84,16 @@ class TestSides:
         assert both.sides["negative"].reference.u_min_V == pytest.approx(both.positive.reference.u_min_V, abs=1e-6)
         assert both.sides["negative"].curve.u_min0_V == pytest.approx(both.positive.curve.u_min0_V, abs=1e-6)
 
+    def test_what_both_sides_give_is_warned_about_once_and_else_the_side_is_named(self):
+        tests = [synthetic_ramp(1.0, Truth(knee_rising=5.4)), synthetic_ramp(2.0, Truth(knee_rising=5.3))]
+        mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in tests]
+        one = {warning.text for warning in identify(tests).warnings}
+        two = identify([*mirrored, *tests]).warnings
+        both = [each.text for each in two if each.code != "two-sides" and not each.source]
+        assert both and {text.removeprefix("both sides: ") for text in both} <= one
+        unlike = [each.text for each in identify([*tests, mirrored[0]]).warnings if each.code != "two-sides"]
+        assert {text.partition(" side")[0] for text in unlike} == {"both", "positive", "negative"}
+
     def test_a_side_without_data_is_said_to_be_missing(self, valve, wording):
         assert valve.untested_sides == ()
         test = synthetic_ramp(1.0, Truth())

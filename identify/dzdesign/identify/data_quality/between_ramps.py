@@ -22,7 +22,10 @@ def about_ramps(
     count = len(tests)
     sd_mV, degrees = 1e3 * found.sd_V, found.degrees_of_freedom
     if found.origin == "assumed":
-        yield warn("no-repeats", percent=100 * ASSUMED_REPEATABILITY, sd_mV=sd_mV)
+        repeats = sum(len(test.ramps) for test in tests) - count
+        drift = " once the drift has taken one" if found.drift_V is not None else ""
+        said = {"percent": 100 * ASSUMED_REPEATABILITY, "sd_mV": sd_mV, "drift": drift}
+        yield warn("assumed-scatter", None, "few-repeats" if repeats else "no-repeats", **said)
     elif degrees is not None and options.repeatability is not None:
         percent = 100 * found.sd_V / options.u_max
         yield warn("repeatability", sd_mV=sd_mV, percent=percent, declared=100 * options.repeatability)

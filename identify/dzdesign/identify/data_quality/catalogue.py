@@ -1,7 +1,7 @@
 """The catalogue of warnings, `warnings.toml`: what is printed of each code, what it means and what to do about it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Literal, Protocol, TypeVar
@@ -46,10 +46,6 @@ class Finding:
     code: str
     text: Worded
     source: str | None
-
-    def of_side(self, prefix: str) -> "Finding":
-        """Return it with a word on which side it is about."""
-        return replace(self, text=worded("{prefix}{text}", prefix=prefix, text=self.text))
 
     def in_units(self, units: RecordedUnits) -> Warning_:
         """Return the warning as valve.json holds it."""

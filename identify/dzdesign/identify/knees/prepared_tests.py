@@ -33,6 +33,7 @@ from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.series_order import with_clock_of_series
 from dzdesign.identify.reading.units_of_columns import shown_units
+from dzdesign.identify.valve.left_out import left_out_in_words
 
 logger = logging.getLogger(__name__)
 
@@ -56,8 +57,9 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     lag = find_lag(ramps, options)
     pooled = pool_ramps(ramps if lag.origin != "identified" else split_recordings(tests, options, lag.seconds))
     pooled = _in_order_of_pressure(pooled)
-    for left_out in dict.fromkeys(part for item in pooled for part in item.left_out):
-        logger.info("%s", left_out.in_words(shown_units(tests, options)))
+    left_out = dict.fromkeys(part for item in pooled for part in item.left_out)
+    for line in left_out_in_words(left_out, shown_units(tests, options)):
+        logger.info("%s", line)
     _refuse_what_shows_no_dead_zone(pooled, options)
     floor = options.meter_floor if options.meter_floor is not None else found_floor(pooled, options)
     described = _described(pooled, floor, lag, options)

@@ -58,7 +58,7 @@ class Repeatability:
         how = {
             "repeats": f"from repeated ramps, {self.degrees_of_freedom or 0:.0f} degrees of freedom",
             "declared": "declared",
-            "assumed": "assumed, for want of repeats",
+            "assumed": "assumed, too few repeated ramps",
         }
         drift = (
             f"drift from the first ramp to the last: {units.number(1e3 * self.drift_V, '+.1f mV')} ± "
