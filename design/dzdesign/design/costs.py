@@ -177,7 +177,8 @@ def _cost_of_zero_band(compensator: Compensator) -> list[str]:
     return [
         f"commands up to {compensator.zero_band_codes} codes ({compensator.zero_band_codes / span:.2%}) count as zero "
         f"({declared}). A rising command leaves this band only above {leave} codes ({leave / span:.2%}). At "
-        f"{end} codes ({end / span:.2%}) the transition ends, on the law's line above the bench's opening threshold"
+        f"{end} codes ({end / span:.2%}) the transition ends: there the output reaches the law's line, above the "
+        "recorded opening threshold"
     ]
 
 

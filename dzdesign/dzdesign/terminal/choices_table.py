@@ -15,8 +15,8 @@ DITHER = (
     "with it, and use identify --dithered and design --dither."
 )
 HEADING = (
-    "Remaining dead zone and hysteresis in % of full command, dead zones of the worst test (to the knee, also between "
-    "the tests), hysteresis as mean over all tests and as largest"
+    "Remaining dead zone and hysteresis in % of full command. Dead zone: largest at the tests, and to the knee also "
+    "between them. Hysteresis: mean and largest over the tests"
 )
 #: Of the inverse play where it is recommended: the table is of the recorded sweeps.
 PLAY = (

@@ -215,7 +215,7 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
-    what = "largest opening dead zone at the tests, without a transition, for each premise of --curve"
+    what = "largest opening dead zone that compensation without a transition leaves at the tests, by premise (--curve)"
     return (f"{what}: {', '.join(words)}. A transition (see design) reduces it",)
 
 

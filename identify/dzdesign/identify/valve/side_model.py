@@ -289,7 +289,7 @@ class SideModel:
             by_hand, meter = units.text(unseen, ".3g L/min"), units.text(level, ".2f L/min")
             return f"flow below {by_hand} (the low-flow readings; the meter shows it from {meter} on) counts as no flow"
         flow = units.text(level, ".2f L/min")
-        by = "the largest of meter floor, noise of averages and 0.5 % of the largest flow"
+        by = "the largest of meter floor, noise of averaged readings and 0.5 % of the largest flow"
         return f"flow below {flow} counts as no flow ({by})"
 
     @property

@@ -35,6 +35,8 @@ TRIED = {
 SAME_THRESHOLD = 0.03
 #: Share of a test's largest flow by which a stand-in's mean flow in a bin of command may differ from the recorded one.
 SAME_FLOW = 0.03
+#: Runs of a scenario pass the same flow within this share of it: the scenario itself sets their pressure drop.
+ALIKE = 1e-3
 
 
 def loop_checks(
@@ -230,8 +232,8 @@ def shut_after_scenarios(
     if _all_shut(required):
         text += f"{units.text(0.0, '.4g L/min')} in each"
     else:
-        text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}; in the runs for "
-        text += f"{_at(worst, units)})"
+        text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}"
+        text += f"{_in_which_runs(worst, required, units)})"
     text += _allowed(worst, units)
     if not plant_given and not any(each.is_load_step for each in scenarios):
         text += "; load steps, and readings stuck during one, were not tried: they need ramps at two pressure drops, "
@@ -244,6 +246,14 @@ def shut_after_scenarios(
     )
 
 
+def _in_which_runs(worst: ScenarioResult, among: Sequence[ScenarioResult], units: RecordedUnits) -> str:
+    """Say at which pressure drop the worst run of a scenario was; nothing where all its runs pass the same flow."""
+    flows = [each.q_zero_L_min for each in among if each.name == worst.name]
+    if len(flows) > 1 and max(flows) - min(flows) <= ALIKE * max(flows):
+        return ""
+    return f"; in the runs for {_at(worst, units)}"
+
+
 def _not_required(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> tuple[str, ...]:
     """Say what passes at zero command after scenarios in which no flow is not required: a sentence for each reason."""
     found = []
@@ -251,8 +261,8 @@ def _not_required(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> 
         others = [each for each in scenarios if each.not_required == reason]
         most, count = max(others, key=_zero_flow), len({each.name for each in others})
         text = f"{TRIED.get(reason, reason)}: {count} scenario{'' if count == 1 else 's'}, "
-        text += f"{_flow(most, most.q_zero_L_min, units)} at zero command (worst: {most.name}; in "
-        text += f"the runs for {_at(most, units)})"
+        text += f"{_flow(most, most.q_zero_L_min, units)} at zero command (worst: {most.name}"
+        text += f"{_in_which_runs(most, others, units)})"
         if reason == NO_CORE_CAN_KNOW and any(each.name.startswith(OPEN_CIRCUITS) for each in others):
             text += "; signals with a live zero and headroom above the span would reveal the failed sensor"
         found.append(text)
