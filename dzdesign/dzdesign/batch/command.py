@@ -28,7 +28,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, 
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in
 from dzdesign.core.input_files import read_recording
-from dzdesign.core.options import arguments_of, read_options
+from dzdesign.core.options import arguments_of, paths_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.design.firmware_manifest import form_named
 from dzdesign.report.lot.budget import lot_budget
@@ -208,6 +208,8 @@ def _task(
 ) -> Task:
     """Read a valve's recordings; where they can't be read the task says why."""
     options = {**vars(args), **valve.overrides, "record": _record(valve, args)}
+    if options["order"] is not None:
+        options["order"] = [os.fspath(item) for item in paths_of(options["order"])]
     recordings, refused = [], ""
     try:
         recordings = [(path.name, read_recording(path, "ramp file")) for path in valve.recordings()]

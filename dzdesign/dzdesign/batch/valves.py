@@ -105,7 +105,11 @@ def _of_table(path: Path, options: Collection[str]) -> list[Valve]:
             "as CSV with commas (a ';' parts the patterns in the column files)"
         )
     labels = [label.strip() for label in rows[0]]  # an entry of the record keeps its own spelling
-    heading = [label if label.startswith(RECORD) else label.replace("-", "_") for label in labels]
+    named = {name.rstrip("_"): name for name in options}  # from is a word of Python, and from_ the argument
+    plain = [label.replace("-", "_") for label in labels]
+    heading = [
+        label if label.startswith(RECORD) else named.get(word, word) for label, word in zip(labels, plain, strict=True)
+    ]
     known = ("name", "files", *options)
     for label in heading:
         if label not in known and not label.startswith(RECORD):

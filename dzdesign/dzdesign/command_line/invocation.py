@@ -9,7 +9,7 @@ from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.options_file import Value, options_from_file
 from dzdesign.command_line.parser import arguments_of_command, build_parser, command_module, unknown_words
 from dzdesign.core.errors import InputError, nearest, quoted
-from dzdesign.core.options import Argument
+from dzdesign.core.options import Argument, flag_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ def parse(argv: list[str]) -> Invocation:
     if quiet and verbose:
         raise InputError("--quiet and --verbose contradict each other; give one of them")
     declared, options_file = arguments_of_command(name), given.pop("config", "")
-    values = _meant_values(options_file, declared) if options_file else {}
+    values = _meant_values(name, options_file, declared) if options_file else {}
     from_file = {key: value for key, value in values.items() if key not in given}
     for argument in declared:
         key = argument.name
@@ -91,12 +91,18 @@ def _command_in(argv: list[str]) -> str | None:
     return None
 
 
-def _meant_values(path: str, declared: tuple[Argument, ...]) -> dict[str, Value]:
+def _meant_values(command: str, path: str, declared: tuple[Argument, ...]) -> dict[str, Value]:
     """Return the options of a file that are for a command; the file may have those of every command."""
     every = [argument for name in COMMANDS for argument in arguments_of_command(name)]
     named = [argument for argument in every if not argument.is_positional and bool not in argument.kinds]
     values = options_from_file(path, named)
     own = {argument.name: argument for argument in declared if argument in named}
+    for name in getattr(command_module(command), "ONE_VALVE", ()):
+        if name in values:
+            raise InputError(
+                f"'{path}': {flag_of(name).removeprefix('--')} is of one valve, and {command} has no such option; "
+                "take it out, and identify that valve by itself"
+            )
     return {key: value for key, value in values.items() if key in own and _is_meant(value, own[key])}
 
 

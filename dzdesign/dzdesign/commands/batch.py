@@ -13,6 +13,8 @@ EXAMPLES = (
     'dzdesign batch lot -o calibrated --meter-lag "0.1 s" --calibration block',
     "dzdesign batch lot.csv -o calibrated --verify --dask tcp://10.0.0.5:8786",
 )
+#: Options of `identify` that a batch does not take: without them a valve would be another one.
+ONE_VALVE = ("low_flow",)
 
 
 def run(arguments: Arguments, json: bool) -> int:

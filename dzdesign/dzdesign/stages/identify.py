@@ -75,6 +75,15 @@ class IdentifyChoices(RampArguments):
     dithered: Annotated[Text, Option("D", RECORDINGS, example="150 Hz 1 %", read=read_dithered)] = None
     """Dither that the drive superimposed on the command of every recording. It is the frequency and peak of a square
     wave, such as "150 Hz 1 %" of full command, or "150 Hz 0.1 V". `design --dither` then requires the same."""
+    order: Annotated[Paths | None, Option("FILE", RECORDINGS)] = None
+    """Recordings in the order of the measurement, such as "p1.csv, p5.csv, p1_again.csv" (default: by date and time in
+    the recordings). The order separates a drift of the valve from the effect of the pressure drop. Repeatable; in the
+    options file also a list."""
+    from_: Annotated[Table, Option("T", RECORDINGS, example="12.3 s")] = None
+    """Start time on a recording's clock, such as "12.3 s"; earlier rows are left out. Dates count from the first row.
+    In the options file also a table [from] from file name or pattern to time."""
+    to: Annotated[Table, Option("T", RECORDINGS, example="62.1 s")] = None
+    """End time on a recording's clock; later rows are left out. In the options file also a table [to]."""
     record: Annotated[Mapping[str, object] | None, Option("ENTRY", RECORDINGS, by_entry=True)] = None
     """Entry of the test record, such as "serial = 4711". It is kept in valve.json and printed in the report, and
     nothing is computed from it. Repeatable; in the options file this is a table [record]."""
@@ -93,15 +102,6 @@ class IdentifyArguments(IdentifyChoices):
     low_flow: Annotated[Paths, Option("TABLE.csv", METER)] = ()
     """Table of flows below the meter's floor, measured by hand with a measuring glass or by a cylinder's drift. Columns
     are u_V, dP_MPa, Q [mL/min], Q_error [mL/min] and branch (opening or closing). Repeatable."""
-    order: Annotated[Paths | None, Option("FILE", RECORDINGS)] = None
-    """Recordings in the order of the measurement, such as "p1.csv, p5.csv, p1_again.csv" (default: by date and time in
-    the recordings). The order separates a drift of the valve from the effect of the pressure drop. Repeatable; in the
-    options file also a list."""
-    from_: Annotated[Table, Option("T", RECORDINGS, example="12.3 s")] = None
-    """Start time on a recording's clock, such as "12.3 s"; earlier rows are left out. Dates count from the first row.
-    In the options file also a table [from] from file name or pattern to time."""
-    to: Annotated[Table, Option("T", RECORDINGS, example="62.1 s")] = None
-    """End time on a recording's clock; later rows are left out. In the options file also a table [to]."""
     plots: Annotated[AnyPath | None, Option("DIR")] = None
     """Folder for plots in SVG and PNG. They show the flow at each pressure drop with knees, onsets and residuals, and
     thresholds, bounds and beta against dP."""

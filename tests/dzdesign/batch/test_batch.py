@@ -114,6 +114,24 @@ def test_a_valve_of_a_batch_has_the_bytes_of_the_commands(lot, made, tmp_path, m
     assert tree(Path("firmware")) == tree(made / "valves/V0001/firmware")
 
 
+def test_order_and_parts_in_the_options_file_count_for_every_valve(lot, tmp_path, monkeypatch, capsys):
+    """Seeded: a batch that leaves them out makes another valve.json, of which the order is not known."""
+    folder, _ = lot
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(folder / "V0001", "lot/V0001")
+    names = sorted(path.name for path in Path("lot/V0001").iterdir())
+    order = ", ".join(f'"{name}"' for name in (*names[1:], names[0]))
+    Path("dz.toml").write_text(f'order = [{order}]\nmeter-lag = "0.1 s"\nto = "1000 s"\n[from]\n"*.csv" = "0.05 s"\n')
+    assert main(["batch", "lot", "-o", "out", "--jobs", "1", "--target", "host", "--config", "dz.toml"]) == 0
+    assert main(["identify", "lot/V0001/*.csv", "--config", "dz.toml"]) == 0
+    assert Path("valve.json").read_bytes() == Path("out/valves/V0001/valve.json").read_bytes()
+    options = json.loads(Path("valve.json").read_text())["options"]
+    assert options["lists"]["order"] == [*names[1:], names[0]] and options["tables"]["from_"] == {"*.csv": "0.05 s"}
+    Path("dz.toml").write_text('low-flow = "glass.csv"\n')
+    assert main(["batch", "lot", "-o", "other", "--config", "dz.toml"]) == 2
+    assert "'dz.toml': low-flow is of one valve, and batch has no such option" in capsys.readouterr().err
+
+
 def test_the_report_of_one_valve_is_of_that_valve(made):
     """Its folder has a manifest, as firmware has; what lies beside it is of other valves, not what it was made from."""
     folder = made / "valves" / "V0003"
