@@ -51,8 +51,12 @@ def run(*words) -> tuple[int, str]:
 
 
 def numbers_as_computed(text):
-    """Return numbers in V, MPa or L/min in lines that are about the recordings."""
+    """Return numbers in V, MPa or L/min in lines that are about the recordings.
+
+    The controller's own command is in V: `--command-signal` declares it, and the bench's signal says nothing of it.
+    """
     plain = re.sub(r"'[^']*'|\"[^\"]*\"|\([^()]*\.\.[^()]*\)", "", text)
+    plain = re.sub(r"ADC code \d+ is zero, \d+ is 10 V|% of command, [\d.]+ V|\| (0|10) V(?= \||, 100)", "", plain)
     return [found[0] for found in COMPUTED.finditer(plain)]
 
 
@@ -269,6 +273,12 @@ def test_a_side_whose_reading_falls_counts_outwards(tmp_path):
     assert float(row[-7]) == pytest.approx(12 - 0.8 * 3.26, abs=0.02)
     table = valve_sections(valve, None)["thresholds"].tables[1]
     assert float(table.rows[0][1].text) == pytest.approx(12 - 0.8 * 3.26, abs=0.02)
+    signal, made = ["--command-signal", "-10..10 V x 0.12 + 1.5 V"], tmp_path / "compensator.json"
+    text = run("design", tmp_path / "valve.json", *signal, "-o", made)[1]
+    # The bench's 4..20 mA are not what the controller reads.
+    assert "ADC code 2048 is zero, 3686 is 10 V, 409 is -10 V" in text
+    assert run("codegen", made, "--target", "f28335", "-o", tmp_path / "firmware")[0] == 0
+    assert "command u_i, -10 V to +10 V" in (tmp_path / "firmware/f28335/README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -132,8 +132,8 @@ def wiring_of(compensator: Compensator, converter: Converter) -> Wiring:
 
 def _commands(compensator: Compensator, converter: Converter) -> dict[Fraction, CommandPoint]:
     """Return the commands to try, by their share of full command, from the lowest."""
-    signs, command, units = compensator.signals.signs, compensator.signals.command, compensator.valve.recorded_units
-    sided = len(signs) == 2 and units.command.at_zero == 0
+    signs, command = compensator.signals.signs, compensator.signals.command
+    units, sided = compensator.valve.recorded_units.of_controller, len(signs) == 2
     points = {}
     for share in sorted({Fraction(0), *(sign * share for sign in signs for share in TRIED)}):
         sign = -1 if share < 0 else 1

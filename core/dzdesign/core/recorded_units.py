@@ -142,6 +142,14 @@ class RecordedUnits:
         return replace(self, command=replace(command, factor=-command.factor))
 
     @property
+    def of_controller(self) -> "RecordedUnits":
+        """Units in which the controller's own command is shown: V, or per cent where the recordings are.
+
+        What the bench put out, such as 4..20 mA, is not the signal that --command-signal declares at the converter.
+        """
+        return self if self.command.unit == "%" else replace(self, command=CommandUnit())
+
+    @property
     def falling(self) -> bool:
         """Whether the reading of the command falls where the valve opens."""
         return self.command.factor < 0

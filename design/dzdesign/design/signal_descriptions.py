@@ -7,8 +7,8 @@ from dzdesign.design.signals import PressureSignal, Signals
 
 def signals_in_words(compensator: Compensator) -> list[str]:
     """Return one line for the command, one for each sensor, and what the sensors are in the recordings."""
-    signals, u_max_V, units = compensator.signals, float(compensator.u_max_V), compensator.valve.recorded_units
-    command = signals.command
+    signals, u_max_V = compensator.signals, float(compensator.u_max_V)
+    units, command = compensator.valve.recorded_units.of_controller, signals.command
     text = f"command: ADC code {command.zero_code} is zero, {command.full_code} is {units.text(u_max_V, 'g V')}"
     if command.negative_full_code is not None:
         text += f", {command.negative_full_code} is {units.text(-u_max_V, 'g V')}"

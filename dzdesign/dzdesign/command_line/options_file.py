@@ -36,6 +36,8 @@ def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Valu
         if argument_name in options:
             raise InputError(f"'{path}': option '{key}' is given twice, with - and with _; keep one")
         free = any(argument.option.by_entry for argument in known[name])  # text for people: dates may stand there
+        if free and isinstance(value, dict):
+            _refuse_options_in(path, key, value, known)
         if not (free and value == {}):
             options[argument_name] = _texts(path, key, value, known[name], free)
     return options
@@ -62,6 +64,19 @@ def _without_tables(
             if inner.replace("-", "_") in known and table_of(inner) != key:
                 raise InputError(f"'{path}': option '{inner}' does not belong in [{key}]; move it above all tables")
             yield inner, text
+
+
+def _refuse_options_in(path: str, table: str, entries: Mapping[str, object], known: Mapping[str, object]) -> None:
+    """Refuse an option that was added at the end of the file, below a table of any names: TOML gives it to the table.
+
+    A word that people use too, such as order or target, may be an entry.
+    """
+    for name in entries:
+        if ("-" in name or "_" in name) and name.replace("-", "_") in known:
+            raise InputError(
+                f"'{path}': option '{name}' stands in the table [{table}], which goes on to the next table or the end "
+                "of the file; move it above all tables"
+            )
 
 
 def _key(name: str) -> str:

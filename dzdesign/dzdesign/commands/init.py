@@ -13,7 +13,10 @@ from dzdesign.terminal.questions import may_ask
 
 Arguments = InitArguments
 EXAMPLES = ("dzdesign init ramps/*.csv", "dzdesign init ramps/*.tdms -o bench2.toml")
-NOT_LOOKED_AT = "Until that is settled, full command, sides and meter are not looked at; init with the option does so."
+NOT_LOOKED_AT = (
+    "Until that is settled, full command, sides and meter are not looked at. Init with that option and another -o "
+    "does so."
+)
 #: Names of recordings that are repeated in the command to give next.
 MOST_NAMES = 3
 #: A name or a pattern in which no shell finds anything but a name or a pattern.

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shlex
 import shutil
 import tomllib
@@ -286,6 +287,19 @@ def test_one_column_in_a_unit_of_pressure_is_named_where_recordings_have_no_drop
     said = capsys.readouterr().err
     assert "'r1.csv' has no column of dP" in said and '--columns "dP=Druck [bar]"' in said
     assert main(["identify", "r*.csv", "--columns", "dP=Druck [bar]"]) == 0
+
+
+def test_every_commented_line_of_an_option_may_be_uncommented(here):
+    """Seeded: a remark behind a value, which TOML does not read."""
+    time, u, dp, q = columns_of(1.0)
+    write("ramp.csv", "t_s,u_V,dP_MPa,Q_Lmin", time, u, dp, q)
+    assert main(["-q", "init", "ramp.csv"]) == 0
+    text = Path("dzdesign.toml").read_text("utf-8")
+    lines = [line.removeprefix("# ") for line in text.splitlines() if re.match(r"(# )?(\[|[a-z0-9-]+ = )", line)]
+    unread = [line for line in lines if line.endswith("(in V; understood by its label)")]
+    options = tomllib.loads("\n".join(line for line in lines if " (in " not in line))
+    assert {"pressure-span", "order", "meter-lag", "machine", "record"} <= set(options) and len(unread) <= 1
+    assert "amplifier" in options["machine"]
 
 
 def test_a_pressure_from_a_name_is_said_and_units_as_people_write_them(here, capsys):

@@ -11,7 +11,7 @@ def share_of_command(compensator: Compensator, codes: int, sign: int = 1) -> str
 
 def in_unit(compensator: Compensator, share: float) -> str:
     """Return a share of full command or drive in the unit that a person sees, behind a comma; nothing in percent."""
-    units = compensator.valve.recorded_units
+    units = compensator.valve.recorded_units.of_controller
     if units.command.unit == "%":
         return ""
     return f", {units.text(share * float(compensator.u_max_V), '.4g dV')}"

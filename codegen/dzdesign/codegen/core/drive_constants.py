@@ -29,7 +29,7 @@ STATUS_BITS = {
 def interface_constants(compensator: Compensator) -> list[Define]:
     """Return the ends of inputs and output."""
     signals, limit = compensator.signals, compensator.drive_functions.compare_limit
-    units, u_max_V = compensator.valve.recorded_units, float(compensator.u_max_V)
+    units, u_max_V = compensator.valve.recorded_units.of_controller, float(compensator.u_max_V)
     share = limit / signals.compare_max
     return [
         Define(symbol="DZ_COMPARE_MAX", value=signals.compare_max, equation="Eq. (32), PWM compare value of u_max",
@@ -62,7 +62,7 @@ def drive_interface_constants(compensator: Compensator) -> list[Define]:
                  data=("signals.tick_Hz", "signals.sample_Hz"), generator=HERE),
         Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=signals.command.zero_code,
                  equation="Eq. (29), code of zero command",
-                 engineering=compensator.valve.recorded_units.text(0.0, "g V"),
+                 engineering=compensator.valve.recorded_units.of_controller.text(0.0, "g V"),
                  rounding="the converter's code, rounded down",
                  data=("signals.command.zero_code",), generator=SIGNALS),
         *drive_status_constants(),
@@ -87,7 +87,7 @@ def drive_constants(compensator: Compensator) -> list[Define]:
     found.append(
         Define(symbol="COMMAND_ZERO", value=compensator.signals.command.zero_code, literal="int32",
                  equation="Eq. (29), code of zero command",
-                 engineering=compensator.valve.recorded_units.text(0.0, "g V"),
+                 engineering=compensator.valve.recorded_units.of_controller.text(0.0, "g V"),
                  rounding="the converter's code, rounded down", data=("signals.command.zero_code",),
                  generator=SIGNALS)
     )  # fmt: skip
@@ -159,7 +159,7 @@ def _leave_zero(compensator: Compensator) -> Define:
 def _play(compensator: Compensator) -> list[Define]:
     signals, functions = compensator.signals, compensator.drive_functions
     codes, band, u_max_V = functions.play_codes, compensator.transition_codes, float(compensator.u_max_V)
-    units = compensator.valve.recorded_units
+    units = compensator.valve.recorded_units.of_controller
     found = [
         Define(symbol="TRANSITION_CODES", value=band, literal="int32",
                equation="codes of command behind the zero band over which the play comes in, the law's transition",
@@ -199,7 +199,8 @@ def _play(compensator: Compensator) -> list[Define]:
 
 def play_tables(compensator: Compensator) -> list[Table]:
     """Return the play's width over the command, a table for each sign; none without a play."""
-    functions, signals, units = compensator.drive_functions, compensator.signals, compensator.valve.recorded_units
+    functions, signals = compensator.drive_functions, compensator.signals
+    units = compensator.valve.recorded_units.of_controller
     if not functions.has_play:
         return []
     found = []

@@ -144,7 +144,7 @@ def _law_words(compensator: Compensator) -> Values:
     chosen = law(compensator.law)
     return {
         "signals": compensator.signals,
-        "u_max": compensator.valve.recorded_units.text(float(compensator.u_max_V), "g V"),
+        "u_max": compensator.valve.recorded_units.of_controller.text(float(compensator.u_max_V), "g V"),
         "bipolar": compensator.negative is not None,
         "law_text": str(chosen.output).replace("**", "^"),
         "law_equation": equation_of(chosen),

@@ -34,7 +34,7 @@ class SignalConstants:
         signals, command = c.signals, c.signals.command
         span, direction = command.span(self.sign), command.direction(self.sign)
         full_key = "full_code" if self.sign > 0 else "negative_full_code"
-        u_max_V, units = float(c.u_max_V) * self.sign, c.valve.recorded_units
+        u_max_V, units = float(c.u_max_V) * self.sign, c.valve.recorded_units.of_controller
 
         def reading(code: int) -> str:
             return units.text(direction * (code - command.zero_code) / span * u_max_V + 0.0, ".4g V")
