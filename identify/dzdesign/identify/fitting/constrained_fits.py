@@ -104,8 +104,10 @@ def fit_knees(
 
 
 def _log(name: str, outcome: Mapping[str, Any]) -> None:
-    status, seconds = outcome["return_status"], outcome.get("t_wall_total", 0.0)
-    logger.debug("%s: %s after %d iterations, %.3f s", name, status, outcome.get("iter_count", 0), seconds)
+    count, status = outcome.get("iter_count", -1), outcome["return_status"]
+    status = status if isinstance(status, str) else f"solver's status {status}"
+    steps = f" after {count} iterations" if count >= 0 else ""  # of an active-set method -1
+    logger.debug("%s: %s%s, %.3f s", name, status, steps, outcome.get("t_wall_total", 0.0))
 
 
 def hessian_of_cost(solver: "ca.Function", at: np.ndarray, known: np.ndarray) -> np.ndarray:
