@@ -36,7 +36,7 @@ def options_from_file(path: str, declared: Iterable[Argument]) -> dict[str, Valu
         if argument_name in options:
             raise InputError(f"'{path}': option '{key}' is given twice, with - and with _; keep one")
         free = any(argument.option.by_entry for argument in known[name])  # text for people: dates may stand there
-        if free and isinstance(value, dict):
+        if isinstance(value, dict):
             _refuse_options_in(path, key, value, known)
         if not (free and value == {}):
             options[argument_name] = _texts(path, key, value, known[name], free)

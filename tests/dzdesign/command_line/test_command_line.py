@@ -353,6 +353,9 @@ def test_an_option_that_was_added_below_the_record_is_refused_and_an_entry_of_pe
     file.write_text('[record]\nserial = "4711"\norder = "PO 12"\npressure-span = "250 bar"\n')
     with pytest.raises(InputError, match=r"option 'pressure-span' stands in the table \[record\].*above all tables"):
         parse(["identify", "a.csv", "--config", str(file)])
+    file.write_text('[dp]\n"a.csv" = "1 MPa"\nmeter_lag = "0.1 s"\n')  # no name of a recording
+    with pytest.raises(InputError, match=r"option 'meter_lag' stands in the table \[dp\]"):
+        parse(["identify", "a.csv", "--config", str(file)])
     file.write_text('pressure-span = "250 bar"\n[record]\nserial = "4711"\norder = "PO 12"\n')
     assert parse(["identify", "a.csv", "--config", str(file)]).arguments.record == {"serial": "4711", "order": "PO 12"}
     assert parse(["design", "valve.json", "--config", str(file)]).arguments.pressure_span == "250 bar"
