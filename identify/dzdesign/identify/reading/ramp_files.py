@@ -19,7 +19,7 @@ from dzdesign.core.input_files import check_address_space
 from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary.array_table import read_binary_table
 from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
-from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, seconds_of_day_times
+from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
 from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
 from dzdesign.identify.reading.missing_values import describe_placeholders, without_placeholders
@@ -168,9 +168,10 @@ def _read_recording(
     table.load([column.label for column in found.values()])
     data, placeholders = {}, {}
     is_clock = sample_rate is None and table.is_clock(found["time"].label)
+    stamp = table.started(found["time"].label) if sample_rate is None and not is_clock else None
     for quantity, column in found.items():
         if quantity == "time" and is_clock:
-            data[quantity] = seconds_of_day_times(table, column.label)
+            data[quantity], stamp = read_times_of_day(table, column.label)
             continue
         numbers, placeholders[column.label] = without_placeholders(
             table.numbers(column.label), rises=quantity == "time"
@@ -196,7 +197,7 @@ def _read_recording(
         simulated=_is_marked(table.comments),
         may_count_ms=sample_rate is None and not is_clock and may_count_ms(rows[0], longest_step=np.inf),
         no_values=describe_placeholders(placeholders),
-        stamp=table.started(found["time"].label) if sample_rate is None else None,
+        stamp=stamp,
         dp_from=edge.columns(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
         units=units_of_columns(table.path, found, u_max),
