@@ -70,13 +70,17 @@ def test_whatever_their_labels(proposed, read, labels, found):
 
 
 def test_a_label_of_the_file_goes_before_a_pair(read):
-    clock = stamps("%H:%M:%S,", START)
-    date, other = ["22.11.2026"] * TIME.size, ["23.11.2026"] * TIME.size
-    content = text("Datum;Uhrzeit;Datum + Uhrzeit;" + LABELS[14:], *rows(date, other, clock, U, DP, Q))
-    test = read(content)
-    assert test.stamp is None  # the label is that of a time of day, and two columns hold dates
-    with pytest.raises(InputError, match=r"has no column 'Uhrzeit [+] Datum', which --columns names for time"):
-        read(content, {"time": "Uhrzeit + Datum"})
+    clock, other = stamps("%H:%M:%S,", START), stamps("%H:%M:%S,", START.replace(hour=7))
+    content = text(
+        "Datum;Uhrzeit;Datum + Uhrzeit;" + LABELS[14:], *rows(["22.11.2026"] * TIME.size, other, clock, U, DP, Q)
+    )
+    assert read(content).stamp == start_of("2026-11-22 03:04:05.123")
+    assert read(content, {"time": "Uhrzeit"}).stamp is None
+
+
+def test_a_pair_is_one_of_dates_and_one_of_times_of_day(read):
+    with pytest.raises(InputError, match=r"has no column 'Uhrzeit [+] u \[V\]', which --columns names for time"):
+        read(two_columns(), {"time": "Uhrzeit + u [V]"})
 
 
 def test_of_two_columns_of_dates_none_is_taken_but_the_declared_one(proposed, read):

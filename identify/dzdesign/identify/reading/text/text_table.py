@@ -129,7 +129,8 @@ class TextTable(Table):
 
         columns = self._read({each: pl.String for each in self.labels}, FEW_ROWS)
         dates = [each for each in self.labels if each and is_date(_first_filled(_cells(columns[each])))]
-        return f"{dates[0]}{AND}{label}" if len(dates) == 1 else label
+        both = f"{dates[0]}{AND}{label}" if len(dates) == 1 else label
+        return label if both in self.labels else both
 
     def pair(self, text: str) -> tuple[str, str] | None:
         """Return the labels of dates and of times of day, in this order, that a text names in either.
