@@ -31,7 +31,9 @@ def _about_one(test: RampTest) -> Iterator[Finding]:
         )
         yield warn("side-refused", test.source, side=test.side_without_dp, reason=reason)
     if test.no_values:
-        yield warn("missing-samples", test.source, numbers=test.no_values)
+        yield warn("missing-samples", test.source, "number", numbers=test.no_values)
+    if test.failed_signals:
+        yield warn("missing-samples", test.source, "signal", signals=test.failed_signals)
     if test.cut:
         yield warn("cut-ramp", test.source, ramps="; ".join(test.cut))
     if test.undeclared_dither:

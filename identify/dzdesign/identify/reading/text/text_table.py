@@ -26,6 +26,8 @@ from dzdesign.identify.reading.time_stamps import (
 if TYPE_CHECKING:
     import polars as pl
 
+#: A cell of nothing but dashes, as loggers write for no value.
+NO_VALUE = r"^[-\u2013\u2014]+$"
 #: A cell with a date.
 DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
 #: A cell whose column most likely holds nothing but numbers.
@@ -216,8 +218,8 @@ class TextTable(Table):
 
 
 def _cells(texts: "pl.Series") -> "pl.Series":
-    """Return cells without blanks and quotes around them."""
-    return texts.str.strip_chars(' \t"')
+    """Return cells without blanks and quotes around them, and without dashes that stand for no value."""
+    return texts.str.strip_chars(' \t"').str.replace(NO_VALUE, "")
 
 
 def _first_filled(texts: "pl.Series") -> str:
