@@ -181,3 +181,43 @@ class TestPressureOnItsWay:
         one = synthetic_ramp(1.0, Truth(), falling=False)
         with pytest.raises(InputError, match="record every pressure drop up and down"):
             identify([one, synthetic_ramp(4.0, Truth(slope=8.0))])
+
+
+class TestPumpOffAtTheStart:
+    """A long rest without pressure before the ramp: signs are judged where oil flows."""
+
+    @staticmethod
+    def recorded(sign_of_dp=1, sign_of_q=1, rest=-1.0):
+        """Return a ramp behind 20 s of rest, at a pressure drop that scatters about `rest`, in kPa."""
+        test = synthetic_ramp(1.0, Truth())
+        step = float(np.median(np.diff(test.time)))
+        count = round(20 / step)
+        noise = np.random.default_rng(3).normal(size=(2, count))
+        return dataclasses.replace(
+            test,
+            time=np.concatenate([test.time[0] - step * np.arange(count, 0, -1), test.time]),
+            u=np.concatenate([np.zeros(count), test.u]),
+            q=np.concatenate([0.01 * L_MIN * noise[0], sign_of_q * test.q]),
+            dp=np.concatenate([1e3 * (rest + noise[1]), sign_of_dp * test.dp]),
+        )
+
+    def test_the_ramp_itself_is_fine(self):
+        assert identify([self.recorded()]).positive.tests[0].dp_MPa == pytest.approx(1.0, abs=0.01)
+
+    @pytest.mark.parametrize("rest", [-1.0, 0.0, 3.0])
+    def test_a_flow_of_the_wrong_sign_is_no_pressure_of_the_wrong_sign(self, rest):
+        with pytest.raises(InputError, match=r"the flow falls with the command.*reverse the sign of Q"):
+            identify([self.recorded(sign_of_q=-1, rest=rest)])
+
+    @pytest.mark.parametrize("rest", [-1.0, 0.0, 3.0])
+    def test_swapped_pressures_are_refused_with_their_value(self, rest):
+        with pytest.raises(
+            InputError, match=r"the pressure drop is -(1\.0|0\.9)\d+ MPa, expected a positive one; swap"
+        ):
+            identify([self.recorded(sign_of_dp=-1, rest=rest)])
+
+    def test_a_pump_that_never_ran_is_refused_as_before(self):
+        test = self.recorded()
+        dp = np.concatenate([test.dp[:100], np.full(test.dp.size - 100, -1e3)])
+        with pytest.raises(InputError, match=r"the pressure drop is -0\.001 MPa, expected a positive one"):
+            identify([dataclasses.replace(test, dp=dp, q=0.01 * test.q)])

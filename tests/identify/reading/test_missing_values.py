@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.missing_values import PLACEHOLDERS, describe_placeholders, without_placeholders
+from dzdesign.identify.reading.missing_values import PLACEHOLDERS, describe_missing, without_placeholders
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.dzdesign.command_line.test_bad_input import csv, ramp
 from tests.support.repeatable_valves import identify
@@ -63,18 +63,87 @@ def test_a_column_of_nothing_else_leaves_no_row_and_says_why(tmp_path, wording):
 def test_a_measurement_stays_one(numbers):
     left, found = without_placeholders(np.array(numbers), rises=False)
     np.testing.assert_array_equal(left, numbers)
-    assert describe_placeholders({"x": found}) == ""
+    assert describe_missing({"x": found}) == ""
 
 
 @pytest.mark.parametrize("number", PLACEHOLDERS)
 def test_every_one_is_found_among_small_numbers(number):
     left, found = without_placeholders(np.array([1.0, number, 2.0]), rises=False)
     assert np.isnan(left).tolist() == [False, True, False]
-    assert describe_placeholders({"x": found}) == f"{number:g} in 1 row of 'x'"
+    assert describe_missing({"x": found}) == f"{number:g} in 1 row of 'x'"
     assert np.isnan(without_placeholders(np.array([1.0, number, 2.0]), rises=True)[0]).any() == (number < 0)
 
 
 def test_two_kinds_in_one_column():
     left, found = without_placeholders(np.array([1.0, -999, 9999, -9999, 2.0, -9999]), rises=False)
     assert np.isnan(left).tolist() == [False, True, True, True, False, True]
-    assert describe_placeholders({"x": found}) == "-9999 in 2 rows of 'x', -999 in 1 row of 'x', 9999 in 1 row of 'x'"
+    assert describe_missing({"x": found}) == "-9999 in 2 rows of 'x', -999 in 1 row of 'x', 9999 in 1 row of 'x'"
+
+
+#: A column of a ramp test as the current of a transmitter: its place, label, range, and current from its SI-like unit.
+SIGNALS = {
+    "u": (1, "u (mA)", "4..20 mA = 0..10 V", lambda u: 4 + 1.6 * u),
+    "both signs": (1, "u (mA)", "4..20 mA = -10..10 V", lambda u: 12 + 0.8 * u),
+    "dP": (2, "dP (mA)", "4..20 mA = 0..25 MPa", lambda dp: 4 + 0.64 * dp),
+    "Q": (3, "Q (A)", "0.004..0.020 A = 0..50 L/min", lambda q: 0.004 + 0.00032 * q),
+    "shunt": (1, "u [V]", "4..20 mA on 150 ohm = 0..10 V", lambda u: 0.6 + 0.24 * u),
+    "backwards": (1, "u (mA)", "20..4 mA = 0..10 V", lambda u: 20 - 1.6 * u),
+}
+
+
+def transmitted(folder: Path, which: str, share: float | None):
+    """Return the recording of `SIGNALS` in which some rows have that share of a signal of 4 mA, and their label."""
+    column, label, meaning, current = SIGNALS[which]
+    rows, labels = ramp(), list(COLUMNS)
+    rows[:, column], labels[column] = current(rows[:, column]), label
+    live_zero = current(0) if which not in ("both signs", "backwards") else 4
+    if share is not None:
+        rows[LOST, column] = share * live_zero
+    lines = [",".join(f"{value:.6f}" for value in row) for row in rows]
+    (folder / "ramp.csv").write_text("\n".join([",".join(labels), *lines]))
+    quantity = which if which in ("dP", "Q") else "u"
+    return read_ramp_file(folder / "ramp.csv", columns={quantity: f"{label}:{meaning}"}), label
+
+
+@pytest.mark.parametrize(
+    ("share", "words"), [(0.0, "below 3.6 mA"), (0.89, "below 3.6 mA"), (5.3, "above 21 mA"), (0.91, ""), (5.2, "")]
+)
+@pytest.mark.parametrize("which", SIGNALS)
+def test_a_failed_transmitter_gives_no_sample(tmp_path, which, share, words):
+    whole, _ = transmitted(tmp_path, which, None)
+    assert not whole.failed_signals and whole.time.size == len(ramp())
+    test, label = transmitted(tmp_path, which, share)
+    assert test.failed_signals == (f"a current {words} in 10 rows of '{label}'" if words else "")
+    assert test.time.size == whole.time.size - (10 if words else 0)
+    assert (bool(words) or which in ("dP", "Q")) is bool(np.all(np.isin(test.u, whole.u)))
+    if words and which == "u":
+        (warning,) = (each for each in identify([test]).warnings if each.code == "missing-samples")
+        assert test.failed_signals in warning.text
+
+
+@pytest.mark.parametrize("meaning", ["0..20 mA = 0..10 V", "4..20 V = 0..10 V"])
+def test_a_signal_without_a_live_zero_may_be_zero(tmp_path, meaning):
+    (tmp_path / "ramp.csv").write_text(csv(ramp(), "time_s,u,dP_MPa,Q_Lmin"))
+    test = read_ramp_file(tmp_path / "ramp.csv", columns={"u": f"u:{meaning}"})
+    assert test.time.size == len(ramp()) and not test.failed_signals
+
+
+@pytest.mark.parametrize("dashes", ["-", "--", "---", "\u2013", "\u2014", "-----"])
+@pytest.mark.parametrize("label", COLUMNS)
+def test_dashes_are_a_blank_cell(tmp_path, label, dashes):
+    lines = csv(ramp()).splitlines()
+    for row in range(LOST.start, LOST.stop):
+        cells = lines[1 + row].split(",")
+        cells[COLUMNS[label]] = dashes
+        lines[1 + row] = ",".join(cells)
+    (tmp_path / "ramp.csv").write_text("\n".join(lines), encoding="utf-8")
+    test = read_ramp_file(tmp_path / "ramp.csv")
+    np.testing.assert_array_equal(test.time, np.delete(ramp()[:, 0], LOST).round(4))
+
+
+@pytest.mark.parametrize("cell", ["-x", "- -1", "--5"])
+def test_a_dash_before_something_is_no_blank_cell(tmp_path, cell):
+    content = csv(ramp()).replace("\n10.", f"\n{cell}.", 1)
+    (tmp_path / "ramp.csv").write_text(content)
+    with pytest.raises(InputError, match="is not a number"):
+        read_ramp_file(tmp_path / "ramp.csv")

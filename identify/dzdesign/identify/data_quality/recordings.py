@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from dzdesign.identify.data_quality.catalogue import Finding, most_serious_first, warn
+from dzdesign.identify.data_quality.lost_rows import about_lost_rows
 from dzdesign.identify.data_quality.recording_order import about_order
 from dzdesign.identify.reading.clock import ASSUMED_MS
 from dzdesign.identify.reading.metering_edge import EDGES
@@ -16,7 +17,7 @@ NAMED_FILES = 3
 def about_recordings(tests: Sequence[RampTest]) -> tuple[Finding, ...]:
     """Return what is to be said of the recordings themselves, the most serious first."""
     of_each = (item for test in tests for item in _about_one(test))
-    return most_serious_first([*_about_simulation(tests), *about_order(tests), *of_each])
+    return most_serious_first([*_about_simulation(tests), *about_order(tests), *about_lost_rows(tests), *of_each])
 
 
 def _about_one(test: RampTest) -> Iterator[Finding]:
@@ -31,7 +32,9 @@ def _about_one(test: RampTest) -> Iterator[Finding]:
         )
         yield warn("side-refused", test.source, side=test.side_without_dp, reason=reason)
     if test.no_values:
-        yield warn("missing-samples", test.source, numbers=test.no_values)
+        yield warn("missing-samples", test.source, "number", numbers=test.no_values)
+    if test.failed_signals:
+        yield warn("missing-samples", test.source, "signal", signals=test.failed_signals)
     if test.cut:
         yield warn("cut-ramp", test.source, ramps="; ".join(test.cut))
     if test.undeclared_dither:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
-from dzdesign.identify.constants import FULL_SWEEP, L_MIN
+from dzdesign.identify.constants import FULL_SWEEP, L_MIN, SMALLEST_DP
 from dzdesign.identify.knees.between_ramps import BetweenRamps, compare_ramps, knees_of_ramps
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.characteristic import describe_branches
@@ -29,7 +29,8 @@ from dzdesign.identify.knees.refusals import (
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import PooledTest, name_of_ramp, pool_ramps
-from dzdesign.identify.ramps.splitting import Ramp, nominal_dp, split_ramps
+from dzdesign.identify.ramps.splitting import Ramp, dp_under_flow, nominal_dp, split_ramps
+from dzdesign.identify.ramps.sweep_pressure import NO_PRESSURE
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.series_order import with_clock_of_series
 from dzdesign.identify.reading.units_of_columns import shown_units
@@ -106,11 +107,26 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
         if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in found):
             raise _no_ramp(test)
         for ramp in found:
+            _refuse_what_has_no_pressure(ramp, options.u_max)
             refuse_a_wrong_pressure(name_of_ramp(ramp), ramp.dp, ramp.test.dp_sign)
         for item in pool_ramps(found) if top >= FULL_SWEEP * max(tops) else ():  # a fragment may well see no flow
             refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
         ramps += found
     return ramps
+
+
+def _refuse_what_has_no_pressure(ramp: Ramp, u_max: float) -> None:
+    """Refuse a ramp without a pressure drop at rest by what it shows where oil flows: the pump may have come up late.
+
+    Of a ramp whose flow has the wrong sign the rest before that can't be told from the ramp.
+    """
+    under_flow = dp_under_flow(ramp.test)
+    if ramp.dp is None or under_flow is None:
+        return
+    if under_flow >= 0 and ramp.dp >= max(SMALLEST_DP, NO_PRESSURE * under_flow):
+        return
+    refuse_a_wrong_pressure(name_of_ramp(ramp), under_flow, ramp.test.dp_sign)
+    refuse_a_shut_valve(ramp.test.source, ramp.branches, u_max)
 
 
 def _no_ramp(test: RampTest) -> InputError:

@@ -49,6 +49,8 @@ PRESSURE_STEP = 0.02
 STEP_SIGNIFICANCE = 5.0
 #: A ramp whose sweeps' pressure drops differ by more than this share was run at two.
 TWO_PRESSURES = 0.1
+#: Quantile of the flow from which it is largest.
+LARGEST_FLOWS = 0.9
 #: Fewest samples of a sweep that is a branch, and how many times faster than the slowest it may be.
 SWEEP_SAMPLES, FASTEST = 5, 20
 
@@ -232,6 +234,14 @@ def nominal_dp(test: RampTest) -> float | None:
         return None
     shut = test.dp[(test.u >= 0) & (test.u <= SHUT * max(test.u.max(), 0))]
     return median(shut if shut.size >= 5 else test.dp[test.q <= np.quantile(test.q, 0.1)])
+
+
+def dp_under_flow(test: RampTest) -> float | None:
+    """Return the pressure drop where the flow is largest, of whatever sign, Pa; None if it is unknown."""
+    if test.dp is None:
+        return None
+    size = np.abs(test.q)
+    return median(test.dp[size >= np.quantile(size, LARGEST_FLOWS)])
 
 
 def _branch(test: RampTest, u: np.ndarray, known: np.ndarray, rows: slice, direction: int) -> Branch:

@@ -1,11 +1,13 @@
 """The clock of a recording: numbers or stamps, never going back; and whether its unit is plain."""
 
+import logging
 import re
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.table import Table, clean_label
+from dzdesign.identify.reading.time_stamps import MIDNIGHT, Start
 
 #: No ramp takes longer than this, s: a clock of whole numbers by which one does counts milliseconds,
 LONGEST_RAMP = 3600.0
@@ -18,10 +20,25 @@ MILLISECONDS = re.compile(r"[\[(]?(?:ms|msec|millis|milli-?se[ck]\w{0,6})[\])]?"
 FRACTION = re.compile(r":\d\d:\d\d[.,:]\d")
 #: What is doubtful about a clock: its column has no unit and was taken as ms; or it states another, and is like ms.
 ASSUMED_MS, LIKE_MS = "taken as ms", "like ms"
+logger = logging.getLogger(__name__)
+
+
+def read_times_of_day(table: Table, label: str) -> tuple[np.ndarray, Start | None]:
+    """Return the seconds since the first row, of a column of dates or times of day, and when that was.
+
+    Of a pair of columns the dates are left out where they do not change with the day, as that of an export does not.
+    """
+    seconds, pair = seconds_of_day_times(table, label), table.pair(label)
+    if pair is None or not np.any(np.diff(seconds[np.isfinite(seconds)]) < -MIDNIGHT):
+        return seconds, table.started(label)
+    logger.info(
+        "'%s': '%s' goes over midnight and '%s' does not change there, so no date is known", table.path, *pair[::-1]
+    )
+    return seconds_of_day_times(table, pair[1]), None
 
 
 def seconds_of_day_times(table: Table, label: str) -> np.ndarray:
-    """Return the seconds since the first row, of a column of dates or times of day.
+    """Return the seconds since the first row, of a column of dates or times of day, or of a pair of them.
 
     Milliseconds that stand in a column of their own, as some loggers part them, are added.
 

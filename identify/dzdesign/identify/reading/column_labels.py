@@ -9,7 +9,7 @@ from math import isclose
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures, si_factor
 from dzdesign.identify.reading.metering_edge import PORTS, metering_edge, which_edge
-from dzdesign.identify.reading.table import Table, clean_label
+from dzdesign.identify.reading.table import AND, Table, clean_label
 
 #: Spelling in a header (lower case, letters only) -> quantity of a ramp test.
 COLUMN_NAMES = {
@@ -168,12 +168,14 @@ def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Colum
                 f"'{label}'; keep one, give the other another name, or choose by --columns"
             )
         _refuse_two_units(table, quantity, label, in_label)
-        columns[quantity] = Column(label=label, unit=unit)
+        columns[quantity] = Column(label=table.dated(label) if quantity == "time" else label, unit=unit)
     return columns
 
 
 def _chosen_column(table: Table, quantity: str, text: str) -> Column:
     """Return the column that was chosen: the whole text is its label, or else what stands before the last colon."""
+    if quantity == "time" and (pair := table.pair(text)):
+        return Column(label=AND.join(pair), unit="s")
     label, colon, unit = (text, "", "") if text in table.labels else text.rpartition(":")
     label, unit = (clean_label(label), unit.strip()) if colon else (text, "")
     if label not in table.labels:
@@ -194,7 +196,7 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
             f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
             + (f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else "")
         )
-    return Column(label=label, unit=unit, stated=stated)
+    return Column(label=table.dated(label) if quantity == "time" else label, unit=unit, stated=stated)
 
 
 def _refuse_two_units(table: Table, quantity: str, label: str, in_label: str) -> None:

@@ -141,7 +141,8 @@ def propose_columns(
                 unclear["dP"] = f"'{port}' is the pressure of one port; which column is that of the other, or the drop?"
             elif len(candidates) == 1 or (len(named) == 1 and quantity != "dP"):
                 label = candidates[0] if len(candidates) == 1 else named[0]
-                proposed[quantity] = Column(label=label, unit=_unit_of(table, label))
+                dated = table.dated(label) if quantity == "time" else label
+                proposed[quantity] = Column(label=dated, unit=_unit_of(table, label))
                 taken.add(label)
             elif why := _why_none(table, quantity, candidates):
                 unclear[quantity] = why

@@ -19,12 +19,12 @@ from dzdesign.core.input_files import check_address_space
 from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary.array_table import read_binary_table
 from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
-from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, seconds_of_day_times
+from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
 from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
-from dzdesign.identify.reading.missing_values import describe_placeholders, without_placeholders
+from dzdesign.identify.reading.missing_values import describe_missing, without_failed_signals, without_placeholders
 from dzdesign.identify.reading.ramp_test import RampTest
-from dzdesign.identify.reading.scaling import scaling_of
+from dzdesign.identify.reading.scaling import Scaling, scaling_of
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.reading.thinning import thin
@@ -99,6 +99,7 @@ def read_ramp_file(
         clock_doubt=doubt,
         simulated=recording.simulated,
         no_values=recording.no_values,
+        failed_signals=recording.failed_signals,
         stamp=recording.stamp,
         started=recording.stamp.seconds if recording.stamp else None,
         units=recording.units,
@@ -117,6 +118,7 @@ class _Recording:
     simulated: bool
     may_count_ms: bool
     no_values: str
+    failed_signals: str
     stamp: Start | None
     dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]
     side_without_dp: str
@@ -135,7 +137,8 @@ def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.n
 def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
     rows = recording.rows.shape[1]
     if rows < MIN_ROWS:
-        missing = f"; {recording.no_values} are missing samples" if recording.no_values else ""
+        found = ", ".join(filter(None, (recording.no_values, recording.failed_signals)))
+        missing = f"; {found} are missing samples" if found else ""
         raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{missing}")
 
 
@@ -166,18 +169,22 @@ def _read_recording(
     _refuse_two_pressures(table, found, dp)
     _refuse_unequal_lengths(table, found)
     table.load([column.label for column in found.values()])
-    data, placeholders = {}, {}
+    data, placeholders, failed = {}, {}, {}
     is_clock = sample_rate is None and table.is_clock(found["time"].label)
+    stamp = table.started(found["time"].label) if sample_rate is None and not is_clock else None
     for quantity, column in found.items():
         if quantity == "time" and is_clock:
-            data[quantity] = seconds_of_day_times(table, column.label)
+            data[quantity], stamp = read_times_of_day(table, column.label)
             continue
         numbers, placeholders[column.label] = without_placeholders(
             table.numbers(column.label), rises=quantity == "time"
         )
         unclear = quantity == "time" and not column.unit and may_count_ms(numbers)
-        # The whole recording tells later what they count.
-        data[quantity] = numbers if unclear else _in_SI(table, quantity, column, numbers, u_max)
+        if not unclear:  # else the whole recording tells later what they count
+            scaling = scaling_of(table.path, quantity, column, u_max)
+            numbers, failed[column.label] = without_failed_signals(numbers, scaling)
+            numbers = _in_SI(table, quantity, column, numbers, scaling)
+        data[quantity] = numbers
     if sample_rate is not None:
         data["time"] = np.arange(data["u"].size) / sample_rate
     edge, labels = metering_edge(found), {quantity: column.label for quantity, column in found.items()}
@@ -195,8 +202,9 @@ def _read_recording(
         clock=found.get("time", DECLARED_CLOCK),
         simulated=_is_marked(table.comments),
         may_count_ms=sample_rate is None and not is_clock and may_count_ms(rows[0], longest_step=np.inf),
-        no_values=describe_placeholders(placeholders),
-        stamp=table.started(found["time"].label) if sample_rate is None else None,
+        no_values=describe_missing(placeholders),
+        failed_signals=describe_missing(failed),
+        stamp=stamp,
         dp_from=edge.columns(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
         units=units_of_columns(table.path, found, u_max),
@@ -227,9 +235,8 @@ def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
             )
 
 
-def _in_SI(table: Table, quantity: str, column: Column, numbers: np.ndarray, u_max: float) -> np.ndarray:
+def _in_SI(table: Table, quantity: str, column: Column, numbers: np.ndarray, scaling: Scaling) -> np.ndarray:
     """Return one column in SI, NaN where a sample is missing; refuse what no valve gives."""
-    scaling = scaling_of(table.path, quantity, column, u_max)
     with np.errstate(over="ignore", invalid="ignore"):  # an infinity is refused below
         numbers = numbers * scaling.gain
         numbers += scaling.offset

@@ -38,7 +38,9 @@ class RampTest:
     simulated : bool
         True if a comment line above the labels begins with `SIMULATED_MARK`.
     no_values : str
-        Numbers that were taken for missing samples, as `describe_placeholders` gives them.
+        Numbers that were taken for missing samples, as `describe_missing` gives them.
+    failed_signals : str
+        Signals of failed transmitters that were, in the same words.
     """
 
     source: str
@@ -56,6 +58,7 @@ class RampTest:
     clock_doubt: str = ""
     simulated: bool = False
     no_values: str = ""
+    failed_signals: str = ""
     #: Samples over which the command was averaged, as its column shows the dither; 0: it does not.
     dither_averaged: int = 0
     #: Peak of a square wave about the command that was not declared, V; 0: none is seen.

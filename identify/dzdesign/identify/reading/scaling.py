@@ -1,5 +1,6 @@
 """From the numbers of a column to SI: by its unit, or by the range of a transmitter, ``4..20 mA = 0..50 L/min``."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,6 +22,8 @@ from dzdesign.identify.reading.column_labels import (
 #: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, percent or bare numbers.
 TRANSMITTED = ("current", "voltage")
 SIGNALS = (*TRANSMITTED, "frequency")
+#: Of a signal from the first on, one below the second or above the third says that it has failed (NAMUR NE 43), A.
+LIVE_ZERO, FAILED_BELOW, FAILED_ABOVE = 0.004, 0.0036, 0.021
 #: Full scale in the examples of messages.
 FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 
@@ -28,10 +31,15 @@ FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scaling:
-    """What turns a column's number into SI: ``gain * number + offset``."""
+    """What turns a column's number into SI: ``gain * number + offset``.
+
+    Numbers below `failed_below` or above `failed_above` are those of a transmitter that has failed.
+    """
 
     gain: float
     offset: float = 0.0
+    failed_below: float = -math.inf
+    failed_above: float = math.inf
 
 
 def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scaling:
@@ -67,7 +75,28 @@ def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
         raise InputError(f"the range '{text}' has no width, expected one such as '4..20 mA = 0..50 L/min'")
     gain = (meaning.top - meaning.bottom) / (high - low)
     factor = _factor(quantity, meaning.unit, u_max)
-    return Scaling(gain=float(gain) * factor, offset=float(meaning.bottom - gain * low) * factor)
+    below, above = _failed_signals(found, low, high)
+    return Scaling(
+        gain=float(gain) * factor,
+        offset=float(meaning.bottom - gain * low) * factor,
+        failed_below=below,
+        failed_above=above,
+    )
+
+
+def _failed_signals(found: SignalRange, low: Fraction, high: Fraction) -> tuple[float, float]:
+    """Return the numbers of a column beyond which a signal of 4 to 20 mA has failed; infinite for other signals.
+
+    `low` and `high` are what the column holds at the ends of the range.
+    """
+    if not measures(found.unit, "current"):
+        return -math.inf, math.inf
+    first, last = (float(end) * si_factor(found.unit, "current") for end in (found.low, found.high))
+    if not math.isclose(min(first, last), LIVE_ZERO):
+        return -math.inf, math.inf
+    per_ampere = float(high - low) / (last - first)
+    below, above = (float(low) + (current - first) * per_ampere for current in (FAILED_BELOW, FAILED_ABOVE))
+    return below, above if max(first, last) < FAILED_ABOVE else math.inf
 
 
 def _ends_in_the_file(quantity: str, column: Column, found: SignalRange) -> tuple[Fraction, Fraction]:

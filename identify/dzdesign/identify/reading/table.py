@@ -15,6 +15,8 @@ from dzdesign.identify.reading.time_stamps import Start
 
 #: Characters of a cell, and columns of a file, that a message quotes.
 QUOTED_CHARACTERS, QUOTED_COLUMNS = 40, 12
+#: Stands between the labels of two columns, one of dates and one of times of day, that are the time together.
+AND = " + "
 #: Characters of a library's own error that are quoted.
 LONGEST_REASON = 200
 
@@ -77,6 +79,17 @@ class Table(ABC):
     def seconds(self, label: str) -> np.ndarray:
         """Return a column of dates or times of day, as `is_clock` tells, as seconds since the first row of the file."""
         raise TypeError(f"column '{label}' holds numbers")
+
+    def dated(self, label: str) -> str:
+        """Return a column of times of day together with the only one of dates, ``Date + Time``; else the label itself.
+
+        `is_clock`, `seconds` and `started` take such a pair as they take a column.
+        """
+        return label
+
+    def pair(self, text: str) -> tuple[str, str] | None:
+        """Return the labels of the dates and of the times of day that a text such as ``Date + Time`` names."""
+        return None
 
     def started(self, label: str) -> Start | None:
         """Return the date and time at which a column of time counts zero; None if they are not known."""

@@ -24,6 +24,9 @@ STAMP = (
 )
 #: What looks like one and lacks seconds or the time: which of the two numbers are minutes can't be told.
 UNCLEAR = re.compile(r"\d{1,3}:[0-5]?\d(?:[.,]\d+)?|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ]\d{1,2}:\d\d)?")
+#: A date with its year first or last, and what begins as one.
+DATE = re.compile(r"'?(?:\d{4}[-./]\d{1,2}[-./]\d{1,2}|\d{1,2}[-./]\d{1,2}[-./](?:\d{4}|\d{2}))")
+START_OF_DATE = re.compile(r"'?\d{1,4}[-./]")
 LONGEST_STAMP = 48
 DAY = 86_400.0
 #: A time of day that goes back by more than this is one of the next day, s.
@@ -51,6 +54,28 @@ def is_stamp(cell: str) -> bool:
     (True, True, False, False)
     """
     return len(cell) <= LONGEST_STAMP and re.match(STAMP, cell) is not None
+
+
+def is_time_of_day(cell: str) -> bool:
+    """Tell whether a cell holds a time of day without a date.
+
+    Examples
+    --------
+    >>> is_time_of_day("03:04:05,123"), is_time_of_day("22.11.2026 03:04:05,123")
+    (True, False)
+    """
+    return is_stamp(cell) and START_OF_DATE.match(cell) is None
+
+
+def is_date(cell: str) -> bool:
+    """Tell whether a cell holds a date and nothing else.
+
+    Examples
+    --------
+    >>> is_date("22.11.2026"), is_date("2026/11/22"), is_date("22.11.2026 03:04"), is_date("31.31.2026")
+    (True, True, False, False)
+    """
+    return DATE.fullmatch(cell) is not None and bool(_days(cell.lstrip("'")))
 
 
 def is_unclear(cell: str) -> bool:

@@ -10,13 +10,24 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
+from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.decimal_marks import BETWEEN_THOUSANDS, FEW_ROWS, DecimalMarks
-from dzdesign.identify.reading.time_stamps import EXAMPLE, Start, is_stamp, is_unclear, seconds_of_stamps, start_of
+from dzdesign.identify.reading.time_stamps import (
+    EXAMPLE,
+    Start,
+    is_date,
+    is_stamp,
+    is_time_of_day,
+    is_unclear,
+    seconds_of_stamps,
+    start_of,
+)
 
 if TYPE_CHECKING:
     import polars as pl
 
+#: A cell of nothing but dashes, as loggers write for no value.
+NO_VALUE = r"^[-\u2013\u2014]+$"
 #: A cell with a date.
 DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
 #: A cell whose column most likely holds nothing but numbers.
@@ -71,7 +82,11 @@ class TextTable(Table):
         import polars as pl
 
         cells = self.rows[: max(self.rows.find(b"\n"), 0) or None].decode().split(self.separator)
-        likely = [label for label in labels if len(self.lines) and NUMBER.fullmatch(cells[self.labels.index(label)])]
+        likely = [
+            label
+            for label in labels
+            if len(self.lines) and label in self.labels and NUMBER.fullmatch(cells[self.labels.index(label)])
+        ]
         if likely:
             with suppress(pl.exceptions.PolarsError):  # a cell is not a number
                 self._loaded.update(self._read(dict.fromkeys(likely, pl.Float64)))
@@ -108,6 +123,34 @@ class TextTable(Table):
             )
         return is_stamp(cell)
 
+    def dated(self, label: str) -> str:
+        """Return a column of times of day together with the only one of dates; else the label itself."""
+        if label not in self.labels or not is_time_of_day(self._first(label)):
+            return label
+        import polars as pl
+
+        columns = self._read({each: pl.String for each in self.labels}, FEW_ROWS)
+        dates = [each for each in self.labels if each and is_date(_first_filled(_cells(columns[each])))]
+        both = f"{dates[0]}{AND}{label}" if len(dates) == 1 else label
+        return label if both in self.labels else both
+
+    def pair(self, text: str) -> tuple[str, str] | None:
+        """Return the labels of dates and of times of day, in this order, that a text names in either.
+
+        None where it names no such columns, or is a label itself.
+        """
+        if text in self.labels:
+            return None
+        parts = text.split(AND)
+        for at in range(1, len(parts)):
+            one, other = AND.join(parts[:at]), AND.join(parts[at:])
+            if one not in self.labels or other not in self.labels:
+                continue
+            for dates, times in ((one, other), (other, one)):
+                if is_date(self._first(dates)) and is_time_of_day(self._first(times)):
+                    return dates, times
+        return None
+
     def started(self, label: str) -> Start | None:
         """Return the date and time of the first row; None where the column has no dates."""
         return start_of(self._first(label)) if self.is_clock(label) else None
@@ -128,17 +171,21 @@ class TextTable(Table):
     def _first(self, label: str) -> str:
         """Return the first cell of a column that is not blank."""
         for rows in (FEW_ROWS, None):
-            texts = self._texts(label, rows)
-            filled = texts.filter(texts.is_not_null() & (texts != ""))
-            if len(filled):
-                return str(filled[0])
+            if first := _first_filled(self._texts(label, rows)):
+                return first
         return ""
 
     def _texts(self, label: str, rows: int | None = None) -> "pl.Series":
         """Return the first cells of a column as they stand in the file, or all of them."""
         import polars as pl
 
-        return self._read({label: pl.String}, rows)[label].str.strip_chars(' \t"')
+        pair = self.pair(label)
+        if pair is None:
+            return _cells(self._read({label: pl.String}, rows)[label])
+        dates, times = (self._texts(each, rows).str.replace("^'", "") for each in pair)
+        # A date that is written once holds for the rows below it.
+        dates = dates.set(dates == "", None).fill_null(strategy="forward").fill_null(strategy="backward")
+        return (dates + " " + times).zip_with((times != "").fill_null(False), times)
 
     def _read(self, types: "dict[str, type[pl.DataType]]", rows: int | None = None) -> "dict[str, pl.Series]":
         import polars as pl
@@ -168,6 +215,17 @@ class TextTable(Table):
             f"'{self.path}' {self.place(row)}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' is not a "
             f"number{date}; correct it, or leave the cell blank if the sample is missing"
         )
+
+
+def _cells(texts: "pl.Series") -> "pl.Series":
+    """Return cells without blanks and quotes around them, and without dashes that stand for no value."""
+    return texts.str.strip_chars(' \t"').str.replace(NO_VALUE, "")
+
+
+def _first_filled(texts: "pl.Series") -> str:
+    """Return the first text that is not blank."""
+    filled = texts.filter(texts.is_not_null() & (texts != ""))
+    return str(filled[0]) if len(filled) else ""
 
 
 def _plainly_written(numbers: "pl.Series") -> "pl.Series":

@@ -1,0 +1,145 @@
+"""Date and time of day in two columns: together they are the clock, or the time of day alone where they can't be."""
+
+import datetime
+import logging
+
+import numpy as np
+import pytest
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.proposed_columns import propose_columns
+from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.series_order import runs_back
+from dzdesign.identify.reading.time_stamps import start_of
+from tests.support.logger_files import DP, START, TIME, Q, U, rows, stamps, text
+
+LATE = START.replace(hour=23, minute=59, second=50)
+FIRST = start_of("2026-11-22 23:59:50.123")
+LABELS = "Datum;Uhrzeit;u [V];dP [MPa];Q [l/min]"
+DECLARED = {"time": "Datum + Uhrzeit"}
+
+
+def two_columns(form="%d.%m.%Y", *, start=LATE, dates=None, labels=LABELS, days=0):
+    """Return a recording, `days` the days by which the dates run ahead."""
+    dates = dates or [
+        (start + datetime.timedelta(days=days, seconds=0.04 * row)).strftime(form) for row in range(TIME.size)
+    ]
+    return text(labels, *rows(dates, stamps("%H:%M:%S,", start), U, DP, Q))
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read_(content, columns=DECLARED, name="ramp.csv"):
+        (tmp_path / name).write_bytes(content)
+        return read_ramp_file(tmp_path / name, columns=columns)
+
+    return read_
+
+
+@pytest.fixture
+def proposed(tmp_path):
+    def proposed_(content):
+        (tmp_path / "ramp.csv").write_bytes(content)
+        look = propose_columns(tmp_path / "ramp.csv", {})
+        return (look.known | look.proposed)["time"].label
+
+    return proposed_
+
+
+@pytest.mark.parametrize("form", ["%d.%m.%Y", "%d.%m.%y", "%Y-%m-%d", "%m/%d/%Y", "'%d.%m.%Y"])
+@pytest.mark.parametrize("columns", [DECLARED, {"time": "Uhrzeit"}, {"time": "Uhrzeit + Datum"}])
+def test_they_are_one_clock_over_midnight(read, form, columns):
+    test = read(two_columns(form), columns)
+    np.testing.assert_allclose(test.time, TIME, atol=6e-4)
+    expected = None if form == "%d.%m.%y" else FIRST  # may be the year first
+    assert test.stamp == expected
+
+
+@pytest.mark.parametrize(
+    ("labels", "found"),
+    [
+        (LABELS, "Datum + Uhrzeit"),
+        ("Date;Time;u [V];dP [MPa];Q [l/min]", "Date + Time"),
+        ("Tag;Zeit + Rest;u [V];dP [MPa];Q [l/min]", "Tag + Zeit + Rest"),
+    ],
+)
+def test_whatever_their_labels(proposed, read, labels, found):
+    content = two_columns(labels=labels)
+    assert proposed(content) == found
+    assert read(content, {"time": found}).stamp == FIRST
+
+
+def test_a_label_of_the_file_goes_before_a_pair(read):
+    clock, other = stamps("%H:%M:%S,", START), stamps("%H:%M:%S,", START.replace(hour=7))
+    content = text(
+        "Datum;Uhrzeit;Datum + Uhrzeit;" + LABELS[14:], *rows(["22.11.2026"] * TIME.size, other, clock, U, DP, Q)
+    )
+    assert read(content).stamp == start_of("2026-11-22 03:04:05.123")
+    assert read(content, {"time": "Uhrzeit"}).stamp is None
+
+
+def test_a_pair_is_one_of_dates_and_one_of_times_of_day(read):
+    with pytest.raises(InputError, match=r"has no column 'Uhrzeit [+] u \[V\]', which --columns names for time"):
+        read(two_columns(), {"time": "Uhrzeit + u [V]"})
+
+
+def test_of_two_columns_of_dates_none_is_taken_but_the_declared_one(proposed, read):
+    exported = ["30.11.2026"] * TIME.size
+    dates = ["22.11.2026"] * TIME.size
+    content = text("Export;" + LABELS, *rows(exported, dates, stamps("%H:%M:%S,", START), U, DP, Q))
+    assert proposed(content) == "Uhrzeit" and read(content, {"time": "Uhrzeit"}).stamp is None
+    assert read(content).stamp == start_of("2026-11-22 03:04:05.123")
+
+
+@pytest.mark.parametrize(
+    "dates",
+    [
+        pytest.param(["22.11.2026"] * TIME.size, id="of the export"),
+        pytest.param(["22.11.2026"] * 300 + ["23.11.2026"] * (TIME.size - 300), id="a second late"),
+        pytest.param(["22.11.2026"] * 200 + ["23.11.2026"] * (TIME.size - 200), id="a second early"),
+        pytest.param(["22.11.2026"] + [""] * (TIME.size - 1), id="written once"),
+    ],
+)
+def test_dates_that_do_not_change_at_midnight_are_left_out(read, dates, caplog):
+    with caplog.at_level(logging.INFO):
+        test = read(two_columns(dates=dates))
+    np.testing.assert_allclose(test.time, TIME, atol=6e-4)
+    assert test.stamp is None and "'Uhrzeit' goes over midnight and 'Datum' does not change there" in caplog.text
+
+
+def test_a_date_that_is_written_once_holds_for_the_rows_below(read):
+    test = read(two_columns(start=START, dates=["22.11.2026"] + [""] * (TIME.size - 1)))
+    np.testing.assert_allclose(test.time, TIME, atol=6e-4)
+    assert test.stamp == start_of("2026-11-22 03:04:05.123")
+
+
+def test_a_time_that_is_missing_is_a_missing_sample(read):
+    content = two_columns(start=START).replace(START.strftime(";%H:%M:%S,163").encode(), b";", 1)
+    assert read(content).time.size == TIME.size - 1
+
+
+@pytest.mark.parametrize(
+    ("dates", "words"),
+    [
+        (["01/02/2026"] * 300 + ["02/02/2026"] * (TIME.size - 300), "it is 1 or 31 days, as it can't be told"),
+        (["22.11.2026"] * 300 + ["soon"] * (TIME.size - 300), "row 302, column 'Datum [+] Uhrzeit': 'soon 00:00:02"),
+    ],
+)
+def test_dates_that_can_not_be_told_are_refused(read, dates, words):
+    with pytest.raises(InputError, match=words):
+        read(two_columns(dates=dates))
+
+
+@pytest.mark.parametrize("dates", [["45989"] * TIME.size, ["22. Nov 2026"] * TIME.size, ["1.2.3"] * TIME.size])
+def test_what_is_no_date_leaves_the_time_of_day(proposed, read, dates):
+    content = two_columns(dates=dates)
+    assert proposed(content) == "Uhrzeit"
+    test = read(content, {"time": "Uhrzeit"})
+    np.testing.assert_allclose(test.time, TIME, atol=6e-4)
+    assert test.stamp is None
+
+
+def test_recordings_that_overlap_are_seen(read):
+    first, early = read(two_columns()), read(two_columns(start=LATE + datetime.timedelta(seconds=20)), name="b.csv")
+    after = read(two_columns(days=1), name="c.csv")
+    assert runs_back([first, early]) == (first, early) and runs_back([first, after]) is None
