@@ -94,7 +94,7 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     assert re.findall(r'<section id="(\w+)">', html) == [
-        "characteristic", "conditions", "acceptance", "loop", "thresholds", "beta", "remaining", "checks", "warnings",
+        "characteristic", "conditions", "loop", "thresholds", "beta", "remaining", "checks", "warnings",
         "data", "budget", "law", "integers", "inputs", "provenance",
     ]  # fmt: skip
     figures = ("dead-zone", "loop", "thresholds", "beta", "fit", "budget", "law", "map", "zero")

@@ -37,14 +37,15 @@ SIGNS = {"good": "✓", "bad": "✗", "open": "?"}
 class Headline:
     """The verdict: good if all holds, bad if something does not, open if something was not checked.
 
-    `reasons` name what does not hold or was not checked, `untried` what nobody asked for and the command that tries it,
-    `cautions` what the verdict is not about, and what somebody accepted; `some_failed`: valves of a lot are not
-    calibrated.
+    `reasons` name what does not hold or was not checked, `unrequired` what passes at zero command at most where no
+    requirement forbids it, `untried` what nobody asked for and the command that tries it, `cautions` what the verdict
+    is not about, and what somebody accepted; `some_failed`: valves of a lot are not calibrated.
     """
 
     kind: str
     text: str
     reasons: tuple[str, ...] = ()
+    unrequired: str = ""
     untried: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
     some_failed: bool = False

@@ -17,6 +17,7 @@ from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.measured_figures import measured_figures, with_span
 from dzdesign.report.page import Figure, Headline, misfit
 from dzdesign.report.sections.cells import counted, whole
+from dzdesign.report.unrequired_flow import unrequired_flow
 from dzdesign.verify.contradictions import contradictions
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.loop_results import PressureResult
@@ -26,8 +27,14 @@ from dzdesign.verify.untried import not_tried
 
 def headline(chain: Chain) -> Headline:
     """Return the verdict on a chain: good only if every requirement was checked and holds, and every file fits."""
-    untried = not_tried(chain.evidence) if chain.evidence and not chain.faults else ()
-    return replace(_verdict(chain), cautions=tuple(_cautions(chain)), untried=untried)
+    evidence, judged = None if chain.faults else chain.evidence, _verdict(chain)
+    # Under a verdict that is bad nobody takes all for harmless, and what is missed needs the place.
+    return replace(
+        judged,
+        unrequired=unrequired_flow(evidence, chain.recorded_units) if evidence and judged.kind != "bad" else "",
+        cautions=tuple(_cautions(chain)),
+        untried=not_tried(evidence) if evidence else (),
+    )
 
 
 def _cautions(chain: Chain) -> Iterator[str]:
@@ -179,12 +186,13 @@ def _at_zero(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
     hidden = "" if unseen is None else "; less than that the recordings don't show"
     value = worst.in_words(flow, units) if unseen is not None else units.number(flow, ".3g L/min")
     unit = units.label("L/min")
+    without, with_it = bare.in_words(bare.q_zero_without_beta_L_min, units), worst.in_words(flow, units)
+    gain = f"; without the correction for the pressure drop (β) it would be {without} {unit}"
     return Figure(
         label="Flow at zero command",
         value="none" if flow <= 1e-9 and unseen is None else f"{value} {unit}",
-        note=f"in the simulated loop, after closing, {worst_of(loops, units)}{hidden}{of_it}; "
-        "without the correction for the pressure drop (β) it would be "
-        f"{bare.in_words(bare.q_zero_without_beta_L_min, units)} {unit}",
+        note=f"in the simulated loop, after closing, {worst_of(loops, units)}{hidden}{of_it}"
+        f"{gain if without != with_it else ''}",
         kind="text" if flow <= 1e-9 or within else "bad",
     )
 
@@ -224,10 +232,10 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         note=f"confidence that the output at zero command stays below the {worst.guard} threshold "
         f"{units.span(low, high, '.2f MPa')}; smallest margin "
         + (
-            f"{units.text(least, '.3f mV')}, of the C's output under the threshold's lower bound"
+            f"{units.text(least, '.3f mV')} of the C's output{_reserve(compensator)}"
             if inputs
             else f"{units.text(1e3 * float(worst.smallest_margin_V), '.3f mV')}, of the exact law under the certified "
-            "offset, beside half a count for the rounding"
+            "offset, beside half a count for the rounding; the statistical reserve is in that offset"
         )
         + (
             f". F{at_zero.none_in_words(worst.guard, units)[1:]}"
@@ -236,6 +244,13 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         )
         + _premise(compensator),
     )
+
+
+def _reserve(compensator: Compensator) -> str:
+    """Say of a margin under a bound where the statistical reserve is; a machine's or a lot's is in the margin, too."""
+    of_rounding = compensator.machine is None and not compensator.lot
+    of_it = ": rounding alone" if of_rounding else " under the lower bound"
+    return f"{of_it}; the statistical reserve is in the bound"
 
 
 def _premise(compensator: Compensator) -> str:

@@ -132,11 +132,12 @@ def _sections(chain: Chain) -> dict[str, Section]:
         "integers": integers_section(chain.firmware, compensator),
         "inputs": inputs_section(chain),
         "loop": loop_section(chain),
-        "acceptance": acceptance_section(chain.assessment, chain.reproduction),
         "checks": checks_section(chain.evidence),
         "warnings": warnings_section(chain.valve, compensator),
         "provenance": provenance_section(chain),
     }
+    if acceptance := acceptance_section(chain.assessment, chain.reproduction):
+        sections["acceptance"] = acceptance
     if compensator:
         sections["remaining"] = remaining_section(compensator)
     if compensator and compensator.lot:

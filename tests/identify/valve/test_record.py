@@ -146,7 +146,7 @@ def test_the_file_that_init_writes_has_a_record_to_fill_in(here):
     Path("dzdesign.toml").write_text(head + "[record]\n" + lines.replace("# ", ""), "utf-8")
     assert main(["-q", "identify", "ramp.csv", "--config", "dzdesign.toml"]) == 0
     record = json.loads(Path("valve.json").read_text())["record"]
-    assert mark and record["date"] == "2026-01-31" and record["oil-temperature"] == "40 °C" and len(record) == 8
+    assert mark and record["date"] == "2026-01-31" and record["oil-temperature"] == "40 °C" and len(record) == 9
 
 
 def test_each_valve_of_a_list_has_its_own_beside_that_of_all(here, wording):

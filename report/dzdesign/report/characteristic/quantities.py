@@ -25,6 +25,10 @@ KEYS = (
 )  # fmt: skip
 
 
+#: Share of full command below which a ramp has come to zero command.
+NEAR_ZERO = 0.01
+
+
 @dataclass(frozen=True, slots=True)
 class Found:
     """A value in the unit of its quantity; None: not seen, and at most `at_most` where that is known."""
@@ -117,7 +121,7 @@ def _of_valve_and_loop(
         rated = max((float(line.q.max()) for line in bare.values()), default=0.0)
         before = _shape(bare, rated, u_max, valve.meter.floor_L_min if valve else 0.0)
         if test and valve:
-            before |= _of_test(test, valve.u_max_V, level, bare)
+            before |= _of_test(test, valve.u_max_V, level, bare) | _at_zero(test, bare)
         elif loop:
             before |= _of_loop_without(loop)
         yield PressureQuantities(
@@ -162,6 +166,13 @@ def _of_test(test: TestResult, u_max_V: float, level: float, lines: Mapping[str,
         at = lines[word].command_at(level) if word in lines else float("nan")
         found[f"dead_zone_{word}"] = Found(None if np.isnan(at) else 100 * at)
     return found
+
+
+def _at_zero(test: TestResult, lines: Mapping[str, Line]) -> dict[str, Found]:
+    """Return the leak, or the noise level where none is seen; nothing where no ramp comes from or to zero command."""
+    if not any(line.u.size and line.u.min() <= NEAR_ZERO for line in lines.values()):
+        return {}
+    return {"flow_at_zero": Found(test.leak_L_min) if test.leak_L_min else Found(None, test.noise_level_L_min)}
 
 
 def _of_loop_without(loop: PressureResult) -> dict[str, Found]:

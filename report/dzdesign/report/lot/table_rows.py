@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.test_record import checked_record
-from dzdesign.report.compensator_sides import SIGNS
+from dzdesign.report.compensator_sides import SIGNS, standing_warnings
 from dzdesign.report.lot.table import HASHED, OUTPUT_HASH, SideFigures, TableRow
 from dzdesign.report.lot.valve_folder import ValveFolder
 from dzdesign.report.lot.valve_names import by_name
@@ -35,13 +35,19 @@ def table_rows(
             status=each.manifest.status,
             reason=each.manifest.reason,
             sides={side: _figures(each.compensator, SIGNS.get(side, 1), lot_law) for side in sides},
-            warnings=tuple(dict.fromkeys(w.code for w in each.compensator.valve.warnings)) if each.compensator else (),
+            warnings=_warnings(each.compensator),
             hashes=_hashes(each),
             record=_record(each, (records or {}).get(each.name, {})),
             outputs=_outputs(each),
         )
         for each in sorted(valves, key=lambda valve: by_name(valve.name))
     ]
+
+
+def _warnings(compensator: "Compensator | None") -> tuple[str, ...]:
+    """Return the codes of the warnings that stand beside a compensator, each once."""
+    found = standing_warnings(compensator.valve, compensator) if compensator else ()
+    return tuple(dict.fromkeys(each.code for each in found))
 
 
 def _hashes(valve: ValveFolder) -> dict[str, str]:

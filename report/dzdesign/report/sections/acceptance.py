@@ -16,8 +16,8 @@ DECIMALS = {"%": 2, "L/min": 3, "L/min/V": 4}
 IN_RECORDED_UNITS = ("L/min", "L/min/V")
 
 
-def acceptance_section(assessment: Assessment | None, reproduction: Reproduction | None) -> Section:
-    """Return the section on acceptance."""
+def acceptance_section(assessment: Assessment | None, reproduction: Reproduction | None) -> Section | None:
+    """Return the section on acceptance; None where nothing was accepted by."""
     tables: list[Table] = []
     if assessment:
         tables += [_limits_table(assessment)] if assessment.limits else []
@@ -25,11 +25,7 @@ def acceptance_section(assessment: Assessment | None, reproduction: Reproduction
     if reproduction:
         for valve in dict.fromkeys(row.valve for row in reproduction.numbers):
             tables.append(_paper_table(valve, [row for row in reproduction.numbers if row.valve == valve]))
-    missing = (
-        "No acceptance table is here: `dzdesign assess` compares recordings with limits, `dzdesign reproduce` the "
-        "paper's numbers."
-    )
-    return Section(tables=tables, missing="" if tables else missing, optional=True)
+    return Section(tables=tables) if tables else None
 
 
 def _paper_table(valve: str, rows: Sequence[PaperNumber]) -> Table:

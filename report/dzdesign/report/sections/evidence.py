@@ -193,12 +193,29 @@ def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -
     return table_of(
         "Beside ramps: each scenario at the pressures where it is worst",
         [worst[key] for key in dict.fromkeys((each.name, each.not_required) for each in scenarios)],
-        ("scenario", lambda one: one.name),
+        ("scenario", lambda one: Cell(text=one.name, more=_where(one, scenarios, units))),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         (f"behind the edge ({units.label('MPa')})", lambda one: recorded(one.back_MPa, ".2f MPa", units)),
         (f"at zero, at the end ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
         (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
         ("required", lambda one: word(_required(one, units) if one.must_shut else f"{one.not_required}: not required")),
+    )
+
+
+def _where(row: ScenarioResult, scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> str:
+    """Say of which runs a row is, where those of one name are required in part: side and pressure drop decide it."""
+    alike = [each for each in scenarios if each.name == row.name]
+    if len({each.not_required for each in alike}) == 1:
+        return ""
+    drops: dict[str, dict[str, None]] = {}
+    for each in sorted(alike, key=lambda one: one.dp_MPa):
+        if each.not_required == row.not_required:
+            drops.setdefault(each.side, {})[units.number(each.dp_MPa, ".2f MPa")] = None
+    two_sided = len({each.side for each in scenarios}) > 1
+    return "; ".join(
+        (f"{word(f'{side} commands')}, " if two_sided else "")
+        + word(f"at {', '.join(found)} {units.label('MPa')}")
+        for side, found in drops.items()
     )
 
 

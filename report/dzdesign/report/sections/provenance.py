@@ -5,6 +5,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import KINDS, Chain
+from dzdesign.report.compensator_sides import standing_warnings
 from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, counted, table_of, whole
@@ -16,7 +17,7 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
     accepted = compensator.options.get("accept", "") if compensator and compensator.options else ""
     codes = accepted.replace(",", " ").split()
     warnings = []
-    for warning in valve.warnings if valve else ():
+    for warning in standing_warnings(valve, compensator):
         source = f"{warning.source}: " if warning.source else ""
         end = ", which it was (--accept)" if warning.code in codes else ""
         warnings.append(f"[{warning.code}] {source}{warning.text}{end}")

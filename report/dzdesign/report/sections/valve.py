@@ -40,8 +40,7 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
         "data": Section(
             figures=fits,
             lines=(
-                f"{counted(sum(len(side.tests) for side in valve.sides.values()), 'ramp test')}; full command "
-                f"{units.text(valve.u_max_V, 'g V')}.",
+                f"{_ramp_tests(valve)}; full command {units.text(valve.u_max_V, 'g V')}.",
                 *([f"Units: {shown}; the files and the curves as CSV are in V, MPa and L/min."] if shown else []),
                 f"Flow meter: floor {units.text(meter.floor_L_min, '.2f L/min')}; {meter.lag_in_words()}.",
                 *([f"Recorded under {valve.dither_in_words}."] if valve.dither else []),
@@ -72,6 +71,13 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
             missing="" if any(betas) else "One pressure drop was tested, so β is 1 and its trend is not known.",
         ),
     }
+
+
+def _ramp_tests(valve: ValveModel) -> str:
+    """Count the ramp tests, and the recordings that they are of: repeats are one test."""
+    tests, recordings = sum(len(side.tests) for side in valve.sides.values()), len(valve.made_from)
+    of = "" if tests == recordings else f" from {counted(recordings, 'recording')}"
+    return f"{counted(tests, 'ramp test')}{of}"
 
 
 def low_flow_table(side: SideModel, title: str, units: RecordedUnits) -> Table:

@@ -233,7 +233,7 @@ def shut_after_scenarios(
         text += f"{units.text(0.0, '.4g L/min')} in each"
     else:
         text += f"{_flow(worst, worst.q_zero_L_min, units)} (worst: {worst.name}"
-        text += f"{_in_which_runs(worst, required, units)})"
+        text += f"{in_which_runs(worst, required, units)})"
     text += _allowed(worst, units)
     if not plant_given and not any(each.is_load_step for each in scenarios):
         text += "; load steps, and readings stuck during one, were not tried: they need ramps at two pressure drops, "
@@ -246,7 +246,7 @@ def shut_after_scenarios(
     )
 
 
-def _in_which_runs(worst: ScenarioResult, among: Sequence[ScenarioResult], units: RecordedUnits) -> str:
+def in_which_runs(worst: ScenarioResult, among: Sequence[ScenarioResult], units: RecordedUnits) -> str:
     """Say at which pressure drop the worst run of a scenario was; nothing where all its runs pass the same flow."""
     flows = [each.q_zero_L_min for each in among if each.name == worst.name]
     if len(flows) > 1 and max(flows) - min(flows) <= ALIKE * max(flows):
@@ -262,7 +262,7 @@ def _not_required(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> 
         most, count = max(others, key=_zero_flow), len({each.name for each in others})
         text = f"{TRIED.get(reason, reason)}: {count} scenario{'' if count == 1 else 's'}, "
         text += f"{_flow(most, most.q_zero_L_min, units)} at zero command (worst: {most.name}"
-        text += f"{_in_which_runs(most, others, units)})"
+        text += f"{in_which_runs(most, others, units)})"
         if reason == NO_CORE_CAN_KNOW and any(each.name.startswith(OPEN_CIRCUITS) for each in others):
             text += "; signals with a live zero and headroom above the span would reveal the failed sensor"
         found.append(text)

@@ -1,0 +1,159 @@
+"""What a stranger reads first is true of this valve and says something: warnings, cards, counts, names, numbers."""
+
+import html
+import re
+import tomllib
+from dataclasses import replace
+
+import pytest
+
+from dzdesign.codegen.project import target_named
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.design.designing import design
+from dzdesign.design.option_texts import options_of
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.report.chain import Chain
+from dzdesign.report.characteristic.curves import characteristic_curves
+from dzdesign.report.characteristic.quantities import characteristic_quantities
+from dzdesign.report.compensator_sides import standing_warnings
+from dzdesign.report.figures.figure import figure_style
+from dzdesign.report.language import LANGUAGES, in_language, table_of_language
+from dzdesign.report.sections.acceptance import acceptance_section
+from dzdesign.report.sections.conditions import RECORDED, conditions_section
+from dzdesign.report.sections.evidence import scenarios_table
+from dzdesign.report.sections.provenance import warnings_section
+from dzdesign.report.sections.valve import valve_sections
+from dzdesign.report.summary import key_figures
+from dzdesign.report.valve_name import valve_name
+from dzdesign.report.valve_report import report_of_folder
+from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
+from dzdesign.verify.loop_results import ScenarioResult
+from tests.support.evidence import LOOP, evidence_with, pressure_result, read_evidence
+from tests.support.golden_firmware import FULL
+from tests.support.paths import ROOT
+from tests.support.synthetic import needs_compiler
+
+BOTH_SIGNS = "-10..10 V x 0.15 + 1.5 V"
+RUN = ScenarioResult(
+    name="sensor A is stuck", side="positive", dp_MPa=1.0, back_MPa=0.0, leak_L_min=0.0, allowed_at_zero_L_min=None,
+    unseen_below_L_min=None, q_zero_L_min=0.0, q_peak_at_zero_L_min=0.0, must_shut=True, not_required="", figures={},
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def both_sides():
+    return read_artefact((FULL / "valve.json").read_bytes(), ValveModel, "valve.json")
+
+
+def designed(valve, **texts):
+    return design(valve, options_of(texts, target_named("f28335").inputs()))
+
+
+def test_a_side_that_is_driven_is_not_said_to_be_left_out(both_sides):
+    """Seeded: the report of a firmware for commands of both signs warned that it drives one side."""
+    one, both = designed(both_sides), designed(both_sides, command_signal=BOTH_SIGNS)
+    for compensator, said in ((one, True), (both, False), (None, True)):
+        ((_, lines), *_) = warnings_section(both_sides, compensator).groups
+        assert any(line.startswith("[two-sides]") for line in lines) is said
+        assert ("two-sides" in {each.code for each in standing_warnings(both_sides, compensator)}) is said
+        others = [each for each in standing_warnings(both_sides, compensator) if each.code != "two-sides"]
+        assert others == [each for each in both_sides.warnings if each.code != "two-sides"]
+
+
+def card(label, pressures, compensator=None, *inputs):
+    evidence = evidence_with(closed_loop=replace(LOOP, pressures=pressures), inputs=inputs)
+    chain = Chain(evidence=evidence, compensator=compensator)
+    (found,) = [each for each in key_figures(chain, characteristic_quantities(None, None, pressures, ()))
+                if each.label.startswith(label)]  # fmt: skip
+    return found
+
+
+def test_the_card_of_the_flow_at_zero_speaks_of_beta_only_where_beta_changes_it():
+    unseen = pressure_result(dp_MPa=1.0, unseen_below_L_min=0.6, q_zero_without_beta_L_min=0.3)
+    assert "β" not in card("Flow at zero", (unseen,)).note
+    assert "(β) it would be 0.84 L/min" in card("Flow at zero", (replace(unseen, q_zero_without_beta_L_min=0.84),)).note
+
+
+@needs_compiler
+def test_a_small_margin_says_where_the_reserve_is(example_valve, example_compensator, reported_demo):
+    """Seeded: a margin of 0.000110 mA on the first page looked like no reserve at all."""
+    loops, (inputs,) = (pressure_result(dp_MPa=1.0),), read_evidence(reported_demo / "evidence").inputs
+    of_law = card("Certificate", loops, example_compensator)
+    assert "the statistical reserve is in that offset" in of_law.note
+    of_c = card("Certificate", loops, example_compensator, inputs)
+    assert "C's output: rounding alone; the statistical reserve is in the bound" in of_c.note
+    assert inputs.smallest_margin_V < example_compensator.positive.certificate.mean_loss_V
+    machine = designed(example_valve, coil_temperature="-20..80 degC", supply="18..32 V")
+    assert "lower bound; the statistical reserve is in the bound" in card("Certificate", loops, machine, inputs).note
+
+
+@needs_compiler
+def test_an_empty_acceptance_stands_nowhere(reported_demo):
+    page = report_of_folder(reported_demo).html
+    assert acceptance_section(None, None) is None
+    assert 'href="#loop"' in page and "#acceptance" not in page and 'id="acceptance"' not in page
+
+
+def test_repeats_are_recordings_of_one_ramp_test(both_sides, example_valve):
+    tests = sum(len(side.tests) for side in both_sides.sides.values())
+    for recordings, said in ((tests, f"{tests} ramp tests;"), (3 * tests, f"{tests} ramp tests from {3 * tests} rec")):
+        source = example_valve.made_from[0]
+        valve = replace(both_sides, made_from=(source,) * recordings)
+        with figure_style():
+            assert valve_sections(valve, None)["data"].lines[0].startswith(said)
+
+
+def test_the_flow_at_zero_that_was_recorded_stands_before_the_simulated_one(example_valve):
+    """Seeded: a dash stood for the meter's noise level, or the leak, of a valve recorded at zero command."""
+    leaks = replace(example_valve.sides["positive"].tests[0], leak_L_min=0.2)
+    side = replace(example_valve.sides["positive"], tests=(leaks, *example_valve.sides["positive"].tests[1:]))
+    valve = replace(example_valve, sides={"positive": side})
+    curves = characteristic_curves(valve, None, {})
+    leaking, *others = characteristic_quantities(valve, None, (), curves).pressures
+    assert leaking.before["flow_at_zero"].value == 0.2
+    for each, test in zip(others, side.tests[1:], strict=True):
+        assert each.before["flow_at_zero"].value is None
+        assert each.before["flow_at_zero"].at_most == test.noise_level_L_min > 0
+    away = [replace(each, branches={name: replace(line, command=line.command + 0.02)
+                                    for name, line in each.branches.items()}) for each in curves]  # fmt: skip
+    assert not any("flow_at_zero" in each.before for each in characteristic_quantities(valve, None, (), away).pressures)
+
+
+def test_rows_of_one_scenario_say_which_runs_they_are_of():
+    """Seeded: one name stood twice, once required and once not."""
+    unknown = {"must_shut": False, "not_required": NO_CORE_CAN_KNOW}
+    runs = [RUN, *(replace(RUN, dp_MPa=dp, **unknown) for dp in (4.0, 2.0)), replace(RUN, name="load step")]
+    found = [(row[0].text, row[0].more) for row in scenarios_table(runs, AS_COMPUTED).rows]
+    assert found == [(RUN.name, "at 1.00 MPa"), (RUN.name, "at 2.00, 4.00 MPa"), ("load step", "")]
+    other = [replace(each, side="negative") for each in runs[:2]]
+    with in_language("de"):
+        found = [row[0].more for row in scenarios_table([*runs, *other], AS_COMPUTED).rows]
+    assert found == [
+        "positive Ansteuerung, bei 1.00 MPa; negative Ansteuerung, bei 1.00 MPa",
+        "positive Ansteuerung, bei 2.00, 4.00 MPa; negative Ansteuerung, bei 4.00 MPa",
+        "",
+    ]
+
+
+@needs_compiler
+def test_every_number_of_a_page_has_a_decimal_point(reported_demo):
+    """In German too, as the findings have points: a comma beside them in one card is a second rule."""
+    for language in LANGUAGES:
+        with in_language(language):
+            page = report_of_folder(reported_demo).html
+        text = html.unescape(re.sub(r"<svg.*?</svg>|<style.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL))
+        assert re.search(r"\d\.\d", text) and not re.findall(r"\d,\d", text)
+    assert not [each for each in table_of_language("de").values() if re.search(r"\d,\d", each)]
+
+
+def test_init_names_every_entry_of_the_record_that_a_report_asks_for(example_valve):
+    """Seeded: the report missed a filter of which the file that `init` writes knew nothing."""
+    template = ROOT / "dzdesign" / "dzdesign" / "initial_options" / "templates" / "dzdesign.toml.jinja"
+    lines = template.read_text(encoding="utf-8").partition("# [record]\n")[2]
+    record = tomllib.loads(lines.replace("# ", ""))
+    names = {name.replace("-", " ") for name in record}
+    assert all(names & set(known) for known in RECORDED.values())
+    filled = replace(example_valve, record={name: str(text) for name, text in record.items()})
+    assert conditions_section(filled, None).missing == ""
+    assert valve_name(filled.record) == f"{record['type']}, serial number {record['serial']}"
