@@ -214,7 +214,7 @@ def target_files(
         **target.context,
         "bipolar": len(signals.signs) == 2,
         "signals": signals,
-        "units": compensator.valve.recorded_units,
+        "units": compensator.valve.recorded_units.of_controller,
         "u_max_V": float(compensator.u_max_V),
         "drive": compensator.drive_functions,
         "limited": compensator.drive_functions.compare_limit < signals.compare_max,

@@ -9,11 +9,14 @@ from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import MACHINE, Argument, flag_of
 from dzdesign.core.toml_documents import read_toml
+from dzdesign.terminal.progress import say
 
 #: Characters of a key to which the nearest known one is looked for.
 LONGEST_KEY = 80
 #: Groups of options that stand in a table of their own.
 TABLES = (MACHINE,)
+#: The table of any names, for people.
+RECORD = "record"
 #: Of an option in the file: text, a list of texts, or a table.
 Value = str | list[str] | dict[str, str]
 
@@ -69,14 +72,14 @@ def _without_tables(
 def _refuse_options_in(path: str, table: str, entries: Mapping[str, object], known: Mapping[str, object]) -> None:
     """Refuse an option that was added at the end of the file, below a table of any names: TOML gives it to the table.
 
-    A word that people use too, such as order or target, may be an entry.
+    In the record a word that people use too, such as order or target, may be an entry; it is said that it is one.
     """
-    for name in entries:
-        if ("-" in name or "_" in name) and name.replace("-", "_") in known:
-            raise InputError(
-                f"'{path}': option '{name}' stands in the table [{table}], which goes on to the next table or the end "
-                "of the file; move it above all tables"
-            )
+    for name in (name for name in entries if name.replace("-", "_") in known):
+        where = f"'{path}': '{name}' stands in the table [{table}], which goes on to the next table or the end"
+        if table == RECORD and "-" not in name and "_" not in name:
+            say(f"{where}, so it is an entry and no option")
+            continue
+        raise InputError(f"{where}; the option belongs above all tables, move it there")
 
 
 def _key(name: str) -> str:

@@ -191,9 +191,10 @@ def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> 
     for name in DEFAULTS:
         given = getattr(choices, name)
         if given is not None and given != designed.get(name):
+            own = f"with {quoted(designed[name])}" if designed.get(name) else "without it"
             raise InputError(
-                f"{flag_of(name)} is {quoted(given)}, but {source} was designed with {quoted(designed.get(name, ''))}; "
-                "leave the option out, or run `dzdesign design` again"
+                f"{flag_of(name)} is {quoted(given)}, but {source} was designed {own}; leave the option out, or run "
+                "`dzdesign design` again"
             )
     try:
         prove_derived(compensator)

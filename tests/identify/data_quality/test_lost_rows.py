@@ -32,7 +32,7 @@ def test_one_warning_counts_them_and_names_the_longest():
     assert "from 4.001 to 4.123 V" in warning.text
 
 
-@pytest.mark.parametrize("lost", ["rows", "flows", "dashes"])
+@pytest.mark.parametrize("lost", ["rows", "flows"])
 def test_blank_cells_and_missing_rows_are_the_same(tmp_path, lost):
     lines = csv(ramp()).splitlines()
     rows = range(200, 230)
@@ -40,7 +40,7 @@ def test_blank_cells_and_missing_rows_are_the_same(tmp_path, lost):
         if lost == "rows":
             del lines[1 + row]
         else:
-            lines[1 + row] = lines[1 + row].rpartition(",")[0] + ("," if lost == "flows" else ",---")
+            lines[1 + row] = lines[1 + row].rpartition(",")[0] + ","
     (tmp_path / "ramp.csv").write_text("\n".join(lines))
     (gap,) = find_gaps(read_ramp_file(tmp_path / "ramp.csv"))
     assert gap.rows == 30 and gap.source == "ramp.csv"

@@ -215,7 +215,7 @@ def spoiled(row, column, cell, before=""):
     return before + "\n".join(lines)
 
 
-@pytest.mark.parametrize("cell", ["n/a", "1.2.3", "1e", "--1", "0x10", "1_0", "OVERFLOW"])
+@pytest.mark.parametrize("cell", ["n/a", "1.2.3", "1e", "--", "0x10", "1_0", "OVERFLOW"])
 def test_text_in_a_number_is_found_in_its_row_of_the_file(refusal, cell, wording):
     # Three lines before the header, which is line 4; four rows on: row 8.
     wording.of_test(refusal(spoiled(4, 1, cell, before="# one\n\n# two\n")))

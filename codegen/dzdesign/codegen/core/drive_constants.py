@@ -29,7 +29,7 @@ STATUS_BITS = {
 def interface_constants(compensator: Compensator) -> list[Define]:
     """Return the ends of inputs and output."""
     signals, limit = compensator.signals, compensator.drive_functions.compare_limit
-    units, u_max_V = compensator.valve.recorded_units.of_controller, float(compensator.u_max_V)
+    units, u_max_V = compensator.valve.recorded_units, float(compensator.u_max_V)
     share = limit / signals.compare_max
     return [
         Define(symbol="DZ_COMPARE_MAX", value=signals.compare_max, equation="Eq. (32), PWM compare value of u_max",

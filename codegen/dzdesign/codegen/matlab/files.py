@@ -79,7 +79,7 @@ def _values(compensator: Compensator, sign: int) -> dict[str, object]:
         "side_text": "" if not bipolar else f", {'positive' if sign > 0 else 'negative'} commands",
         "signals": signals,
         "full_code": command.full_code if sign > 0 else command.negative_full_code,
-        "u_max": compensator.valve.recorded_units.text(float(compensator.u_max_V) * sign, "g V"),
+        "u_max": compensator.valve.recorded_units.of_controller.text(float(compensator.u_max_V) * sign, "g V"),
         "limit": compensator.drive_functions.compare_limit,
         "at_zero": zero_command(compensator, sign),
         "certificate": certificate_lines(compensator, sign),

@@ -12,8 +12,8 @@ from dzdesign.identify.reading.ramp_test import RampTest
 LONGER, NEARLY_ALL = 10.0, 0.99
 #: The command rests below the first share of its largest size, and is at its top above the second.
 REST, TOP = 0.05, 0.9
-#: A command that changes by less than this share of its largest size across a gap is held.
-HELD = 0.01
+#: A command that changes by less than this share of its largest size across a gap is held: at the top, and elsewhere.
+HELD_AT_TOP, HELD = 0.01, 0.001
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,8 @@ class Gap:
 
 def about_lost_rows(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield one warning for all recordings together, if any lacks rows."""
-    gaps = [gap for test in tests for gap in find_gaps(test)]
+    # Samples that were taken for missing have a warning of their own: no logger lost them.
+    gaps = [gap for test in tests if not (test.no_values or test.failed_signals) for gap in find_gaps(test)]
     if not gaps:
         return
     longest = max(gaps, key=lambda gap: gap.seconds)
@@ -45,7 +46,7 @@ def about_lost_rows(tests: Sequence[RampTest]) -> Iterator[Finding]:
 
 
 def find_gaps(test: RampTest) -> Iterator[Gap]:
-    """Yield the gaps of a recording in the order of time, but for the pauses between ramps and in a hold at the top."""
+    """Yield the gaps of a recording in the order of time, but for the pauses between ramps and in a hold."""
     steps = np.diff(test.time)
     moving = steps[steps > 0]
     if moving.size == 0:
@@ -66,4 +67,4 @@ def _is_a_pause(before: float, after: float, largest: float) -> bool:
     at_rest, at_top = low <= REST * largest, high >= TOP * largest
     if at_rest:
         return at_top or high <= REST * largest
-    return at_top and abs(after - before) <= HELD * largest
+    return abs(after - before) <= (HELD_AT_TOP if at_top else HELD) * largest

@@ -121,7 +121,7 @@ def _refuse_what_has_no_pressure(ramp: Ramp, u_max: float) -> None:
     Of a ramp whose flow has the wrong sign the rest before that can't be told from the ramp.
     """
     under_flow = dp_under_flow(ramp.test)
-    if ramp.dp is None or under_flow is None:
+    if ramp.dp is None or under_flow is None or abs(under_flow) < SMALLEST_DP:
         return
     if under_flow >= 0 and ramp.dp >= max(SMALLEST_DP, NO_PRESSURE * under_flow):
         return

@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.table import Table, clean_label
-from dzdesign.identify.reading.time_stamps import MIDNIGHT, Start
+from dzdesign.identify.reading.time_stamps import DAY, MIDNIGHT, Start
 
 #: No ramp takes longer than this, s: a clock of whole numbers by which one does counts milliseconds,
 LONGEST_RAMP = 3600.0
@@ -20,21 +20,28 @@ MILLISECONDS = re.compile(r"[\[(]?(?:ms|msec|millis|milli-?se[ck]\w{0,6})[\])]?"
 FRACTION = re.compile(r":\d\d:\d\d[.,:]\d")
 #: What is doubtful about a clock: its column has no unit and was taken as ms; or it states another, and is like ms.
 ASSUMED_MS, LIKE_MS = "taken as ms", "like ms"
+#: Times of day of a recording that begins within so many seconds after midnight are counted from its own beginning.
+ELAPSED = 1.0
 logger = logging.getLogger(__name__)
 
 
 def read_times_of_day(table: Table, label: str) -> tuple[np.ndarray, Start | None]:
     """Return the seconds since the first row, of a column of dates or times of day, and when that was.
 
-    Of a pair of columns the dates are left out where they do not change with the day, as that of an export does not.
+    Of a pair of columns the dates are left out where they do not change just as the times pass midnight, as those of an
+    export or of another time zone do not, and where the times count from zero.
     """
-    seconds, pair = seconds_of_day_times(table, label), table.pair(label)
-    if pair is None or not np.any(np.diff(seconds[np.isfinite(seconds)]) < -MIDNIGHT):
-        return seconds, table.started(label)
-    logger.info(
-        "'%s': '%s' goes over midnight and '%s' does not change there, so no date is known", table.path, *pair[::-1]
-    )
-    return seconds_of_day_times(table, pair[1]), None
+    seconds, start, pair = seconds_of_day_times(table, label), table.started(label), table.pair(label)
+    if pair is None:
+        return seconds, start
+    jumps = np.any(np.abs(np.diff(seconds[np.isfinite(seconds)])) > MIDNIGHT)
+    elapsed = start is not None and start.seconds % DAY < ELAPSED
+    if not (jumps or elapsed):
+        return seconds, start
+    dates, times = pair
+    why = f"'{times}' counts from zero" if elapsed else f"'{dates}' does not change just as '{times}' passes midnight"
+    logger.info("'%s': %s, so the dates are not used", table.path, why)
+    return seconds_of_day_times(table, times), None
 
 
 def seconds_of_day_times(table: Table, label: str) -> np.ndarray:

@@ -196,7 +196,7 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
             f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
             + (f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else "")
         )
-    return Column(label=table.dated(label) if quantity == "time" else label, unit=unit, stated=stated)
+    return Column(label=label, unit=unit, stated=stated)
 
 
 def _refuse_two_units(table: Table, quantity: str, label: str, in_label: str) -> None:

@@ -1,20 +1,18 @@
-"""Missing samples, which are counted: numbers of a logger that has no value, such as -9999, and failed signals."""
+"""Missing samples, which are counted: numbers of a logger that has no value, such as -9999, and no signal."""
 
 from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
 
-from dzdesign.identify.reading.scaling import FAILED_ABOVE, FAILED_BELOW, Scaling
+from dzdesign.identify.reading.scaling import NO_CURRENT, Scaling
 
 #: Such numbers; 9.91e37 is SCPI's.
 PLACEHOLDERS = (-999.0, -999.25, -999.9, -9999.0, -99999.0, -999999.0, 999.0, 9999.0, 99999.0, 999999.0, 9.91e37)
 #: Share of such a number that no other value in the column reaches: in a column of its size it may be a measurement.
 FAR = 0.5
-#: What a signal of a failed transmitter is called.
-FAILED_LOW, FAILED_HIGH = (
-    f"a current {side} {1e3 * limit:g} mA" for side, limit in (("below", FAILED_BELOW), ("above", FAILED_ABOVE))
-)
+#: What no signal is called.
+NO_SIGNAL = f"a current below {1e3 * NO_CURRENT:g} mA"
 
 
 def without_placeholders(numbers: np.ndarray, *, rises: bool) -> tuple[np.ndarray, Counter[float]]:
@@ -34,12 +32,11 @@ def without_placeholders(numbers: np.ndarray, *, rises: bool) -> tuple[np.ndarra
 
 
 def without_failed_signals(numbers: np.ndarray, scaling: Scaling) -> tuple[np.ndarray, Counter[str]]:
-    """Return numbers with NaN in place of the signals of a failed transmitter, and how many are too low or too high."""
+    """Return numbers with NaN in place of those of a broken wire, and how many those are."""
     with np.errstate(invalid="ignore"):
-        low, high = numbers < scaling.failed_below, numbers > scaling.failed_above
-    counts = {FAILED_LOW: int(np.count_nonzero(low)), FAILED_HIGH: int(np.count_nonzero(high))}
-    found = Counter({what: count for what, count in counts.items() if count})
-    return (np.where(low | high, np.nan, numbers) if found else numbers), found
+        failed = numbers < scaling.no_signal_below
+    count = int(np.count_nonzero(failed))
+    return (np.where(failed, np.nan, numbers), Counter({NO_SIGNAL: count})) if count else (numbers, Counter())
 
 
 def describe_missing(found: Mapping[str, Mapping[float, int] | Mapping[str, int]]) -> str:

@@ -22,8 +22,9 @@ from dzdesign.identify.reading.column_labels import (
 #: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, percent or bare numbers.
 TRANSMITTED = ("current", "voltage")
 SIGNALS = (*TRANSMITTED, "frequency")
-#: Of a signal from the first on, one below the second or above the third says that it has failed (NAMUR NE 43), A.
-LIVE_ZERO, FAILED_BELOW, FAILED_ABOVE = 0.004, 0.0036, 0.021
+#: A signal from the first on has no current below the second, A: a broken wire, or a channel that is off. NAMUR NE 43
+#: calls less than 3.6 mA failed, but noise about a zero of 3.6 mA, cut off on one side, would raise thresholds.
+LIVE_ZERO, NO_CURRENT = 0.004, 0.002
 #: Full scale in the examples of messages.
 FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 
@@ -33,13 +34,12 @@ FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 class Scaling:
     """What turns a column's number into SI: ``gain * number + offset``.
 
-    Numbers below `failed_below` or above `failed_above` are those of a transmitter that has failed.
+    Numbers below `no_signal_below` are those of a broken wire.
     """
 
     gain: float
     offset: float = 0.0
-    failed_below: float = -math.inf
-    failed_above: float = math.inf
+    no_signal_below: float = -math.inf
 
 
 def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scaling:
@@ -75,28 +75,24 @@ def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
         raise InputError(f"the range '{text}' has no width, expected one such as '4..20 mA = 0..50 L/min'")
     gain = (meaning.top - meaning.bottom) / (high - low)
     factor = _factor(quantity, meaning.unit, u_max)
-    below, above = _failed_signals(found, low, high)
     return Scaling(
         gain=float(gain) * factor,
         offset=float(meaning.bottom - gain * low) * factor,
-        failed_below=below,
-        failed_above=above,
+        no_signal_below=_no_signal_below(found, low, high),
     )
 
 
-def _failed_signals(found: SignalRange, low: Fraction, high: Fraction) -> tuple[float, float]:
-    """Return the numbers of a column beyond which a signal of 4 to 20 mA has failed; infinite for other signals.
+def _no_signal_below(found: SignalRange, low: Fraction, high: Fraction) -> float:
+    """Return the number of a column below which a signal of 4 to 20 mA is none; infinite for other signals.
 
     `low` and `high` are what the column holds at the ends of the range.
     """
     if not measures(found.unit, "current"):
-        return -math.inf, math.inf
+        return -math.inf
     first, last = (float(end) * si_factor(found.unit, "current") for end in (found.low, found.high))
     if not math.isclose(min(first, last), LIVE_ZERO):
-        return -math.inf, math.inf
-    per_ampere = float(high - low) / (last - first)
-    below, above = (float(low) + (current - first) * per_ampere for current in (FAILED_BELOW, FAILED_ABOVE))
-    return below, above if max(first, last) < FAILED_ABOVE else math.inf
+        return -math.inf
+    return float(low) + (NO_CURRENT - first) * float(high - low) / (last - first)
 
 
 def _ends_in_the_file(quantity: str, column: Column, found: SignalRange) -> tuple[Fraction, Fraction]:

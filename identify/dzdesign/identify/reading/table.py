@@ -81,7 +81,7 @@ class Table(ABC):
         raise TypeError(f"column '{label}' holds numbers")
 
     def dated(self, label: str) -> str:
-        """Return a column of times of day together with the only one of dates, ``Date + Time``; else the label itself.
+        """Return a column of times of day with the only one of their dates, as ``Date + Time``; else the label itself.
 
         `is_clock`, `seconds` and `started` take such a pair as they take a column.
         """

@@ -26,8 +26,8 @@ from dzdesign.identify.reading.time_stamps import (
 if TYPE_CHECKING:
     import polars as pl
 
-#: A cell of nothing but dashes, as loggers write for no value.
-NO_VALUE = r"^[-\u2013\u2014]+$"
+#: What a column of the dates of its rows is called.
+DATE_LABEL = re.compile(r"(?:log|mess|test)?[ _-]?(?:date|datum)|day|tag|fecha|data", re.IGNORECASE)
 #: A cell with a date.
 DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
 #: A cell whose column most likely holds nothing but numbers.
@@ -124,13 +124,17 @@ class TextTable(Table):
         return is_stamp(cell)
 
     def dated(self, label: str) -> str:
-        """Return a column of times of day together with the only one of dates; else the label itself."""
+        """Return a column of times of day together with the only one of dates that is called so; else the label itself.
+
+        Any other date, as of a calibration, would give the recordings a false order.
+        """
         if label not in self.labels or not is_time_of_day(self._first(label)):
             return label
         import polars as pl
 
         columns = self._read({each: pl.String for each in self.labels}, FEW_ROWS)
-        dates = [each for each in self.labels if each and is_date(_first_filled(_cells(columns[each])))]
+        called = [each for each in self.labels if DATE_LABEL.fullmatch(each)]
+        dates = [each for each in called if is_date(_first_filled(_cells(columns[each])))]
         both = f"{dates[0]}{AND}{label}" if len(dates) == 1 else label
         return label if both in self.labels else both
 
@@ -218,8 +222,8 @@ class TextTable(Table):
 
 
 def _cells(texts: "pl.Series") -> "pl.Series":
-    """Return cells without blanks and quotes around them, and without dashes that stand for no value."""
-    return texts.str.strip_chars(' \t"').str.replace(NO_VALUE, "")
+    """Return cells without blanks and quotes around them."""
+    return texts.str.strip_chars(' \t"')
 
 
 def _first_filled(texts: "pl.Series") -> str:
