@@ -256,7 +256,7 @@ def checks_section(evidence: Evidence | None) -> Section:
     """Return the section with every requirement."""
     if evidence is None:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
-    tried = [
+    tried: list[tuple[Cell | str, str, str]] = [
         row
         for check in evidence.checks
         for row in (
