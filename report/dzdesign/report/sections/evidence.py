@@ -256,14 +256,10 @@ def checks_section(evidence: Evidence | None) -> Section:
     """Return the section with every requirement."""
     if evidence is None:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
-    tried: list[tuple[Cell | str, str, str]] = [
-        row
-        for check in evidence.checks
-        for row in (
-            (verdict(check.holds), word(check.name), check.text),
-            *((word(NOT_REQUIRED), word(check.name), found) for found in check.not_required),
-        )
-    ]
+    tried: list[tuple[Cell | str, str, str]] = []
+    for check in evidence.checks:
+        tried.append((verdict(check.holds), word(check.name), check.text))
+        tried += [(word(NOT_REQUIRED), word(check.name), found) for found in check.not_required]
     untried = untried_requirements(evidence)
     how = [word(f"to try it: {each.how}") for each in untried]
     labels = [unasked(label_of_untried(each)) for each in untried]
