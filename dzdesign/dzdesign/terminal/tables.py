@@ -215,8 +215,8 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
-    what = "largest opening dead zone that compensation without a transition leaves at the tests, by premise (--curve)"
-    return (f"{what}: {', '.join(words)}. A transition (see design) reduces it",)
+    what = "without a transition, compensation leaves at most this opening dead zone at the tests, for each premise"
+    return (f"{what} (--curve): {', '.join(words)}. A transition (see design) reduces it",)
 
 
 def _tables(compensator: "Compensator", nodes: int) -> str:
