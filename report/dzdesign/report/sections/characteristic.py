@@ -121,8 +121,8 @@ def _text(found: Found | None, unit: str, units: RecordedUnits) -> str:
     digits = DECIMALS[unit]
     known = unit in IN_RECORDED_UNITS
     cell = recorded(value, f".{digits}f {unit}", units) if known else number(value, digits)
-    # A narrow space: with a wide one, a bound beside a value would make a table of six pressures scroll.
-    return cell.text if found.value is not None else f"≤\u202f{cell.text}"
+    # Without a space: with one, two bounds in a cell would make a table of six pressures scroll.
+    return cell.text if found.value is not None else f"≤{cell.text}"
 
 
 def _limit(limits: Sequence[LimitResult], units: RecordedUnits) -> Cell:
