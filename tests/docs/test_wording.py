@@ -70,7 +70,7 @@ def test_numbers_of_the_law_are_put_into_words(example_valve, capsys):
     # What the signals hide is no cost among others: it comes first.
     first = design.index("warning: of sensor A a broken wire")
     assert first < design.index("law: 'paper', Eq. (18)") < design.index("note: ") and "note: of sensor" not in design
-    travel = r"at dP0 \(the opening threshold plus its error\), drive range of the law k x_max/u_max = "
+    travel = r"at dP0 \(the opening threshold plus three standard errors\), drive range of the law k x_max/u_max = "
     travel += r"\d+/\d+ = 0\.\d{5} \(from there to"
     assert re.search(travel, design)
     nodes = len(example_compensator.positive.beta)

@@ -169,7 +169,7 @@ def test_a_valve_file_that_was_replaced_is_said_first(copied):
     check = valve_follows(copied / "firmware", compensator)
     assert check.holds and "valve.json" not in check.name
     assert check.text.startswith(f"valve.json beside the firmware is ANOTHER valve, SHA-256 {digest}, and not used; ")
-    assert check.text.endswith(f"has the SHA-256 that made_from states: {stated}")
+    assert check.text.endswith(f"have the SHA-256 in made_from: {stated}")
     shutil.rmtree(copied / "evidence")
     report = report_of_folder(copied / "firmware")
     assert any(line.startswith(f"valve.json has the SHA-256 {digest}, but the compen") for line in report.missing)

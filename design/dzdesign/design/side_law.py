@@ -94,7 +94,7 @@ class SideLaw:
         quantity(
             "1",
             "Threshold u_min0 of the law at dP0, over full command. It is the offset. With a transition it "
-            "is the opening threshold plus its error: the law's line, extended to zero command.",
+            "is the opening threshold plus three standard errors: the law's line, extended to zero command.",
         ),
     ]
     beta: Annotated[
@@ -121,7 +121,9 @@ class SideLaw:
     @property
     def start(self) -> str:
         """Meaning of `u_min0` in words; with a transition the certified offset lies below it."""
-        return "the certified offset" if self.transition_beta is None else "the opening threshold plus its error"
+        if self.transition_beta is None:
+            return "the certified offset"
+        return "the opening threshold plus three standard errors"
 
     def __post_init__(self) -> None:
         if not 0 < self.u_min0_over_u_max < 1:

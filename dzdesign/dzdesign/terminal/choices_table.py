@@ -15,8 +15,8 @@ DITHER = (
     "with it, and use identify --dithered and design --dither."
 )
 HEADING = (
-    "Remaining dead zone and hysteresis in % of full command. Dead zone: largest at the tests, and to the knee also "
-    "between them. Hysteresis: mean and largest over the tests"
+    "Remaining dead zone and hysteresis in % of full command. To the knee: largest over the whole tested range. To a "
+    "flow: largest at the tests. Hysteresis: mean and largest of the tests"
 )
 #: Of the inverse play where it is recommended: the table is of the recorded sweeps.
 PLAY = (

@@ -182,7 +182,8 @@ def _guarded(side: "SideModel") -> str:
     """Say which threshold is bounded."""
     if side.zero_flow_L_min is not None:
         return "the command that passes the flow allowed at zero"
-    return "the knee, or, if the port opens gradually, the command at which the small flow below the knee reaches zero"
+    gradual = "if the port opens gradually, it is the lower command where the small flow below the knee reaches zero"
+    return f"the knee; {gradual}"
 
 
 def _none(side: "SideModel", units: "RecordedUnits") -> str:
@@ -215,8 +216,8 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
-    what = "without a transition, compensation leaves at most this opening dead zone at the tests, for each premise"
-    return (f"{what} (--curve): {', '.join(words)}. A transition (see design) reduces it",)
+    what = "predicted opening dead zone without a transition, largest over the tested pressure drops, for each premise"
+    return (f"{what} (--curve): {', '.join(words)}. `design` states the exact values; a transition reduces them",)
 
 
 def _tables(compensator: "Compensator", nodes: int) -> str:

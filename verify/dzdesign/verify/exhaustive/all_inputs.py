@@ -95,7 +95,7 @@ def input_checks(inputs: InputCheck, units: RecordedUnits, *, both_signs: bool) 
                 else "at every pressure code of the tests the output at zero command stays below the threshold's lower "
                 "bound"
             )
-            + f"; smallest margin of the C's output {margin}",
+            + f"; smallest margin of the C code's output {margin}",
         ),
         (
             requirements.PRESSURE_DIFFERENCE,

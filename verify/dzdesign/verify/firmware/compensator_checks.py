@@ -73,8 +73,7 @@ def valve_follows(folder: Path, compensator: Compensator) -> Check:
         if each.valve != valve
     )
     if stated == compensator.valve_sha256:  # as `identify` writes it: no file is needed
-        text = "the valve in compensator.json, written in the format of `identify`, has the SHA-256 that made_from "
-        text += f"states: {stated}"
+        text = f"the valve data in compensator.json, written as valve.json, have the SHA-256 in made_from: {stated}"
         return VALVE.check(holds=True, text=other + text)
     for each in around:
         if each.sha256 == stated:

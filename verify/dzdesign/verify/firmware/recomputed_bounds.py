@@ -58,8 +58,8 @@ def bounds_follow(compensator: Compensator) -> Check:
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
         text = f"{faults[0]}{more}; a number of valve.json was edited: make it again with `dzdesign identify`"
         return BOUNDS.check(holds=False, text=text)
-    text = f"{count} numbers (the bounds at the tests and the bands above them) follow from the "
-    text += "thresholds, errors and budgets in valve.json; these inputs were not checked here; largest "
+    text = f"{count} numbers (the bounds at the tests, and the error bands above the highest test) follow from the "
+    text += "thresholds, errors and uncertainty budgets in valve.json; these inputs were not checked here; largest "
     return BOUNDS.check(holds=True, text=f"{text}difference {units.text(1e3 * largest, '.2g mV')}")
 
 
