@@ -216,7 +216,7 @@ def _premise_lines(side: "SideModel") -> tuple[str, ...]:
         tested = untested if p_value is None else f"lack of fit {chance(p_value)}"
         leaves = "no offset" if left is None else f"{100 * left:.1f} %"
         words.append(f"{check.premise} {leaves} ({tested})")
-    what = "predicted opening dead zone without a transition, largest over the tested pressure drops, for each premise"
+    what = "predicted opening dead zone without a transition, largest over the tested pressure range, for each premise"
     return (f"{what} (--curve): {', '.join(words)}. `design` states the exact values; a transition reduces them",)
 
 
