@@ -46,8 +46,8 @@ def given_blocks(folder: Path, files: Iterable[Path]) -> list[GivenBlock]:
     wanted = list(dict.fromkeys(files))
     if wanted and read_firmware_manifest(folder).calibration != "block":
         raise InputError(
-            f"--blocks is for a firmware in block form, and '{folder}' has its valve's numbers in the C; make one with "
-            "`dzdesign codegen --calibration block`, or leave --blocks out"
+            f"--blocks is for a firmware in block form, and '{folder}' has its valve's numbers in the C code; make one "
+            "with `dzdesign codegen --calibration block`, or leave --blocks out"
         )
     beside: dict[Path, Mapping[str, Path]] = {}
     return [_given_block(path, beside) for path in wanted]

@@ -82,7 +82,7 @@ def test_a_small_margin_says_where_the_reserve_is(example_valve, example_compens
     of_law = card("Certificate", loops, example_compensator)
     assert "the statistical reserve is in that offset" in of_law.note
     of_c = card("Certificate", loops, example_compensator, inputs)
-    assert "C's output: rounding alone; the statistical reserve is in the bound" in of_c.note
+    assert "C code's output: rounding alone; the statistical reserve is in the bound" in of_c.note
     assert inputs.smallest_margin_V < example_compensator.positive.certificate.mean_loss_V
     machine = designed(example_valve, coil_temperature="-20..80 degC", supply="18..32 V")
     assert "lower bound; the statistical reserve is in the bound" in card("Certificate", loops, machine, inputs).note

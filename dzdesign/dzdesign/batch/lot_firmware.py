@@ -23,7 +23,7 @@ LOT = "lot"
 
 
 class Project(NamedTuple):
-    """All that the C of a firmware in block form depends on."""
+    """All that the C code of a firmware in block form depends on."""
 
     target: str
     built: "BuiltFor"

@@ -61,7 +61,7 @@ class VerifyArguments:
     c2000ware: Annotated[AnyPath | None, Option("DIR", CHECKS)] = None
     """Folder of your C2000Ware. The f28335 firmware is then compiled against its headers too."""
     mutate: Annotated[bool, Option(group=CHECKS)] = False
-    """Insert a fault at every place of the C, one at a time, and count the faults that are detected."""
+    """Insert a fault at every place of the C code, one at a time, and count the faults that are detected."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
     """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr. FMUs run every
     input in Wine and in QEMU."""

@@ -222,7 +222,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         return Figure(
             label="Certificate",
             value="EXCEEDED",
-            note=f"at {whole(exceeded)} pressure codes the C drives the valve at zero command above the "
+            note=f"at {whole(exceeded)} pressure codes the C code drives the valve at zero command above the "
             f"{worst.guard} threshold's {100 * worst.confidence:g} % bound, by up to {units.text(-least, '.2f mV')}",
             kind="bad",
         )
@@ -232,7 +232,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
         note=f"confidence that the output at zero command stays below the {worst.guard} threshold "
         f"{units.span(low, high, '.2f MPa')}; smallest margin "
         + (
-            f"{units.text(least, '.3f mV')} of the C's output{_reserve(compensator)}"
+            f"{units.text(least, '.3f mV')} of the C code's output{_reserve(compensator)}"
             if inputs
             else f"{units.text(1e3 * float(worst.smallest_margin_V), '.3f mV')}, of the exact law under the certified "
             "offset, beside half a count for the rounding; the statistical reserve is in that offset"
@@ -269,11 +269,12 @@ def _premise(compensator: Compensator) -> str:
 
 def _inputs(evidence: Evidence) -> Figure:
     if not evidence.inputs:
-        return Figure(label="Inputs checked", value=NOT_CHECKED, note="the C did not get so far", kind="open")
+        return Figure(label="Inputs checked", value=NOT_CHECKED, note="the C code did not get so far", kind="open")
     wrong, every = sum(each.wrong for each in evidence.inputs), sum(each.inputs for each in evidence.inputs)
     pairs = "pairs of command code and pressure-difference code"
     if wrong:
         return Figure(
             label="Inputs checked", value=f"{whole(wrong)} wrong", note=f"of {whole(every)} {pairs}", kind="bad"
         )
-    return Figure(label="Inputs checked", value=whole(every), note=f"{pairs}; on each the C gives what the law does")
+    note = f"{pairs}; on each, the C code gives what the law does"
+    return Figure(label="Inputs checked", value=whole(every), note=note)

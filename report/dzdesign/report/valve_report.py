@@ -90,7 +90,7 @@ def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "")
     loops = chain.evidence.closed_loop.pressures if chain.evidence else ()
     found = characteristic_quantities(chain.valve, chain.assessment, loops, curves)
     lot, figures = lot_figures(chain), key_figures(chain, found)
-    if lot and chain.evidence:  # the last of them, the inputs, is of the C and not of a valve
+    if lot and chain.evidence:  # the last of them, the inputs, is of the C code and not of a valve
         lot, figures = (*lot, figures[-1]), figures[:-1]
     with figure_style():
         sections = {

@@ -167,7 +167,7 @@ class MutantOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MutationScore:
-    """Wrong versions of the C, and the number of them that the checks caught."""
+    """Wrong versions of the C code, and the number of them that the checks caught."""
 
     mutants: Annotated[Count, about("Number of mutants.")]
     killed: Annotated[Count, about("Number of mutants that a check caught.")]
@@ -221,7 +221,7 @@ class Evidence(Artefact):
         CurrentLoopResult | None,
         about("Current loop of a current-controlled drive; null for a duty-controlled one, or if it did not run."),
     ]
-    mutants: Annotated[MutationScore | None, about("Mutation test of the C, if --mutate was given.")]
+    mutants: Annotated[MutationScore | None, about("Mutation test of the C code, if --mutate was given.")]
     not_covered: Annotated[
         Names, about("What the verdict does not cover, such as an identified side that the output does not drive.")
     ] = ()

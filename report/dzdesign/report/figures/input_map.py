@@ -1,4 +1,4 @@
-"""The map of the C's output against command and pressure drop, with what is wrong or falls back."""
+"""The map of the C code's output against command and pressure drop, with what is wrong or falls back."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -43,7 +43,7 @@ def map_figure(
     left.set(xlim=(first, last), ylabel=f"pressure drop dP ({units.label('MPa')})", title="every difference of codes")
     tested.set(xlim=(max(first, -OTHER_SIGN), last), title="the tested interval, dashed, and around it")
     bar = figure.colorbar(mesh, ax=tested, pad=0.02)
-    bar.set_label(f"output u_O of the C ({units.label('V')})")
+    bar.set_label(f"output u_O of the C code ({units.label('V')})")
     bar.outline.set_visible(False)
     bar.add_lines(lines)
     wrong, fallen = int(grid.wrong.sum()), int(grid.fallen.sum())
@@ -51,7 +51,7 @@ def map_figure(
         figure,
         f"map-{side}",
         f"What the compiled C puts out for {side} commands, on a coarse grid of the pairs that were checked. "
-        "Hatched: a command or a pressure drop that can't be, where the C falls back to the safe value. "
+        "Hatched: a command or a pressure drop that can't be, where the C code falls back to the safe value. "
         "Red crosses: points where it is not "
         f"the exactly rounded law; on this grid {wrong}, of all pairs {whole(inputs.wrong)}. Strip at zero "
         f"command: green where the output is below the threshold's bound, red and hatched where not ({over} codes).",

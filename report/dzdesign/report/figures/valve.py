@@ -130,10 +130,10 @@ def beta_figure(
     ]
     if compensator:
         where, nodes, of_the_C = _beta_table(compensator, name)
-        table = nodes * of_the_C / u_min0  # with a transition the C counts from the opening threshold
+        table = nodes * of_the_C / u_min0  # with a transition the C code counts from the opening threshold
         near = (where >= dp[0] - 0.1 * np.ptp(dp)) & (where <= dp[-1] + 0.1 * np.ptp(dp))
         shown = units.convert(where[near], "MPa")
-        axes.plot(shown, table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C's offset / u_min0")
+        axes.plot(shown, table[near], ".-", color=LIGHT["ink"], ms=4, lw=1, label="the C code's offset / u_min0")
         rows += [
             ["C", round(float(x), 6), round(float(y), 7), None, round(float(y * of_the_C), 7)]
             for x, y in zip(where, nodes, strict=True)
@@ -157,8 +157,8 @@ def _about_the_table(compensator: Compensator | None) -> str:
     if compensator is None:
         return ""
     holds = compensator.below_dp0 == "hold"
-    held = " Up to dP0 the C holds what it has there, as the paper does." if holds else ""
-    return f"{held} The table in the C is rounded down, so that it stays below the bound."
+    held = " Up to dP0 the C code holds what it has there, as the paper does." if holds else ""
+    return f"{held} The table in the C code is rounded down, so that it stays below the bound."
 
 
 def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.ndarray, float]:

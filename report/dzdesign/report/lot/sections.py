@@ -161,8 +161,8 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     lines = (
         "The largest offset that over-compensates none of the valves, certified for each of them "
         f"{span(*setting.dp_MPa, lot.units)}, is in {setting.file}; its trend is that of {setting.carrier}.",
-        f"{_sentence(checked_line(setting, lot.units))} The C made of the file is compared with all bounds by dzdesign "
-        "verify.",
+        f"{_sentence(checked_line(setting, lot.units))} The C code made of the file is compared with all bounds by "
+        "dzdesign verify.",
         *(f"{line}." for line in untested_lines(setting, lot.units)),
         *map(_sentence, cost_lines(lot.summary)),
         f"It is held down by {and_more(setting.binding, NAMED)}.",

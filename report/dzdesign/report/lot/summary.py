@@ -93,7 +93,7 @@ class SmallestMargin:
         quantity(
             "V",
             "Smallest margin of the exact law below the valve's bound, with half a count reserved for "
-            "rounding. The margin in `verify` refers to the rounded integers of the C.",
+            "rounding. The margin in `verify` refers to the rounded integers of the C code.",
         ),
     ]
 

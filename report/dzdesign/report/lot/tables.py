@@ -170,7 +170,7 @@ def holding_table(lot: Lot, setting: LotSettingSummary) -> Table:
             "A valve's own ceiling, which its own offset may not exceed, runs straight between its tests, at its "
             "bounds or under them: this margin is no larger than that valve's margin under its bounds, which is said "
             "above of the nearest valve. Both are of the exact law, with half a count of rounding added; what dzdesign "
-            "verify states is of the whole numbers that the C gives.",
+            "verify states is of the whole numbers that the C code gives.",
         ),
     )
 

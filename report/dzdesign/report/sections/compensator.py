@@ -1,4 +1,4 @@
-"""Sections on the compensator: its law in exact numbers, the integers of the C and what they cost."""
+"""Sections on the compensator: its law in exact numbers, the integers of the C code and what they cost."""
 
 from collections.abc import Iterator
 from fractions import Fraction
@@ -46,7 +46,7 @@ def _exact(value: Fraction) -> str:
 
 
 def integers_section(firmware: FirmwareManifest | None, compensator: Compensator | None) -> Section:
-    """Return the section on the integers of the C."""
+    """Return the section on the integers of the C code."""
     tables = (rounding_table(compensator),) if compensator else ()
     if firmware is None:
         return Section(tables=tables, missing="No firmware is here: `dzdesign codegen` makes it, and its constants.")
@@ -54,7 +54,7 @@ def integers_section(firmware: FirmwareManifest | None, compensator: Compensator
 
 
 def constants_table(firmware: FirmwareManifest) -> Table:
-    """Return every number in the C: what it stands for, how it was rounded and where it comes from."""
+    """Return every number in the C code: what it stands for, how it was rounded and where it comes from."""
     return table_of(
         "Every number in the core, in the order of the files",
         firmware.constants,
@@ -123,7 +123,7 @@ def rounding_table(compensator: Compensator) -> Table:
         "What the integers cost",
         rows,
         ("number", lambda row: word(row[0])),
-        ("in the C", lambda row: word(row[1])),
+        ("in the C code", lambda row: word(row[1])),
         ("exact, or what is done", lambda row: word(row[2])),
         (f"difference, at most ({units.label('mV')})", lambda row: recorded(row[3], "+.3f mV", units)),
     )

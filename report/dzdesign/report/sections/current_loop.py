@@ -20,7 +20,7 @@ def _optional(value: float | None, places: int, factor: float = 1.0) -> Cell:
 
 def _corners(result: CurrentLoopResult) -> Table:
     return table_of(
-        "Current loop: margins of its equations, and the C with the coil, at every corner",
+        "Current loop: margins of its equations, and the C code with the coil, at every corner",
         result.corners,
         ("resistance (ohm)", lambda one: number(one.resistance_ohm, 2)),
         ("inductance (mH)", lambda one: number(1e3 * one.inductance_H, 1)),

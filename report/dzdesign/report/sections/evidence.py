@@ -52,7 +52,7 @@ def _curves(chain: Chain, name: str) -> Curves | None:
 def inputs_section(chain: Chain) -> Section:
     """Return the section on the check of every input."""
     if chain.evidence is None:
-        return Section(missing="No evidence is here: `dzdesign verify` tries every input of the C.")
+        return Section(missing="No evidence is here: `dzdesign verify` tries every input of the C code.")
     figures: list[ReportFigure] = []
     lines, missing = [], ""
     for each in chain.evidence.inputs:
@@ -68,7 +68,7 @@ def inputs_section(chain: Chain) -> Section:
             if curves is None or law is None:
                 missing = f"{name} or its compensator is missing; `dzdesign verify` makes it."
     if not chain.evidence.inputs:
-        missing = f"{NOT_CHECKED}: the C did not compile or did not run, see the requirements."
+        missing = f"{NOT_CHECKED}: the C code did not compile or did not run, see the requirements."
     return Section(figures=figures, lines=tuple(lines), missing=missing)
 
 
@@ -76,8 +76,8 @@ def _input_lines(found: InputCheck, units: RecordedUnits) -> list[str]:
     line = (
         f"{found.side.capitalize()} commands: {whole(found.inputs)} pairs of command and pressure-difference code "
         f"compared with the exactly rounded law, {whole(found.wrong)} wrong, largest error {found.largest_error} "
-        f"counts; {found.over_compensated} pressure codes over-compensated, smallest margin of the C's compare values "
-        f"{units.text(1e3 * found.smallest_margin_V, '.3f mV')}."
+        f"counts; {found.over_compensated} pressure codes over-compensated, smallest margin of the C code's compare "
+        f"values {units.text(1e3 * found.smallest_margin_V, '.3f mV')}."
     )
     return [line, f"First wrong: {found.first_wrong}."] if found.first_wrong else [line]
 

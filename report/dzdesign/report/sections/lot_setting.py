@@ -97,14 +97,14 @@ def _worst(evidence: Evidence | None, units: RecordedUnits) -> Figure:
     if not found:
         return Figure(
             label="Worst valve of the lot", value=NOT_CHECKED, kind="open",
-            note="no evidence here compares the C with the bounds of each valve",
+            note="no evidence here compares the C code with the bounds of each valve",
         )  # fmt: skip
     worst = min(found, key=lambda each: each.smallest_margin_V)
     over = {name for each in found for name in each.over_compensated}
     return Figure(
         label=f"Worst valve of the lot: {worst.worst}",
         value=units.text(1e3 * worst.smallest_margin_V, ".3f mV"),
-        note="margin of the C's compare values at zero command under its own lower bound, at "
+        note="margin of the C code's compare values at zero command under its own lower bound, at "
         f"{units.text(worst.worst_dp_MPa, '.2f MPa')}; {len(over)} of {min(each.valves for each in found)} valves "
         "over-compensated",
         kind="bad" if over else "text",

@@ -1,7 +1,7 @@
 """No undefined behaviour where `int` has 16 bits, for every input: shown by Frama-C's Eva, where that is installed.
 
 Running the core at every input, on the host and in simulators, can't show that: a signed overflow or an index beyond a
-table may do by chance what was meant. Eva reads the C as the standard does, with the 16-bit `int` of TI's C28x.
+table may do by chance what was meant. Eva reads the C code as the standard does, with the 16-bit `int` of TI's C28x.
 """
 
 import csv

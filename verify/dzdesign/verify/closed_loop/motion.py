@@ -145,7 +145,7 @@ def numbers_of(plant: Plant, compare_max: int) -> Numbers:
 
 @cache
 def motion_header() -> str:
-    """Return the C of the functions that plant_period.h calls; the same for every plant.
+    """Return the C code of the functions that plant_period.h calls; the same for every plant.
 
     ``plant_step(i, x, v, response[5], acts, push, supply_MPa, p) -> (i, x, v, charge, middle, acts, excess)``
         moves over a period that touches neither a stop nor the edge. `response`: what the voltage adds to current,

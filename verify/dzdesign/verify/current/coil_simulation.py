@@ -45,7 +45,7 @@ class CoilLoop:
         return self.sensor.V_per_A * self.converter.levels / float(self.converter.full_V)
 
     def coil_struct(self, corner: Corner, *, stuck: bool = False) -> np.ndarray:
-        """Return a coil at a supply as the C takes it; of one that is stuck the switch stays on."""
+        """Return a coil at a supply as the C code takes it; of one that is stuck the switch stays on."""
         sampling = self.sampling
         values = (
             *corner, self.circuit.freewheel_V, sampling.period_s, self.loop.full_counts, self.circuit.rated_A,
@@ -54,7 +54,7 @@ class CoilLoop:
         return np.array([values], dtype=COIL)
 
     def sensor_struct(self) -> np.ndarray:
-        """Return the sensor as the C takes it."""
+        """Return the sensor as the C code takes it."""
         sensor, converter = self.sensor, self.converter
         codes_per_V = converter.levels / float(converter.full_V)
         values = (sensor.V_per_A, sensor.offset_V, codes_per_V, converter.code_max, sensor.supply_divider)

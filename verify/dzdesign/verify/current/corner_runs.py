@@ -1,4 +1,4 @@
-"""The C with the coil at every declared corner: set points held, a step, faults of the circuit."""
+"""The C code with the coil at every declared corner: set points held, a step, faults of the circuit."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class HeldCurrent:
 
 
 def held_current(simulation: CoilSimulation, corner: Corner, share: float, offset_codes: float = 0.0) -> HeldCurrent:
-    """Hold a set point; with a sensor whose zero is off, the offset is what the C calibrated."""
+    """Hold a set point; with a sensor whose zero is off, the offset is what the C code calibrated."""
     around = simulation.around
     loop, sampling = around.loop, around.sampling
     settle, held = (round(seconds * sampling.tick_Hz) for seconds in (SETTLE_S, HELD_S))
@@ -122,7 +122,7 @@ class CornerRun:
 
 
 def run_corner(simulation: CoilSimulation, corner: Corner) -> CornerRun:
-    """Run the C with one coil at one supply."""
+    """Run the C code with one coil at one supply."""
     around = simulation.around
     tried = [share for share in SHARES if carries(around, corner, share)]
     held = [held_current(simulation, corner, share) for share in tried]

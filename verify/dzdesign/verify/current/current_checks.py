@@ -58,7 +58,7 @@ class CurrentChecks:
 
 
 def read_controller(folder: Path) -> dict[str, str]:
-    """Return the C of a firmware's current controller, by file; one that is not there is a `RequirementError`."""
+    """Return the C code of a firmware's current controller, by file; one that is not there is a `RequirementError`."""
     try:
         core = {name: (folder / "core" / name).read_text(encoding="utf-8") for name in CORE}
         if bound := bound_files(folder):

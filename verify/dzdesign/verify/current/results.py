@@ -31,7 +31,7 @@ class ControllerStates:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentCorner:
-    """One coil at one supply: margins of the loop by its equations, and the behaviour of the C."""
+    """One coil at one supply: margins of the loop by its equations, and the behaviour of the C code."""
 
     resistance_ohm: Annotated[float, quantity("ohm", "Resistance of the whole circuit.", ge=0, le=1e6)]
     inductance_H: Annotated[float, quantity("H", "Inductance of the coil.", ge=0, le=1e6)]
@@ -68,7 +68,7 @@ class CurrentCorner:
     ]
     least_rise_s: Annotated[float | None, quantity("s", "Rise time with the switch always on.")]
     overshoot: Annotated[float | None, quantity("1", "Overshoot of that step, relative to its height.")]
-    faults: Annotated[Number, about("Fault bits DZ_CURRENT_... that the C set; must be 0.")]
+    faults: Annotated[Number, about("Fault bits DZ_CURRENT_... that the C code set; must be 0.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +125,7 @@ class ValveAtCorners:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentLoopResult:
-    """Result of the current loop: the C alone, and with the coil at every corner of the declared ranges."""
+    """Result of the current loop: the C code alone, and with the coil at every corner of the declared ranges."""
 
     states: Annotated[ControllerStates, about("Comparison of the controller with its exact model, state by state.")]
     seconds: Annotated[float, quantity("s", "Time for which each set point was held after settling.", ge=0, le=1e6)]

@@ -87,7 +87,7 @@ def above_checked(inputs: InputCheck, units: RecordedUnits, sign: str) -> Check:
         parts.append("nothing is certified there")
     else:
         margin = "" if above.smallest_margin_V is None else (
-            f" (smallest margin of the C's compare values {units.text(1e3 * above.smallest_margin_V, '.3f mV')})"
+            f" (smallest margin of the C code's compare values {units.text(1e3 * above.smallest_margin_V, '.3f mV')})"
         )
         parts.append(
             f"up to {units.text(above.certified_to_MPa, '.3g MPa')}, {above.over_compensated} exceed the bound that "

@@ -23,7 +23,7 @@ from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
 from dzdesign.verify.toolchain.machines import discard
 
-#: The C that decides which blocks the core may use.
+#: The C code that decides which blocks the core may use.
 ACCEPTANCE = "dz_calibration.c"
 #: Octets of a block, and what is wrong with one.
 FUNCTIONS = (Function("dz_size", (), "uint32_t"), Function("dz_calibration_check", ("in",), "uint16_t"))
@@ -38,7 +38,7 @@ class BlockCheck(Artefact):
         Literal["dzdesign.calibration-check/1"], Meta(description="Name and version of this schema.")
     ] = "dzdesign.calibration-check/1"
     block_sha256: Annotated[Sha256, about("Hash of the block's octets.")]
-    check_sha256: Annotated[Sha256, about("Hash of the C of dz_calibration_check() that was compiled.")]
+    check_sha256: Annotated[Sha256, about("Hash of the C code of dz_calibration_check() that was compiled.")]
     refused: Annotated[int, about("What dz_calibration_check() returns: 0, or what it finds wrong.")]
     inputs: Annotated[tuple[InputCheck, ...], about("One entry a side; empty of a block that is refused.")]
     holds: Annotated[bool, about("Whether it is accepted and nothing was found on any input.")] = field(init=False)

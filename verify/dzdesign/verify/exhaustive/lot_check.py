@@ -62,7 +62,7 @@ def lot_checked(inputs: Sequence[InputCheck], compensator: Compensator) -> list[
         f"{min(each.valves for each in found)} of {count} valves, each at every difference of pressure codes that it "
         f"was tested over, against its own bounds ({least if least == most else f'{least} to {most}'} % for each): "
         f"{len(over)} over-compensated" + (f": {and_more(over, NAMED)}" if over else "") + "; smallest margin of the "
-        f"C's compare values {units.text(1e3 * worst.smallest_margin_V, '.3f mV')}: {worst.worst}, "
+        f"C code's compare values {units.text(1e3 * worst.smallest_margin_V, '.3f mV')}: {worst.worst}, "
         f"{units.text(worst.worst_dp_MPa, '.2f MPa')}"
     )
     all_there = all(each.valves == count for each in found)

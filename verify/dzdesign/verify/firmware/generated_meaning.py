@@ -67,7 +67,7 @@ class _Tree:
     command: tuple[str, ...]
 
     def run(self, source: str, *options: str) -> str:
-        """Run the compiler on a C file, as make does in the target's folder; what the C lacks is an error."""
+        """Run the compiler on a C file, as make does in the target's folder; what the C code lacks is an error."""
         name = source if Path(source).is_absolute() else posixpath.relpath(source, self.place)
         try:
             done = run_compiler([*self.command, *options, name], self.root / self.place)

@@ -18,7 +18,7 @@ INCLUDE = re.compile(rf"{HASH}(?:include_next|include|import){BLANK}([^\n]*)", r
 INCLUDED_SCRIPT = re.compile(r"\bINCLUDE\s+(\S+)")
 NAME = re.compile(r"[A-Za-z_]\w*")
 FUNCTION = re.compile(r"\b(dz_\w+)\s*\(")
-#: A symbol that a linker file gives an address, over that of the C; its name may stand in quotes.
+#: A symbol that a linker file gives an address, over that of the C code; its name may stand in quotes.
 ASSIGNED = re.compile(r"\b(\w+)\"?\s*(?:[-+*/&|]|<<|>>)?=(?!=)")
 #: A file that a linker file has linked beside those of the command.
 LINKED = re.compile(r"\b(?:INPUT|GROUP|STARTUP|AS_NEEDED)\s*\(([^)]*)\)")

@@ -1,4 +1,4 @@
-"""Checks of a folder for MATLAB: the function's text, every input of it in Octave, and of the C beside it."""
+"""Checks of a folder for MATLAB: the function's text, every input of it in Octave, and of the C code beside it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -75,7 +75,7 @@ def _unchanged(folder: Path, manifest: OutputManifest, compensator: Compensator)
 def _of_side(
     folder: Path, compensator: Compensator, sign: int, text: bytes, read: ReadFunction, octave: Octave, say: Say
 ) -> tuple[list[Check], list[TriedInputs]]:
-    """Return what trying every input of one side found: of the C, and where Octave is there of the function."""
+    """Return what trying every input of one side found: of the C code, and where Octave is there of the function."""
     prepared = PreparedInputs(ExactLaw(compensator, sign))
     core, name, units = CompiledCore(folder, sign), f"{NAMES[sign]}.m", compensator.valve.recorded_units
     say(f"trying every input of core/{core.name}")
@@ -85,7 +85,7 @@ def _of_side(
         found.append(operations_check(read, prepared))
         tried = [_tried(f"core/{core.name}", of_c)]
         # Of wrong C the check asks for more inputs than of right one, so there is no list of them.
-        missing = "not run, because the C beside it is wrong" if of_c.wrong + of_c.odd_pairs else octave.missing
+        missing = "not run, because the C code beside it is wrong" if of_c.wrong + of_c.odd_pairs else octave.missing
         if missing:
             found.append(EXACT_LAW.check(holds=None, text=missing, name=f"{name}: {EXACT_LAW.title}"))
             return found, tried

@@ -1,4 +1,4 @@
-"""A function block's text evaluated by NumPy: slow, and the referee of the C that the text is turned into.
+"""A function block's text evaluated by NumPy: slow, and the referee of the C code that the text is turned into.
 
 Every variable is an array with an element for each input; a branch acts on the elements of its condition.
 """

@@ -48,6 +48,6 @@ def bound_files(folder: Path) -> dict[str, str]:
 
 
 def core_sources(folder: Path) -> dict[str, str]:
-    """Return the C of a firmware's core, and what binds one in block form to its block."""
+    """Return the C code of a firmware's core, and what binds one in block form to its block."""
     core = {path.name: path.read_text(encoding="utf-8") for path in sorted((folder / "core").glob("*.[ch]"))}
     return {**core, **bound_files(folder)}
