@@ -19,6 +19,7 @@ from dzdesign.report.lot.output_types import NOT_MADE, ValveOutput
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
 from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
 from dzdesign.stages.identify import IdentifyChoices
+from dzdesign.terminal.progress import reporting
 
 if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
@@ -120,7 +121,8 @@ def calibrate(task: Task) -> Outcome:
     """Identify, design, generate and, if asked for, verify one valve; a failure is an outcome, never an exception."""
     if task.refused:
         return task.outcome(FAILED, task.refused)
-    with SOLVER_LOCK, scratch_folder() as folder:
+    # The batch says a line for each valve; a stage's own would not name its valve, and a worker knows no --quiet.
+    with SOLVER_LOCK, reporting(quiet=True, verbose=False), scratch_folder() as folder:
         try:
             result = _run(task, folder)
         except DzdesignError as error:

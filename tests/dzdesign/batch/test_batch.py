@@ -495,6 +495,20 @@ def test_no_more_processes_than_have_something_to_do(monkeypatch):
     assert [useful_jobs(1000, waiting) for waiting in (0, 1, 3)] == [2, 2, 3]  # one alone would be this very process
 
 
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_batch_in_a_pipe_says_a_line_a_valve_and_none_if_quiet(jobs, quiet, tmp_path):
+    """In a process of its own: of a worker, stderr is that of the process and not a test's."""
+    write_lot(tmp_path / "lot", 2, 0, SEED)
+    code = "import sys; from dzdesign.command_line.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "batch", "lot", "-o", "out", "--jobs", jobs, *OPTIONS, *["--quiet"] * quiet]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0
+    said = sorted(line.partition(" of 2: ")[2] or line for line in done.stderr.splitlines())
+    lines = ["V0000: calibrated", "V0001: calibrated", "dzdesign: 2 valves, 0 of them done before"]
+    assert said == ([] if quiet else lines)
+
+
 def test_a_board_file_that_was_filled_in_stays_and_its_valve_with_it(tmp_path, capsys):
     lot = tmp_path / "lot"
     write_lot(lot, 2, 0, SEED)
