@@ -155,10 +155,10 @@ def test_a_read_only_file_that_windows_can_not_sync_is_carried_over(tmp_path, mo
     (folder / "object").write_text("mine")
     real = os.open
 
-    def windows(path, flags, *rest):
+    def windows(path, flags, *rest, **more):
         if flags == os.O_RDWR and str(path).endswith("object"):
             raise PermissionError(13, "Permission denied")
-        return real(path, flags, *rest)
+        return real(path, flags, *rest, **more)
 
     monkeypatch.setattr("dzdesign.core.disk_sync.FOLDERS_OPEN", False)
     monkeypatch.setattr(os, "open", windows)

@@ -73,7 +73,7 @@ def test_the_options_are_those_of_the_commands():
         options = [argument.name for argument in arguments_of_command(command) if argument.name != "list_targets"]
         assert set(inspect.signature(function).parameters) == set(options)
         for name in options:
-            assert re.search(rf"^ +{name} : \w+", function.__doc__, re.MULTILINE), (command, name)
+            assert re.search(rf"^{name} : \w+", inspect.getdoc(function), re.MULTILINE), (command, name)
         assert re.search(r"\n\n *Raises\n *------\n", function.__doc__)
 
 

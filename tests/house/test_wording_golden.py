@@ -24,9 +24,9 @@ def test_a_changed_text_is_seen_and_an_update_keeps_it(tmp_path):
 def test_every_message_is_of_a_test():
     """A name is ``group: case``; the group stands in the tests as it is written, or is the name of their file."""
     groups = {name.partition(": ")[0] for name in read_messages()}
-    sources = {path.stem: path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py")}
-    asked = set(re.findall(r"wording\(\s*f?[\"']([^:\"'{]+): ", "".join(sources.values())))
-    asked |= {name_of_tests(stem) for stem, text in sources.items() if re.search(r"wording\.(refusal|of_test)\(", text)}
+    sources = [(path.stem, path.read_text(encoding="utf-8")) for path in TESTS.rglob("test_*.py")]
+    asked = set(re.findall(r"wording\(\s*f?[\"']([^:\"'{]+): ", "".join(text for _, text in sources)))
+    asked |= {name_of_tests(stem) for stem, text in sources if re.search(r"wording\.(refusal|of_test)\(", text)}
     assert groups and groups == asked
 
 

@@ -87,6 +87,8 @@ def check_address_space(what: str, needed_MiB: int = NEEDED_MIB) -> None:
 
 def reason_of(error: OSError | ValueError) -> str:
     """Return why a file can't be read or written: the system's own words, where it has some."""
+    if isinstance(error, ValueError) and "embedded null" in str(error):  # each version of Python words it otherwise
+        return "a file's name has no NUL character"
     return getattr(error, "strerror", None) or str(error)
 
 
@@ -171,4 +173,4 @@ def _refusing(path: Path, what: str) -> Iterator[None]:
             raise InputError(f"{what} '{path}' is a folder, expected a file") from error
         raise InputError(f"{what} '{path}' can't be read: {error.strerror}") from error
     except ValueError as error:  # a name with a NUL, from a TOML file
-        raise InputError(f"{what} '{path}' can't be a file's name ({error})") from error
+        raise InputError(f"{what} '{path}' can't be read: {reason_of(error)}") from error
