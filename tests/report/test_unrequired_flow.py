@@ -21,7 +21,7 @@ COLD = ScenarioResult(
     unseen_below_L_min=0.6, q_zero_L_min=5.02, q_peak_at_zero_L_min=5.1, must_shut=False, not_required=NOT_DECLARED,
     figures={},
 )  # fmt: skip
-BOTH = replace(COLD, name="coil 40 K colder, supply 20% higher", q_zero_L_min=11.52)
+BOTH = replace(COLD, name="coil 40 K colder, supply voltage 20% higher", q_zero_L_min=11.52)
 STUCK = replace(COLD, name="dP above the tests", q_zero_L_min=0.9, not_required=NO_CORE_CAN_KNOW)
 
 
@@ -31,7 +31,7 @@ def said(*scenarios: ScenarioResult) -> str:
 
 def test_the_largest_flow_leads_with_its_remedy():
     text = said(COLD, BOTH, STUCK)
-    assert "up to 11.5 L/min at zero command (coil 40 K colder, supply 20% higher; in the runs for 5.00 MPa)" in text
+    assert f"up to 11.5 L/min at zero command ({BOTH.name}; in the runs for 5.00 MPa)" in text
     assert "--coil-temperature" in text and "5.02" not in text
 
 

@@ -56,9 +56,9 @@ def test_the_drive_at_each_corner_is_that_of_the_declared_machine_by_another_for
     found = {each.name: each.voltage_ratio / each.resistance_ratio for each in drive_corners(compensator)}
     assert len(found) == 6 and all(not each.not_required for each in drive_corners(compensator))
     for coil_C, supply_V, name in (
-        (-20.0, 24.0, "coil at -20 °C"), (80.0, 24.0, "coil at 80 °C"), (25.0, 18.0, "supply at 18 V"),
-        (25.0, 32.0, "supply at 32 V"), (-20.0, 32.0, "coil at -20 °C, supply at 32 V"),
-        (80.0, 18.0, "coil at 80 °C, supply at 18 V"),
+        (-20.0, 24.0, "coil at -20 °C"), (80.0, 24.0, "coil at 80 °C"), (25.0, 18.0, "supply voltage 18 V"),
+        (25.0, 32.0, "supply voltage 32 V"), (-20.0, 32.0, "coil at -20 °C, supply voltage 32 V"),
+        (80.0, 18.0, "coil at 80 °C, supply voltage 18 V"),
     ):  # fmt: skip
         assert found[name] == pytest.approx(1 / float(MACHINE.drive_factor(coil_C, supply_V)), rel=1e-12)
     aged = 1 - MACHINE.oil_error
@@ -68,7 +68,7 @@ def test_the_drive_at_each_corner_is_that_of_the_declared_machine_by_another_for
 def test_a_machine_that_was_not_declared_is_shown_and_not_required(results):
     shown = {each.name: each for each in results if each.not_required == NOT_DECLARED and each.dp_MPa > 4}
     assert shown["coil 40 K colder"].q_zero_L_min > 3, "690 mV of a threshold of 5.0 V"
-    assert shown["supply 20% higher"].q_zero_L_min > 3
+    assert shown["supply voltage 20% higher"].q_zero_L_min > 3
     opening = "dead_zone_on_opening_percent"
     hot, cold = (shown[f"coil {name}"].figures[opening] for name in ("60 K hotter", "40 K colder"))
     assert cold < 0.1 < 20 < hot

@@ -59,8 +59,8 @@ def _machine(compensator: Compensator, sign: int) -> str:
     budget = compensator.side(sign).budget
     if compensator.machine is None or budget is None:
         return (
-            "No machine was declared: the certificate does not cover coil temperature, supply, pressure sensors, "
-            "converters beyond rounding, oil or ageing."
+            "No machine was declared: the certificate does not cover coil temperature, supply voltage, "
+            "pressure sensors, converters beyond rounding, oil or ageing."
         )
     words = taken_off(budget, compensator.valve.recorded_units.of_side(SIDE_NAMES[sign]))
     return f"{words[0].upper()}{words[1:]}; compensator.json lists all of it."

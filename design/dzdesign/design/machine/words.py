@@ -10,8 +10,8 @@ def reach_of_certificate(compensator: Compensator) -> str:
     """Return a sentence on what the certificate counts of a machine, or that it counts nothing of one."""
     if compensator.machine is None:
         return (
-            "The certificate covers the valve as recorded: no machine was declared, so coil temperature, supply, "
-            "pressure sensors, oil and ageing are not counted."
+            "The certificate covers the valve as recorded: no machine was declared, so coil temperature, "
+            "supply voltage, pressure sensors, oil and ageing are not counted."
         )
     parts = []
     for sign in compensator.signals.signs:

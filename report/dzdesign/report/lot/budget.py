@@ -87,8 +87,8 @@ def lot_budget_lines(budget: LotBudget | None) -> tuple[str, ...]:
     if any("machine" in each for each in budget.certified_of):
         return (f"The certificates cover {budget.certified_of[0]}.",)
     return (
-        "The certificates cover the valves as recorded: no machine was declared, so coil temperature, supply, pressure "
-        "sensors, oil and ageing are not counted.",
+        "The certificates cover the valves as recorded: no machine was declared, so coil temperature, "
+        "supply voltage, pressure sensors, oil and ageing are not counted.",
     )
 
 

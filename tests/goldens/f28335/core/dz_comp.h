@@ -70,7 +70,7 @@
  * MPa the offset falls with the continued bound. Up to 21.8 MPa this offset is certified if the threshold continues
  * from the last tests' value and slope, with curvature at most M = 0 mV/MPa^2. Below 1.00 MPa the offset of the lowest
  * test is held and nothing is certified. A threshold that keeps rising towards zero pressure drop stays above this
- * offset. No machine was declared: the certificate does not cover coil temperature, supply, pressure sensors,
+ * offset. No machine was declared: the certificate does not cover coil temperature, supply voltage, pressure sensors,
  * converters beyond rounding, oil or ageing.
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);

@@ -71,7 +71,7 @@
  * MPa this offset is certified if the threshold continues from the last tests' value and slope, with curvature at most
  * M = 0 mV/MPa^2. Below 1.00 MPa the offset of the lowest test is held and nothing is certified. A threshold that keeps
  * rising towards zero pressure drop stays above this offset. No machine was declared: the certificate does not cover
- * coil temperature, supply, pressure sensors, converters beyond rounding, oil or ageing.
+ * coil temperature, supply voltage, pressure sensors, converters beyond rounding, oil or ageing.
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
@@ -86,8 +86,8 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
  * zero from 15.3 MPa on. There the full dead zone is back. Up to there this offset is certified if the threshold
  * continues from the last tests' value and slope, with curvature at most M = 39.8 mV/MPa^2. Below 1.00 MPa the offset
  * of the lowest test is held and nothing is certified: the threshold grows with the pressure drop, so flow at zero
- * command is possible there. No machine was declared: the certificate does not cover coil temperature, supply, pressure
- * sensors, converters beyond rounding, oil or ageing.
+ * command is possible there. No machine was declared: the certificate does not cover coil temperature, supply voltage,
+ * pressure sensors, converters beyond rounding, oil or ageing.
  */
 uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 

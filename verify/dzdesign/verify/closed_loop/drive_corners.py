@@ -114,10 +114,11 @@ def _coils(machine: Machine | None) -> tuple[_End, _End]:
 def _supplies(machine: Machine | None) -> tuple[_End, _End]:
     """Return the supply low and high."""
     if machine is not None and machine.supply_V is not None and machine.bench_supply_V is not None:
-        low, high = (_End(name=f"supply at {end:g} V", ratio=end / machine.bench_supply_V) for end in machine.supply_V)
+        bench_V = machine.bench_supply_V
+        low, high = (_End(name=f"supply voltage {end:g} V", ratio=end / bench_V) for end in machine.supply_V)
         return low, high
     low, high = (
-        _End(name=f"supply {SUPPLY_SHARE:.0%} {word}", ratio=1 + way * SUPPLY_SHARE, not_required=NOT_DECLARED)
+        _End(name=f"supply voltage {SUPPLY_SHARE:.0%} {word}", ratio=1 + way * SUPPLY_SHARE, not_required=NOT_DECLARED)
         for word, way in (("lower", -1), ("higher", 1))
     )
     return low, high
@@ -128,7 +129,7 @@ def _circuit_ends(circuit: CoilCircuit) -> tuple[tuple[_End, _End], tuple[_End, 
     cold, hot = (
         _End(name=f"coil of {factor:g} times the resistance", ratio=factor) for factor in circuit.resistance_factors
     )
-    low, high = (_End(name=f"supply at {end:g} V", ratio=1.0, supply_V=end) for end in circuit.supply_V)
+    low, high = (_End(name=f"supply voltage {end:g} V", ratio=1.0, supply_V=end) for end in circuit.supply_V)
     return (cold, hot), (low, high)
 
 
