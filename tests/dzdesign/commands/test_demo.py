@@ -71,8 +71,8 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys, monkeypatch):
     assert len(rows) == 6 and all(45 < share < 55 for share in without) and {round(share) for share in left} == {1}
     assert "the first half of the command gives no flow" in readme
     assert "flow starts at about 1 % of full command" in readme
-    pairs = f"every command code and every difference of two valid pressure codes: {round(INPUTS / 1e6)} million pairs"
-    assert pairs in readme
+    inputs = f"all {round(INPUTS / 1e6)} million inputs: every command code with every pressure-difference code"
+    assert inputs in readme
 
 
 @needs_compiler
