@@ -15,8 +15,8 @@ from tests.support.synthetic import needs_compiler
 PAGE = ROOT / "docs" / "howto" / "ci.md"
 EXAMPLE = ROOT / "examples" / "paper_valve"
 OPTIONS = 'meter_lag = "0.1 s"\nmeter_floor = "0.6 L/min"\n'
-#: Steps that a test can't try: they install from an index.
-NOT_HERE = ("pip install dzdesign",)
+#: Steps that a test can't try: they install the wheel of a release.
+NOT_HERE = ("pip install tools/dzdesign-1.0.0-py3-none-any.whl",)
 
 
 def workflow():
@@ -35,6 +35,14 @@ def test_the_workflow_is_one():
     assert [step["run"] for step in job["steps"] if "run" in step] == steps()
     assert all({"run", "uses"} & set(step) for step in job["steps"])
     assert document[True]  # `on`, which YAML 1.1 reads so
+
+
+def test_no_page_installs_a_name_that_anybody_may_register():
+    """The project is not on PyPI: `pip install dzdesign` would take whatever stands there."""
+    by_name = re.compile(r"pip install(?: -\S+)* [\"']?dzdesign(?!-\d)")
+    assert by_name.search("pip install dzdesign") and by_name.search("pip install 'dzdesign[fmu]'")
+    for page in (ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("*/dzdesign/**/*.py")):
+        assert not by_name.search(page.read_text("utf-8").replace("\n", " ")), page
 
 
 def test_the_workflow_derives_before_it_designs():

@@ -21,6 +21,13 @@ def test_the_picture_is_small_and_described():
     assert struct.unpack(">II", picture[16:24]) > (900, 600)
 
 
+def test_the_first_commands_are_those_that_ci_runs():
+    commands = re.findall(r"^    (make .+)$", README, re.MULTILINE)
+    assert commands == ["make demo", "make test"]
+    assert "\nmake test " in (ROOT / ".ci/run").read_text("utf-8")
+    assert README.index("make demo") < README.index("pip install")
+
+
 def test_the_instructions_are_those_of_the_generated_readme():
     """tests/codegen/test_core_costs.py measures them."""
     generated = (TESTS / "goldens/cortex-m4/cortex_m4/README.md").read_text("utf-8")

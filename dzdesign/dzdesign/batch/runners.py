@@ -234,7 +234,7 @@ def _client(address: str) -> "Client":
     try:
         from distributed import Client
     except ImportError as error:
-        raise InputError("--dask needs the package distributed; pip install 'dzdesign[cluster]'") from error
+        raise InputError("--dask needs the package distributed; pip install distributed") from error
     try:
         return Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:

@@ -29,7 +29,7 @@ class Tool:
     ask: tuple[str, ...] = ("--version",)
 
 
-XCODE, PIP, TI = "xcode-select --install", "pip install dzdesign[zig]", "https://www.ti.com/tool/C2000-CGT"
+XCODE, PIP, TI = "xcode-select --install", "pip install ziglang", "https://www.ti.com/tool/C2000-CGT"
 #: One of these is the main job: without it nothing can be verified.
 COMPILERS = (
     Tool("gcc", "verify", "apt install gcc libc6-dev", XCODE, "winget install BrechtSanders.WinLibs.POSIX.UCRT"),

@@ -224,7 +224,7 @@ def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -
     checked, wrong = (sum(getattr(each, name) for each in verification.evidence.inputs) for name in ("inputs", "wrong"))
     put_line(console, f"Inputs checked: {checked}, wrong: {wrong}")
     put_line(console, verification.verdict)
-    put_line(console, f"Artefacts: {folder}")
+    put_line(console, f"Open first: {folder}/evidence/report.html")
 
 
 def print_firmware_mutants(score: "MutationScore", console: "Console") -> None:

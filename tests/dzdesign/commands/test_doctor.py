@@ -47,7 +47,7 @@ def test_nothing_there_is_exit_status_1_with_what_to_do(bare, capsys):
         assert all(tool[system] for system in ("debian", "macos", "windows"))
     assert main(["doctor"]) == 1
     page = capsys.readouterr().out
-    assert "NO C COMPILER WORKS" in page and "pip install dzdesign[zig]" in page
+    assert "NO C COMPILER WORKS" in page and "pip install ziglang" in page
     assert "Debian, Ubuntu" in page and "macOS" in page and "Windows" in page and "qemu-system-arm" in page
 
 

@@ -298,6 +298,27 @@ def test_the_page_shows_what_is_printed(reproduced, monkeypatch, tmp_path, capsy
     assert [line for line in shown if line not in printed] == []
 
 
+def test_the_readme_shows_what_is_printed(reproduced, monkeypatch, tmp_path, capsys):
+    assert again(reproduced[1], monkeypatch, tmp_path) == 0
+    tables = capsys.readouterr().out.split("without / with hysteresis: ")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in readme.splitlines() if re.match(r"\| .*valve, \d MPa", line)]
+    for name, uncompensated, paper, product, ideal in rows:
+        valve, pressure = name.split(", ")
+        (table,) = [text for text in tables if text.startswith(f"{valve}\n")]
+        without, compensated = (
+            re.search(rf"dead zone {kind} \(at 0\.6 L/min\) +{pressure[0]} +(\S+) %.*", table)
+            for kind in ("without", "with")
+        )
+        flow = float(re.search(rf"largest flow without +{pressure[0]} +(\S+) L/min", table)[1])
+        assert (uncompensated, paper) == (f"{without[1]} %", f"{compensated[1]} %")
+        assert product == f"{float(re.findall(r'[0-9]+[.][0-9][0-9]', compensated[0])[-1]):.1f} %"
+        assert ideal == f"{100 * 0.6 / flow:.1f} %"
+    assert len(rows) == 3
+    (first,) = [text for text in tables if text.startswith("first valve\n")]
+    assert re.search(r"zero command without beta +5 +1\.6 L/min .* 0\.00!", first)
+
+
 def onset(run: LoopRun) -> float:
     """Command, per cent of full, at which flow begins: no meter between."""
     return 100 * dead_zone(run, FLOW_SHARE * float(run.q_mean_L_min.max()), rising=True)

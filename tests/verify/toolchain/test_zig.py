@@ -14,7 +14,7 @@ from dzdesign.verify.toolchain.host_compiler import LIKE_OTHERS, environment, fi
 from dzdesign.verify.toolchain.machines import HOST
 
 needs_zig = pytest.mark.skipif(
-    not importlib.util.find_spec("ziglang"), reason="no Zig (pip install dzdesign[zig]) in this environment"
+    not importlib.util.find_spec("ziglang"), reason="no Zig (pip install ziglang) in this environment"
 )
 SOURCE = {"f.c": b"int f(int a);\nint f(int a) { return (a << 3) / 7; }\n"}
 

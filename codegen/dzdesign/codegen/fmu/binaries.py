@@ -62,13 +62,13 @@ def ziglang_version() -> str:
 def _version() -> str:
     if find_spec("ziglang") is None:
         raise MissingToolError(
-            'binaries of an FMU are compiled by ziglang, which is not installed; run `pip install "dzdesign[fmu]"`'
+            'binaries of an FMU are compiled by ziglang, which is not installed; run `pip install "ziglang>=0.17"`'
         )
     found = version("ziglang")
     if tuple(int(part) for part in re.findall(r"\d+", found)[:2]) < OLDEST:
         raise MissingToolError(
             f"ziglang {found} can't link the FMUs' binaries without a library, expected {OLDEST[0]}.{OLDEST[1]} or "
-            'later; run `pip install --upgrade "dzdesign[fmu]"`'
+            'later; run `pip install --upgrade "ziglang>=0.17"`'
         )
     return found
 

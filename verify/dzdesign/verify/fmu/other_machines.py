@@ -57,5 +57,5 @@ def _missing(simulated: Simulated) -> str:
     absent = [name for name in simulated.needs if not (find_program(name) or Path(name).exists())]
     words = [f"{name} not found; apt install {simulated.needs[name]}" for name in absent]
     if find_zig() is None:
-        words.append('ziglang not found; run `pip install "dzdesign[fmu]"`')
+        words.append('ziglang not found; run `pip install "ziglang>=0.17"`')
     return "; ".join(words)

@@ -118,7 +118,7 @@ def host_compiler() -> str:
     if not compilers:
         raise InputError(
             "no C compiler was found (tried $CC, cc, gcc, clang, zig); install one, for example "
-            "`pip install dzdesign[zig]` into this environment, `apt install gcc`, `xcode-select --install`, or on "
+            "`pip install ziglang` into this environment, `apt install gcc`, `xcode-select --install`, or on "
             "Windows `winget install LLVM.LLVM`; `dzdesign doctor` says what is there"
         )
     if os.environ.get("CC"):
