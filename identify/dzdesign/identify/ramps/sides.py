@@ -31,7 +31,9 @@ def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[Ra
 
 def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:
     """Leave out the other side: its flow and, in some recordings, its pressure drop have the other sign."""
-    return test.part(sign * test.u >= -AT_REST * u_max)
+    of_side = sign * test.u >= -AT_REST * u_max
+    back = np.flatnonzero(of_side[1:] & ~of_side[:-1]) + 1
+    return replace(test.part(of_side), crossed=tuple(test.time[back].tolist()))
 
 
 def flow_is_negative(test: RampTest) -> bool:

@@ -102,13 +102,17 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         Where the command jumps back and forth within a ramp.
     """
     test = without_command_spikes(test)
-    stairs = find_staircase(test.u, test.q, test.source)
+    stairs = find_staircase(test.u, test.q, test.source, np.searchsorted(test.time, test.crossed))
     if stairs is not None:  # what has settled has no lag
-        test = replace(test, u=stairs.u).part(stairs.settled)
+        test = replace(test, u=stairs.u, q=stairs.q).part(stairs.settled)
+    if stairs is not None and stairs.shuffled:
+        test = _in_order_of_levels(test)
+    side = 0 if stairs is None else stairs.reached
     u = lagged_command(test.time, test.u, lag) if stairs is None else test.u
     sweeps = _sweeps(test, u)
     reasons = _why_no_ramp(sweeps)
-    groups = _groups([sweep for sweep, reason in zip(sweeps, reasons, strict=True) if reason is None])
+    taken = [sweep for sweep, reason in zip(sweeps, reasons, strict=True) if reason is None]
+    groups = _groups(taken, branches=1 if side else 2)
     kept = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
     found, left_out = [], list(test.left_out)
     for sweep, reason in zip(sweeps, reasons, strict=True):
@@ -119,7 +123,8 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         off, part = _off_level(group, test), test.part(rows)
         in_ramp = kept.copy()
         in_ramp[rows] &= ~off
-        branches = [_branch(test, u, in_ramp, sweep.rows, sweep.direction) for sweep in group if sweep.is_branch]
+        slow = [sweep for sweep in group if sweep.is_branch]
+        branches = [_branch(test, u, in_ramp, sweep.rows, side or sweep.direction) for sweep in slow]
         branches = [branch for branch in branches if branch.u.size >= SWEEP_SAMPLES]
         not_taken = rows.start + np.flatnonzero(off if branches else np.ones_like(off))
         left_out += stretches(test, not_taken, "pressure" if branches else "no-ramp")
@@ -127,6 +132,22 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     if any(branches for _, branches in found):
         found = [(part, branches) for part, branches in found if branches]
     return _numbered(found, joined(left_out, test))
+
+
+def _in_order_of_levels(test: RampTest) -> RampTest:
+    """Return levels that were all reached from one side as one sweep over them, on the clock of the recording.
+
+    A level's own time does not matter: it has settled.
+    """
+    order = np.argsort(test.u, kind="stable")
+    if test.dp is not None:
+        shut = test.dp[test.q <= np.quantile(test.q, 0.1)]
+        if np.quantile(shut, 0.95) > (1 + TWO_PRESSURES) * np.quantile(shut, 0.05):
+            raise InputError(
+                f"'{test.source}': the levels of the command follow in no order, at several pressure drops; make a "
+                "recording of each pressure drop, or give --from and --to"
+            )
+    return replace(test.part(order), time=test.time)
 
 
 def _why_no_ramp(sweeps: Sequence[_Sweep]) -> list[Reason | None]:
@@ -176,25 +197,25 @@ def _sweeps(test: RampTest, u: np.ndarray) -> list[_Sweep]:
     return sweeps
 
 
-def _groups(sweeps: Sequence[_Sweep]) -> list[list[_Sweep]]:
-    """Return sweeps that make a ramp together: two in a row, and the jump before or after them."""
+def _groups(sweeps: Sequence[_Sweep], branches: int) -> list[list[_Sweep]]:
+    """Return sweeps that make a ramp together: two branches in a row (or one), and the jump before or after them."""
     groups: list[list[_Sweep]] = []
     for sweep in sweeps:
-        if groups and groups[-1][-1].rows.stop == sweep.rows.start and _belongs(sweep, groups[-1]):
+        if groups and groups[-1][-1].rows.stop == sweep.rows.start and _belongs(sweep, groups[-1], branches):
             groups[-1].append(sweep)
         else:
             groups.append([sweep])
     return groups
 
 
-def _belongs(sweep: _Sweep, group: Sequence[_Sweep]) -> bool:
+def _belongs(sweep: _Sweep, group: Sequence[_Sweep], branches: int) -> bool:
     """Tell whether a sweep goes on with the ramp that the sweeps before it make."""
     last = group[-1]
     if not sweep.is_branch:
         return sweep.direction < 0  # a jump down leads back from a rising ramp, a jump up to a falling one
     if not last.is_branch:
         return last.direction >= 0
-    return sum(one.is_branch for one in group) == 1 and not _apart(last.level, sweep.level)
+    return sum(one.is_branch for one in group) < branches and not _apart(last.level, sweep.level)
 
 
 def _apart(one: SweepLevel, other: SweepLevel) -> bool:

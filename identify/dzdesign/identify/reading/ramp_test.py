@@ -70,6 +70,8 @@ class RampTest:
     left_out: tuple[LeftOut, ...] = ()
     #: Ramps that this cuts, each with the branches of it that are lost: ``ramp 2, 12.3 to 62.1 s (falling)``.
     cut: tuple[str, ...] = ()
+    #: Times before which the command was on the other side of zero, whose samples are left out, s.
+    crossed: tuple[float, ...] = ()
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
 
