@@ -20,6 +20,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.command import (
     SMALLEST_MOVE,
+    TURN,
     despiked,
     lagged_command,
     sweep_direction,
@@ -53,6 +54,8 @@ TWO_PRESSURES = 0.1
 LARGEST_FLOWS = 0.9
 #: Fewest samples of a sweep that is a branch, and how many times faster than the slowest it may be.
 SWEEP_SAMPLES, FASTEST = 5, 20
+#: Fewest of them between its ends: with fewer the command steps, and a level tells nothing of the way to it.
+BETWEEN_ENDS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,7 +195,8 @@ def _sweeps(test: RampTest, u: np.ndarray) -> list[_Sweep]:
         samples = test.part(part)
         way = int(direction[turn])
         level = sweep_level(samples, nominal_dp(samples), SHUT)
-        is_branch = way != 0 and one <= FASTEST * slowest and samples.u.size >= SWEEP_SAMPLES
+        steps = samples.u.size < SWEEP_SAMPLES or np.sum(_between_ends(u[part])) < BETWEEN_ENDS
+        is_branch = way != 0 and one <= FASTEST * slowest and not steps
         sweeps.append(_Sweep(rows=part, test=samples, direction=way, is_branch=is_branch, level=level))
     return sweeps
 
@@ -242,8 +246,13 @@ def _off_level(group: Sequence[_Sweep], test: RampTest) -> np.ndarray:
 
 def _pace(u: np.ndarray) -> float:
     """Return volts per sample between the holds of a sweep: over the middle of its range."""
-    low, high = u.min() + 0.1 * np.ptp(u), u.max() - 0.1 * np.ptp(u)
-    return 0.8 * float(np.ptp(u)) / max(int(np.sum((u > low) & (u < high))), 1)
+    return 0.8 * float(np.ptp(u)) / max(int(np.sum(_between_ends(u))), 1)
+
+
+def _between_ends(u: np.ndarray) -> np.ndarray:
+    """Return which samples of a sweep lie in the middle of its range, away from the holds at its ends (N,)."""
+    between: np.ndarray = (u > u.min() + 0.1 * np.ptp(u)) & (u < u.max() - 0.1 * np.ptp(u))
+    return between
 
 
 def nominal_dp(test: RampTest) -> float | None:
@@ -269,15 +278,29 @@ def _branch(test: RampTest, u: np.ndarray, known: np.ndarray, rows: slice, direc
     inside = np.zeros(u.size, dtype=bool)
     inside[rows] = True
     inside &= known & (u >= 0)
+    inside[_hold_from_the_other_side(u, rows, direction)] = False
     part, u = test.part(inside), u[inside]
     return Branch(rising=direction > 0, u=u, q=part.q, dp=part.dp, rate=_rate(part.time, u))
+
+
+def _hold_from_the_other_side(u: np.ndarray, rows: slice, direction: int) -> slice:
+    """Return the samples at a sweep's beginning that hold between the ends of the command: the sweep before came there.
+
+    At the ends themselves, in the dead zone or at full command, both branches are one.
+    """
+    part, span = direction * u[rows], float(np.ptp(u))
+    if part.min() - (direction * u).min() <= SHUT * span:
+        return slice(0)
+    away = part - part.min() > TURN * span
+    held = np.flatnonzero(part[: int(np.argmax(away))] - part.min() <= SMALLEST_MOVE * span)
+    return slice(rows.start, rows.start + int(held[-1]) + 1) if held.size else slice(0)
 
 
 def _rate(time: np.ndarray, u: np.ndarray) -> float:
     """Return the pace of the command between the holds of a sweep, V/s; NaN if it can't be told."""
     if u.size < SWEEP_SAMPLES:
         return math.nan
-    middle = (u > u.min() + 0.1 * np.ptp(u)) & (u < u.max() - 0.1 * np.ptp(u))
+    middle = _between_ends(u)
     seconds = float(np.ptp(time[middle])) if middle.sum() > 1 else 0.0
     return float(np.ptp(u[middle])) / seconds if seconds > 0 else math.nan
 

@@ -24,8 +24,8 @@ from dzdesign.identify.ramps.command import despiked
 STEP_SIGMAS, SMALLEST_STEP = 6.0, 2.5e-3
 #: Fewest samples of a dwell and dwells of a staircase, and share of the samples that lie in dwells.
 DWELL_SAMPLES, FEWEST_DWELLS, IN_DWELLS = 8, 8, 0.8
-#: Between levels that are many, the command may be slewed: this share in dwells is enough for so many levels.
-IN_MANY_DWELLS, MANY_LEVELS = 0.4, 12
+#: Between levels that are reached from one side the command may be slewed: this share is enough, of so many levels.
+IN_SLEWED_DWELLS, SLEWED_LEVELS = 0.4, 6
 #: Levels follow each other up and down if fewer of their steps than this share turn, and contradict no more than this
 #: share of the sides from which they were reached.
 TURNING, CONTRADICTED = 1 / 3, 0.25
@@ -81,10 +81,12 @@ def find_staircase(
     dwells = _dwells(u)
     if dwells is None:
         return None
-    starts, ends = dwells
+    starts, ends, share = dwells
     levels = np.array([np.median(u[start:end]) for start, end in zip(starts, ends, strict=True)])
     steps = np.diff(levels, prepend=levels[0])
     reached = _reached(u, starts, ends, levels, from_other_side)
+    if share < IN_DWELLS and _follow_each_other(levels, reached, _smallest_step(u)):
+        return None
     side, taken = _one_side(levels, reached, _smallest_step(u), source)
     smooth = despiked(q)
     spikes = np.abs(q - smooth) > SPIKE * float(np.ptp(smooth))
@@ -148,15 +150,20 @@ def _turning(levels: np.ndarray, least: float) -> float:
     return float(np.mean(ways[1:] != ways[:-1])) if ways.size > 1 else 0.0
 
 
+def _follow_each_other(levels: np.ndarray, reached: np.ndarray, least: float) -> bool:
+    """Tell whether levels go up and down in order, each reached from the one before."""
+    steps = np.diff(levels, prepend=levels[0])
+    moved = (np.abs(steps) > least) & (reached != 0)
+    contradicted = float(np.mean(reached[moved] != np.sign(steps[moved]))) if moved.any() else 0.0
+    return _turning(levels, least) <= TURNING and contradicted <= CONTRADICTED
+
+
 def _one_side(levels: np.ndarray, reached: np.ndarray, least: float, source: str) -> tuple[int, np.ndarray]:
     """Return from which side the levels that count were reached, 0 as they follow each other, and which they are (D,).
 
     From one level, such as zero, all others are reached from one side; that level itself shows neither branch.
     """
-    steps = np.diff(levels, prepend=levels[0])
-    moved = (np.abs(steps) > least) & (reached != 0)
-    contradicted = float(np.mean(reached[moved] != np.sign(steps[moved]))) if moved.any() else 0.0
-    if _turning(levels, least) <= TURNING and contradicted <= CONTRADICTED:
+    if _follow_each_other(levels, reached, least):
         return 0, np.ones(levels.size, dtype=bool)
     for side in (1, -1):
         between = levels[reached == -side]
@@ -205,8 +212,11 @@ def _response_from_one_level(
     return response
 
 
-def _dwells(u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return where the dwells of a staircase begin and end, None if the command is none."""
+def _dwells(u: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """Return where the dwells of a staircase begin and end, and the share of the samples that lie in them.
+
+    None if the command is none.
+    """
     moves = np.abs(np.diff(u))
     span = float(np.ptp(u))
     noise = 1.4826 * float(np.median(moves)) if moves.size else 0.0
@@ -223,10 +233,11 @@ def _dwells(u: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     step = float(np.median(np.abs(np.diff((before + after) / 2))))
     # A ramp with a hole or two, or with holds, has stretches that are no level.
     flat = np.abs(after - before) <= LEVEL * step + STEP_SIGMAS * noise / np.sqrt(ends - starts)
-    many = np.unique(np.round((before + after)[flat] / 2 / (LEVEL * step))).size >= MANY_LEVELS if step > 0 else False
-    if step < SMALLEST_STEP * span or np.sum((ends - starts)[flat]) < (IN_MANY_DWELLS if many else IN_DWELLS) * u.size:
+    share = float(np.sum((ends - starts)[flat])) / u.size
+    if step < SMALLEST_STEP * span or not step > 0:
         return None
-    return starts[flat], ends[flat]
+    many = np.unique(np.round((before + after)[flat] / 2 / (LEVEL * step))).size >= SLEWED_LEVELS
+    return (starts[flat], ends[flat], share) if share >= (IN_SLEWED_DWELLS if many else IN_DWELLS) else None
 
 
 def _mean_response(
