@@ -60,9 +60,9 @@ def without_clipping(
     """Return the recordings without what lies beyond the ends of the meter, its floor, and what to say.
 
     Wherever the meter was cut off below, the flow is zero; a floor that is declared stays, unless the meter was cut off
-    above it. Rows at its upper end are left out.
+    above it. Rows at its upper end are marked as beyond it.
     """
-    tests, beyond = _without_upper_end(tests, options.u_max)
+    tests, beyond = _marked_upper_end(tests, options.u_max)
     lowest = [_clipped_at(test, options.u_max) for test in tests]
     if not any(lowest):
         return tests, options, beyond
@@ -79,24 +79,32 @@ def without_clipping(
     return seen, replace(options, meter_floor=floor), (*warnings, *beyond)
 
 
-def _without_upper_end(tests: Sequence[RampTest], u_max: float) -> tuple[list[RampTest], tuple[Finding, ...]]:
-    """Return the recordings without the rows at the upper end of the meter's range, and what to say of each."""
+def _marked_upper_end(tests: Sequence[RampTest], u_max: float) -> tuple[list[RampTest], tuple[Finding, ...]]:
+    """Return the recordings with the rows at the upper end of the meter's range marked, and what to say of each."""
     tops = [_top(test, u_max) for test in tests]
     left, findings = [], []
     for test, top in zip(tests, tops, strict=True):
-        end = _same_at_other_pressures(top, tops, u_max) or _declared_end(test, u_max)
-        end = end or (0.0 if _is_a_stop(top, tops) else _repeated_largest(test))
+        exact = 0.0 if _is_a_stop(top, tops) else _repeated_largest(test)
+        end = exact or _same_at_other_pressures(top, tops, u_max) or _declared_end(test, u_max)
         if end:
-            noise = _noise(test.q)
-            near = end - max(2 * noise, STANDS * end)
-            at_end = (_averaged(test.q) >= near) | (test.q >= end - _one_reading(test))
+            at_end = _rows_at(test, end, averaged=not exact)
             unseen = float(test.u[at_end].max(initial=0.0))
             findings.append(warn("flow-clipped", test.source, "end", flow_L_min=end / L_MIN, rows=int(at_end.sum())))
-            test = replace(test.part(~at_end), unseen=(test.unseen[0], max(unseen, test.unseen[1])))
+            test = replace(test, beyond=at_end, unseen=(test.unseen[0], max(unseen, test.unseen[1])))
         elif test.unseen_top(UNSEEN * u_max):
             findings.append(warn("flow-clipped", test.source, "missing", from_V=test.u.max(), to_V=test.unseen[1]))
         left.append(test)
     return left, tuple(findings)
+
+
+def _rows_at(test: RampTest, end: float, *, averaged: bool) -> np.ndarray:
+    """Return which rows read the upper end (N,), glitches among them; on average where noise was added to it."""
+    near = end - max(2 * _noise(test.q), STANDS * end)
+    at_end: np.ndarray = ((_averaged(test.q) if averaged else test.q) >= near) | (test.q >= end - _one_reading(test))
+    rows = np.flatnonzero(at_end)
+    for row in np.flatnonzero(np.diff(rows) <= AVERAGED).tolist():
+        at_end[rows[row] : rows[row + 1]] = True
+    return at_end
 
 
 def _repeated_largest(test: RampTest) -> float:

@@ -66,16 +66,17 @@ def _about_the_command(test: TestResult, item: DescribedTest, guard: str, u_max:
 
 def _about_the_flow(test: TestResult, item: DescribedTest) -> Iterator[Finding]:
     shapes = item.branches
+    whole = not any(shape.prepared.unseen_top for shape in shapes)
     largest, at_top, noise = (
         float(np.mean(values))
         for values in zip(
             *((shape.prepared.profile[1].max(), shape.y_max, shape.sigma) for shape in shapes), strict=True
         )
     )
-    if largest - at_top > max(FLOW_FALLS * largest, FALL_SIGNIFICANCE * noise):
+    if whole and largest - at_top > max(FLOW_FALLS * largest, FALL_SIGNIFICANCE * noise):
         yield warn("flow-falls", test.source, largest_L_min=largest / L_MIN, at_top_L_min=at_top / L_MIN)
     missing = float(np.mean([_missing_at_full_drive(shape) for shape in shapes]))
-    if missing > CURVED and not any(shape.prepared.unseen_top for shape in shapes):
+    if whole and missing > CURVED:
         yield warn("curved", test.source, missing=missing)
     share = sum(shape.outliers for shape in shapes) / max(sum(int(shape.line.inside.sum()) for shape in shapes), 1)
     if share > MANY_OUTLIERS:

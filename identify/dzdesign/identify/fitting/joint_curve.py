@@ -175,7 +175,9 @@ def _largest_flow(placed: Sequence[tuple[int, int, BranchShape]], reference: int
     whole = [row for row, _, shape in placed if not shape.prepared.unseen_top]
     teller = min(whole, key=lambda row: (abs(row - reference), row)) if whole else reference
     at_dp0 = [(index, shape) for index, (row, _, shape) in enumerate(placed) if row == teller]
-    readers = at_dp0[: read_at_top(at_dp0[0][1].prepared.recorded[0].size)]
+    # The straight line beyond what the meter showed is of the branch by which the valve opens.
+    one = 1 if at_dp0[0][1].prepared.unseen_top else read_at_top(at_dp0[0][1].prepared.recorded[0].size)
+    readers = at_dp0[:one]
     index, shape = max(readers, key=lambda each: each[1].full_flow)
     return _LargestFlow(flow=shape.full_flow, flow_se=_top_error(shape), weights=np.eye(len(placed))[index])
 

@@ -108,6 +108,8 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     stairs = find_staircase(test.u, test.q, test.source, np.searchsorted(test.time, test.crossed))
     if stairs is not None:  # what has settled has no lag
         test = replace(test, u=stairs.u, q=stairs.q).part(stairs.settled)
+    if test.beyond is not None:  # only now: a level whose flow is not seen is where the next one is reached from
+        test = replace(test.part(~test.beyond), beyond=None)
     if stairs is not None and stairs.shuffled:
         test = _in_order_of_levels(test)
     side = 0 if stairs is None else stairs.reached

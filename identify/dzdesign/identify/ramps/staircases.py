@@ -26,9 +26,9 @@ STEP_SIGMAS, SMALLEST_STEP = 6.0, 2.5e-3
 DWELL_SAMPLES, FEWEST_DWELLS, IN_DWELLS = 8, 8, 0.8
 #: Between levels that are reached from one side the command may be slewed: this share is enough, of so many levels.
 IN_SLEWED_DWELLS, SLEWED_LEVELS = 0.4, 6
-#: Levels follow each other up and down if fewer of their steps than this share turn, and contradict no more than this
-#: share of the sides from which they were reached.
-TURNING, CONTRADICTED = 1 / 3, 0.25
+#: Levels follow each other up and down if no more of their steps than the first share turn, and no more than the second
+#: lead over a command beyond both levels.
+TURNING, LED_BEYOND = 1 / 3, 0.25
 #: Share of the dwells between steps that stand at the one level from which these are made.
 AT_BASE = 0.9
 #: A level at which the valve is open passes this share of the largest flow.
@@ -84,10 +84,14 @@ def find_staircase(
     starts, ends, share = dwells
     levels = np.array([np.median(u[start:end]) for start, end in zip(starts, ends, strict=True)])
     steps = np.diff(levels, prepend=levels[0])
-    reached = _reached(u, starts, ends, levels, from_other_side)
-    if share < IN_DWELLS and _follow_each_other(levels, reached, _smallest_step(u)):
+    reached, beyond = _reached(u, starts, ends, levels, from_other_side)
+    in_order = _turning(levels, _smallest_step(u)) <= TURNING and beyond <= LED_BEYOND
+    if share < IN_DWELLS and in_order:
         return None
-    side, taken = _one_side(levels, reached, _smallest_step(u), source)
+    if in_order:
+        side, taken = 0, np.ones(levels.size, dtype=bool)
+    else:
+        side, taken = _one_side(levels, reached, _smallest_step(u), source)
     smooth = despiked(q)
     spikes = np.abs(q - smooth) > SPIKE * float(np.ptp(smooth))
     smooth = np.where(spikes, smooth, q)
@@ -126,21 +130,25 @@ def _smallest_step(u: np.ndarray) -> float:
 
 def _reached(
     u: np.ndarray, starts: np.ndarray, ends: np.ndarray, levels: np.ndarray, from_other_side: np.ndarray | None
-) -> np.ndarray:
+) -> tuple[np.ndarray, float]:
     """Return from which side each dwell was reached: 1 from below, -1 from above, 0 if unknown (D,).
 
-    The command's last sample off the level tells, be it of the dwell before or of a visit too short for one.
+    The command's last sample off the level tells, be it of the dwell before or of a visit too short for one. Beside
+    them the share of the dwells that were reached over a command beyond the two levels.
     """
     least = _smallest_step(u)
     crossed = np.array([], dtype=int) if from_other_side is None else from_other_side
-    reached = np.zeros(levels.size, dtype=int)
+    reached, beyond = np.zeros(levels.size, dtype=int), np.zeros(levels.size, dtype=bool)
     for index in range(1, levels.size):
-        off = u[ends[index - 1] - 1 : starts[index]] - levels[index]
+        way = u[ends[index - 1] - 1 : starts[index]]
+        off = way - levels[index]
         off = off[np.abs(off) > least]
         reached[index] = -int(np.sign(off[-1])) if off.size else 0
+        low, high = sorted(levels[index - 1 : index + 1].tolist())
+        beyond[index] = np.min(way, initial=low) < low - least or np.max(way, initial=high) > high + least
         if np.any((crossed >= ends[index - 1]) & (crossed <= starts[index])):
-            reached[index] = 1
-    return reached
+            reached[index], beyond[index] = 1, True
+    return reached, float(beyond.mean())
 
 
 def _turning(levels: np.ndarray, least: float) -> float:
@@ -150,21 +158,11 @@ def _turning(levels: np.ndarray, least: float) -> float:
     return float(np.mean(ways[1:] != ways[:-1])) if ways.size > 1 else 0.0
 
 
-def _follow_each_other(levels: np.ndarray, reached: np.ndarray, least: float) -> bool:
-    """Tell whether levels go up and down in order, each reached from the one before."""
-    steps = np.diff(levels, prepend=levels[0])
-    moved = (np.abs(steps) > least) & (reached != 0)
-    contradicted = float(np.mean(reached[moved] != np.sign(steps[moved]))) if moved.any() else 0.0
-    return _turning(levels, least) <= TURNING and contradicted <= CONTRADICTED
-
-
 def _one_side(levels: np.ndarray, reached: np.ndarray, least: float, source: str) -> tuple[int, np.ndarray]:
-    """Return from which side the levels that count were reached, 0 as they follow each other, and which they are (D,).
+    """Return from which side the levels that count were reached, and which they are (D,).
 
     From one level, such as zero, all others are reached from one side; that level itself shows neither branch.
     """
-    if _follow_each_other(levels, reached, least):
-        return 0, np.ones(levels.size, dtype=bool)
     for side in (1, -1):
         between = levels[reached == -side]
         base = float(np.median(between)) if between.size else np.nan
@@ -174,8 +172,8 @@ def _one_side(levels: np.ndarray, reached: np.ndarray, least: float, source: str
             away = np.isnan(base) | (side * (levels - base) > least)
             return side, (reached == side) & away
     raise InputError(
-        f"'{source}': the levels of the command follow in no order, so they were reached from above and below alike, "
-        "and show neither the opening nor the closing threshold. Step up and down in order, or each time from zero"
+        f"'{source}': the levels of the command follow in no order, each reached from either side by chance, so they "
+        "show neither threshold. Step up and down in order, or each time from zero"
     )
 
 
