@@ -304,6 +304,20 @@ class TestStepsFromOneLevel:
         with pytest.raises(InputError, match="follow in no order"):
             self.sides_of(levels, base=None)
 
+    @pytest.mark.parametrize("base", [0.0, 10.0])
+    def test_a_command_that_overshoots_shows_no_side(self, base):
+        """The spool may have followed beyond the level, and come back to it."""
+        test = steps(UP[:-1], base=base)
+        ringing = np.convolve(np.diff(test.u, prepend=test.u[0]), 0.2 * np.array([0, 1, 1, 1, 1, 1]))[: test.u.size]
+        with pytest.raises(InputError, match="follow in no order"):
+            identify([dataclasses.replace(test, u=test.u + ringing)], IdentifyOptions(u_max=12.0))
+
+    def test_a_staircase_whose_command_overshoots_is_one(self):
+        test = steps(np.r_[UP, UP[::-1]], base=None)
+        ringing = np.convolve(np.diff(test.u, prepend=test.u[0]), 0.3 * np.array([0, 1, 1, 1, 1, 1]))[: test.u.size]
+        (found,) = identify([dataclasses.replace(test, u=test.u + ringing)]).positive.tests
+        assert (found.u_knee_rising_V, found.u_knee_falling_V) == pytest.approx((5.3, 5.1), abs=0.015)
+
     def test_they_are_refused_with_the_way(self, wording):
         with wording.refusal(InputError):
             self.sides_of(SHUFFLED, base=None)

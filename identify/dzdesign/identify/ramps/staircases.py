@@ -29,6 +29,8 @@ IN_SLEWED_DWELLS, SLEWED_LEVELS = 0.4, 6
 #: Levels follow each other up and down if no more of their steps than the first share turn, and no more than the second
 #: lead over a command beyond both levels.
 TURNING, LED_BEYOND = 1 / 3, 0.25
+#: A command that comes to a level from less than this share of how far it was away, on the other side, overshot.
+OVERSHOOT = 0.5
 #: Share of the dwells between steps that stand at the one level from which these are made.
 AT_BASE = 0.9
 #: A level at which the valve is open passes this share of the largest flow.
@@ -88,20 +90,18 @@ def find_staircase(
     in_order = _turning(levels, _smallest_step(u)) <= TURNING and beyond <= LED_BEYOND
     if share < IN_DWELLS and in_order:
         return None
-    if in_order:
-        side, taken = 0, np.ones(levels.size, dtype=bool)
-    else:
-        side, taken = _one_side(levels, reached, _smallest_step(u), source)
+    everything = np.ones(levels.size, dtype=bool)
+    side, taken = (0, everything) if in_order else _one_side(levels, reached, _smallest_step(u), source)
     smooth = despiked(q)
     spikes = np.abs(q - smooth) > SPIKE * float(np.ptp(smooth))
     smooth = np.where(spikes, smooth, q)
     last = np.array([np.mean(smooth[end - (end - start) // 4 : end]) for start, end in zip(starts, ends, strict=True)])
-    if side:
-        before = _flow_before(last, taken, side)
-        response = _response_from_one_level(smooth, starts, ends, last, before, taken, source)
-    else:
-        before = last
-        response = _mean_response(smooth, starts, ends, last, levels, steps)
+    before = _flow_before(last, taken, side) if side else last
+    response = (
+        _response_from_one_level(smooth, starts, ends, last, before, taken, source)
+        if side
+        else _mean_response(smooth, starts, ends, last, levels, steps)
+    )
     if response is None:
         return None
     first, rest = response
@@ -133,8 +133,9 @@ def _reached(
 ) -> tuple[np.ndarray, float]:
     """Return from which side each dwell was reached: 1 from below, -1 from above, 0 if unknown (D,).
 
-    The command's last sample off the level tells, be it of the dwell before or of a visit too short for one. Beside
-    them the share of the dwells that were reached over a command beyond the two levels.
+    The command's last samples off the level tell, be they of the dwell before or of a visit too short for one; if they
+    are much nearer than others were, the command overshot, and the spool may have followed or not. Beside them the
+    share of the dwells that were reached over a command well beyond the two levels.
     """
     least = _smallest_step(u)
     crossed = np.array([], dtype=int) if from_other_side is None else from_other_side
@@ -143,12 +144,20 @@ def _reached(
         way = u[ends[index - 1] - 1 : starts[index]]
         off = way - levels[index]
         off = off[np.abs(off) > least]
-        reached[index] = -int(np.sign(off[-1])) if off.size else 0
+        if off.size and np.max(np.abs(off[_last_of_one_sign(off)])) >= OVERSHOOT * np.max(np.abs(off)):
+            reached[index] = -int(np.sign(off[-1]))
         low, high = sorted(levels[index - 1 : index + 1].tolist())
-        beyond[index] = np.min(way, initial=low) < low - least or np.max(way, initial=high) > high + least
+        well = max(least, (high - low) / 2)
+        beyond[index] = np.min(way, initial=low) < low - well or np.max(way, initial=high) > high + well
         if np.any((crossed >= ends[index - 1]) & (crossed <= starts[index])):
             reached[index], beyond[index] = 1, True
     return reached, float(beyond.mean())
+
+
+def _last_of_one_sign(off: np.ndarray) -> slice:
+    """Return the samples at the end that lie on one side of zero."""
+    others = np.flatnonzero(off * off[-1] < 0)
+    return slice(int(others[-1]) + 1 if others.size else 0, None)
 
 
 def _turning(levels: np.ndarray, least: float) -> float:
@@ -163,7 +172,7 @@ def _one_side(levels: np.ndarray, reached: np.ndarray, least: float, source: str
 
     From one level, such as zero, all others are reached from one side; that level itself shows neither branch.
     """
-    for side in (1, -1):
+    for side in (1, -1) if np.mean(reached == 0) <= 1 - AT_BASE else ():
         between = levels[reached == -side]
         base = float(np.median(between)) if between.size else np.nan
         at_base = np.abs(between - base) <= least
