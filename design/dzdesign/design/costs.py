@@ -38,6 +38,7 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
             f"from the first flow seen down to the onset: below {units.text(least, '.3g L/min')} not all of the "
             "recordings show a flow"
         )
+    lines += _unseen_stop(compensator)
     return (*lines, *_left_out(compensator), *_released(compensator), *_cost_of_options(compensator))
 
 
@@ -48,6 +49,15 @@ def design_warnings(compensator: Compensator) -> tuple[str, ...]:
     without a look at these is told them again.
     """
     return (*hidden_failures(compensator), *_left_out(compensator), *_released(compensator))
+
+
+def _unseen_stop(compensator: Compensator) -> list[str]:
+    if not any(warning.code == "flow-clipped" for warning in compensator.valve.warnings):
+        return []
+    return [
+        "flow-clipped: the meter's range ended below the largest flow of a test. If no other test shows a stop of the "
+        "valve, the drive range and the largest output are those of a flow that goes on straight"
+    ]
 
 
 def _released(compensator: Compensator) -> tuple[str, ...]:

@@ -131,8 +131,9 @@ def _each_side(
         in_side = units.of_side(name)
         mixed = about_mixed_pressures(of_side)
         pressures = (*mixed, *about_single_pressures(of_side, mixed))
-        of_side, dropped = without_drop_outs(of_side)
+        # At the end of its range a meter stands still as one that is stuck does.
         of_side, side_options, clipped = without_clipping(of_side, options)
+        of_side, dropped = without_drop_outs(of_side)
         try:
             sides[name] = identify_side(of_side, side_options, in_side, by_hand)
         except InputError as error:

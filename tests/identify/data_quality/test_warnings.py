@@ -399,6 +399,117 @@ class TestClippedMeter:
         assert quiet.positive.tests[0].u_guard_lower_V < 5.375  # where the first of them closes
 
 
+class TestUpperEnd:
+    """A flow at the end of the meter's range is no stop of the valve, and a stop is no such end."""
+
+    @staticmethod
+    def valve(cut, *, pressures=PRESSURES, sign=1, **truth):
+        tests = []
+        for dp in pressures:
+            changes = {name: value * dp**0.5 if name == "saturation" else value for name, value in truth.items()}
+            test, rng = valve_at(dp, **changes), np.random.default_rng(9)
+            tests.append(replace(test, u=sign * test.u, q=sign * cut(test.q / L_MIN, rng) * L_MIN))
+        return tests
+
+    @staticmethod
+    def check(found, *, drive_range, clipped, opens=5.5):
+        (side,) = found.sides.values()
+        assert side.k_x_max_over_u_max == pytest.approx(drive_range, abs=0.006)
+        assert len(warned(found, "flow-clipped")) == clipped
+        for test in side.tests:
+            knee = opens - 0.05 * (test.dp_MPa or 1.0)
+            assert test.u_knee_rising_V == pytest.approx(knee, abs=0.015)
+            assert test.u_guard_lower_V < knee - 0.1
+        assert not {"curved", "flow-falls", "not-full-command"} & {warning.code for warning in found.warnings}
+        return side
+
+    @pytest.mark.parametrize("sign", [1, -1])
+    @pytest.mark.parametrize(
+        "cut",
+        [
+            pytest.param(lambda q, rng: np.minimum(q, 8.0), id="at one number"),
+            pytest.param(lambda q, rng: np.minimum(q, 3.0), id="at a small one"),
+            pytest.param(lambda q, rng: np.clip(q, 0, 8.0), id="at both ends"),
+            pytest.param(lambda q, rng: np.minimum(q, 8.0) + rng.normal(0, 0.03, q.size), id="noise added to it"),
+            pytest.param(lambda q, rng: np.where(rng.random(q.size) < 2e-3, 40, np.minimum(q, 8)), id="glitches"),
+            pytest.param(lambda q, rng: np.where(rng.random(q.size) < 2e-3, 0, np.minimum(q, 8)), id="drop-outs"),
+            pytest.param(lambda q, rng: np.round(np.minimum(q, 8.0) / 0.5) * 0.5, id="in coarse steps"),
+        ],
+    )
+    def test_the_end_of_the_range_is_no_stop(self, cut, sign):
+        found = identify(self.valve(cut, sign=sign))
+        side = self.check(found, drive_range=0.455, clipped=3)
+        assert not any(test.saturates for test in side.tests)
+
+    def test_it_is_said_with_what_follows(self, wording):
+        found = identify(self.valve(lambda q, rng: np.minimum(q, 8.0)))
+        wording.of_test("\n".join(warned(found, code)[0].text for code in ("flow-clipped", "no-saturation")))
+        notes = as_document(design(found, DesignOptions()))["costs"]
+        assert any(note.startswith("flow-clipped:") for note in notes)
+
+    def test_another_pressure_drop_shows_the_stop(self):
+        found = identify(self.valve(lambda q, rng: np.minimum(q, 20.0), saturation=12.0))
+        side = self.check(found, drive_range=0.3, clipped=1)
+        assert [test.saturates for test in side.tests] == [True, True, False]
+
+    @pytest.mark.parametrize(
+        "cut",
+        [
+            pytest.param(lambda q, rng: q, id="noise"),
+            pytest.param(lambda q, rng: np.round(q / 0.1) * 0.1, id="steps"),
+            pytest.param(lambda q, rng: np.round(q / 0.5) * 0.5, id="coarse steps"),
+            pytest.param(lambda q, rng: np.minimum(q, np.median(q[q > 0.98 * q.max()])), id="one number each"),
+        ],
+    )
+    def test_a_stop_stays_one(self, cut):
+        side = self.check(identify(self.valve(cut, saturation=12.0)), drive_range=0.3, clipped=0)
+        assert all(test.saturates for test in side.tests)
+
+    def test_a_stop_without_noise_at_one_pressure_stays_one(self):
+        self.check(identify(self.valve(lambda q, rng: q, pressures=(1.0,), saturation=12.0, noise=0.0)),
+                   drive_range=0.3, clipped=0)  # fmt: skip
+
+    def test_one_pressure_is_enough_for_a_number_that_repeats(self):
+        self.check(
+            identify(self.valve(lambda q, rng: np.minimum(q, 8.0), pressures=(1.0,))), drive_range=0.455, clipped=1
+        )
+
+    def test_the_declared_end_is_enough_for_one_with_noise(self, tmp_path):
+        (test,) = self.valve(lambda q, rng: np.minimum(q, 8.0) + rng.normal(0, 0.03, q.size), pressures=(1.0,))
+        rows = {"time_s": test.time, "u_V": test.u, "dP_MPa": test.dp / MPA, "Q_mA": 4 + 2 * test.q / L_MIN}
+        (tmp_path / "ramp.csv").write_bytes(ramp_file_bytes(rows, (), compress=False))
+        for columns, clipped in ({"Q": "Q_mA:4..20 mA = 0..8 L/min"}, 1), ({"Q": "Q_mA:4..24 mA = 0..10 L/min"}, 0):
+            read = read_ramp_file(tmp_path / "ramp.csv", columns=columns)
+            assert len(warned(identify([read]), "flow-clipped")) == clipped
+
+    @pytest.mark.parametrize("sign", [1, -1])
+    def test_rows_without_a_flow_at_the_top_are_beyond_the_range(self, tmp_path, sign, wording):
+        tests = []
+        for test in self.valve(lambda q, rng: q, sign=sign):
+            path = tmp_path / test.source
+            written(path, test)
+            head, *lines = path.read_text().splitlines()
+            blank = [line if abs(float(line.split(",")[3])) < 8 else line.rsplit(",", 1)[0] + "," for line in lines]
+            path.write_text("\n".join([head, *blank]))
+            tests.append(read_ramp_file(path))
+        found = identify(tests)
+        self.check(found, drive_range=0.455, clipped=3)
+        if sign > 0:
+            wording.of_test(warned(found, "flow-clipped")[0].text)
+
+    def test_a_supply_at_its_limit_is_not_the_meter(self):
+        tests = []
+        for test in self.valve(lambda q, rng: q, noise=0.0):
+            left = np.minimum(1, 12.0 * L_MIN / np.maximum(test.q, 1e-9))
+            noise = np.random.default_rng(8).normal(0, 0.08, test.q.size)
+            tests.append(replace(test, q=test.q * left + noise * L_MIN, dp=test.dp * left**2))
+        assert not warned(identify(tests), "flow-clipped")
+
+    def test_a_healthy_range_is_not_blamed(self):
+        tests = [replace(test, q_range=(0.0, 50 * L_MIN)) for test in self.valve(lambda q, rng: q)]
+        self.check(identify(tests), drive_range=0.455, clipped=0)
+
+
 class TestOrder:
     def test_what_stops_a_design_comes_first(self, crossed):
         marked = [replace(valve_at(dp, hysteresis=-0.05), simulated=True) for dp in PRESSURES]

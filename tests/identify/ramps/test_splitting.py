@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from bench_plant import lagged, with_play
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -16,7 +17,7 @@ from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.repeatable_valves import identify
-from tests.support.synthetic import MPA, Truth, synthetic_ramp
+from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
 
 laws = settings(
     max_examples=8, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -214,3 +215,132 @@ def test_a_ramp_from_the_top_keeps_its_bottom(noise):
     ramps = split_ramps(turned, lag=0.0)
     lowest = [min(branch.u.min() for branch in ramp.branches if branch) for ramp in ramps]
     assert max(lowest) < 0.02
+
+
+UP = np.arange(0.2, 10.01, 0.2)
+SHUFFLED = np.random.default_rng(5).permutation(UP)
+OF_BOTH_SIGNS = np.ravel(np.column_stack([UP, -UP]))
+
+
+def steps(levels, *, base=0.0, held_s=1.0, base_s=0.5, slew_s=0.0, rate_Hz=50.0, noise_V=0.0, sign=1, seed=0):
+    """Return a recording of levels, each from the base if there is one; opening at 5.3, closing at 5.1 V."""
+    visits = [(float(level), held_s) for level in levels]
+    if base is not None:
+        visits = [(base, base_s), *(part for visit in visits for part in (visit, (base, base_s)))]
+    corners = [(0.0, visits[0][0])]
+    for level, seconds in visits:
+        clock = corners[-1][0] + max(slew_s, 1e-9)
+        corners += [(clock, level), (clock + seconds, level)]
+    time = np.arange(0, corners[-1][0], 1 / rate_Hz)
+    u = np.interp(time, *np.array(corners).T)
+    spool = with_play(u, 0.2)
+    q = lagged(3 * np.sign(spool) * np.maximum(np.abs(spool) - 5.2, 0), 0.05 * rate_Hz)
+    rng = np.random.default_rng(seed)
+    read, shown = q + 0.05 * rng.standard_normal(u.size), u + noise_V * rng.standard_normal(u.size)
+    columns = {"time": time, "u": sign * shown, "q": sign * read * L_MIN, "dp": np.full(u.size, 1.0 * MPA)}
+    return RampTest(source=f"steps_{seed}.csv", sha256=f"{seed:064d}", **columns)
+
+
+class TestStepsFromOneLevel:
+    """A level belongs to the branch from whose side it was reached."""
+
+    @staticmethod
+    def sides_of(levels, **how):
+        tests = [steps(levels, seed=seed, **how) for seed in (0, 1)]
+        return identify(tests, IdentifyOptions(meter_lag=0.0)).sides
+
+    @pytest.mark.parametrize(
+        ("levels", "how"),
+        [
+            pytest.param(UP, {}, id="rising"),
+            pytest.param(UP[::-1], {}, id="falling"),
+            pytest.param(SHUFFLED, {}, id="in no order"),
+            pytest.param(np.repeat(UP, 2), {}, id="each twice"),
+            pytest.param(np.r_[UP, UP[::-1]], {}, id="up and down"),
+            pytest.param(UP[15:], {"base": 3.0}, id="from 3 V"),
+            pytest.param(UP[::-1], {"base_s": 0.1}, id="short visits of zero"),
+            pytest.param(UP, {"held_s": 0.3, "base_s": 0.3}, id="short levels"),
+            pytest.param(UP, {"rate_Hz": 10.0}, id="ten rows a level"),
+            pytest.param(UP[::-1], {"slew_s": 0.3}, id="slewed"),
+            pytest.param(UP, {"noise_V": 0.02}, id="noisy command"),
+            pytest.param(UP[::-1], {"sign": -1}, id="negative"),
+            pytest.param(OF_BOTH_SIGNS, {"base": None}, id="of both signs in turn"),
+            pytest.param(OF_BOTH_SIGNS[::-1], {"base": None}, id="of both signs in turn, falling"),
+        ],
+    )
+    def test_steps_up_are_openings(self, levels, how):
+        sides = self.sides_of(levels, **how)
+        assert len(sides) == 1 + (how.get("base", 0.0) is None)
+        for side in sides.values():
+            (test,) = side.tests
+            assert test.u_knee_rising_V == pytest.approx(5.3, abs=0.015) and test.u_knee_falling_V is None
+            assert 5.15 < test.u_guard_lower_V < 5.3 and side.certificate.guard == "opening"
+
+    @pytest.mark.parametrize(
+        ("levels", "how"),
+        [
+            pytest.param(UP[-2::-1], {}, id="falling"),
+            pytest.param(UP[:-1], {"slew_s": 0.3}, id="rising, slewed"),
+            pytest.param(SHUFFLED[SHUFFLED < 9.9], {}, id="in no order"),
+            pytest.param(UP[:-1], {"base_s": 0.1}, id="short visits of full command"),
+            pytest.param(UP[-2::-1], {"sign": -1}, id="negative"),
+        ],
+    )
+    def test_steps_down_are_closings(self, levels, how):
+        (side,) = self.sides_of(levels, base=10.0, **how).values()
+        (test,) = side.tests
+        assert test.u_knee_falling_V == pytest.approx(5.1, abs=0.015) and test.u_knee_rising_V is None
+        assert 4.95 < test.u_guard_lower_V < 5.1
+
+    @pytest.mark.parametrize(
+        "levels",
+        [
+            pytest.param(SHUFFLED, id="in no order"),
+            pytest.param(np.random.default_rng(6).permutation(OF_BOTH_SIGNS), id="of both signs"),
+            pytest.param(np.ravel(np.column_stack([UP[2:], UP[:-2]])), id="two up, one down"),
+        ],
+    )
+    def test_levels_reached_from_both_sides_are_refused(self, levels):
+        with pytest.raises(InputError, match="follow in no order"):
+            self.sides_of(levels, base=None)
+
+    @pytest.mark.parametrize("base", [0.0, 10.0])
+    def test_a_command_that_overshoots_shows_no_side(self, base):
+        """The spool may have followed beyond the level, and come back to it."""
+        test = steps(UP[:-1], base=base)
+        ringing = np.convolve(np.diff(test.u, prepend=test.u[0]), 0.2 * np.array([0, 1, 1, 1, 1, 1]))[: test.u.size]
+        with pytest.raises(InputError, match="follow in no order"):
+            identify([dataclasses.replace(test, u=test.u + ringing)], IdentifyOptions(u_max=12.0))
+
+    def test_a_staircase_whose_command_overshoots_is_one(self):
+        test = steps(np.r_[UP, UP[::-1]], base=None)
+        ringing = np.convolve(np.diff(test.u, prepend=test.u[0]), 0.3 * np.array([0, 1, 1, 1, 1, 1]))[: test.u.size]
+        (found,) = identify([dataclasses.replace(test, u=test.u + ringing)]).positive.tests
+        assert (found.u_knee_rising_V, found.u_knee_falling_V) == pytest.approx((5.3, 5.1), abs=0.015)
+
+    def test_they_are_refused_with_the_way(self, wording):
+        with wording.refusal(InputError):
+            self.sides_of(SHUFFLED, base=None)
+
+    def test_steps_in_no_order_at_two_pressures_are_refused(self, wording):
+        low = steps(SHUFFLED)
+        high = {"time": low.time + low.time[-1] + 0.02, "u": low.u, "q": 2**0.5 * low.q, "dp": 2 * low.dp}
+        both = {name: np.concatenate([getattr(low, name), values]) for name, values in high.items()}
+        with wording.refusal(InputError):
+            identify([dataclasses.replace(low, **both)])
+
+    def test_a_flow_that_does_not_settle_is_refused(self, wording):
+        test = steps(UP)
+        late = dataclasses.replace(test, q=lagged(test.q, 150.0))
+        with wording.refusal(InputError):
+            identify([late])
+
+    def test_fewer_rows_than_a_level_needs_are_no_ramp(self):
+        with pytest.raises(InputError):
+            self.sides_of(UP, rate_Hz=8.0, held_s=0.6)
+
+    def test_holds_of_slow_trapezoids_are_not_closings(self):
+        (side,) = self.sides_of(np.arange(6, 10.1, 0.5), slew_s=10.0, held_s=5.0, base_s=5.0).values()
+        (test,) = side.tests
+        # At 1 V/s the lag of 50 ms, which is not taken out, opens 50 mV late and closes 50 mV early.
+        assert (test.u_knee_rising_V, test.u_knee_falling_V) == pytest.approx((5.35, 5.05), abs=0.025)

@@ -1,16 +1,18 @@
-"""A meter, or a logger, that never writes less than some flow: what it writes at rest is neither a zero error nor flow.
+"""A meter, or a logger, whose readings end below or above some flow: what it writes there is no flow.
 
-Subtracted as a zero error it would put every knee above the true one, by that flow over the slope: the wrong way. It is
-taken as what it is: no flow was seen below a floor.
+Subtracted as a zero error, the lower end would put every knee above the true one, by that flow over the slope: the
+wrong way. It is taken as what it is: no flow was seen below a floor. Taken for the valve's stop, the upper end would
+leave out a part of the valve's stroke for ever. Its rows are left out: the flow went beyond it.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import Finding, warn
+from dzdesign.identify.knees.gated_line import UNSEEN
 from dzdesign.identify.knees.readings_at_rest import FEWEST_AT_REST, readings_at_rest
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -19,20 +21,51 @@ from dzdesign.identify.reading.ramp_test import RampTest
 ONE_READING = 1e-6
 #: Share of the readings at rest, from below, among which drop-outs and glitches may lie.
 GLITCHES = 0.05
-#: Fewest of the readings at rest that are the lowest one, and most of all readings that lie between zero and it.
-STAYS, BELOW = 0.4, 0.005
+#: Fewest of the readings at rest that are the lowest one, and most of all readings that lie between zero and it; most
+#: of all readings that lie above the upper end.
+STAYS, BELOW, ABOVE = 0.4, 0.005, 0.005
+#: Rows in a row that read the largest flow to the last digit; the noise is at least so many steps of the readings, and
+#: this share of the flow, so that no flow that stands still would.
+REPEATS, STEPS, NOISE = 10, 1.0, 1e-4
+#: Share of u_max, from the largest command down, and again from as far below, in which the flow stands at an end.
+TOP = 0.02
+#: So near the end of a declared range, over its width, or one of the other, over the flow, it stands there.
+AT_END, STANDS, ALIKE = 0.002, 0.005, 0.01
+#: Roots of pressure drops that differ by more than this share; the flow comes near its end by a command that differs by
+#: this share of u_max.
+ROOTS, SOONER = 0.1, 0.005
+#: Flows that grow as the root of the pressure drop do so within this share.
+BY_ROOT = 0.05
+#: Rows over which the flow is averaged where its noise was added after it was cut off.
+AVERAGED = 9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Top:
+    """A flow that stands still at the largest commands, m³/s."""
+
+    flow: float
+    #: Pressure drop there, Pa, and the command at which the flow comes near, V.
+    dp: float
+    near: float
+
+    def at_another_pressure(self, other: "_Top") -> bool:
+        """Tell whether the roots of the pressure drops differ, by which a stop tells itself from a meter's end."""
+        return min(self.dp, other.dp) > 0 and abs(np.log(other.dp / self.dp)) / 2 > ROOTS
 
 
 def without_clipping(
     tests: Sequence[RampTest], options: IdentifyOptions
 ) -> tuple[list[RampTest], IdentifyOptions, tuple[Finding, ...]]:
-    """Return the recordings with a zero wherever the meter was cut off, the floor that this means, and what to say.
+    """Return the recordings without what lies beyond the ends of the meter, its floor, and what to say.
 
-    A floor that is declared stays, unless the meter was cut off above it.
+    Wherever the meter was cut off below, the flow is zero; a floor that is declared stays, unless the meter was cut off
+    above it. Rows at its upper end are marked as beyond it.
     """
+    tests, beyond = _marked_upper_end(tests, options.u_max)
     lowest = [_clipped_at(test, options.u_max) for test in tests]
     if not any(lowest):
-        return list(tests), options, ()
+        return tests, options, beyond
     seen = [
         replace(test, q=np.where(test.q <= low + _one_reading(test), 0.0, test.q)) if low else test
         for test, low in zip(tests, lowest, strict=True)
@@ -43,7 +76,107 @@ def without_clipping(
         for test, low in zip(tests, lowest, strict=True)
         if low
     )
-    return seen, replace(options, meter_floor=floor), warnings
+    return seen, replace(options, meter_floor=floor), (*warnings, *beyond)
+
+
+def _marked_upper_end(tests: Sequence[RampTest], u_max: float) -> tuple[list[RampTest], tuple[Finding, ...]]:
+    """Return the recordings with the rows at the upper end of the meter's range marked, and what to say of each."""
+    tops = [_top(test, u_max) for test in tests]
+    left, findings = [], []
+    for test, top in zip(tests, tops, strict=True):
+        exact = 0.0 if _is_a_stop(top, tops) else _repeated_largest(test)
+        end = exact or _same_at_other_pressures(top, tops, u_max) or _declared_end(test, u_max)
+        if end:
+            at_end = _rows_at(test, end, averaged=not exact)
+            unseen = float(test.u[at_end].max(initial=0.0))
+            findings.append(warn("flow-clipped", test.source, "end", flow_L_min=end / L_MIN, rows=int(at_end.sum())))
+            test = replace(test, beyond=at_end, unseen=(test.unseen[0], max(unseen, test.unseen[1])))
+        elif test.unseen_top(UNSEEN * u_max):
+            findings.append(warn("flow-clipped", test.source, "missing", from_V=test.u.max(), to_V=test.unseen[1]))
+        left.append(test)
+    return left, tuple(findings)
+
+
+def _rows_at(test: RampTest, end: float, *, averaged: bool) -> np.ndarray:
+    """Return which rows read the upper end (N,), glitches among them; on average where noise was added to it."""
+    near = end - max(2 * _noise(test.q), STANDS * end)
+    at_end: np.ndarray = ((_averaged(test.q) if averaged else test.q) >= near) | (test.q >= end - _one_reading(test))
+    rows = np.flatnonzero(at_end)
+    for row in np.flatnonzero(np.diff(rows) <= AVERAGED).tolist():
+        at_end[rows[row] : rows[row + 1]] = True
+    return at_end
+
+
+def _repeated_largest(test: RampTest) -> float:
+    """Return the largest flow, m³/s, if it is read to the last digit over many rows while others scatter; else 0."""
+    flowing = test.q[test.q > 0.9 * np.quantile(test.q, 1 - ABOVE)] if test.q.size else test.q
+    values, counts = np.unique(flowing, return_counts=True)
+    if not values.size or counts.max() < REPEATS:
+        return 0.0
+    end, one = float(values[np.argmax(counts)]), _one_reading(test)
+    at_end = np.abs(test.q - end) <= one
+    changes = np.flatnonzero(np.diff(at_end, prepend=False, append=False))
+    longest = int((changes[1::2] - changes[::2]).max())
+    steps = np.diff(np.unique(test.q))
+    noise, step = _noise(test.q[test.q < end - one]), float(steps[steps > one].min(initial=np.inf))
+    scatters = noise >= max(STEPS * step, NOISE * end)
+    return end if longest >= REPEATS and scatters and np.mean(test.q > end + one) <= ABOVE else 0.0
+
+
+def _declared_end(test: RampTest, u_max: float) -> float:
+    """Return the upper end of the declared range, m³/s, if the flow at the largest commands stands there; else 0."""
+    if test.q_range is None:
+        return 0.0
+    at_top = test.q[test.u >= test.u.max() - TOP * u_max]
+    end, width = max(test.q_range), abs(test.q_range[1] - test.q_range[0])
+    return end if end > 0 and abs(float(np.median(at_top)) - end) <= AT_END * width else 0.0
+
+
+def _top(test: RampTest, u_max: float) -> _Top | None:
+    """Return the flow that stands still at the largest commands; None if it still rises there."""
+    if test.dp is None:
+        return None
+    depth = float(test.u.max()) - test.u
+    rows, before = depth <= TOP * u_max, (depth > 2 * TOP * u_max) & (depth <= 3 * TOP * u_max)
+    if min(np.sum(rows), np.sum(before)) < AVERAGED:
+        return None
+    flow, earlier = float(np.median(test.q[rows])), float(np.median(test.q[before]))
+    near = (test.q > 0.85 * flow) & (test.q < 0.95 * flow)
+    if not flow > 0 or abs(flow - earlier) > STANDS * flow or not near.any():
+        return None
+    return _Top(flow=flow, dp=float(np.median(test.dp[rows])), near=float(np.median(test.u[near])))
+
+
+def _same_at_other_pressures(top: _Top | None, tops: Sequence[_Top | None], u_max: float) -> float:
+    """Return a flow that stands still, m³/s, if it does so at the same value at another pressure drop; else 0.
+
+    A valve's stop lets more pass there, by Eq. (1). So does a supply at its limit, at the pressure drop that is left.
+    """
+    alike = top is not None and any(
+        top.at_another_pressure(other)
+        and abs(other.flow - top.flow) <= ALIKE * top.flow
+        and abs(other.near - top.near) > SOONER * u_max
+        for other in filter(None, tops)
+    )
+    return top.flow if top and alike else 0.0
+
+
+def _is_a_stop(top: _Top | None, tops: Sequence[_Top | None]) -> bool:
+    """Tell whether a flow stands still at another pressure drop too, larger by the root of it: Eq. (1)."""
+    return top is not None and any(
+        top.at_another_pressure(other) and abs(np.log(other.flow / top.flow * (top.dp / other.dp) ** 0.5)) <= BY_ROOT
+        for other in filter(None, tops)
+    )
+
+
+def _noise(q: np.ndarray) -> float:
+    """Return the standard deviation of single readings, of flows that move slowly, m³/s."""
+    return 1.4826 * float(np.median(np.abs(np.diff(q, 2)))) / 6**0.5 if q.size > 2 else 0.0
+
+
+def _averaged(q: np.ndarray) -> np.ndarray:
+    padded = np.pad(q, AVERAGED // 2, mode="edge")
+    return np.convolve(padded, np.full(AVERAGED, 1 / AVERAGED), mode="valid")
 
 
 def _clipped_at(test: RampTest, u_max: float) -> float:

@@ -92,14 +92,15 @@ def _drop_outs(test: RampTest) -> Iterator[_DropOut]:
             yield _DropOut(start=start, stop=stop, still=False, beside=min(beside))
     runs = [(start, stop + 1) for start, stop in _runs(np.diff(test.q) == 0) if test.q[start] >= least]
     lengths = np.array([stop - start for start, stop in runs])
+    step = float(np.median(np.diff(np.unique(test.q)))) if runs else 0.0
     for number, (start, stop) in enumerate(runs):
         others = np.delete(lengths, number)
         usual = float(np.median(others)) if others.size else 1.0
         if stop - start < max(STILL, LONGER * usual) or stop + BESIDE > test.q.size:
             continue
-        # A flow that a supply or a meter holds down goes on from there without a jump.
+        # A flow that a supply or a meter holds down goes on from there without a jump; a coarse meter by one step.
         after = test.q[stop : stop + BESIDE]
-        least_jump = max(JUMP * largest, STEPS * float(np.median(np.abs(np.diff(after)))))
+        least_jump = max(JUMP * largest, STEPS * float(np.median(np.abs(np.diff(after)))), 1.5 * step)
         jumps = abs(float(after[0] - test.q[start])) > least_jump and min(_beside(test.q, start, stop)) >= least
         if jumps and _is_the_meters(test, start, stop):
             yield _DropOut(start=start, stop=stop, still=True, beside=float(np.median(after)))

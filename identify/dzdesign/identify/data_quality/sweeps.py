@@ -30,7 +30,9 @@ def about_sweeps(side: SideModel, tests: tuple[DescribedTest, ...], u_max: float
         yield from _about_the_command(test, item, side.certificate.guard, u_max)
         yield from _about_the_flow(test, item)
     if not any(test.saturates for test in side.tests):
-        yield warn("no-saturation", k_x_max_over_u_max=side.k_x_max_over_u_max)
+        unseen = any(shape.prepared.unseen_top for item in tests for shape in item.branches)
+        case = "unseen" if unseen else "seen"
+        yield warn("no-saturation", None, case, k_x_max_over_u_max=side.k_x_max_over_u_max)
 
 
 def _about_branches(test: TestResult) -> Iterator[Finding]:
@@ -54,7 +56,7 @@ def _about_holes(test: TestResult, item: DescribedTest, guard: str) -> Iterator[
 
 
 def _about_the_command(test: TestResult, item: DescribedTest, guard: str, u_max: float) -> Iterator[Finding]:
-    top = float(item.test.u.max())
+    top = max(float(item.test.u.max()), item.test.unseen[1])
     if top < FULL_COMMAND * u_max:
         yield warn("not-full-command", test.source, top_V=top, u_max_V=u_max)
     lowest = float(item.branch(1 if guard == "closing" else 0).prepared.branch.u.min())
@@ -64,16 +66,17 @@ def _about_the_command(test: TestResult, item: DescribedTest, guard: str, u_max:
 
 def _about_the_flow(test: TestResult, item: DescribedTest) -> Iterator[Finding]:
     shapes = item.branches
+    whole = not any(shape.prepared.unseen_top for shape in shapes)
     largest, at_top, noise = (
         float(np.mean(values))
         for values in zip(
             *((shape.prepared.profile[1].max(), shape.y_max, shape.sigma) for shape in shapes), strict=True
         )
     )
-    if largest - at_top > max(FLOW_FALLS * largest, FALL_SIGNIFICANCE * noise):
+    if whole and largest - at_top > max(FLOW_FALLS * largest, FALL_SIGNIFICANCE * noise):
         yield warn("flow-falls", test.source, largest_L_min=largest / L_MIN, at_top_L_min=at_top / L_MIN)
     missing = float(np.mean([_missing_at_full_drive(shape) for shape in shapes]))
-    if missing > CURVED:
+    if whole and missing > CURVED:
         yield warn("curved", test.source, missing=missing)
     share = sum(shape.outliers for shape in shapes) / max(sum(int(shape.line.inside.sum()) for shape in shapes), 1)
     if share > MANY_OUTLIERS:

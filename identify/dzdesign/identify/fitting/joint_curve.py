@@ -161,6 +161,7 @@ def _solve(
 class _LargestFlow:
     """The largest flow at dP0, of the rising branch where there is one, with its standard error, m³/s.
 
+    Where the meter could not show it, that of another pressure drop.
     `weights` are 1 for that branch, 0 for the others.
     """
 
@@ -170,10 +171,15 @@ class _LargestFlow:
 
 
 def _largest_flow(placed: Sequence[tuple[int, int, BranchShape]], reference: int) -> _LargestFlow:
-    at_dp0 = [(index, shape) for index, (row, _, shape) in enumerate(placed) if row == reference]
-    readers = at_dp0[: read_at_top(at_dp0[0][1].prepared.recorded[0].size)]
-    index, shape = max(readers, key=lambda each: each[1].y_max)
-    return _LargestFlow(flow=shape.y_max, flow_se=_top_error(shape), weights=np.eye(len(placed))[index])
+    # A test whose meter showed all of its flow knows of a stop; of several such the one of the nearest pressure drop.
+    whole = [row for row, _, shape in placed if not shape.prepared.unseen_top]
+    teller = min(whole, key=lambda row: (abs(row - reference), row)) if whole else reference
+    at_dp0 = [(index, shape) for index, (row, _, shape) in enumerate(placed) if row == teller]
+    # The straight line beyond what the meter showed is of the branch by which the valve opens.
+    one = 1 if at_dp0[0][1].prepared.unseen_top else read_at_top(at_dp0[0][1].prepared.recorded[0].size)
+    readers = at_dp0[:one]
+    index, shape = max(readers, key=lambda each: each[1].full_flow)
+    return _LargestFlow(flow=shape.full_flow, flow_se=_top_error(shape), weights=np.eye(len(placed))[index])
 
 
 def _top_error(shape: BranchShape) -> float:

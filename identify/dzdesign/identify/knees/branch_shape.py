@@ -55,3 +55,9 @@ class BranchShape:
     ripple: float
     #: True if the flow at full command lies clearly below the straight line.
     saturates: bool
+
+    @property
+    def full_flow(self) -> float:
+        """Flow at full command, m³/s: beyond the meter's range that of the straight line, unless a stop is seen."""
+        unseen = self.prepared.unseen_top
+        return self.slope * (unseen - self.knee) if unseen and not self.saturates else self.y_max

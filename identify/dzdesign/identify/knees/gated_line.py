@@ -16,6 +16,8 @@ GATE = 6.0
 #: The inflation by one branch's blocks counts if it is so many times the mean of all: 99.9 % of those of one noise are
 #: below it.
 STANDS_OUT = 2.6
+#: Rows without a flow are beyond the meter's range from this share of u_max above all others on.
+UNSEEN = 0.01
 
 
 def fit_line(u: np.ndarray, y: np.ndarray) -> tuple[float, float]:
@@ -39,6 +41,8 @@ class PreparedBranch:
     #: Flow at the largest command, and the meter's floor, m³/s.
     y_max: float
     floor: float
+    #: Largest command whose flow the meter could not show, V; 0 if it showed all.
+    unseen_top: float
     #: For messages.
     source: str
 
@@ -54,6 +58,7 @@ def prepare_branch(branch: Branch, test: RampTest, *, u_max: float, floor: float
         recorded=profile if y is branch.q else smooth_profile(branch.u, branch.q, u_max),
         y_max=flow_at_top(*profile),
         floor=floor,
+        unseen_top=test.unseen_top(UNSEEN * u_max),
         source=test.source,
     )
 

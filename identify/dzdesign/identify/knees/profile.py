@@ -14,6 +14,8 @@ TOP_GATE, SMALLEST_MISS = 6.0, 0.05
 #: A step between two points of a profile is a hole, rows that are missing, beyond so many usual steps, and this share
 #: of u_max.
 USUAL_STEPS, SMALLEST_HOLE = 4.0, 2e-3
+#: Steps as wide as holes, of half of the range together, are those of levels if there are so many.
+FEWEST_LEVELS = 8
 #: A profile of fewer points has one a level, as a staircase test gives.
 FEWEST_OF_RAMP = 200
 
@@ -48,12 +50,15 @@ def crossing(u: np.ndarray, y: np.ndarray, level: float) -> float:
 def hole_within(u: np.ndarray, low: float, high: float, u_max: float) -> tuple[float, float] | None:
     """Return the widest stretch without samples that shares a command with [low, high], or None; V.
 
-    The commands of a profile rise. Where all steps are wide, as of a staircase, none is a hole.
+    The commands of a profile rise. Where all steps are wide, as of a staircase, none is a hole: not even if the levels
+    of its ramps, brought together, lie side by side.
     """
     steps = np.diff(u)
     if not steps.size:
         return None
-    wide = steps > max(USUAL_STEPS * median(steps), SMALLEST_HOLE * u_max)
+    coarse = steps[steps > SMALLEST_HOLE * u_max]
+    levels = coarse.size >= FEWEST_LEVELS and coarse.sum() > 0.5 * np.ptp(u)
+    wide = steps > max(USUAL_STEPS * median(coarse if levels else steps), SMALLEST_HOLE * u_max)
     here = np.flatnonzero(wide & (u[:-1] <= high) & (u[1:] >= low))
     if not here.size:
         return None

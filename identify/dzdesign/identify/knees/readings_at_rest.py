@@ -184,7 +184,8 @@ def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
     """Return which readings are taken where the command rests, in order; fewer than `FEWEST_AT_REST` if nowhere.
 
     Of the hold before the first ramp only the later half counts, and none of it if it still drifts: hoses and meter may
-    be filling. Where the command hardly rests, what the meter reads far below the first flow serves as well.
+    be filling. A rest that the command steps to from an open valve does not count: flow and meter are on their way.
+    Where the command hardly rests, what the meter reads far below the first flow serves as well.
     """
     flowing = np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()
     opens = float(np.quantile(np.abs(test.u[flowing]), 0.01)) if flowing.any() else 0.0
@@ -193,10 +194,18 @@ def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
         at_rest = np.abs(test.u) <= share * u_max
         if share > AT_REST[0] and share * u_max > FAR_BELOW * opens:
             break  # the valve may be open there
-        rest = _without_filling(test, at_rest)
+        rest = _without_filling(test, at_rest & ~_after_flow(at_rest, flowing))
         if rest.size >= FEWEST_AT_REST:
             break
     return rest
+
+
+def _after_flow(at_rest: np.ndarray, flowing: np.ndarray) -> np.ndarray:
+    """Return which samples are of a rest whose first sample, or the one before it, still flows (N,)."""
+    begins = np.flatnonzero(at_rest & ~np.concatenate([[False], at_rest[:-1]]))
+    stretch = np.cumsum(np.bincount(begins, minlength=at_rest.size)[: at_rest.size]) - 1
+    after = (flowing[begins] | flowing[np.maximum(begins - 1, 0)]) & (begins > 0)
+    return at_rest & after[stretch] if begins.size else at_rest
 
 
 def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:

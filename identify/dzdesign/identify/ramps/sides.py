@@ -31,7 +31,9 @@ def tests_of_side(tests: Sequence[RampTest], sign: int, u_max: float) -> list[Ra
 
 def _without_the_other(test: RampTest, sign: int, u_max: float) -> RampTest:
     """Leave out the other side: its flow and, in some recordings, its pressure drop have the other sign."""
-    return test.part(sign * test.u >= -AT_REST * u_max)
+    of_side = sign * test.u >= -AT_REST * u_max
+    back = np.flatnonzero(of_side[1:] & ~of_side[:-1]) + 1
+    return replace(test.part(of_side), crossed=tuple(test.time[back].tolist()))
 
 
 def flow_is_negative(test: RampTest) -> bool:
@@ -49,11 +51,14 @@ def _mirrored(test: RampTest, u_max: float) -> RampTest:
 
     The pressure drop of two ports of an edge has no sign to change: below zero, it is refused.
     """
-    q = -test.q if flow_is_negative(test) else test.q
+    q, q_range = test.q, test.q_range
+    if flow_is_negative(test):
+        q, q_range = -q, (-q_range[1], -q_range[0]) if q_range else None
     dp, dp_from = test.dp, test.dp_from[::-1]
     sign: DropSign = 1
     below_zero = dp is not None and np.median(dp[_most_negative(test)]) < 0
     if dp is not None and below_zero and all(each.quantities in OF_EITHER_SIGN for each in dp_from[0]):
         at_rest = np.abs(test.u) <= AT_REST * u_max  # there it may still have the other side's sign
         dp, sign = np.where(at_rest, np.abs(dp), -dp), -1
-    return replace(test, u=-test.u, q=q, dp=dp, dp_from=dp_from, dp_sign=sign)
+    unseen = (-test.unseen[1], -test.unseen[0])
+    return replace(test, u=-test.u, q=q, dp=dp, dp_from=dp_from, dp_sign=sign, q_range=q_range, unseen=unseen)

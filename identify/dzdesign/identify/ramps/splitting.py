@@ -20,6 +20,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.command import (
     SMALLEST_MOVE,
+    TURN,
     despiked,
     lagged_command,
     sweep_direction,
@@ -53,6 +54,8 @@ TWO_PRESSURES = 0.1
 LARGEST_FLOWS = 0.9
 #: Fewest samples of a sweep that is a branch, and how many times faster than the slowest it may be.
 SWEEP_SAMPLES, FASTEST = 5, 20
+#: Fewest of them between its ends: with fewer the command steps, and a level tells nothing of the way to it.
+BETWEEN_ENDS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,13 +105,19 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         Where the command jumps back and forth within a ramp.
     """
     test = without_command_spikes(test)
-    stairs = find_staircase(test.u, test.q, test.source)
+    stairs = find_staircase(test.u, test.q, test.source, np.searchsorted(test.time, test.crossed))
     if stairs is not None:  # what has settled has no lag
-        test = replace(test, u=stairs.u).part(stairs.settled)
+        test = replace(test, u=stairs.u, q=stairs.q).part(stairs.settled)
+    if test.beyond is not None:  # only now: a level whose flow is not seen is where the next one is reached from
+        test = replace(test.part(~test.beyond), beyond=None)
+    if stairs is not None and stairs.shuffled:
+        test = _in_order_of_levels(test)
+    side = 0 if stairs is None else stairs.reached
     u = lagged_command(test.time, test.u, lag) if stairs is None else test.u
     sweeps = _sweeps(test, u)
     reasons = _why_no_ramp(sweeps)
-    groups = _groups([sweep for sweep, reason in zip(sweeps, reasons, strict=True) if reason is None])
+    taken = [sweep for sweep, reason in zip(sweeps, reasons, strict=True) if reason is None]
+    groups = _groups(taken, branches=1 if side else 2)
     kept = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
     found, left_out = [], list(test.left_out)
     for sweep, reason in zip(sweeps, reasons, strict=True):
@@ -119,7 +128,8 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
         off, part = _off_level(group, test), test.part(rows)
         in_ramp = kept.copy()
         in_ramp[rows] &= ~off
-        branches = [_branch(test, u, in_ramp, sweep.rows, sweep.direction) for sweep in group if sweep.is_branch]
+        slow = [sweep for sweep in group if sweep.is_branch]
+        branches = [_branch(test, u, in_ramp, sweep.rows, side or sweep.direction) for sweep in slow]
         branches = [branch for branch in branches if branch.u.size >= SWEEP_SAMPLES]
         not_taken = rows.start + np.flatnonzero(off if branches else np.ones_like(off))
         left_out += stretches(test, not_taken, "pressure" if branches else "no-ramp")
@@ -127,6 +137,22 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     if any(branches for _, branches in found):
         found = [(part, branches) for part, branches in found if branches]
     return _numbered(found, joined(left_out, test))
+
+
+def _in_order_of_levels(test: RampTest) -> RampTest:
+    """Return levels that were all reached from one side as one sweep over them, on the clock of the recording.
+
+    A level's own time does not matter: it has settled.
+    """
+    order = np.argsort(test.u, kind="stable")
+    if test.dp is not None:
+        shut = test.dp[test.q <= np.quantile(test.q, 0.1)]
+        if np.quantile(shut, 0.95) > (1 + TWO_PRESSURES) * np.quantile(shut, 0.05):
+            raise InputError(
+                f"'{test.source}': the levels of the command follow in no order, at several pressure drops; make a "
+                "recording of each pressure drop, or give --from and --to"
+            )
+    return replace(test.part(order), time=test.time)
 
 
 def _why_no_ramp(sweeps: Sequence[_Sweep]) -> list[Reason | None]:
@@ -171,30 +197,31 @@ def _sweeps(test: RampTest, u: np.ndarray) -> list[_Sweep]:
         samples = test.part(part)
         way = int(direction[turn])
         level = sweep_level(samples, nominal_dp(samples), SHUT)
-        is_branch = way != 0 and one <= FASTEST * slowest and samples.u.size >= SWEEP_SAMPLES
+        steps = samples.u.size < SWEEP_SAMPLES or np.sum(_between_ends(u[part])) < BETWEEN_ENDS
+        is_branch = way != 0 and one <= FASTEST * slowest and not steps
         sweeps.append(_Sweep(rows=part, test=samples, direction=way, is_branch=is_branch, level=level))
     return sweeps
 
 
-def _groups(sweeps: Sequence[_Sweep]) -> list[list[_Sweep]]:
-    """Return sweeps that make a ramp together: two in a row, and the jump before or after them."""
+def _groups(sweeps: Sequence[_Sweep], branches: int) -> list[list[_Sweep]]:
+    """Return sweeps that make a ramp together: two branches in a row (or one), and the jump before or after them."""
     groups: list[list[_Sweep]] = []
     for sweep in sweeps:
-        if groups and groups[-1][-1].rows.stop == sweep.rows.start and _belongs(sweep, groups[-1]):
+        if groups and groups[-1][-1].rows.stop == sweep.rows.start and _belongs(sweep, groups[-1], branches):
             groups[-1].append(sweep)
         else:
             groups.append([sweep])
     return groups
 
 
-def _belongs(sweep: _Sweep, group: Sequence[_Sweep]) -> bool:
+def _belongs(sweep: _Sweep, group: Sequence[_Sweep], branches: int) -> bool:
     """Tell whether a sweep goes on with the ramp that the sweeps before it make."""
     last = group[-1]
     if not sweep.is_branch:
         return sweep.direction < 0  # a jump down leads back from a rising ramp, a jump up to a falling one
     if not last.is_branch:
         return last.direction >= 0
-    return sum(one.is_branch for one in group) == 1 and not _apart(last.level, sweep.level)
+    return sum(one.is_branch for one in group) < branches and not _apart(last.level, sweep.level)
 
 
 def _apart(one: SweepLevel, other: SweepLevel) -> bool:
@@ -221,8 +248,13 @@ def _off_level(group: Sequence[_Sweep], test: RampTest) -> np.ndarray:
 
 def _pace(u: np.ndarray) -> float:
     """Return volts per sample between the holds of a sweep: over the middle of its range."""
-    low, high = u.min() + 0.1 * np.ptp(u), u.max() - 0.1 * np.ptp(u)
-    return 0.8 * float(np.ptp(u)) / max(int(np.sum((u > low) & (u < high))), 1)
+    return 0.8 * float(np.ptp(u)) / max(int(np.sum(_between_ends(u))), 1)
+
+
+def _between_ends(u: np.ndarray) -> np.ndarray:
+    """Return which samples of a sweep lie in the middle of its range, away from the holds at its ends (N,)."""
+    between: np.ndarray = (u > u.min() + 0.1 * np.ptp(u)) & (u < u.max() - 0.1 * np.ptp(u))
+    return between
 
 
 def nominal_dp(test: RampTest) -> float | None:
@@ -248,15 +280,29 @@ def _branch(test: RampTest, u: np.ndarray, known: np.ndarray, rows: slice, direc
     inside = np.zeros(u.size, dtype=bool)
     inside[rows] = True
     inside &= known & (u >= 0)
+    inside[_hold_from_the_other_side(u, rows, direction)] = False
     part, u = test.part(inside), u[inside]
     return Branch(rising=direction > 0, u=u, q=part.q, dp=part.dp, rate=_rate(part.time, u))
+
+
+def _hold_from_the_other_side(u: np.ndarray, rows: slice, direction: int) -> slice:
+    """Return the samples at a sweep's beginning that hold between the ends of the command: the sweep before came there.
+
+    At the ends themselves, in the dead zone or at full command, both branches are one.
+    """
+    part, span = direction * u[rows], float(np.ptp(u))
+    if part.min() - (direction * u).min() <= SHUT * span:
+        return slice(0)
+    away = part - part.min() > TURN * span
+    held = np.flatnonzero(part[: int(np.argmax(away))] - part.min() <= SMALLEST_MOVE * span)
+    return slice(rows.start, rows.start + int(held[-1]) + 1) if held.size else slice(0)
 
 
 def _rate(time: np.ndarray, u: np.ndarray) -> float:
     """Return the pace of the command between the holds of a sweep, V/s; NaN if it can't be told."""
     if u.size < SWEEP_SAMPLES:
         return math.nan
-    middle = (u > u.min() + 0.1 * np.ptp(u)) & (u < u.max() - 0.1 * np.ptp(u))
+    middle = _between_ends(u)
     seconds = float(np.ptp(time[middle])) if middle.sum() > 1 else 0.0
     return float(np.ptp(u[middle])) / seconds if seconds > 0 else math.nan
 

@@ -102,6 +102,8 @@ def read_ramp_file(
         failed_signals=recording.failed_signals,
         stamp=recording.stamp,
         started=recording.stamp.seconds if recording.stamp else None,
+        q_range=recording.q_range,
+        unseen=recording.unseen,
         units=recording.units,
     )
 
@@ -123,6 +125,8 @@ class _Recording:
     dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]
     side_without_dp: str
     units: Mapping[Quantity, tuple[Unit, ...]]
+    q_range: tuple[float, float] | None
+    unseen: tuple[float, float]
 
 
 def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.ndarray) -> str:
@@ -170,6 +174,7 @@ def _read_recording(
     _refuse_unequal_lengths(table, found)
     table.load([column.label for column in found.values()])
     data, placeholders, failed = {}, {}, {}
+    q_range = None
     is_clock = sample_rate is None and table.is_clock(found["time"].label)
     stamp = table.started(found["time"].label) if sample_rate is None and not is_clock else None
     for quantity, column in found.items():
@@ -184,6 +189,7 @@ def _read_recording(
             scaling = scaling_of(table.path, quantity, column, u_max)
             numbers, failed[column.label] = without_failed_signals(numbers, scaling)
             numbers = _in_SI(table, quantity, column, numbers, scaling)
+            q_range = scaling.ends if quantity == "Q" else q_range
         data[quantity] = numbers
     if sample_rate is not None:
         data["time"] = np.arange(data["u"].size) / sample_rate
@@ -197,6 +203,7 @@ def _read_recording(
     for row, samples in zip(rows, columns, strict=True):
         row[:] = samples[complete]
     rows[0] = never_back(table, rows[0], complete)
+    without_flow = data["u"][np.isfinite(data["u"]) & ~np.isfinite(data["Q"])]
     return _Recording(
         rows=rows,
         clock=found.get("time", DECLARED_CLOCK),
@@ -208,6 +215,8 @@ def _read_recording(
         dp_from=edge.columns(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
         units=units_of_columns(table.path, found, u_max),
+        q_range=q_range,
+        unseen=(float(without_flow.min(initial=0.0)), float(without_flow.max(initial=0.0))),
     )
 
 

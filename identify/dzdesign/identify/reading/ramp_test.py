@@ -70,18 +70,30 @@ class RampTest:
     left_out: tuple[LeftOut, ...] = ()
     #: Ramps that this cuts, each with the branches of it that are lost: ``ramp 2, 12.3 to 62.1 s (falling)``.
     cut: tuple[str, ...] = ()
+    #: Times before which the command was on the other side of zero, whose samples are left out, s.
+    crossed: tuple[float, ...] = ()
+    #: Declared range of the signal of Q, m³/s; and the least and the largest command whose flow it could not show, V.
+    q_range: tuple[float, float] | None = None
+    unseen: tuple[float, float] = (0.0, 0.0)
+    #: Rows whose flow lies beyond what the meter can show, (N,) bool; None: none does.
+    beyond: np.ndarray | None = None
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for array in (self.time, self.u, self.q, self.dp):
+        for array in (self.time, self.u, self.q, self.dp, self.beyond):
             if array is None:
                 continue
             if array.shape != self.time.shape or array.ndim != 1:
                 raise ValueError("the columns of a ramp test are vectors of one length")
             array.flags.writeable = False
 
+    def unseen_top(self, least: float) -> float:
+        """Return the largest command of rows without a flow, V; 0 unless it is more than `least` above all others."""
+        return self.unseen[1] if self.u.size and self.unseen[1] > float(self.u.max()) + least else 0.0
+
     def part(self, rows: slice | np.ndarray) -> "RampTest":
         """Return the recording with some of its rows."""
         dp = None if self.dp is None else self.dp[rows]
-        return replace(self, time=self.time[rows], u=self.u[rows], q=self.q[rows], dp=dp)
+        beyond = None if self.beyond is None else self.beyond[rows]
+        return replace(self, time=self.time[rows], u=self.u[rows], q=self.q[rows], dp=dp, beyond=beyond)

@@ -34,12 +34,13 @@ FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 class Scaling:
     """What turns a column's number into SI: ``gain * number + offset``.
 
-    Numbers below `no_signal_below` are those of a broken wire.
+    Numbers below `no_signal_below` are those of a broken wire; `ends` are those of a declared range, in SI.
     """
 
     gain: float
     offset: float = 0.0
     no_signal_below: float = -math.inf
+    ends: tuple[float, float] | None = None
 
 
 def scaling_of(path: Path, quantity: str, column: Column, u_max: float) -> Scaling:
@@ -79,6 +80,7 @@ def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
         gain=float(gain) * factor,
         offset=float(meaning.bottom - gain * low) * factor,
         no_signal_below=_no_signal_below(found, low, high),
+        ends=(float(meaning.bottom) * factor, float(meaning.top) * factor),
     )
 
 
