@@ -114,7 +114,11 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
         yield warn("lag-unchecked", lag_s=lag.seconds, shift_mV=shift_mV, rate_V_s=fastest, tolerance_mV=tolerance_mV)
     if lag.contradicted_by is not None:
         found, se = lag.contradicted_by
-        yield warn("lag-contradicted", None, "rates", lag_s=lag.seconds, found_s=found, se_s=se)
+        case = "rates" if found >= 0 else "late"
+        yield warn("lag-contradicted", None, case, lag_s=lag.seconds, found_s=abs(found), se_s=se)
+    elif lag.seconds < 0:
+        late, shift_mV = -lag.seconds, -1e3 * fastest * lag.seconds
+        yield warn("command-late", late_s=late, error_s=lag.longer, shift_mV=shift_mV, rate_V_s=fastest)
 
 
 def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Finding]:

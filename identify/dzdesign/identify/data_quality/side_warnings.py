@@ -152,8 +152,8 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
 def _softness_of_the_meter(item: DescribedTest, group: DescribedTests) -> float:
     """Return how far below the knee of a sharp edge the tail ends, V, by the longest lag that the meter may have."""
     shape = item.closing_branch
-    branch, longest = shape.prepared.branch, group.lag.seconds + group.lag.longer
-    return softness_of_filter(longest * branch.rate, shape.level / shape.slope, TAIL, rising=branch.rising)
+    branch = shape.prepared.branch
+    return softness_of_filter(group.lag.longest * branch.rate, shape.level / shape.slope, TAIL, rising=branch.rising)
 
 
 def _leak_in_overlap(item: DescribedTest, threshold: float) -> float:

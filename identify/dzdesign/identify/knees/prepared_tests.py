@@ -98,7 +98,7 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
                 f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it: "
                 "record it, or declare it by --dp or [dp]"
             )
-        if lag > 0 and not np.ptp(test.time) > 0:
+        if lag != 0 and not np.ptp(test.time) > 0:
             raise InputError(
                 f"'{test.source}': the time stands still at {test.time[0]:g} s, so the meter's lag can't be taken out; "
                 "correct the column of time, or leave out --meter-lag"
@@ -169,7 +169,7 @@ def _described(pooled: list[PooledTest], floor: float, lag: MeterLag, options: I
         u_max=options.u_max,
         window=options.knee_window,
         noise_level=options.noise_level,
-        longest_lag=lag.seconds + lag.longer,
+        longest_lag=lag.longest,
     )
     for shape in shapes:
         refuse_an_impossible_knee(shape.prepared.branch, shape.knee, shape.prepared.source, options.u_max)

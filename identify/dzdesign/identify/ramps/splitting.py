@@ -109,7 +109,8 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     sweeps = _sweeps(test, u)
     reasons = _why_no_ramp(sweeps)
     groups = _groups([sweep for sweep, reason in zip(sweeps, reasons, strict=True) if reason is None])
-    kept = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
+    # Before that, or after, the command that the flow belongs to was not recorded.
+    kept = (test.time >= test.time[0] + lag) & (test.time <= test.time[-1] + lag)
     found, left_out = [], list(test.left_out)
     for sweep, reason in zip(sweeps, reasons, strict=True):
         if reason is not None:
