@@ -18,7 +18,7 @@ from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.mixed_branches import refuse_mixed_branches
 from dzdesign.identify.knees.profile import largest_at_top
-from dzdesign.identify.knees.readings_at_rest import find_rest_flows
+from dzdesign.identify.knees.readings_at_rest import find_rest_flows, hidden_zero
 from dzdesign.identify.knees.refusals import (
     refuse_a_jump,
     refuse_a_shut_valve,
@@ -52,6 +52,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     """
     refuse_two_directions(tests)
     rest = find_rest_flows(tests, options.u_max)
+    as_read = tests
     tests = [replace(test, q=test.q - flow) for test, flow in zip(tests, rest.flows, strict=True)]
     tests = with_clock_of_series(tests)
     ramps = split_recordings(tests, options, options.meter_lag or 0.0)
@@ -75,6 +76,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         floor=floor,
         lag=lag,
         zero_L_min={source: zero / L_MIN for source, zero in rest.zero.items() if zero},
+        hidden_zero=hidden_zero(as_read, floor, options),
         # Of several recordings pooled to one test, the worst: each stands for its own part of the ramp.
         zero_se=tuple(max(rest.se.get(name, 0.0) for name, _ in item.files) for item in described),
         leak=tuple(rest.leak_per_Pa * (item.dp or 0.0) for item in described),

@@ -28,10 +28,14 @@ from dzdesign.identify.ramps.command import (
 from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.ramps.sweep_pressure import (
+    SHUT_FLOW,
+    SWINGS,
     Reason,
     SweepLevel,
     joined,
+    level_of_swings,
     off_level,
+    spread_of,
     stretches,
     sweep_level,
     why_no_ramp,
@@ -229,12 +233,18 @@ def _pace(u: np.ndarray) -> float:
 def nominal_dp(test: RampTest) -> float | None:
     """Return the pressure drop at (almost) no flow, Pa; None if it is unknown.
 
-    Read where the command is near zero; a fragment that never comes there is read at its smallest flows.
+    Read where the command is near zero; a fragment that never comes there is read at its smallest flows. One that
+    swings is read wherever the valve is shut: near zero there may be no whole swing.
     """
     if test.dp is None:
         return None
     shut = test.dp[(test.u >= 0) & (test.u <= SHUT * max(test.u.max(), 0))]
-    return median(shut if shut.size >= 5 else test.dp[test.q <= np.quantile(test.q, 0.1)])
+    if shut.size < 5:
+        return median(test.dp[test.q <= np.quantile(test.q, 0.1)])
+    level = median(shut)
+    if spread_of(shut) <= SWINGS * abs(level):
+        return level
+    return level_of_swings(test.dp[(test.u >= 0) & (np.abs(test.q) <= SHUT_FLOW * np.abs(test.q).max())])
 
 
 def dp_under_flow(test: RampTest) -> float | None:
