@@ -29,7 +29,6 @@ from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.ramps.sweep_pressure import (
     SHUT_FLOW,
-    SWINGS,
     Reason,
     SweepLevel,
     joined,
@@ -38,6 +37,7 @@ from dzdesign.identify.ramps.sweep_pressure import (
     spread_of,
     stretches,
     sweep_level,
+    swings_about,
     why_no_ramp,
 )
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -242,7 +242,7 @@ def nominal_dp(test: RampTest) -> float | None:
     if shut.size < 5:
         return median(test.dp[test.q <= np.quantile(test.q, 0.1)])
     level = median(shut)
-    if spread_of(shut) <= SWINGS * abs(level):
+    if not swings_about(level, spread_of(shut)):
         return level
     return level_of_swings(test.dp[(test.u >= 0) & (np.abs(test.q) <= SHUT_FLOW * np.abs(test.q).max())])
 

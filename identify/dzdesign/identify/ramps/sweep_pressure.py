@@ -105,7 +105,7 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
         near_edge = test.dp[goes_with]
     dp = float(np.median(near_edge))
     spread = spread_of(near_edge)
-    moves, swings = False, spread > SWINGS * dp
+    moves, swings = False, swings_about(dp, spread)
     if swings:
         dp = level_of_swings(test.dp[goes_with])
     if near_zero.size >= FIRST_SAMPLES:
@@ -114,6 +114,11 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
         moves = abs(at_zero - dp) > max(OFF_LEVEL * dp, error)
         dp = dp if moves or swings else at_zero
     return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread, moves_at_zero=moves)
+
+
+def swings_about(level: float, spread: float) -> bool:
+    """Tell whether a pressure drop of such a spread swings, and neither stands still nor was switched."""
+    return SWINGS * level < spread <= GOES_WITH * level
 
 
 def level_of_swings(dp: np.ndarray) -> float:
