@@ -65,7 +65,7 @@ class MeterTaken:
     """Properties of the flow meter as assumed."""
 
     floor_L_min: Annotated[Flow, Meta(description="Flow below which the meter reads zero.")]
-    lag_s: Annotated[float, quantity("s", "First-order lag of the meter.", ge=0, le=1e6)]
+    lag_s: Annotated[float, quantity("s", "Lag of the meter; below zero if the command comes late.", ge=-1e6, le=1e6)]
     lag_is: Annotated[
         Literal["declared", "identified", "unknown"],
         Meta(description="Whether the lag was declared, identified or unknown."),

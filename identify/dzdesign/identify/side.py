@@ -139,6 +139,9 @@ def _side_model(
     k_mm = 1 / (options.x_max * 1e3) if options.x_max else None
     rows = range(len(described))
     level = group.noise_level / L_MIN
+    unseen = unseen_of_curve(low_flow, guard, curves[guard], level).below_L_min
+    # Readings by hand at the threshold tell what a meter that hides its zero can't.
+    unseen = max(unseen, group.hidden_zero / L_MIN) if unseen == level else unseen
     return SideModel(
         recorded_drop=_recorded_drop(described),
         tests=tuple(_test_result(group, knees, row, curves[guard], options, units) for row in rows),
@@ -159,7 +162,7 @@ def _side_model(
             confidence=options.confidence,
             guard=guard,
             level_L_min=level,
-            unseen_below_L_min=unseen_of_curve(low_flow, guard, curves[guard], level).below_L_min,
+            unseen_below_L_min=unseen,
             zero_flow_L_min=None if options.zero_flow is None else options.zero_flow / L_MIN,
             repeatability=_repeatability(group.between(guarding.column)),
         ),

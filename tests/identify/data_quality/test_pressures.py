@@ -58,9 +58,20 @@ class TestFlowAgainstPressure:
         said = f"{warning.source}: {warning.text}"
         assert "ramp_dP1.csv" in said and "ramp_dP2.csv" in said
 
-    @pytest.mark.parametrize("exponent", [0.0, 0.3, 0.5, 0.6])
-    def test_valves_as_they_are_are_not_blamed(self, exponent):
-        assert not warned([ramp(dp, exponent=exponent) for dp in (1, 2, 5)], "flow-contradicts-dp")
+    @pytest.mark.parametrize("pressures", [(6, 8, 10), (6, 10), (1, 2, 5), (3, 3.5, 4.5)])
+    def test_a_flow_that_does_not_grow_is_said(self, pressures, wording):
+        """A gauge at the supply, or a valve that compensates its pressure."""
+        (warning,) = warned([ramp(2, said=dp, source=f"{dp}.csv") for dp in pressures], "flow-contradicts-dp")
+        if pressures == (6, 8, 10):
+            wording("pressures: a flow that does not grow", warning.text)
+
+    @pytest.mark.parametrize("exponent", [0.3, 0.5, 0.6])
+    @pytest.mark.parametrize("pressures", [(1, 2, 5), (6, 8, 10), (6, 10), (5, 6)])
+    def test_valves_as_they_are_are_not_blamed(self, exponent, pressures):
+        assert not warned([ramp(dp, exponent=exponent) for dp in pressures], "flow-contradicts-dp")
+
+    def test_pressures_too_near_for_a_growth_are_not_compared(self):
+        assert not warned([ramp(5, exponent=0.0), ramp(6, exponent=0.0)], "flow-contradicts-dp")
 
     def test_a_supply_at_its_limit_is_not_blamed(self):
         assert not warned([ramp(dp, saturation=9.0) for dp in (0.5, 1, 2, 5)], "flow-contradicts-dp")

@@ -151,6 +151,44 @@ class TestContradiction:
         assert {"lag-contradicted", "branch-order"} <= set(codes(tests, meter_lag=0.2))
 
 
+def late(tests, seconds):
+    """The same, their column of the command late: what a fieldbus reads back."""
+    return [replace(test, u=np.interp(test.time - seconds, test.time, test.u)) for test in tests]
+
+
+class TestLateCommand:
+    @pytest.mark.parametrize(("seconds", "lag", "sign"), [(0.3, 0.0, 1), (0.06, 0.0, 1), (1.1, 0.1, 1), (0.3, 0.1, -1)])
+    def test_it_is_said_and_taken_out(self, seconds, lag, sign, wording):
+        tests = late(recordings(lag, seconds=100.0) + recordings(lag, seconds=40.0), seconds)
+        tests = [replace(test, u=sign * test.u, q=sign * test.q) for test in tests]
+        valve = identify(tests, IdentifyOptions(repeatability=0.0))
+        assert valve.meter.lag_s == pytest.approx(lag - seconds, abs=0.02)
+        (side,) = valve.sides.values()
+        for test in side.tests:
+            assert test.u_knee_falling_V == pytest.approx(CLOSING, abs=0.004)
+        bound = side.certified["closing"].u_min0_V
+        assert CLOSING - 0.02 < bound < CLOSING
+        (said,) = [warning for warning in valve.warnings if warning.code == "command-late"]
+        if sign > 0 and seconds == 0.3:
+            wording("meter lag: a command that comes late", said.text)
+
+    def test_a_declared_lag_that_it_contradicts_is_said_and_the_bounds_allow_for_it(self, wording):
+        tests = late(recordings(0.0, seconds=100.0) + recordings(0.0, seconds=40.0), 0.3)
+        options = IdentifyOptions(repeatability=0.0, meter_lag=0.0, meter_lag_tolerance=0.02)
+        valve = identify(tests, options)
+        assert valve.positive.certified["closing"].u_min0_V < CLOSING
+        (said,) = [warning for warning in valve.warnings if warning.code == "lag-contradicted"]
+        wording("meter lag: a declared one beside a late command", said.text)
+
+    def test_what_does_not_stand_out_is_not_taken_but_counts_in_the_bounds(self):
+        tests = late(recordings(0.0, seconds=100.0) + recordings(0.0, seconds=40.0), 0.005)
+        meter = identify(tests, IdentifyOptions(repeatability=0.0)).meter
+        assert (meter.lag_s, meter.lag_is) == (0.0, "identified") and meter.lag_shorter_s > 0.005
+
+    def test_a_meter_that_lags_makes_no_command_late(self):
+        assert "command-late" not in codes(recordings(0.1, seconds=100.0) + recordings(0.1, seconds=40.0))
+
+
 class TestFilter:
     @pytest.mark.parametrize("rising", [True, False])
     @pytest.mark.parametrize("at_level", [0.02, 0.1, 0.3])

@@ -98,3 +98,66 @@ class TestZero:
             valve = identify(recordings(0.0, noise=0.75, memory=0.98, pressures=pressures), OPTIONS)
             feigned += valve.positive.tests[0].leak_L_min > 0
         assert feigned == 0
+
+
+class TestHiddenZero:
+    """A meter that writes nothing below zero: its zero error puts every knee too high, unseen at rest."""
+
+    @staticmethod
+    def cut_off(zero, *, at=0.0, noise=0.05, pressures=PRESSURES, step=0.0, sign=1, memory=0.0):
+        tests = recordings(0.0, zero=zero, noise=noise, pressures=pressures, memory=memory)
+        tests = [replace(test, q=np.maximum(test.q, at * L_MIN)) for test in tests]
+        if step:
+            tests = [replace(test, q=np.round(test.q / L_MIN / step) * step * L_MIN) for test in tests]
+        return [replace(test, u=sign * test.u, q=sign * test.q) for test in tests]
+
+    @pytest.mark.parametrize(
+        ("zero", "changes"),
+        [
+            (-0.6, {}), (-0.3, {"noise": 0.02}), (-0.75, {"noise": 0.2}), (-0.6, {"pressures": (1.0,)}),
+            (-0.6, {"noise": 0.1, "step": 0.1}), (-0.6, {"sign": -1}), (-0.6, {"at": -0.02}), (-0.6, {"memory": 0.9}),
+        ],
+        ids=["0.6", "little noise", "much noise", "one pressure", "coarse", "negative", "below zero", "slow noise"],
+    )  # fmt: skip
+    def test_it_is_said_and_the_level_counts_it(self, zero, changes, wording):
+        tests = self.cut_off(zero, **changes)
+        valve = identify(tests, OPTIONS)
+        (said,) = warned(valve, "zero-hidden")
+        (side,) = valve.sides.values()
+        assert side.certificate.unseen_below_L_min > -zero > side.certificate.level_L_min
+        for guard in ("closing", "opening"):
+            assert side.unseen_below_L_min(guard) > -zero
+            assert "--meter-zero" in side.none_in_words(guard, valve.recorded_units)
+        if not changes:
+            wording("readings at rest: a hidden zero", said.text)
+            wording("readings at rest: a level with a hidden zero", side.none_in_words("closing", valve.recorded_units))
+        # Declared, it is in the bounds, and there is nothing to say.
+        declared = identify(tests, replace(OPTIONS, meter_zero=-zero * L_MIN))
+        assert not warned(declared, "zero-hidden")
+        for test in next(iter(declared.sides.values())).tests:
+            assert test.u_guard_lower_V < CLOSING
+
+    def test_a_flow_allowed_at_zero_is_said_to_come_beside_it(self):
+        valve = identify(self.cut_off(-0.6), replace(OPTIONS, zero_flow=0.3 * L_MIN))
+        assert "beside a zero error" in valve.positive.zero_flow_in_words(valve.recorded_units)
+
+    @pytest.mark.parametrize(
+        "tests",
+        [
+            recordings(0.0),
+            recordings(0.0, noise=0.0),
+            recordings(0.0, zero=-0.6),
+            [record(Valve(floor=0.6, noise=0.0), dp) for dp in PRESSURES],
+            [replace(test, q=np.where(test.q < 0.6 * L_MIN, 0.0, test.q)) for test in recordings(0.0)],
+            [replace(test, q=np.round(test.q / L_MIN, 1) * L_MIN) for test in recordings(0.0, noise=0.01)],
+            [
+                replace(test, q=test.q * (1 + 0.02 * np.random.default_rng(1).standard_normal(test.q.size)))
+                for test in recordings(0.0, noise=0.0)
+            ],
+        ],
+        ids=["noise", "simulated", "zero seen", "floor, no noise", "floor", "coarse", "noise of the flow itself"],
+    )
+    def test_a_meter_that_shows_its_zero_or_has_a_floor_is_not_blamed(self, tests):
+        valve = identify(tests, OPTIONS)
+        assert not warned(valve, "zero-hidden")
+        assert valve.positive.certificate.unseen_below_L_min == valve.positive.certificate.level_L_min

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import spool_ripple
@@ -94,6 +95,68 @@ OTHERS = {
 @pytest.mark.parametrize("seed", [1, 2])
 def test_what_else_ripples_is_not_taken_for_it(name, seed):
     assert ripples(recordings(gain=3.2, seed=seed, **OTHERS[name]))[0] == [0.0, 0.0]
+
+
+def swinging(frequency, lag=0.1, share=0.1, breakaway=0.0, seed=1):
+    """Record three pressure drops that swing with the pump; the flow follows at once, the meter's filter late."""
+    rng, tests = np.random.default_rng(seed), []
+    up, hold = np.linspace(0, 10, RAMP_S * RATE_Hz), np.zeros(3 * RATE_Hz)
+    u = np.concatenate([hold, up, up[::-1], hold])
+    time = np.arange(u.size) / RATE_Hz
+    for dp in (1.0, 3.0, 5.0):
+        spool = sticking(u, breakaway, rng) if breakaway else u
+        opening = np.clip(spool - 5.3 + 0.05 * dp, 0, None)
+        swing = share * np.sin(2 * np.pi * frequency * time + rng.uniform(0, 2 * np.pi))
+        now = dp * (1 + swing)
+        flow = 3.2 * now**0.5 * opening
+        if lag:
+            pole = np.exp(-1 / (lag * RATE_Hz))
+            flow = lfilter([1 - pole], [1, -pole], flow)
+        tests.append(
+            RampTest(
+                source=f"swing{dp:g}.csv",
+                sha256=f"{round(dp):064d}",
+                time=time,
+                u=u + 2e-3 * rng.standard_normal(u.size),
+                q=(flow + 0.05 * rng.standard_normal(u.size)) * L_MIN,
+                dp=now * MPA * (1 + 4e-3 * rng.standard_normal(u.size)),
+            )
+        )
+    return tests
+
+
+class TestSwingingSupply:
+    """A pressure drop that swings: its level is the mean, the flow follows, and the spool stands still."""
+
+    @pytest.mark.parametrize("lag", [0.0, 0.1])
+    @pytest.mark.parametrize("frequency", [0.2, 0.5, 1.3, 3.0, 7.0, 12.5, 20.0])
+    def test_the_level_is_found_and_no_bound_is_above_the_threshold(self, frequency, lag, wording):
+        options = IdentifyOptions(meter_lag=lag, meter_lag_tolerance=0.0, repeatability=0.0)
+        model = identify(swinging(frequency, lag), options)
+        codes = [warning.code for warning in model.warnings]
+        assert "stick-slip" not in codes and "pressure-swings" in codes
+        assert [test.dp_MPa for test in model.positive.tests] == pytest.approx([1.0, 3.0, 5.0], rel=0.01)
+        for test, dp in zip(model.positive.tests, (1.0, 3.0, 5.0), strict=True):
+            assert test.u_guard_lower_V < 5.3 - 0.05 * dp
+            assert test.u_knee_falling_V == pytest.approx(5.3 - 0.05 * dp, abs=0.015)
+        if (frequency, lag) == (3.0, 0.1):
+            (said,) = [warning.text for warning in model.warnings if warning.code == "pressure-swings"]
+            wording("spool ripple: a supply that swings", said)
+
+    def test_a_spool_that_sticks_under_a_swinging_supply_is_still_seen(self):
+        model = identify(swinging(3.0, breakaway=0.3), IdentifyOptions(meter_lag=0.1))
+        assert {"stick-slip", "pressure-swings"} <= {warning.code for warning in model.warnings}
+        ripple = [test.spool_ripple_V for test in model.positive.tests]
+        assert ripple == pytest.approx([0.3 / 12**0.5] * 3, rel=0.4)
+
+    def test_a_steady_supply_is_not_said_to_swing(self):
+        model = identify(swinging(3.0, share=0.0), IdentifyOptions(meter_lag=0.1))
+        assert "pressure-swings" not in {warning.code for warning in model.warnings}
+
+    def test_seeded_without_the_swings_it_passes_for_stick_slip(self, monkeypatch):
+        monkeypatch.setattr(spool_ripple, "SWINGS", np.inf)
+        model = identify(swinging(3.0), IdentifyOptions(meter_lag=0.1))
+        assert "stick-slip" in {warning.code for warning in model.warnings}
 
 
 class TestSeeded:

@@ -32,9 +32,11 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:
         text += f" Hence {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)}."
     elif certificate.guard == "closing":
-        by_hand = certificate.level_L_min < compensator.valve.sides[SIDE_NAMES[sign]].certificate.level_L_min
+        meter_L_min = compensator.valve.sides[SIDE_NAMES[sign]].certificate.level_L_min
+        by_hand, hidden = certificate.level_L_min < meter_L_min, certificate.level_L_min > meter_L_min
         flow = units.text(certificate.level_L_min, ".3g L/min" if by_hand else ".2f L/min")
         shown = "as the low-flow readings show" if by_hand else "which is less than the recordings can show"
+        shown = "a zero error included that the flow meter may hide at rest" if hidden else shown
         text += f" The flow is less than {flow}, {shown}."
     else:
         text += " After closing, flow may remain: the closing threshold lies lower and is not the guarded one."

@@ -27,12 +27,21 @@ READINGS_A_LEVEL = 5
 
 def about_the_meter(side: SideModel, group: DescribedTests, options: IdentifyOptions) -> Iterator[Finding]:
     """Yield the warnings about the flow meter, of one side."""
+    yield from _about_a_hidden_zero(side)
     yield from _about_a_leak(side)
     yield from _about_the_zero_flow(side, group)
     yield from _about_the_noise_level(side, options)
     yield from _about_steps(side, group.tests, options)
     yield from _about_the_lag(group, options)
     yield from _about_lag_and_order(side, group)
+
+
+def _about_a_hidden_zero(side: SideModel) -> Iterator[Finding]:
+    """Say that readings at rest are one number where the meter scatters, so that its zero error does not show."""
+    unseen = side.certificate.unseen_below_L_min
+    if unseen > side.certificate.level_L_min:
+        shift_mV = 1e3 * max(unseen / test.slope_L_min_V for test in side.tests)
+        yield warn("zero-hidden", zero_L_min=unseen, shift_mV=shift_mV)
 
 
 def _about_a_leak(side: SideModel) -> Iterator[Finding]:
@@ -114,7 +123,11 @@ def _about_the_lag(group: DescribedTests, options: IdentifyOptions) -> Iterator[
         yield warn("lag-unchecked", lag_s=lag.seconds, shift_mV=shift_mV, rate_V_s=fastest, tolerance_mV=tolerance_mV)
     if lag.contradicted_by is not None:
         found, se = lag.contradicted_by
-        yield warn("lag-contradicted", None, "rates", lag_s=lag.seconds, found_s=found, se_s=se)
+        case = "rates" if found >= 0 else "late"
+        yield warn("lag-contradicted", None, case, lag_s=lag.seconds, found_s=abs(found), se_s=se)
+    elif lag.seconds < 0:
+        late, shift_mV = -lag.seconds, -1e3 * fastest * lag.seconds
+        yield warn("command-late", late_s=late, error_s=lag.longer, shift_mV=shift_mV, rate_V_s=fastest)
 
 
 def _about_lag_and_order(side: SideModel, group: DescribedTests) -> Iterator[Finding]:

@@ -18,6 +18,7 @@ from dzdesign.identify.knees.described_tests import DescribedTest, DescribedTest
 from dzdesign.identify.knees.meter_lag import softness_of_filter
 from dzdesign.identify.knees.scatter_checks import ScatterChecks
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.ramps.sweep_pressure import SWINGS
 from dzdesign.identify.valve.side_model import SideModel
 
 #: A softer edge than this share of u_max between knee and the tail's zero is said.
@@ -28,6 +29,8 @@ OVERLAP, LEAK_SIGNIFICANCE = (0.6, 0.85), 5.0
 WIDE_HYSTERESIS = 0.03
 #: A leak below this share of the largest flow is not worth a word.
 LEAK_SHARE = 1e-3
+#: Half swings of the pressure drop on one ramp, while the valve is shut, from which it swings.
+FEWEST_SWINGS = 6
 
 
 def find_warnings(
@@ -117,12 +120,35 @@ def _about_pressure(side: SideModel, tests: tuple[DescribedTest, ...]) -> Iterat
     elif side.trend == "flat" and side.trend_change_V is not None and side.trend_change_se_V is not None:
         change_mV, se_mV = 1e3 * side.trend_change_V, 1e3 * side.trend_change_se_V
         yield warn("flat-trend", change_mV=change_mV, change_se_mV=se_mV, p_value=side.trend_p)
+    yield from _about_swings(tests)
     for item in tests:
         share = _sag(item)
         if share > 1 / 3:
             yield warn("pressure-sag", item.test.source, share=share)
         if item.test.dp_is_declared:
             yield warn("declared-pressure", item.test.source, "declared")
+
+
+def _about_swings(tests: tuple[DescribedTest, ...]) -> Iterator[Finding]:
+    """Say of a supply that swings while the valve is shut that it does: the flow follows, and no spool makes it."""
+    swings = [_swing(item) for item in tests]
+    worst = int(np.argmax(swings))
+    if swings[worst] > SWINGS:
+        count = sum(share > SWINGS for share in swings)
+        yield warn("pressure-swings", tests[worst].test.source, share=swings[worst], count=count, tests=len(tests))
+
+
+def _swing(item: DescribedTest) -> float:
+    """Return the spread of the pressure drop over its mean while the valve is shut; 0 of one that drifts or steps."""
+    branch, knee = item.closing_branch.prepared.branch, item.closing_branch.knee
+    shares = []
+    for part in branch.ramps if branch.dp is not None else ():
+        dp = branch.dp[part][branch.u[part] < 0.9 * knee]
+        away = dp - dp.mean() if dp.size else dp
+        beyond = away[np.abs(away) > np.std(away) / 2]
+        swings = np.count_nonzero(np.diff(np.sign(beyond))) >= FEWEST_SWINGS
+        shares.append(float(np.std(away) / dp.mean()) if swings and dp.mean() > 0 else 0.0)
+    return float(np.median(shares)) if shares else 0.0
 
 
 def _sag(item: DescribedTest) -> float:
@@ -152,8 +178,8 @@ def _about_the_edge(side: SideModel, group: DescribedTests, u_max: float) -> Ite
 def _softness_of_the_meter(item: DescribedTest, group: DescribedTests) -> float:
     """Return how far below the knee of a sharp edge the tail ends, V, by the longest lag that the meter may have."""
     shape = item.closing_branch
-    branch, longest = shape.prepared.branch, group.lag.seconds + group.lag.longer
-    return softness_of_filter(longest * branch.rate, shape.level / shape.slope, TAIL, rising=branch.rising)
+    branch = shape.prepared.branch
+    return softness_of_filter(group.lag.longest * branch.rate, shape.level / shape.slope, TAIL, rising=branch.rising)
 
 
 def _leak_in_overlap(item: DescribedTest, threshold: float) -> float:

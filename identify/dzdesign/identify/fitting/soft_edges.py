@@ -118,7 +118,7 @@ def _lags(lag: MeterLag, shapes: Sequence[BranchShape], known: Sequence[EdgeAver
     """Return lags, s, from the shortest to the longest that the meter may have, so near that none hides the level."""
     # Of ramps of several rates in one test, the slower ones are rounded less.
     slowest = min(_slowest_pace(shape) for shape in shapes)
-    ends = max(lag.seconds - lag.shorter, 0.0) * slowest, lag.seconds + lag.longer
+    ends = max(lag.seconds - lag.shorter, 0.0) * slowest, lag.longest
     if ends[1] - ends[0] <= 0 or not any(item.rate > 0 for item in known):
         return np.array(ends[:1])
     # A filter of so many seconds shows so much flow where a sharp edge has none.

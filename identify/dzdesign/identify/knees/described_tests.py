@@ -58,6 +58,8 @@ class DescribedTests:
     lag: MeterLag
     #: Source -> flow read at zero command, where it is not zero; it has been subtracted.
     zero_L_min: dict[str, float]
+    #: Largest zero error of the meter that readings at rest hide, m³/s; 0 where they tell the zero.
+    hidden_zero: float
     #: Standard error of what was subtracted from each of `tests`, as of white noise, m³/s; 0 where nothing was.
     zero_se: tuple[float, ...]
     #: Leak that was subtracted from each of `tests`, m³/s; 0 where there is none.

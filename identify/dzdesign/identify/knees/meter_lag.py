@@ -5,6 +5,9 @@ one ramp rate that can't be told from hysteresis; a second rate moves the knees 
 
 A lag that is taken out wrongly moves both knees, and one of them to the unsafe side: taken too long it puts the closing
 knee too high, too short the opening knee. So a lag comes with how much longer and shorter the true one may be.
+
+No meter runs ahead of the flow, but a column of the command may come late, as one that a fieldbus reads back does: then
+ramps of two rates show a lag below zero.
 """
 
 import math
@@ -41,9 +44,9 @@ FILTER_POINTS = 2000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeterLag:
-    """Lag of the flow meter that was taken out, s; `origin` says how it is known.
+    """Lag of the flow behind the command that was taken out, s, below zero of a command that comes late.
 
-    `origin` is "declared", "identified" (from ramps of two rates) or "unknown": then none is taken.
+    `origin` says how it is known: "declared", "identified" (from ramps of two rates) or "unknown": then none is taken.
     """
 
     seconds: float
@@ -55,6 +58,11 @@ class MeterLag:
     contradicted_by: tuple[float, float] | None = None
     #: Whether ramps of two rates tell the lag well enough to check one that was declared.
     seen_by_rates: bool = False
+
+    @property
+    def longest(self) -> float:
+        """The longest lag that the meter itself may have, s, by which it may round an edge."""
+        return max(self.seconds + self.longer, 0.0)
 
     def shift_at(self, rates: np.ndarray, *, rising: bool) -> np.ndarray:
         """Return by how much knees, at ramps of such rates (V/s), may be too high, V; an unknown rate (NaN) tells 0."""
@@ -77,12 +85,13 @@ def find_lag(ramps: Sequence[Ramp], options: IdentifyOptions) -> MeterLag:
         return MeterLag(seconds=0.0, origin="unknown", longer=LONGEST_UNKNOWN, shorter=0.0)
     seconds, se = found
     # Below its error there may be none; the error counts in the bounds either way.
-    taken = seconds if seconds > LAG_SIGNIFICANCE * se else 0.0
+    taken = seconds if abs(seconds) > LAG_SIGNIFICANCE * se else 0.0
     return MeterLag(
         seconds=taken,
         origin="identified",
         longer=max(seconds - taken, 0.0) + LAG_ERRORS * se,
-        shorter=min(taken, LAG_ERRORS * se),
+        # No meter runs ahead of the flow; a lag found below zero says that the command may come late.
+        shorter=min(taken, LAG_ERRORS * se) if seconds >= 0 else taken - seconds + LAG_ERRORS * se,
         seen_by_rates=True,
     )
 
@@ -108,16 +117,17 @@ def softness_of_filter(shift: float, at_level: float, ratio: float, *, rising: b
 def _declared(seconds: float, stated: float | None, left: tuple[float, float] | None) -> MeterLag:
     """Return a declared lag with its tolerance; `left` is what two rates show to be left of it, and its error, s."""
     tolerance = max(LAG_TOLERANCE * seconds, LEAST_TOLERANCE) if stated is None else stated
-    longer, shorter, contradicted_by = tolerance, tolerance, None
+    longer, shorter, contradicted_by = tolerance, min(tolerance, seconds), None  # no meter runs ahead of the flow
     if left is not None and abs(left[0]) > tolerance + LAG_ERRORS * left[1]:
-        contradicted_by = (max(seconds + left[0], 0.0), left[1])
+        contradicted_by = (seconds + left[0], left[1])
         longer = max(longer, left[0] + LAG_ERRORS * left[1])
-        shorter = max(shorter, LAG_ERRORS * left[1] - left[0])
+        by_rates = LAG_ERRORS * left[1] - left[0]
+        shorter = max(shorter, by_rates if contradicted_by[0] < 0 else min(by_rates, seconds))
     return MeterLag(
         seconds=seconds,
         origin="declared",
         longer=longer,
-        shorter=min(shorter, seconds),  # no meter runs ahead of the flow
+        shorter=shorter,
         contradicted_by=contradicted_by,
         seen_by_rates=left is not None,
     )

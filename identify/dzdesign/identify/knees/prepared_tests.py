@@ -18,7 +18,7 @@ from dzdesign.identify.knees.meter_floor import find_meter_floor
 from dzdesign.identify.knees.meter_lag import MeterLag, find_lag
 from dzdesign.identify.knees.mixed_branches import refuse_mixed_branches
 from dzdesign.identify.knees.profile import largest_at_top
-from dzdesign.identify.knees.readings_at_rest import find_rest_flows
+from dzdesign.identify.knees.readings_at_rest import find_rest_flows, hidden_zero
 from dzdesign.identify.knees.refusals import (
     refuse_a_jump,
     refuse_a_shut_valve,
@@ -52,6 +52,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
     """
     refuse_two_directions(tests)
     rest = find_rest_flows(tests, options.u_max)
+    as_read = tests
     tests = [replace(test, q=test.q - flow) for test, flow in zip(tests, rest.flows, strict=True)]
     tests = with_clock_of_series(tests)
     ramps = split_recordings(tests, options, options.meter_lag or 0.0)
@@ -75,6 +76,7 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         floor=floor,
         lag=lag,
         zero_L_min={source: zero / L_MIN for source, zero in rest.zero.items() if zero},
+        hidden_zero=hidden_zero(as_read, floor, options),
         # Of several recordings pooled to one test, the worst: each stands for its own part of the ramp.
         zero_se=tuple(max(rest.se.get(name, 0.0) for name, _ in item.files) for item in described),
         leak=tuple(rest.leak_per_Pa * (item.dp or 0.0) for item in described),
@@ -98,7 +100,7 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
                 f"'{test.source}' has no column of dP (or pA and pB); several ramp tests can only be told apart by it: "
                 "record it, or declare it by --dp or [dp]"
             )
-        if lag > 0 and not np.ptp(test.time) > 0:
+        if lag != 0 and not np.ptp(test.time) > 0:
             raise InputError(
                 f"'{test.source}': the time stands still at {test.time[0]:g} s, so the meter's lag can't be taken out; "
                 "correct the column of time, or leave out --meter-lag"
@@ -169,7 +171,7 @@ def _described(pooled: list[PooledTest], floor: float, lag: MeterLag, options: I
         u_max=options.u_max,
         window=options.knee_window,
         noise_level=options.noise_level,
-        longest_lag=lag.seconds + lag.longer,
+        longest_lag=lag.longest,
     )
     for shape in shapes:
         refuse_an_impossible_knee(shape.prepared.branch, shape.knee, shape.prepared.source, options.u_max)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.identify.knees.noise import robust_sigma
+from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.reading.ramp_test import RampTest
 
@@ -26,6 +27,16 @@ ZERO_ERRORS, ZERO_SHARE = 5.0, 2e-3
 TWO_PRESSURES = 1.1
 #: Share of the squares of the readings at rest about their mean that a leak must explain, and its standard errors.
 EXPLAINED, LEAK_ERRORS = 0.5, 4.0
+#: Share of the readings at rest that are one number, from which that hides noise, and from which it hides the zero.
+#: Flows over the largest at which the noise is looked at, and its least size over a step of the readings, the largest
+#: flow, and that at middle flow: less is a simulation's, or the flow's own.
+HIDES_NOISE, HIDES_ALL = 0.6, 0.95
+LOW_FLOW, MIDDLE_FLOW, FEWEST_AT_FLOW = (0.02, 0.1), (0.3, 0.6), 40
+NOISE_OVER_STEP, NOISE_OVER_FLOW, NOISE_OVER_MIDDLE = 0.5, 2e-4, 0.2
+#: Share of the readings up to twice a meter's floor that may lie below so much of it: with more it hides none.
+BELOW_FLOOR, OF_FLOOR = 0.1, 0.75
+#: Zero error of a meter that may stay hidden: 0.5 % of a range of ten times the largest flow, as data sheets have it.
+HIDDEN_ZERO = 0.05
 #: Blocks of the readings at rest, in the order of time, whose means say how coloured their noise is.
 BLOCKS = 8
 
@@ -213,6 +224,48 @@ def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:
     third, fourth = test.q[before // 2 : 3 * before // 4], test.q[3 * before // 4 : before]
     drifts = third.size >= 5 and abs(median(third) - median(fourth)) > 5 * _error_of_median(fourth)
     return np.flatnonzero(at_rest & (np.arange(at_rest.size) >= (before if drifts else before // 2)))
+
+
+def hidden_zero(tests: Sequence[RampTest], floor: float, options: IdentifyOptions) -> float:
+    """Return the largest zero error, m³/s, that readings at rest hide because the meter writes none below zero.
+
+    At rest they are one number though the meter scatters where oil flows, so an error below zero does not show; it puts
+    every knee too high. 0 where they tell the zero, where it was declared, and where a floor hides them: the level at
+    which flow counts is above that.
+    """
+    if options.meter_zero > 0:
+        return 0.0
+    largest = max(float(np.abs(test.q).max()) for test in tests)
+    found = [_hidden_in(test, floor, largest, options.u_max) for test in tests]
+    told = [value for value in found if value is not None]
+    return float(np.median(told)) if told else 0.0
+
+
+def _hidden_in(test: RampTest, floor: float, largest: float, u_max: float) -> float | None:
+    """Return the zero error that a recording hides, m³/s; None where it can't tell."""
+    rest = test.q[readings_at_rest(test, u_max)]
+    low = _noise_between(test.q, LOW_FLOW)
+    if rest.size < FEWEST_AT_REST or low is None:
+        return None
+    one = float(np.mean(rest == median(rest)))
+    noise, middle = low, _noise_between(test.q, MIDDLE_FLOW) or 0.0
+    steps = np.diff(np.unique(test.q))
+    step = float(np.median(steps)) if steps.size else 0.0
+    scatters = noise > max(NOISE_OVER_STEP * step, NOISE_OVER_FLOW * largest, NOISE_OVER_MIDDLE * middle)
+    below = test.q[(test.q > 0) & (test.q < 2 * floor)]
+    # The lowest step of the readings is none.
+    has_floor = floor > 2 * step and below.size > 0 and np.mean(below < OF_FLOOR * floor) < BELOW_FLOOR
+    if one < HIDES_NOISE or not scatters or has_floor:
+        return 0.0
+    return HIDDEN_ZERO * largest if one >= HIDES_ALL else min(2 * noise, HIDDEN_ZERO * largest)
+
+
+def _noise_between(q: np.ndarray, shares: tuple[float, float]) -> float | None:
+    """Return the quick noise of the readings between two shares of the largest flow, by their second differences."""
+    low, high = (share * float(q.max()) for share in shares)
+    inside = (q > low) & (q < high)
+    bends = np.abs(np.diff(q, 2))[inside[:-2] & inside[1:-1] & inside[2:]]
+    return float(np.quantile(bends, 0.68)) / math.sqrt(6) if bends.size >= FEWEST_AT_FLOW else None
 
 
 def _error_of_median(values: np.ndarray) -> float:

@@ -8,6 +8,10 @@ there the spool moves as well, and no flow follows.
 A meter that reads zero below a floor shows no noise there. Then what neighbouring readings on the line differ by tells
 its quick noise, and nothing of slow noise, or of a pump's pulsation. But these rise and fall alike, and a spool that
 sticks does not: many small steps one way, while it waits, and a few large ones the other way.
+
+A supply that swings moves the flow as well. A meter that lags shows that late and smaller, so the flow brought to the
+nominal pressure drop by each sample swings, too. What of it the pressure drop tells is no step of the spool, if it
+swings as much while the valve is shut; where it does not, the flow has moved the pressure.
 """
 
 import math
@@ -31,6 +35,11 @@ RIPPLE_RATIO, SMALLEST_RIPPLE = 4.0, 1e-3
 #: A meter whose readings in the dead zone are one number to this share shows no noise there. One of whose neighbouring
 #: readings on the line as many are equal moves in steps of its own.
 ONE_NUMBER = 0.5
+#: Spread of the pressure drop over its running mean from which it swings, and the share of it that the shut valve must
+#: show as well.
+SWINGS, WHILE_SHUT = 0.01, 0.5
+#: Samples by which a flow may follow a swing; sums of these span the delay of a meter's filter.
+DELAYS = (0, 1, 3, 8, 20, 50)
 #: Standard errors by which the steps of all ramps have to be skewed.
 SKEWED = 4.0
 
@@ -90,6 +99,7 @@ def _ramps(read: PreparedBranch, line: GatedLine, u_max: float) -> list[_Ramp]:
     residual = read.y - line.slope * (u - line.knee)
     ramps = []
     for part in read.branch.ramps:
+        residual[part] -= _swings(read, line, part, residual[part], seen[part], still[part], u_max)
         on_line = _course(u[part][seen[part]], residual[part][seen[part]], u_max)
         at_rest = _course(u[part][still[part]], read.y[part][still[part]], u_max)
         if on_line is None or at_rest is None:
@@ -100,6 +110,33 @@ def _ramps(read: PreparedBranch, line: GatedLine, u_max: float) -> list[_Ramp]:
         elif np.mean(np.diff(q[part][seen[part]]) == 0) < ONE_NUMBER and on_line.quick > 0:
             ramps.append(_Ramp(on_line, None))
     return ramps
+
+
+def _swings(
+    read: PreparedBranch,
+    line: GatedLine,
+    part: slice,
+    residual: np.ndarray,
+    seen: np.ndarray,
+    still: np.ndarray,
+    u_max: float,
+) -> np.ndarray:
+    """Return what of the residuals of one ramp (N,) follows the swings of the supply, m³/s."""
+    none = np.zeros(residual.size)
+    if read.branch.dp is None or min(seen.sum(), still.sum()) < FEWEST_SAMPLES:
+        return none
+    dp, u = read.branch.dp[part], read.branch.u[part]
+    width = max(int(AVERAGED * LOCAL * u_max / max(np.ptp(u), AVERAGED * u_max) * u.size), 1)
+    padded = np.pad(dp, (width // 2, width - 1 - width // 2), mode="edge")
+    swing = dp / np.convolve(padded, np.full(width, 1 / width), "valid") - 1
+    if np.std(swing[seen]) < SWINGS or np.std(swing[still]) < WHILE_SHUT * np.std(swing[seen]):
+        return none
+    # Eq. (1): a share of the flow itself.
+    flow = line.slope * np.maximum(u - line.knee, 0.0)
+    late = np.array([flow * np.concatenate([np.full(k, swing[0]), swing[: swing.size - k]]) for k in DELAYS])
+    inside = late[:, seen]
+    found: np.ndarray = np.linalg.lstsq(inside @ inside.T, inside @ residual[seen], rcond=None)[0] @ late
+    return found
 
 
 def _course(u: np.ndarray, y: np.ndarray, u_max: float) -> Course | None:

@@ -222,7 +222,7 @@ def read_pilot(model: ValveModel, wanted: str | None = None) -> Pilot:
         noise_inflation=float(np.median([test.noise_variance_inflation for test in tests])),
         meter_floor=L_MIN * model.meter.floor_L_min,
         meter_zero=L_MIN * model.meter.zero_L_min,
-        meter_lag=None if model.meter.lag_is == "unknown" else model.meter.lag_s,
+        meter_lag=None if model.meter.lag_is == "unknown" or model.meter.lag_s < 0 else model.meter.lag_s,
         recorded_units=model.recorded_units.of_side(name),
     )
 

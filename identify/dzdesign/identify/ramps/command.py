@@ -23,11 +23,11 @@ def without_command_spikes(test: RampTest) -> RampTest:
 
 
 def lagged_command(time: np.ndarray, u: np.ndarray, lag: float) -> np.ndarray:
-    """Return the command to which each reading of a meter with a lag (s) belongs.
+    """Return the command to which each reading of a meter with a lag (s) belongs; a late command has one below zero.
 
     The clock (s) may stand still, as of a logger that stamps in whole seconds.
     """
-    if lag <= 0:
+    if lag == 0:
         return u
     clock = _spread(time)
     return np.asarray(np.interp(clock - lag, clock, u))

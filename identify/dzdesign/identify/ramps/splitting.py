@@ -29,12 +29,16 @@ from dzdesign.identify.ramps.command import (
 from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.ramps.staircases import find_staircase
 from dzdesign.identify.ramps.sweep_pressure import (
+    SHUT_FLOW,
     Reason,
     SweepLevel,
     joined,
+    level_of_swings,
     off_level,
+    spread_of,
     stretches,
     sweep_level,
+    swings_about,
     why_no_ramp,
 )
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -118,7 +122,8 @@ def split_ramps(test: RampTest, lag: float) -> list[Ramp]:
     reasons = _why_no_ramp(sweeps)
     taken = [sweep for sweep, reason in zip(sweeps, reasons, strict=True) if reason is None]
     groups = _groups(taken, branches=1 if side else 2)
-    kept = test.time >= test.time[0] + lag  # before that, the command that the flow belongs to was not recorded
+    # Before that, or after, the command that the flow belongs to was not recorded.
+    kept = (test.time >= test.time[0] + lag) & (test.time <= test.time[-1] + lag)
     found, left_out = [], list(test.left_out)
     for sweep, reason in zip(sweeps, reasons, strict=True):
         if reason is not None:
@@ -260,12 +265,18 @@ def _between_ends(u: np.ndarray) -> np.ndarray:
 def nominal_dp(test: RampTest) -> float | None:
     """Return the pressure drop at (almost) no flow, Pa; None if it is unknown.
 
-    Read where the command is near zero; a fragment that never comes there is read at its smallest flows.
+    Read where the command is near zero; a fragment that never comes there is read at its smallest flows. One that
+    swings is read wherever the valve is shut: near zero there may be no whole swing.
     """
     if test.dp is None:
         return None
     shut = test.dp[(test.u >= 0) & (test.u <= SHUT * max(test.u.max(), 0))]
-    return median(shut if shut.size >= 5 else test.dp[test.q <= np.quantile(test.q, 0.1)])
+    if shut.size < 5:
+        return median(test.dp[test.q <= np.quantile(test.q, 0.1)])
+    level = median(shut)
+    if not swings_about(level, spread_of(shut)):
+        return level
+    return level_of_swings(test.dp[(test.u >= 0) & (np.abs(test.q) <= SHUT_FLOW * np.abs(test.q).max())])
 
 
 def dp_under_flow(test: RampTest) -> float | None:

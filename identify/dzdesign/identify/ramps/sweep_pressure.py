@@ -33,6 +33,8 @@ FIRST_SAMPLES, SHUT_SAMPLES = 5, 10
 NEAR_EDGE = 0.5
 #: The pressure drop near zero is off the level by more than this share of it, and so many spreads of the shut valve's.
 OFF_LEVEL, OFF_SPREADS = 0.02, 5.0
+#: Spread of a pressure drop over itself from which it swings or scatters: then what a moment shows is not its level.
+SWINGS = 0.03
 #: Within a sweep the pressure is another where it is off by this factor with no flow, and gone below this share of it.
 ANOTHER, GONE = 2.0, 0.1
 #: A sweep with no flow has no pressure below this share of the largest level.
@@ -102,17 +104,30 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
     if near_edge.size < FIRST_SAMPLES:
         near_edge = test.dp[goes_with]
     dp = float(np.median(near_edge))
-    spread = _spread(near_edge)
-    moves = False
+    spread = spread_of(near_edge)
+    moves, swings = False, swings_about(dp, spread)
+    if swings:
+        dp = level_of_swings(test.dp[goes_with])
     if near_zero.size >= FIRST_SAMPLES:
         at_zero = float(np.median(near_zero))
-        error = 3 * spread / math.sqrt(min(near_zero.size, near_edge.size))
+        error = 3 * spread / (1.0 if swings else math.sqrt(min(near_zero.size, near_edge.size)))
         moves = abs(at_zero - dp) > max(OFF_LEVEL * dp, error)
-        dp = dp if moves else at_zero
+        dp = dp if moves or swings else at_zero
     return SweepLevel(dp=dp, sure=True, flows=flows, shut_below=shut_below, spread=spread, moves_at_zero=moves)
 
 
-def _spread(dp: np.ndarray) -> float:
+def swings_about(level: float, spread: float) -> bool:
+    """Tell whether a pressure drop of such a spread swings, and neither stands still nor was switched."""
+    return SWINGS * level < spread <= GOES_WITH * level
+
+
+def level_of_swings(dp: np.ndarray) -> float:
+    """Return what a pressure drop that swings does so about: the mean, without what is far off."""
+    middle = float(np.median(dp))
+    return float(dp[np.abs(dp - middle) <= GOES_WITH * abs(middle)].mean())
+
+
+def spread_of(dp: np.ndarray) -> float:
     """Return the spread of a pressure drop that stands still, at least a step of a coarse converter."""
     steps = np.abs(np.diff(dp))
     steps = steps[steps > 0]

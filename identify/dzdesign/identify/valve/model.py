@@ -30,7 +30,7 @@ class Meter:
     """Properties of the flow meter as assumed."""
 
     floor_L_min: Annotated[Flow, Meta(description="Flow below which the meter reads zero, declared or found.")]
-    lag_s: Annotated[float, quantity("s", "First-order lag of the meter.", ge=0, le=1e6)]
+    lag_s: Annotated[float, quantity("s", "Lag of the meter; below zero if the command comes late.", ge=-1e6, le=1e6)]
     lag_is: Annotated[
         LagOrigin,
         Meta(description="Whether the lag was declared or identified. If it is unknown, it was taken as zero."),

@@ -88,8 +88,9 @@ class BoundsBasis:
     unseen_below_L_min: Annotated[
         Flow,
         Meta(
-            description="Flow below which nothing is known at the guard's bounds. It is level_L_min, or less if "
-            "low-flow readings at or above the guarded threshold of every test show that no more flows."
+            description="Flow below which nothing is known at the guard's bounds. It is level_L_min. It is less if "
+            "low-flow readings at or above the guarded threshold of every test show that no more flows, and more if "
+            "the readings at rest may hide a larger zero error of the meter."
         ),
     ]
     repeatability: Annotated[Repeatability, Meta(description="Differences from ramp to ramp.")]
@@ -260,6 +261,9 @@ class SideModel:
         if declared is None or allowed is None:
             return ""
         text = f"up to {units.text(allowed, '.3g L/min')} may flow, a leak included: "
+        if self.certificate.unseen_below_L_min > self.certificate.level_L_min:
+            hidden = units.text(self.certificate.unseen_below_L_min, ".3g L/min")
+            text = f"beside a zero error of the meter up to {hidden} that readings at rest hide, {text}"
         if allowed <= PROMISED * declared:
             return f"{text}the declared zero flow"
         zero_flow = units.text(declared, ".3g L/min")
@@ -280,7 +284,8 @@ class SideModel:
         Readings by hand tell of the default one's bounds.
         """
         basis = self.certificate
-        return basis.unseen_below_L_min if guard == basis.guard else basis.level_L_min
+        unseen = basis.unseen_below_L_min
+        return unseen if guard == basis.guard else max(unseen, basis.level_L_min)
 
     def none_in_words(self, guard: str, units: RecordedUnits) -> str:
         """Say which flow at a guard's bounds counts as no flow, and by what."""
@@ -288,6 +293,10 @@ class SideModel:
         if unseen < level:
             by_hand, meter = units.text(unseen, ".3g L/min"), units.text(level, ".2f L/min")
             return f"flow below {by_hand} (the low-flow readings; the meter shows it from {meter} on) counts as no flow"
+        if unseen > level:
+            flow, meter = units.text(unseen, ".3g L/min"), units.text(level, ".2f L/min")
+            hidden = "a zero error of the meter that readings at rest may hide; declare --meter-zero"
+            return f"flow below {flow} counts as no flow ({hidden}; beside it the meter shows flow from {meter} on)"
         flow = units.text(level, ".2f L/min")
         by = "the largest of meter floor, noise of averaged readings and 0.5 % of the largest flow"
         return f"flow below {flow} counts as no flow ({by})"
