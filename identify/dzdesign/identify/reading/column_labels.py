@@ -8,7 +8,7 @@ from math import isclose
 
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.units import measures, si_factor
-from dzdesign.identify.reading.metering_edge import PORTS, metering_edge, which_edge
+from dzdesign.identify.reading.metering_edge import PORTS, gauge_beside_absolute, metering_edge, which_edge
 from dzdesign.identify.reading.table import AND, Table, clean_label
 
 #: Spelling in a header (lower case, letters only) -> quantity of a ramp test.
@@ -139,6 +139,9 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
             "P or T, or dP"
         )
     columns = {name: column for name, column in columns.items() if name not in PRESSURES or name in edge.quantities}
+    texts = [{name: getattr(column, text) for name, column in columns.items()} for text in ("label", "unit")]
+    if why := gauge_beside_absolute(edge, *texts):
+        raise InputError(f"'{table.path}'{table.header} has {why}")
     for quantity in ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, columns)
