@@ -6,8 +6,9 @@ A long recording is thinned: see `thinning`.
 import gzip
 import io
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -23,9 +24,9 @@ from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_m
 from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
 from dzdesign.identify.reading.missing_values import describe_missing, without_failed_signals, without_placeholders
-from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest, Switch
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
-from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
+from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.reading.thinning import thin
 from dzdesign.identify.reading.time_stamps import Start
@@ -36,6 +37,8 @@ from dzdesign.identify.valve.recorded_drop import DropColumns
 MIN_ROWS = 20
 #: First word of the first comment line of a recording that is none: whoever makes one up writes it there.
 SIMULATED_MARK = "SIMULATED"
+#: A column of two values is looked for among so many, in so many rows, and changes so often at most.
+MOST_SWITCHES, LONGEST_SWITCH, MOST_CHANGES = 8, 1_000_000, 200
 #: Stands for the column of time where the sample rate is declared.
 DECLARED_CLOCK = Column(label="--sample-rate", unit="s")
 #: SI numbers beyond these are not a measurement of a valve: a wrong unit, or what a logger writes for an overflow.
@@ -103,6 +106,9 @@ def read_ramp_file(
         stamp=recording.stamp,
         started=recording.stamp.seconds if recording.stamp else None,
         units=recording.units,
+        switches=tuple(
+            replace(each, changes=each.changes / (1e3 if doubt == ASSUMED_MS else 1.0)) for each in recording.switches
+        ),
     )
 
 
@@ -123,6 +129,7 @@ class _Recording:
     dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]
     side_without_dp: str
     units: Mapping[Quantity, tuple[Unit, ...]]
+    switches: tuple[Switch, ...]
 
 
 def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.ndarray) -> str:
@@ -209,7 +216,23 @@ def _read_recording(
         dp_from=edge.columns(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
         units=units_of_columns(table.path, found, u_max),
+        switches=tuple(_switches(table, found, rows[0], complete)),
     )
+
+
+def _switches(table: Table, found: Mapping[str, Column], time: np.ndarray, complete: np.ndarray) -> Iterator[Switch]:
+    """Yield the columns of two values beside those that were read, of a table that has few others."""
+    taken = {label for column in found.values() for each in column.every for label in each.label.split(AND)}
+    others = [label for label in table.labels if label and label not in taken]
+    if len(others) > MOST_SWITCHES or not 0 < time.size <= LONGEST_SWITCH:
+        return
+    for label in others:
+        with suppress(InputError):
+            two = table.two_values(label) if table.length(label) == complete.size else None
+            changes = np.flatnonzero(np.diff(two[1][complete])) + 1 if two else np.empty(0, dtype=int)
+            if two and 0 < changes.size <= MOST_CHANGES:
+                values = two[0][::-1] if two[1][complete][0] else two[0]
+                yield Switch(label=table.in_file(label), values=values, changes=time[changes])
 
 
 def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float | None) -> None:
