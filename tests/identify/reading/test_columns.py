@@ -204,7 +204,7 @@ class TestEqualLabels:
 class TestTwoSolenoids:
     """A command column for each solenoid: their difference is one signed command."""
 
-    @pytest.fixture(params=["volts", "pwm", "mA"])
+    @pytest.fixture(params=["volts", "pwm", "letters", "mA"])
     def both(self, request, bench):
         """A file, its columns' labels, and what --columns says of them."""
         rows = ramp(ramp_s=40)
@@ -214,6 +214,7 @@ class TestTwoSolenoids:
         labels, unit, scale = {
             "volts": ("uA_V,uB_V", "", lambda u: u),
             "pwm": ("PWM_A,PWM_B", ":0..255 = 0..100 %", lambda u: np.round(25.5 * u)),
+            "letters": ("u_A,u_B", ":0..10 = 0..100 %", lambda u: u),
             "mA": ("i A (mA),i B (mA)", ":4..20 mA = 0..10 V", lambda u: 4 + 1.6 * u),
         }[request.param]
         every = np.vstack([rows, other])

@@ -29,6 +29,8 @@ MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
 PER_CENT = ("%", "pct", "percent")
 QUANTITIES = ("time", "voltage", "pressure", "flow")
+#: The last letters of the labels of two sides, exchanged.
+TWINS = str.maketrans("ABab", "BAba")
 #: Stands between the commands of two solenoids whose difference is the signed command.
 LESS = re.compile(r"\s[-\u2212\u2013]\s")
 #: Characters of a label in which a quantity is looked for.
@@ -297,10 +299,16 @@ def split_label(label: str) -> tuple[str | None, str]:
 
 
 def split_column(table: Table, label: str) -> tuple[str | None, str]:
-    """Return what `split_label` does, for a column of a table: beside ``PWM_B`` the A of ``PWM_A`` is no unit."""
+    """Return what `split_label` does, for a column of a table: beside ``PWM_B`` the A of ``PWM_A`` is no unit.
+
+    Of ``u_A`` and ``u_B`` neither is the command.
+    """
     in_file = table.in_file(label)
     quantity, unit = split_label(in_file)
-    return quantity, "" if unit == "A" and in_file.endswith("A") and f"{in_file[:-1]}B" in table.labels else unit
+    twin = in_file[:-1] + in_file[-1:].translate(TWINS)
+    if twin == in_file or twin not in table.labels or unit.lower() not in ("a", "b"):
+        return quantity, unit
+    return None if quantity == "u" else quantity, ""
 
 
 def _quantity_named(name: str) -> str | None:
