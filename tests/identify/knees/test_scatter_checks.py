@@ -300,6 +300,15 @@ class TestTwoGroups:
         assert scatter_checks.find_two_groups(knee, row, number, noise, switched).column == "DIR"
         assert scatter_checks.find_two_groups(knee, row, number, noise, []) is None
 
+    @pytest.mark.parametrize(("repeats", "lower"), [(4, 2), (4, 1), (20, 1), (20, 19)])
+    def test_the_bounds_are_below_the_lower_group(self, repeats, lower):
+        order = np.repeat(np.arange(TESTS), repeats)
+        number = np.tile(np.arange(repeats), TESTS)
+        knees = 5.1 + 1e-3 * np.random.default_rng(repeats).standard_normal(order.size) + 0.5 * (number >= lower)
+        between = compared(knees, order, dated=False, noise=1e-4)
+        assert between.checks.groups
+        assert (bounded(between, knees, order) < 5.1).all()
+
     def test_a_valve_that_closes_at_two_places_by_chance_is_two(self):
         said = 0
         for seed in range(50):

@@ -179,8 +179,13 @@ class RampKnees:
 
 
 def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
-    """Compare the ramps of one branch, as `pool_scatter`; the largest scatter counts where the repeats refuse one."""
+    """Compare the ramps of one branch, as `pool_scatter`; the largest scatter counts where the repeats refuse one.
+
+    Of two groups of ramps half their distance is the least scatter.
+    """
     pooled = pool_scatter(known, counts, declared=declared, u_max=u_max)
+    if pooled.checks.groups:  # the bounds are those of the lower group too, however few of the ramps are in it
+        pooled = replace(pooled, sd=max(pooled.sd, pooled.checks.groups.apart / 2))
     largest, drift = pooled.checks.largest, pooled.drift
     if largest is None or pooled.origin != "repeats":
         return pooled
