@@ -59,7 +59,8 @@ class ColumnArguments:
     columns: Annotated[Table, Option("MAP", RECORDINGS)] = None
     """Columns, such as "u=AO0:V, Q=Flow (L/min)". Each entry is a quantity, its label in the file and, after a colon, a
     unit that the label lacks. Quantities are time, u, Q and dP, or in place of dP the pressures of the ports: pP, pA,
-    pB, pT. In the options file this is a table [columns]."""
+    pB, pT. Of equal labels, "Q=Q_Lmin#2" is the second. Of two solenoids, "u=uA_V - uB_V" is the signed command. In the
+    options file this is a table [columns]."""
     dp: Annotated[Table, Option("P", RECORDINGS, example="1 MPa")] = None
     """Pressure drop of files without a column for it, such as "1 MPa". In the options file also a table [dp] from file
     name or pattern to pressure."""

@@ -15,7 +15,7 @@ from dzdesign.identify.data_quality.catalogue import most_serious_first, warn
 from dzdesign.identify.data_quality.clipped_meter import without_clipping
 from dzdesign.identify.data_quality.drop_outs import without_drop_outs
 from dzdesign.identify.data_quality.pressures import about_mixed_pressures, about_single_pressures
-from dzdesign.identify.data_quality.recordings import about_recordings
+from dzdesign.identify.data_quality.recordings import about_recordings, about_rest
 from dzdesign.identify.data_quality.whole_meter import about_whole_meter
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.dithered_command import without_dither
@@ -99,7 +99,7 @@ def identify_sides(
         sides={name: side.model for name, side in sides.items()},
         warnings=most_serious_first(
             (
-                *(item.in_units(units) for item in about_recordings(tests)),
+                *(item.in_units(units) for item in (*about_recordings(tests), *about_rest(tests, options.u_max))),
                 *([warn("two-sides").in_units(units)] if len(sides) > 1 else []),
                 *(item.in_units(units) for item in about_whole_meter(zeros, tests, options.u_max)),
                 *warnings,

@@ -161,3 +161,54 @@ class TestHiddenZero:
         valve = identify(tests, OPTIONS)
         assert not warned(valve, "zero-hidden")
         assert valve.positive.certificate.unseen_below_L_min == valve.positive.certificate.level_L_min
+
+
+class TestAnotherSolenoid:
+    """Flow that the other solenoid drives while the command rests is no rest: case 65 and its kin."""
+
+    @staticmethod
+    def beside(zero=0.0, *, first=True, sign=-1, share=1.0, steps=False):
+        """Ramps of one solenoid, before or after those of the other, whose command is not in the recording."""
+        tests = []
+        for test in recordings(0.0, zero=zero):
+            at = np.linspace(0, 2, test.u.size)
+            other = np.where((at > 0.5) & (at < 1.5), 1.0, 0.0) if steps else np.clip(1 - 2 * abs(at - 1), 0, None)
+            noise = np.random.default_rng(5).normal(0, 0.05, at.size)
+            flow = (sign * share * other * test.q.max() / L_MIN + zero + noise) * L_MIN
+            own = [(flow, 0.0 * test.u), (test.q, test.u)][:: 1 if first else -1]
+            q, u = (np.concatenate(each) for each in zip(*own, strict=True))
+            time = np.arange(q.size) * (test.time[1] - test.time[0])
+            tests.append(replace(test, time=time, u=u, q=q, dp=np.full(q.size, test.dp[0])))
+        return tests
+
+    @pytest.mark.parametrize(
+        "made",
+        [
+            {}, {"sign": 1}, {"first": False}, {"first": False, "sign": 1}, {"steps": True}, {"share": 0.3},
+            {"zero": 0.2}, {"steps": True, "sign": 1, "first": False},
+        ],
+    )  # fmt: skip
+    def test_it_does_not_shift_the_zero_and_is_said(self, made):
+        valve = identify(self.beside(**made), OPTIONS)
+        alone = identify(recordings(0.0, zero=made.get("zero", 0.0)), OPTIONS)
+        for test, one in zip(valve.positive.tests, alone.positive.tests, strict=True):
+            assert test.u_knee_falling_V == pytest.approx(one.u_knee_falling_V, abs=2e-3)
+            assert test.u_guard_lower_V < CLOSING
+        assert len(warned(valve, "flow-at-rest")) == 1
+        assert bool(warned(valve, "meter-zero")) == bool(made.get("zero"))
+
+    @pytest.mark.parametrize("tau_s", [0.2, 2.0])
+    def test_a_flow_that_dies_away_after_a_step_is_none(self, tau_s):
+        tests = []
+        for test in recordings(0.0):
+            left = test.q.max() * np.exp(-np.arange(1000) / 50 / tau_s)
+            rest = left + np.random.default_rng(6).normal(0, 0.05 * L_MIN, 1000)
+            q, u = np.concatenate([test.q, rest]), np.concatenate([test.u, np.zeros(1000)])
+            u[test.u.size - 1] = 10.0
+            time = np.arange(q.size) * 0.02
+            tests.append(replace(test, time=time, u=u, q=q, dp=np.full(q.size, test.dp[0])))
+        assert not warned(identify(tests, OPTIONS), "flow-at-rest")
+
+    @pytest.mark.parametrize("per_MPa", [0.0, 0.3])
+    def test_neither_is_a_leak(self, per_MPa):
+        assert not warned(identify(recordings(per_MPa), OPTIONS), "flow-at-rest")

@@ -8,6 +8,7 @@ import pytest
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.identify.reading.ramp_test import Switch
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -65,6 +66,20 @@ def test_a_flow_of_the_wrong_sign_is_not_called_a_shut_valve(wording):
     test = synthetic_ramp(1.0, Truth())
     with wording.refusal(InputError):
         identify([dataclasses.replace(test, q=-test.q)])
+
+
+@pytest.mark.parametrize("column", [True, False])
+def test_flows_of_two_signs_under_commands_of_one_are_two_sides(column, wording):
+    one, other = (synthetic_ramp(1.0, Truth(), seed=seed, source=f"{seed}.csv") for seed in (1, 2))
+    other = dataclasses.replace(other, q=-0.8 * other.q)
+    if column:
+        none = np.empty(0)
+        one, other = (
+            dataclasses.replace(test, switches=(Switch(label="DIR", values=(bit, "x"), changes=none),))
+            for test, bit in ((one, "1"), (other, "0"))
+        )
+    with wording.refusal(InputError, f"flows of two signs, {'with' if column else 'without'} a column"):
+        identify([one, other])
 
 
 def test_a_refused_rise_is_said_beside_what_was_expected(wording):

@@ -11,6 +11,7 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.knees import scatter_checks
 from dzdesign.identify.knees.between_ramps import RampKnees, compare_ramps
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.identify.reading.ramp_files import read_ramp_file
 from tests.identify.knees.test_between_ramps import (
     EXACT_LAG,
     PRESSURES,
@@ -256,3 +257,95 @@ def test_the_largest_scatter_keeps_the_premise_of_one_tail():
     assert between.checks.largest.test == TESTS - 1
     assert between.tail(0.99, TESTS) == 0.99
     assert compared(5 + 1e-3 * np.sin(7.0 * order), order).tail(0.99, TESTS) == pytest.approx(0.9975)
+
+
+class TestTwoGroups:
+    """Ramps of two sides, benches or places are said to be two; the normal scatter of one valve is not."""
+
+    @staticmethod
+    def knees(repeats, *, scatter, apart=0.0, seed=0, tests=3, swap=False):
+        rng = np.random.default_rng([seed, repeats])
+        row, number = np.repeat(np.arange(tests), repeats), np.tile(np.arange(repeats), tests)
+        second = rng.random(row.size) < 0.5 if swap else number % 2 == 1
+        knee = 5.1 - 0.1 * row + scatter * rng.standard_normal(row.size) + apart * second * (1 - 0.1 * row)
+        return row, number, knee, second
+
+    @pytest.mark.parametrize("column", [False, True])
+    def test_a_normal_scatter_makes_none(self, column):
+        """Of 400 families of three to six ramps no more than the checks may say by chance."""
+        said = 0
+        for seed in range(400):
+            row, number, knee, second = self.knees(3 + seed % 4, scatter=0.01, seed=seed, tests=1 + seed // 4 % 5)
+            switched = [{"DIR": str(int(one))} for one in second] if column else []
+            said += scatter_checks.find_two_groups(knee, row, number, np.full(row.size, 1e-8), switched) is not None
+        assert said <= binom.isf(1e-4, 400, scatter_checks.REFUSED if column else scatter_checks.PARTED)
+
+    @pytest.mark.parametrize("repeats", [3, 4, 6])
+    @pytest.mark.parametrize("apart", [0.5, -0.5, 0.1])
+    @pytest.mark.parametrize("column", [False, True])
+    def test_two_sides_are_two(self, repeats, apart, column):
+        row, number, knee, second = self.knees(repeats, scatter=1e-3, apart=apart)
+        switched = [{"x": "1", "DIR": "AB"[int(one)]} for one in second] if column else []
+        found = scatter_checks.find_two_groups(knee, row, number, np.full(row.size, 1e-8), switched)
+        assert found.apart == pytest.approx(0.9 * abs(apart), rel=0.05)
+        low, high = (knee[(row == test) & (number == ramp)][0] for test, ramp in found.ramps)
+        assert high - low > 0.7 * abs(apart)
+        assert found.column == ("DIR" if column else "")
+        assert found.values == (("", "") if not column else ("A", "B") if apart > 0 else ("B", "A"))
+
+    def test_one_ramp_of_each_at_a_pressure_is_told_by_the_column_alone(self):
+        row, number, knee, second = self.knees(2, scatter=1e-3)
+        knee = knee + 0.5 * second
+        noise, switched = np.full(6, 1e-8), [{"DIR": str(int(one))} for one in second]
+        assert scatter_checks.find_two_groups(knee, row, number, noise, switched).column == "DIR"
+        assert scatter_checks.find_two_groups(knee, row, number, noise, []) is None
+
+    @pytest.mark.parametrize(("repeats", "lower"), [(4, 2), (4, 1), (20, 1), (20, 19)])
+    def test_the_bounds_are_below_the_lower_group(self, repeats, lower):
+        order = np.repeat(np.arange(TESTS), repeats)
+        number = np.tile(np.arange(repeats), TESTS)
+        knees = 5.1 + 1e-3 * np.random.default_rng(repeats).standard_normal(order.size) + 0.5 * (number >= lower)
+        between = compared(knees, order, dated=False, noise=1e-4)
+        assert between.checks.groups
+        assert (bounded(between, knees, order) < 5.1).all()
+
+    def test_a_valve_that_closes_at_two_places_by_chance_is_two(self):
+        said = 0
+        for seed in range(50):
+            row, number, knee, _ = self.knees(5, scatter=1e-3, apart=0.2, seed=seed, swap=True)
+            said += scatter_checks.find_two_groups(knee, row, number, np.full(row.size, 1e-8), []) is not None
+        assert said >= 45
+
+    @pytest.mark.parametrize("fault", ["outlier", "one pressure", "drift"])
+    def test_what_other_warnings_say_is_none(self, fault):
+        row, number, knee, _ = self.knees(4, scatter=1e-3)
+        if fault == "outlier":
+            knee[5] += 0.2
+        elif fault == "one pressure":
+            knee[row == 1] += np.array([0.0, 0.1, 0.03, 0.07])
+        else:
+            knee += 0.05 * number
+        assert scatter_checks.find_two_groups(knee, row, number, np.full(row.size, 1e-8), []) is None
+
+    def test_identify_names_the_column_of_the_file(self, tmp_path):
+        """The direction bit of case 58: both sides have positive flows, and the bounds stay below the lower one."""
+        names = []
+        for dp in (1.0, 5.0):
+            for repeat in range(2):
+                sides = [
+                    synthetic_ramp(dp, Truth(knee_rising=knee, noise=0.05), seed=repeat, ramp_s=16.0, rate_Hz=25.0)
+                    for knee in (5.2 - 0.02 * dp, 5.7 - 0.02 * dp)
+                ]
+                u, q = (np.concatenate([getattr(side, name) for side in sides]) for name in ("u", "q"))
+                bit = np.repeat([1, 0], sides[0].u.size)
+                table = np.column_stack([np.arange(u.size) / 25.0, u, bit, np.full(u.size, dp), q / L_MIN])
+                names.append(tmp_path / f"r{dp:g}_{repeat}.csv")
+                np.savetxt(names[-1], table, "%.4f", ",", header="time_s,u_V,DIR,dP_MPa,Q_Lmin", comments="")
+        valve = identify([read_ramp_file(name) for name in names], IdentifyOptions(**EXACT_LAG))
+        (warning,) = [each for each in valve.warnings if each.code == "two-groups"]
+        assert valve.warnings[0] == warning and "Column 'DIR'" in warning.text
+        assert all(test.u_guard_lower_V < 5.1 - 0.02 * test.dp_MPa for test in valve.positive.tests)
+
+    def test_repeats_of_one_valve_are_none(self):
+        for seed in range(3):
+            assert "two-groups" not in codes(series(shuffled(seed), scatter=0.01, seed=seed).tests)

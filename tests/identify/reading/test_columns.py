@@ -159,3 +159,154 @@ class TestToPaste:
         german.write_text(german.read_text().replace("Druck A", "Druck vor").replace("Druck B", "Druck nach"))
         assert main(["identify", "german.csv", "-o", "none.json"]) == 2
         assert "Durchfluss [l/min]" in (line := capsys.readouterr().err) and "pA=" not in line
+
+
+class TestEqualLabels:
+    """Labels that stand twice are chosen by their number: ``Q_Lmin#2``."""
+
+    @pytest.fixture
+    def twice(self, bench):
+        rows = ramp()
+        rows = np.column_stack([rows, rows[:, 3]])
+        rows[:, 3] = 0.0
+        Path("twice.csv").write_text(csv(rows, "time_s,u_V,dP_MPa,Q_Lmin,Q_Lmin"))
+        return rows
+
+    def test_the_message_proposes_what_chooses_one(self, twice, capsys):
+        proposed = '--columns "Q=Q_Lmin#2"'
+        for argv in (["twice.csv"], ["twice.csv", "--columns", "Q=Q_Lmin"]):
+            assert proposed in refusal(capsys, *argv)
+        assert main(["init", "twice.csv", "-o", "o.toml"]) == 2 and proposed in capsys.readouterr().err
+        found = identified("twice.csv", "--columns", "Q=Q_Lmin#2, u=u_V#1")
+        assert knees(found) == pytest.approx(knees(identified("plain.csv")), abs=1e-6)
+        Path("valve.json").unlink()
+        assert "does not show the valve opening" in refusal(capsys, "twice.csv", "--columns", "Q=Q_Lmin#1")
+
+    @pytest.mark.parametrize("number", ["#0", "#3", "#x"])
+    def test_a_number_that_none_has(self, twice, capsys, number):
+        assert f"no column 'Q_Lmin{number}'" in refusal(capsys, "twice.csv", "--columns", f"Q=Q_Lmin{number}")
+
+    def test_each_of_them_has_its_own_unit(self, twice):
+        twice[:, 3] = 1000 * twice[:, 4]
+        lines = [";".join(f"{value:.4f}" for value in row).replace(".", ",") for row in twice]
+        Path("units.csv").write_text("\n".join(["time;u;dP;Q;Q", "s;V;MPa;ml/min;l/min", *lines]))
+        for number in (1, 2):
+            found = identified("units.csv", "--columns", f"Q=Q#{number}")
+            assert knees(found) == pytest.approx(knees(identified("plain.csv")), abs=1e-3)
+
+    def test_a_label_that_ends_so_in_the_file_goes_first(self, twice):
+        twice = np.column_stack([twice[:, :4], twice[:, 3], twice[:, 4]])
+        Path("named.csv").write_text(csv(twice, "time_s,u_V,dP_MPa,Q_Lmin,Q_Lmin,Q_Lmin#2"))
+        found = identified("named.csv", "--columns", "Q=Q_Lmin#2")
+        assert knees(found) == pytest.approx(knees(identified("plain.csv")), abs=1e-6)
+
+
+class TestTwoSolenoids:
+    """A command column for each solenoid: their difference is one signed command."""
+
+    @pytest.fixture(params=["volts", "pwm", "letters", "mA"])
+    def both(self, request, bench):
+        """A file, its columns' labels, and what --columns says of them."""
+        rows = ramp(ramp_s=40)
+        other = rows * [1, 1, 1, -1] + [rows[-1, 0] + 0.04, 0, 0, 0]
+        zero = np.zeros(len(rows))
+        first, second = np.concatenate([rows[:, 1], zero]), np.concatenate([zero, rows[:, 1]])
+        labels, unit, scale = {
+            "volts": ("uA_V,uB_V", "", lambda u: u),
+            "pwm": ("PWM_A,PWM_B", ":0..255 = 0..100 %", lambda u: np.round(25.5 * u)),
+            "letters": ("u_A,u_B", ":0..10 = 0..100 %", lambda u: u),
+            "mA": ("i A (mA),i B (mA)", ":4..20 mA = 0..10 V", lambda u: 4 + 1.6 * u),
+        }[request.param]
+        every = np.vstack([rows, other])
+        table = np.column_stack([every[:, 0], scale(first), scale(second), every[:, 2:]])
+        Path("both.csv").write_text(csv(table, f"time_s,{labels},dP_MPa,Q_Lmin"))
+        return labels.split(","), unit, request.param
+
+    def test_it_has_the_thresholds_of_both_sides(self, both):
+        (one, other), unit, kind = both
+        for text in (f"u={one}{unit} - {other}{unit}", f"u={one} - {other}{unit}"):
+            identified("both.csv", "--columns", text, "--meter-lag", "0 s")
+            sides = json.loads(Path("valve.json").read_text())["sides"]
+            for name in ("positive", "negative"):
+                (test,) = sides[name]["tests"]
+                within = 0.03 if kind == "pwm" else 0.015
+                assert (test["u_knee_rising_V"], test["u_knee_falling_V"]) == pytest.approx((5.0, 4.9), abs=within)
+                assert test["u_guard_lower_V"] < 4.9
+
+    def test_init_and_the_refusal_propose_it(self, both, capsys):
+        (one, other), unit, kind = both
+        if kind == "mA":
+            return  # nothing says that a current is a command
+        proposed = f"u={one} - {other}{unit}"
+        assert f'{proposed}"' in refusal(capsys, "both.csv")
+        assert main(["init", "both.csv", "-o", "o.toml"]) == 1
+        assert f'--columns "{proposed}"' in capsys.readouterr().out
+        assert main(["init", "both.csv", "-o", "p.toml", "--columns", proposed]) == 0
+        assert f'u = "{one} - {other}{unit}"' in Path("p.toml").read_text()
+
+    def test_units_that_differ_are_refused(self, both, capsys):
+        (one, other), _, _ = both
+        assert "give both one unit" in refusal(capsys, "both.csv", "--columns", f"u={one}:V - {other}:mV")
+
+    def test_a_command_and_its_feedback_are_no_pair(self, bench, capsys):
+        rows = ramp()
+        table = np.column_stack([rows[:, :2], 1.01 * rows[:, 1], rows[:, 2:]])
+        Path("fed.csv").write_text(csv(table, "time_s,u_set [V],u_act [V],dP_MPa,Q_Lmin"))
+        assert "u=LABEL:V" in refusal(capsys, "fed.csv")
+
+    def test_a_label_with_a_minus_goes_first(self, bench):
+        Path("minus.csv").write_text(csv(ramp(), "time_s,a - b,dP_MPa,Q_Lmin"))
+        found = identified("minus.csv", "--columns", "u=a - b:V")
+        assert knees(found) == pytest.approx(knees(identified("plain.csv")), abs=1e-6)
+
+
+class TestGaugeAndAbsolute:
+    """A drop of a gauge and an absolute pressure is off by the ambient one."""
+
+    @staticmethod
+    def written(labels, bar=10.0, absolute=0.0):
+        rows = ramp()
+        ports = [(rows[:, 2] + 0.2 + absolute) * bar, np.full(len(rows), 0.2 * bar)]
+        table = np.column_stack([rows[:, :2], *ports, rows[:, 3]])
+        Path("ports.csv").write_text(csv(table, f"time_s,u_V,{labels},Q_Lmin"))
+
+    @pytest.mark.parametrize(
+        "labels",
+        [
+            "pA [bara],pB [barg]", "pA [barg],pB [bara]", "pA (bar(a)),pB (bar(g))", "pA_psia,pB_psig",
+            "pA [bara],pB [bar]", "pA_bar,pB_bara",
+        ],
+    )  # fmt: skip
+    def test_the_two_are_refused(self, bench, capsys, labels):
+        self.written(labels)
+        said = refusal(capsys, "ports.csv")
+        assert "an absolute pressure, and" in said
+        assert all(repr(label) in said for label in labels.split(","))
+
+    @pytest.mark.parametrize(
+        "labels", ["pA [bara],pB [bara]", "pA [barg],pB [bar]", "pA [bar],pB [bar]", "pA [bar(a)],pB [bara]"]
+    )
+    def test_two_alike_are_taken(self, bench, labels):
+        self.written(labels)
+        assert [test["dp_MPa"] for test in identified("ports.csv")] == pytest.approx([1.0])
+
+    @pytest.mark.parametrize(("unit", "bar"), [("bar", 10.0), ("psi", 145.0377)])
+    def test_the_advice_gives_the_drop(self, bench, capsys, unit, bar):
+        self.written(f"pA [{unit}a],pB [{unit}g]", bar, absolute=0.101325)
+        advice = refusal(capsys, "ports.csv").rpartition('--columns "')[2].partition('"')[0]
+        found = identified("ports.csv", "--columns", advice)
+        assert [test["dp_MPa"] for test in found] == pytest.approx([1.0], abs=1e-4)
+
+    def test_beside_one_that_does_not_say_either_advice_does(self, bench, capsys):
+        self.written("pA [bara],pB [bar]", absolute=0.101325)
+        first, second = refusal(capsys, "ports.csv").split('--columns "')[1:]
+        for advice, dp in ((first, 1.101325), (second, 1.0)):
+            found = identified("ports.csv", "--columns", advice.partition('"')[0])
+            assert [test["dp_MPa"] for test in found] == pytest.approx([dp], abs=1e-4)
+            Path("valve.json").unlink()
+
+    @pytest.mark.parametrize("unit", ["bara", "barg", "psia"])
+    def test_a_single_drop_may_be_called_so(self, bench, unit):
+        rows = ramp() * [1, 1, 10 if unit != "psia" else 145.0377, 1]
+        Path("drop.csv").write_text(csv(rows, f"time_s,u_V,dP [{unit}],Q_Lmin"))
+        assert [test["dp_MPa"] for test in identified("drop.csv")] == pytest.approx([1.0], rel=1e-4)

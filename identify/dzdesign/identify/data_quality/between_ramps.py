@@ -44,7 +44,18 @@ def _about_premises(
     found: Repeatability, checks: ScatterChecks, tests: Sequence[DescribedTest], u_max: float
 ) -> Iterator[Finding]:
     """Yield what the repeats say against a scatter that is normal, alike at all pressure drops, and independent."""
-    largest, outlying, alike = checks.largest, checks.outlying, checks.alike
+    largest, outlying, alike, groups = checks.largest, checks.outlying, checks.alike, checks.groups
+    if groups and groups.apart > SMALLEST_DISTANCE * u_max:
+        low, high = (tests[test].ramps[number] for test, number in groups.ramps)
+        yield warn(
+            "two-groups",
+            tests[groups.ramps[0][0]].test.source,
+            "column" if groups.column else "ramps",
+            apart_mV=1e3 * groups.apart,
+            column=groups.column,
+            low=groups.values[0] or low,
+            high=groups.values[1] or high,
+        )
     if alike:
         where = "at all pressure drops together, and most of all here," if alike.everywhere else "here"
         yield warn(

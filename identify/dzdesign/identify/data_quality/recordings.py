@@ -2,9 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
+from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.data_quality.catalogue import Finding, most_serious_first, warn
 from dzdesign.identify.data_quality.lost_rows import about_lost_rows
 from dzdesign.identify.data_quality.recording_order import about_order
+from dzdesign.identify.knees.readings_at_rest import moved_at_rest
 from dzdesign.identify.reading.clock import ASSUMED_MS
 from dzdesign.identify.reading.metering_edge import EDGES
 from dzdesign.identify.reading.ramp_test import RampTest
@@ -18,6 +22,24 @@ def about_recordings(tests: Sequence[RampTest]) -> tuple[Finding, ...]:
     """Return what is to be said of the recordings themselves, the most serious first."""
     of_each = (item for test in tests for item in _about_one(test))
     return most_serious_first([*_about_simulation(tests), *about_order(tests), *about_lost_rows(tests), *of_each])
+
+
+def about_rest(tests: Sequence[RampTest], u_max: float) -> Iterator[Finding]:
+    """Yield a warning where flow passes while the command rests, of the recording where it does the longest."""
+    moved = [moved_at_rest(test, u_max) for test in tests]
+    lasts = [
+        float(np.diff(test.time, append=test.time[-1])[rows].sum()) for test, rows in zip(tests, moved, strict=True)
+    ]
+    longest = int(np.argmax(lasts))
+    if moved[longest].any():
+        yield warn(
+            "flow-at-rest",
+            tests[longest].source,
+            lasts_s=lasts[longest],
+            largest_L_min=float(np.abs(tests[longest].q[moved[longest]]).max()) / L_MIN,
+            count=sum(bool(rows.any()) for rows in moved),
+            recordings=len(tests),
+        )
 
 
 def _about_one(test: RampTest) -> Iterator[Finding]:

@@ -15,7 +15,7 @@ refuse one variance for all, that of the pressure drop with the largest scatter 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ import numpy as np
 from dzdesign.identify.knees.branch_shape import BranchShape
 from dzdesign.identify.knees.gated_line import fit_line
 from dzdesign.identify.knees.least_noise import least_noise, least_step
-from dzdesign.identify.knees.scatter_checks import ScatterChecks, check_scatter, find_alike_repeats
+from dzdesign.identify.knees.scatter_checks import ScatterChecks, check_scatter, find_alike_repeats, find_two_groups
 from dzdesign.identify.valve.repeatability import NoDrift, Origin
 
 #: Standard deviation of the thresholds from ramp to ramp, over u_max, taken where nothing tells it: data sheets of
@@ -174,11 +174,18 @@ class RampKnees:
     when: np.ndarray
     #: Variance that the noise gives each knee at least, V²; 0, or no array, where it is not known.
     least: np.ndarray | None = None
+    #: What the recording's columns of two values say of each; nothing where there are none.
+    switched: Sequence[Mapping[str, str]] = ()
 
 
 def compare_ramps(known: RampKnees, counts: Sequence[int], *, declared: float | None, u_max: float) -> BetweenRamps:
-    """Compare the ramps of one branch, as `pool_scatter`; the largest scatter counts where the repeats refuse one."""
+    """Compare the ramps of one branch, as `pool_scatter`; the largest scatter counts where the repeats refuse one.
+
+    Of two groups of ramps half their distance is the least scatter.
+    """
     pooled = pool_scatter(known, counts, declared=declared, u_max=u_max)
+    if pooled.checks.groups:  # the bounds are those of the lower group too, however few of the ramps are in it
+        pooled = replace(pooled, sd=max(pooled.sd, pooled.checks.groups.apart / 2))
     largest, drift = pooled.checks.largest, pooled.drift
     if largest is None or pooled.origin != "repeats":
         return pooled
@@ -215,7 +222,11 @@ def pool_scatter(known: RampKnees, counts: Sequence[int], *, declared: float | N
     measured = origin == "repeats"
     least = known.noise + (FINEST * u_max) ** 2
     checks = check_scatter(residual, design, known.test, known.number, least, known.when)
-    checks = replace(checks, alike=find_alike_repeats(residual, design, known.test, known.least))
+    checks = replace(
+        checks,
+        alike=find_alike_repeats(residual, design, known.test, known.least),
+        groups=find_two_groups(known.knee, known.test, known.number, known.noise, known.switched),
+    )
     sd = math.sqrt(squares / degrees) if measured else ASSUMED_REPEATABILITY * u_max if declared is None else declared
     rows = told if no_drift else np.ones(count + 1, dtype=bool)
     # A test without a ramp that tells its knee counts as one ramp.
@@ -246,10 +257,15 @@ def pool_scatter(known: RampKnees, counts: Sequence[int], *, declared: float | N
     )
 
 
-def knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float]]) -> RampKnees:
+def knees_of_ramps(
+    shapes: Sequence[BranchShape],
+    when: Sequence[Sequence[float]],
+    switched: Sequence[Sequence[Mapping[str, str]]],
+) -> RampKnees:
     """Return the zeros of lines through each ramp's samples of the straight part that the test's line rests on.
 
-    `when` has for each ramp of each test when it was recorded, s, on one clock for all.
+    `when` has for each ramp of each test when it was recorded, s, on one clock for all; `switched` what the
+    recording's columns of two values say of it.
     """
     told: list[tuple[float, ...]] = []
     for test, (shape, times) in enumerate(zip(shapes, when, strict=True)):
@@ -267,7 +283,9 @@ def knees_of_ramps(shapes: Sequence[BranchShape], when: Sequence[Sequence[float]
             at_least = least_noise(branch.q[part][seen[part]], step) / slope**2 * lever
             told.append((test, number, knee, noise, times[number], at_least))
     columns = np.array(told).reshape(-1, 6).T
-    return RampKnees(*columns[:2].astype(int), *columns[2:])
+    test, number = columns[:2].astype(int)
+    marks = [switched[row][ramp] for row, ramp in zip(test, number, strict=True)]
+    return RampKnees(test, number, *columns[2:], switched=marks)
 
 
 def _series_clock(known: RampKnees, count: int) -> tuple[np.ndarray, NoDrift]:

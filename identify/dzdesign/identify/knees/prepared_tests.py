@@ -25,6 +25,7 @@ from dzdesign.identify.knees.refusals import (
     refuse_a_wrong_pressure,
     refuse_an_impossible_knee,
     refuse_two_directions,
+    refuse_two_signs_of_flow,
 )
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.ramps.command import despiked
@@ -89,7 +90,7 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
 
     The flow meter's lag is in s.
     """
-    ramps = []
+    ramps, split = list[Ramp](), list[list[Ramp]]()
     tops = [float(despiked(test.u).max()) for test in tests]
     for test, top in zip(tests, tops, strict=True):
         if top > 1.05 * options.u_max:
@@ -108,6 +109,9 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
         found = split_ramps(test, lag)
         if np.ptp(test.u) < SMALLEST_SWEEP * options.u_max or not any(ramp.branches for ramp in found):
             raise _no_ramp(test)
+        split.append(found)
+    refuse_two_signs_of_flow([ramp for found in split for ramp in found])
+    for found, top in zip(split, tops, strict=True):
         for ramp in found:
             _refuse_what_has_no_pressure(ramp, options.u_max)
             refuse_a_wrong_pressure(name_of_ramp(ramp), ramp.dp, ramp.test.dp_sign)
@@ -185,7 +189,7 @@ def _between_ramps(described: list[DescribedTest], column: int, options: Identif
     if not shapes:
         return None
     declared = None if options.repeatability is None else options.repeatability * options.u_max
-    known = knees_of_ramps(shapes, [item.when for item in described])
+    known = knees_of_ramps(shapes, [item.when for item in described], [item.switched for item in described])
     return compare_ramps(known, [len(item.when) for item in described], declared=declared, u_max=options.u_max)
 
 
@@ -208,6 +212,7 @@ def _describe(item: PooledTest, shapes: Iterator[BranchShape]) -> DescribedTest:
         q_max=largest_at_top([shape.prepared.recorded for shape in (rising, falling) if shape]),
         ramps=item.ramps,
         when=item.when,
+        switched=item.switched,
         files=item.files,
         left_out=item.left_out,
     )

@@ -21,6 +21,8 @@ from dzdesign.identify.reading.ramp_test import RampTest
 AT_REST, FEWEST_AT_REST = (0.01, 0.03, 0.1), 20
 #: Share of the largest flow that is a flow for certain, and share of the command there that lies far below it.
 FIRST_FLOW, FAR_BELOW = 0.2, 0.5
+#: Share of the largest flow, and standard deviations, that a flow at rest exceeds for certain that another cause moves.
+MOVED, MOVED_ERRORS = 0.1, 10.0
 #: Standard errors by which a reading at rest must differ from zero, and share of the largest flow: below, it is none.
 ZERO_ERRORS, ZERO_SHARE = 5.0, 2e-3
 #: Pressure drops at rest that differ by more than this factor are two.
@@ -199,10 +201,12 @@ def readings_at_rest(test: RampTest, u_max: float) -> np.ndarray:
     Where the command hardly rests, what the meter reads far below the first flow serves as well.
     """
     flowing = np.abs(test.q) > FIRST_FLOW * np.abs(test.q).max()
-    opens = float(np.quantile(np.abs(test.u[flowing]), 0.01)) if flowing.any() else 0.0
     rest = np.empty(0, dtype=int)
+    moved = moved_at_rest(test, u_max)
+    flowing &= ~moved
+    opens = float(np.quantile(np.abs(test.u[flowing]), 0.01)) if flowing.any() else 0.0
     for share in AT_REST:
-        at_rest = np.abs(test.u) <= share * u_max
+        at_rest = (np.abs(test.u) <= share * u_max) & ~moved
         if share > AT_REST[0] and share * u_max > FAR_BELOW * opens:
             break  # the valve may be open there
         rest = _without_filling(test, at_rest & ~_after_flow(at_rest, flowing))
@@ -217,6 +221,33 @@ def _after_flow(at_rest: np.ndarray, flowing: np.ndarray) -> np.ndarray:
     stretch = np.cumsum(np.bincount(begins, minlength=at_rest.size)[: at_rest.size]) - 1
     after = (flowing[begins] | flowing[np.maximum(begins - 1, 0)]) & (begins > 0)
     return at_rest & after[stretch] if begins.size else at_rest
+
+
+def moved_at_rest(test: RampTest, u_max: float) -> np.ndarray:
+    """Return in which samples flow passes while the command rests that it did not leave behind: another solenoid's.
+
+    From the first reading on that side of zero to the last one; a flow that only dies away after the command is none.
+    """
+    moved = np.zeros(test.q.size, dtype=bool)
+    at_rest = np.flatnonzero(np.abs(test.u) <= AT_REST[0] * u_max)
+    largest = float(np.abs(test.q).max())
+    low = test.q[at_rest][np.abs(test.q[at_rest]) <= FIRST_FLOW * largest]
+    if low.size < FEWEST_AT_REST:
+        return moved
+    away = test.q[at_rest] - median(low)
+    certain = np.abs(away) > max(MOVED * largest, MOVED_ERRORS * robust_sigma(low))
+    if np.count_nonzero(certain) < FEWEST_AT_REST:
+        return moved
+    # Pieces of the rest that lie on one side of zero; a piece ends where the command moves.
+    ends = np.flatnonzero((np.diff(np.sign(away)) != 0) | (np.diff(at_rest) > 1)) + 1
+    for piece in np.split(np.arange(at_rest.size), ends):
+        if np.count_nonzero(certain[piece]) < FEWEST_AT_REST:
+            continue
+        start, flow = at_rest[piece[0]], np.abs(away[piece])
+        half = flow.size // 2
+        left_behind = (start == 0 or at_rest[piece[0] - 1] != start - 1) and flow[half:].mean() < flow[:half].mean() / 2
+        moved[at_rest[piece]] = not left_behind
+    return moved
 
 
 def _without_filling(test: RampTest, at_rest: np.ndarray) -> np.ndarray:

@@ -12,6 +12,8 @@ from dzdesign.identify.knees.noise import robust_sigma
 from dzdesign.identify.knees.profile import crossing, largest_flow
 from dzdesign.identify.ramps.branches import Branch
 from dzdesign.identify.ramps.medians import median
+from dzdesign.identify.ramps.pooling import name_of_ramp
+from dzdesign.identify.ramps.splitting import Ramp
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.recorded_drop import DropSign
 
@@ -21,6 +23,9 @@ MIDDLE = (0.15, 0.45)
 LARGEST_FLOOR = 0.55
 #: Fewest of the readings there, as a share, and width over u_max above which few readings are a coarse staircase's.
 FEWEST_IN_THE_MIDDLE, WIDEST_JUMP = 0.25, 0.05
+#: Shares of a ramp's largest command up to which it rests, and from which on its flow is compared; and share of the
+#: largest flow that has a sign.
+AT_REST, AT_TOP, SMALL_FLOW = 0.05, 0.9, 0.1
 #: So far below the lowest command of a ramp, over u_max, a knee may lie: it is extrapolated, and a warning says so.
 EXTRAPOLATED = 0.1
 
@@ -33,6 +38,35 @@ def refuse_two_directions(tests: Sequence[RampTest]) -> None:
             f"the pressure drop was recorded above zero in '{found[1]}' and below it in '{found[-1]}', expected one "
             "direction at all commands of one sign; correct the sign of dP, or swap pA and pB in one of them"
         )
+
+
+def refuse_two_signs_of_flow(ramps: Sequence[Ramp]) -> None:
+    """Refuse ramps of one side of which some have a flow above zero and others below: two sides under one command."""
+    flows: dict[bool, tuple[float, Ramp]] = {}
+    for ramp in ramps:
+        u, q = ramp.test.u, ramp.test.q
+        rest, top = q[u <= AT_REST * u.max()], q[u >= AT_TOP * u.max()]
+        flow, noise = (median(top) - median(rest), robust_sigma(rest)) if rest.size and top.size else (0.0, 0.0)
+        if abs(flow) > max(6 * noise, abs(flows.get(flow > 0, (0.0, ramp))[0])):
+            flows[flow > 0] = flow, ramp
+    if len(flows) < 2 or min(abs(flow) for flow, _ in flows.values()) < SMALL_FLOW * max(
+        abs(flow) for flow, _ in flows.values()
+    ):
+        return
+    (above, one), (below, other) = flows[True], flows[False]
+    says, its = one.test.switched_to(), other.test.switched_to()
+    column = next((label for label, value in says.items() if its.get(label, value) != value), "")
+    raise InputError(
+        worded(
+            "the flow reaches {above:+.3g L/min} in '{one}' and {below:+.3g L/min} in '{other}', at commands of one "
+            "sign: two sides of the valve{column}. Give the command its sign, or each side a file of its own",
+            above=above / L_MIN,
+            one=name_of_ramp(one),
+            below=below / L_MIN,
+            other=name_of_ramp(other),
+            column=f", which column '{column}' tells apart" if column else ", or a meter turned round",
+        )
+    )
 
 
 def refuse_a_wrong_pressure(source: str, dp: float | None, sign: DropSign = 1) -> None:

@@ -4,6 +4,7 @@ A valve of four ports opens two edges at once: P to A and B to T at positive com
 ones. Which pressures were recorded says which edge is meant; with all four both edges are there.
 """
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import final
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.core.units import measures, si_factor
 from dzdesign.identify.valve.recorded_drop import DropColumns, DropQuantity
 
 #: Pressures of a valve's ports, as columns are called.
@@ -27,6 +29,13 @@ TWO_SENSORS: tuple[DropQuantity, DropQuantity] = ("pA", "pB")
 OF_EITHER_SIGN: tuple[tuple[DropQuantity, ...], ...] = (("dP",), TWO_SENSORS)
 #: Commands within this share of u_max are at rest: noise about zero does not turn the valve round.
 AT_REST = 0.01
+#: What a pressure is measured from, behind its unit, as in bara, MPa(g) and psi abs; or as a word of its label.
+REFERENCE = re.compile(
+    r"(bar|psi|pa|at|kgf?/cm(?:2|\u00b2))[\s_([]*(a|g|abs\.?|absolute?|ga?uge|rel\.?|relativ)[)\]]?$", re.IGNORECASE
+)
+REFERENCE_IN_LABEL = re.compile(r"(?<![^\W_])(?:abs|absolute?|ga?uge|rel|relativ)(?![^\W_])", re.IGNORECASE)
+#: The ambient pressure, Pa.
+AMBIENT = 101_325.0
 #: A recording shows a side if so many samples of its command go that far into it, over u_max.
 SMALLEST_SWEEP, SWEEP_SAMPLES = 0.1, 5
 
@@ -96,6 +105,48 @@ def metering_edge(quantities: Collection[str]) -> MeteringEdge:
         return MeteringEdge(positive=TWO_SENSORS, negative=TWO_SENSORS)
     positive, negative = (next((edge for edge in EDGES[sign] if known >= set(edge)), None) for sign in (1, -1))
     return MeteringEdge(positive=positive, negative=negative)
+
+
+def gauge_beside_absolute(edge: MeteringEdge, labels: Mapping[str, str], units: Mapping[str, str]) -> str:
+    """Return what to say where the drop is that of an absolute pressure and another, by quantity's label and unit.
+
+    One without a word on it may be either, so it is refused beside an absolute one, and is gauge beside a gauge one.
+    """
+    for pair in (edge.positive, edge.negative):
+        kinds = {_reference(units[name], labels[name]): name for name in pair or ()}
+        if len(kinds) == 1 or "absolute" not in kinds:
+            continue
+        kind, other = next((kind, name) for kind, name in kinds.items() if kind != "absolute")
+        one = kinds["absolute"]
+        bare = REFERENCE.sub(r"\1", units[one]).rpartition("..")[2].lstrip("0123456789. ")
+        ambient = AMBIENT / si_factor(bare, "pressure") if measures(bare, "pressure") else 0.0
+        gauge = f"{bare}g" if measures(f"{bare}g", "pressure") else bare
+        off = f'--columns "{one}={labels[one]}:{ambient:.4f}..{100 + ambient:.4f} = 0..100 {gauge}"'
+        if kind:
+            return (
+                f"'{labels[one]}', an absolute pressure, and '{labels[other]}', a gauge pressure: their difference is "
+                f"off by the ambient pressure. Take that off, for example {off}"
+            )
+        return (
+            f"'{labels[one]}', an absolute pressure, and '{labels[other]}', which may be a gauge pressure. If it is "
+            f'absolute too, give --columns "{other}={labels[other]}:{units[one]}"; if not, {off}'
+        )
+    return ""
+
+
+def _reference(unit: str, label: str) -> str:
+    """Return what a pressure is measured from, ``absolute`` or ``gauge``; nothing where unit and label don't say.
+
+    Examples
+    --------
+    >>> [_reference(unit, "pA") for unit in ("bara", "MPa (abs)", "4..20 mA = 0..100 barg", "kPa")]
+    ['absolute', 'absolute', 'gauge', '']
+    """
+    found = REFERENCE.search(unit.strip())
+    word = found[2] if found else ""
+    if not word and "=" not in unit and (found := REFERENCE_IN_LABEL.search(label)):
+        word = found[0]
+    return {"a": "absolute", "g": "gauge", "r": "gauge"}.get(word[:1].lower(), "")
 
 
 def which_edge(labels: Mapping[str, str]) -> str:

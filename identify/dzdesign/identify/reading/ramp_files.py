@@ -6,8 +6,9 @@ A long recording is thinned: see `thinning`.
 import gzip
 import io
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -23,9 +24,9 @@ from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_m
 from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
 from dzdesign.identify.reading.missing_values import describe_missing, without_failed_signals, without_placeholders
-from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.ramp_test import RampTest, Switch
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
-from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
+from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.reading.thinning import thin
 from dzdesign.identify.reading.time_stamps import Start
@@ -36,6 +37,8 @@ from dzdesign.identify.valve.recorded_drop import DropColumns
 MIN_ROWS = 20
 #: First word of the first comment line of a recording that is none: whoever makes one up writes it there.
 SIMULATED_MARK = "SIMULATED"
+#: A column of two values is looked for among so many, in so many rows, and changes so often at most.
+MOST_SWITCHES, LONGEST_SWITCH, MOST_CHANGES = 8, 1_000_000, 200
 #: Stands for the column of time where the sample rate is declared.
 DECLARED_CLOCK = Column(label="--sample-rate", unit="s")
 #: SI numbers beyond these are not a measurement of a valve: a wrong unit, or what a logger writes for an overflow.
@@ -105,6 +108,9 @@ def read_ramp_file(
         q_range=recording.q_range,
         unseen=recording.unseen,
         units=recording.units,
+        switches=tuple(
+            replace(each, changes=each.changes / (1e3 if doubt == ASSUMED_MS else 1.0)) for each in recording.switches
+        ),
     )
 
 
@@ -127,6 +133,7 @@ class _Recording:
     units: Mapping[Quantity, tuple[Unit, ...]]
     q_range: tuple[float, float] | None
     unseen: tuple[float, float]
+    switches: tuple[Switch, ...]
 
 
 def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.ndarray) -> str:
@@ -172,7 +179,7 @@ def _read_recording(
     found = find_columns(table, chosen, sample_rate)
     _refuse_two_pressures(table, found, dp)
     _refuse_unequal_lengths(table, found)
-    table.load([column.label for column in found.values()])
+    table.load([each.label for column in found.values() for each in column.every])
     data, placeholders, failed = {}, {}, {}
     q_range = None
     is_clock = sample_rate is None and table.is_clock(found["time"].label)
@@ -181,16 +188,17 @@ def _read_recording(
         if quantity == "time" and is_clock:
             data[quantity], stamp = read_times_of_day(table, column.label)
             continue
-        numbers, placeholders[column.label] = without_placeholders(
-            table.numbers(column.label), rises=quantity == "time"
-        )
-        unclear = quantity == "time" and not column.unit and may_count_ms(numbers)
-        if not unclear:  # else the whole recording tells later what they count
-            scaling = scaling_of(table.path, quantity, column, u_max)
-            numbers, failed[column.label] = without_failed_signals(numbers, scaling)
-            numbers = _in_SI(table, quantity, column, numbers, scaling)
-            q_range = scaling.ends if quantity == "Q" else q_range
-        data[quantity] = numbers
+        for each in column.every:
+            numbers, placeholders[each.label] = without_placeholders(
+                table.numbers(each.label), rises=quantity == "time"
+            )
+            unclear = quantity == "time" and not each.unit and may_count_ms(numbers)
+            if not unclear:  # else the whole recording tells later what they count
+                scaling = scaling_of(table.path, quantity, each, u_max)
+                numbers, failed[each.label] = without_failed_signals(numbers, scaling)
+                numbers = _in_SI(table, quantity, each, numbers, scaling)
+                q_range = scaling.ends if quantity == "Q" else q_range
+            data[quantity] = numbers if each is column else data[quantity] - numbers
     if sample_rate is not None:
         data["time"] = np.arange(data["u"].size) / sample_rate
     edge, labels = metering_edge(found), {quantity: column.label for quantity, column in found.items()}
@@ -217,7 +225,23 @@ def _read_recording(
         units=units_of_columns(table.path, found, u_max),
         q_range=q_range,
         unseen=(float(without_flow.min(initial=0.0)), float(without_flow.max(initial=0.0))),
+        switches=tuple(_switches(table, found, rows[0], complete)),
     )
+
+
+def _switches(table: Table, found: Mapping[str, Column], time: np.ndarray, complete: np.ndarray) -> Iterator[Switch]:
+    """Yield the columns of two values beside those that were read, of a table that has few others."""
+    taken = {label for column in found.values() for each in column.every for label in each.label.split(AND)}
+    others = [label for label in table.labels if label and label not in taken]
+    if len(others) > MOST_SWITCHES or not 0 < time.size <= LONGEST_SWITCH:
+        return
+    for label in others:
+        with suppress(InputError):
+            two = table.two_values(label) if table.length(label) == complete.size else None
+            changes = np.flatnonzero(np.diff(two[1][complete])) + 1 if two else np.empty(0, dtype=int)
+            if two and 0 < changes.size <= MOST_CHANGES:
+                values = two[0][::-1] if two[1][complete][0] else two[0]
+                yield Switch(label=table.in_file(label), values=values, changes=time[changes])
 
 
 def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float | None) -> None:
@@ -236,7 +260,7 @@ def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
     """Refuse columns that are not samples of one clock."""
     first = found["time" if "time" in found else "u"].label
     expected = table.length(first)
-    for column in found.values():
+    for column in [each for one in found.values() for each in one.every]:
         if table.length(column.label) != expected:
             raise InputError(
                 f"'{table.path}' column '{column.label}' has {table.length(column.label)} samples, but "

@@ -12,6 +12,21 @@ from dzdesign.identify.valve.recorded_drop import DropColumns, DropSign
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Switch:
+    """A column of a recording that holds two values, such as a direction bit."""
+
+    label: str
+    #: That of the first row, and the other one.
+    values: tuple[str, str]
+    #: Times from which the other value holds, s.
+    changes: np.ndarray
+
+    def at(self, time: float) -> str:
+        """Return its value at a time of the recording, s."""
+        return self.values[int(np.searchsorted(self.changes, time, side="right")) % 2]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RampTest:
     """One recorded ramp test in SI units, read-only.
 
@@ -80,6 +95,9 @@ class RampTest:
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
 
+    #: Columns beside those that were read, of two values each.
+    switches: tuple[Switch, ...] = ()
+
     def __post_init__(self) -> None:
         for array in (self.time, self.u, self.q, self.dp, self.beyond):
             if array is None:
@@ -91,6 +109,11 @@ class RampTest:
     def unseen_top(self, least: float) -> float:
         """Return the largest command of rows without a flow, V; 0 unless it is more than `least` above all others."""
         return self.unseen[1] if self.u.size and self.unseen[1] > float(self.u.max()) + least else 0.0
+
+    def switched_to(self) -> dict[str, str]:
+        """Return what its columns of two values say at the largest command."""
+        at_top = float(self.time[np.argmax(np.abs(self.u))])
+        return {switch.label: switch.at(at_top) for switch in self.switches}
 
     def part(self, rows: slice | np.ndarray) -> "RampTest":
         """Return the recording with some of its rows."""

@@ -113,6 +113,14 @@ class TextTable(Table):
             raise self._no_number(label, int(bad[0]), texts[int(bad[0])])
         return np.asarray(numbers.fill_null(np.nan).to_numpy())
 
+    def two_values(self, label: str) -> tuple[tuple[str, str], np.ndarray] | None:
+        """Return the two texts that a column holds, and where it holds the second; None if it holds others."""
+        if self._texts(label, FEW_ROWS).n_unique() > 2:
+            return None
+        texts = self._texts(label)
+        values = [str(text) for text in texts.drop_nulls().unique().sort() if text]
+        return ((values[0], values[1]), (texts == values[1]).fill_null(False).to_numpy()) if len(values) == 2 else None
+
     def is_clock(self, label: str) -> bool:
         """Tell whether the first cell of a column that is not blank holds a time of day."""
         cell = self._first(label)
