@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from math import isclose
 
@@ -29,6 +29,8 @@ MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
 PER_CENT = ("%", "pct", "percent")
 QUANTITIES = ("time", "voltage", "pressure", "flow")
+#: Stands between the commands of two solenoids whose difference is the signed command.
+LESS = re.compile(r"\s[-\u2212\u2013]\s")
 #: Characters of a label in which a quantity is looked for.
 LONGEST_NAME = 80
 
@@ -43,11 +45,19 @@ class Column:
         As the file or ``--columns`` says.
     stated : str
         The unit that the file states, where ``--columns`` says another or a range.
+    less : Column or None
+        What is subtracted from it: the command of the other solenoid.
     """
 
     label: str
     unit: str
     stated: str = ""
+    less: "Column | None" = None
+
+    @property
+    def every(self) -> "tuple[Column, ...]":
+        """This column, and the one that is subtracted from it."""
+        return (self,) if self.less is None else (self, self.less)
 
 
 class MissingColumnError(InputError):
@@ -66,7 +76,8 @@ def parse_columns(text: str | Mapping[str, str]) -> dict[str, str]:
     text : str or mapping
         ``"u=AO0:V, Q=Flow (L/min)"``, or the same as a mapping. A quantity is one of time, u, dP, pP, pA, pB, pT, Q; a
         label stands as in the file, and a unit that it lacks follows after a colon. A comma parts two entries only
-        before another ``quantity=``, so a label may hold one.
+        before another ``quantity=``, so a label may hold one. Of equal labels ``Q_Lmin#2`` is the second; of two
+        solenoids ``u=uA_V - uB_V`` is the signed command.
 
     Raises
     ------
@@ -148,11 +159,11 @@ def _without_time(table: Table, columns: dict[str, Column], sample_rate: float) 
 def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
     """Return what `find_columns` does, without a word on quantities that have no column."""
     columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
-    taken = {column.label for column in columns.values()}
+    taken = {each.label for column in columns.values() for each in column.every}
     edge = metering_edge(chosen)
     pressures = set(PRESSURES) if edge.ambiguous or edge.quantities else set()
     for label in table.labels:
-        quantity, in_label = split_label(label)
+        quantity, in_label = split_column(table, label)
         if quantity is None or label in taken or quantity in chosen.keys() | pressures:
             continue
         is_unit = in_label and (fits(in_label, quantity) or label not in table.units)
@@ -165,7 +176,7 @@ def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Colum
         if quantity in columns and fits(columns[quantity].unit, quantity):
             raise InputError(
                 f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
-                f"'{label}'; keep one, give the other another name, or choose by --columns"
+                f"'{label}'; choose one, for example --columns \"{quantity}={label}\""
             )
         _refuse_two_units(table, quantity, label, in_label)
         columns[quantity] = Column(label=table.dated(label) if quantity == "time" else label, unit=unit)
@@ -176,13 +187,18 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
     """Return the column that was chosen: the whole text is its label, or else what stands before the last colon."""
     if quantity == "time" and (pair := table.pair(text)):
         return Column(label=AND.join(pair), unit="s")
-    label, colon, unit = (text, "", "") if text in table.labels else text.rpartition(":")
-    label, unit = (clean_label(label), unit.strip()) if colon else (text, "")
+    label, unit = _label_and_unit(table, text)
+    if quantity == "u" and label not in table.labels and (two := _two_solenoids(table, text)):
+        column, less = (_chosen_column(table, quantity, each) for each in two)
+        if " ".join(column.unit.split()) != " ".join(less.unit.split()) and not same_unit(column.unit, less.unit, "u"):
+            raise InputError(
+                f"'{table.path}': '{column.label}' is in '{column.unit}', '{less.label}' in '{less.unit}'; give both "
+                f'one unit, for example --columns "u={column.label} - {less.label}:{column.unit}"'
+            )
+        return replace(column, less=less)
     if label not in table.labels:
-        raise table.no_column(label, f"--columns names for {quantity}")
-    if table.labels.count(label) > 1:
-        raise InputError(f"'{table.path}'{table.header} has {table.labels.count(label)} columns '{label}'; rename one")
-    _, in_label = split_label(label)
+        raise table.no_column(label, f"--columns names for {quantity}", quantity)
+    _, in_label = split_column(table, label)
     bracketed = bool(re.search(r"[\[(]", label))
     stated = (in_label if bracketed or names_a_quantity_or_current(in_label) else "") or table.units.get(label, "")
     if not unit:
@@ -197,6 +213,27 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
             + (f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else "")
         )
     return Column(label=label, unit=unit, stated=stated)
+
+
+def _label_and_unit(table: Table, text: str) -> tuple[str, str]:
+    """Return a column's label and the unit behind it; of a single column ``LABEL#1`` is that too."""
+    label, colon, unit = (text, "", "") if text in table.labels else text.rpartition(":")
+    label, unit = (clean_label(label), unit.strip()) if colon else (text, "")
+    only = label.removesuffix("#1")
+    return (only if label not in table.labels and only in table.labels else label), unit
+
+
+def _two_solenoids(table: Table, text: str) -> tuple[str, str] | None:
+    """Return the two columns, each with its unit, whose difference a text such as ``uA_V - uB_V`` names; else None.
+
+    A unit behind the second one only is that of both.
+    """
+    for less in LESS.finditer(text):
+        one, other = text[: less.start()].strip(), text[less.end() :].strip()
+        (label, unit), (its_label, its_unit) = (_label_and_unit(table, each) for each in (one, other))
+        if label in table.labels and its_label in table.labels and label != its_label:
+            return (f"{label}:{its_unit}" if its_unit and not unit else one), other
+    return None
 
 
 def _refuse_two_units(table: Table, quantity: str, label: str, in_label: str) -> None:
@@ -256,6 +293,13 @@ def split_label(label: str) -> tuple[str | None, str]:
     return _after_a_blank_or_slash(bare) if not bracket else (None, unit)
 
 
+def split_column(table: Table, label: str) -> tuple[str | None, str]:
+    """Return what `split_label` does, for a column of a table: beside ``PWM_B`` the A of ``PWM_A`` is no unit."""
+    in_file = table.in_file(label)
+    quantity, unit = split_label(in_file)
+    return quantity, "" if unit == "A" and in_file.endswith("A") and f"{in_file[:-1]}B" in table.labels else unit
+
+
 def _quantity_named(name: str) -> str | None:
     return COLUMN_NAMES.get(re.sub(r"[\s_]", "", name[:LONGEST_NAME]).lower())
 
@@ -277,7 +321,7 @@ def names_a_quantity(unit: str) -> bool:
 
 def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> MissingColumnError:
     """Return the error that names the columns found, and the one that may have been meant."""
-    unused = [label for label in table.labels[:MOST_MEANT] if split_label(label)[0] not in columns]
+    unused = [label for label in table.labels[:MOST_MEANT] if split_column(table, label)[0] not in columns]
     bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
     spellings = [name for name, its in COLUMN_NAMES.items() if its == quantity and len(name) > 1]  # T_degC is no time
     meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]

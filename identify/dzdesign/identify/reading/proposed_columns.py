@@ -5,7 +5,9 @@ The reader's own recognition goes first; a quantity whose label it does not know
 
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +19,15 @@ from dzdesign.identify.reading.clock import is_milliseconds
 from dzdesign.identify.reading.column_labels import (
     COLUMN_NAMES,
     EXAMPLE_UNITS,
+    LESS,
     PRESSURES,
     QUANTITY_OF_COLUMN,
     Column,
     fits,
     labelled_columns,
     names_a_quantity,
+    same_unit,
+    split_column,
     split_label,
 )
 from dzdesign.identify.reading.metering_edge import PORTS, MeteringEdge, metering_edge, which_edge
@@ -39,6 +44,10 @@ PRESSURE_LIKE = re.compile(
 DUTY_LIKE = re.compile(r"\bduty|_duty|pwm|tast(?:grad|verh)", re.IGNORECASE)
 #: Counts of a command that has no unit are fewer.
 LARGEST_COMMAND = 1e6
+#: A solenoid is driven above this share of its largest command; of two, both in so few rows, over those of either.
+DRIVEN, BOTH = 0.1, 0.01
+#: Columns among which two solenoids' are looked for.
+MOST_COMMANDS = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +69,8 @@ class ProposedColumns:
     pressures : dict
         Columns that may make the pressure drop, for a person to say which is which: label -> unit, "" if it has none.
     command_range : str
-        Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct.
+        Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct;
+        or of two columns that may drive a solenoid each the difference, ``uA_V - uB_V``.
     """
 
     labels: tuple[str, ...]
@@ -83,6 +93,8 @@ class ProposedColumns:
             labels |= _two_ports(self.pressures)
         if not labels:
             return ""
+        if LESS.search(self.command_range):
+            labels |= {"u": self.command_range}
         labels |= {name: f"LABEL:{EXAMPLE_UNITS[name]}" for name in ("u", "Q") if name not in labels}
         return ", ".join(f"{name}={label}" for name, label in labels.items() if label)
 
@@ -147,9 +159,12 @@ def propose_columns(
             elif why := _why_none(table, quantity, candidates):
                 unclear[quantity] = why
         command_range = _command_range(table, known, taken) if "u" in unclear else ""
+        command_range = (_two_solenoids(table, known, taken) if "u" in unclear else "") or command_range
         pressures = {} if edge.quantities else _pressures(table, known, taken - {_label_of(proposed.get("dP"))})
     if command_range:
-        unclear["u"] += f"; or say what its numbers mean, for example --columns \"u={command_range}\""
+        why = "if each drives a solenoid, their difference is the signed command:"
+        why = why if LESS.search(command_range) else "or say what its numbers mean, for example"
+        unclear["u"] += f"; {why} --columns \"u={command_range}\""
     has_pressure = bool(edge.quantities) or "dP" in proposed
     bare = (label for label, unit in pressures.items() if not unit and label not in taken)
     return ProposedColumns(
@@ -180,10 +195,41 @@ def _command_range(table: Table, known: Mapping[str, Column], taken: set[str]) -
     """Return the range form of a command without a unit, or of the only column that is named like a duty cycle."""
     labels = [known["u"].label] if "u" in known and not known["u"].unit else []
     labels = labels or [label for label in table.labels if label not in taken and DUTY_LIKE.search(label)]
-    if len(labels) != 1 or not labels[0]:
+    return _range_of(table, labels[0]) if len(labels) == 1 and labels[0] else ""
+
+
+def _two_solenoids(table: Table, known: Mapping[str, Column], taken: set[str]) -> str:
+    """Return the difference of the only two columns that may be commands of which never both are driven; or nothing."""
+    taken = taken - {_label_of(known.get("u"))}
+    labels = [label for label in table.labels if label not in taken and not LESS.search(label)]
+    named = [each for each in labels if DUTY_LIKE.search(each) or split_label(each)[0] == "u"]
+    driven = {}
+    for label in [each for each in labels if fits(_unit_of(table, each), "u") or each in named][:MOST_COMMANDS]:
+        with suppress(InputError):
+            numbers = table.numbers(label)
+            on = numbers > DRIVEN * np.fmax.reduce(numbers, initial=0.0)
+            if np.fmin.reduce(numbers, initial=0.0) >= 0 and on.any():
+                driven[label] = on
+    pairs = [
+        (one, other)
+        for one, other in combinations(driven, 2)
+        if driven[one].size == driven[other].size
+        and np.count_nonzero(driven[one] & driven[other]) <= BOTH * min(map(np.count_nonzero, driven.values()))
+        and same_unit(_unit_of(table, one), _unit_of(table, other), "u") == fits(_unit_of(table, one), "u")
+    ]
+    if len(pairs) != 1:
         return ""
+    one, other = pairs[0]
+    if fits(_unit_of(table, one), "u"):
+        return f"{one} - {other}"
+    ranges = [_range_of(table, label).removeprefix(f"{label}:") for label in pairs[0]]
+    return f"{one} - {other}:{max(ranges, key=lambda text: float(text.partition(' ')[0].rpartition('..')[2]))}"
+
+
+def _range_of(table: Table, label: str) -> str:
+    """Return the range form of a column without a unit; nothing where its numbers are no command's."""
     try:
-        numbers = table.numbers(labels[0])
+        numbers = table.numbers(label)
     except InputError:
         return ""
     lowest, highest = np.fmin.reduce(numbers, initial=0.0), np.fmax.reduce(numbers, initial=0.0)
@@ -191,7 +237,7 @@ def _command_range(table: Table, known: Mapping[str, Column], taken: set[str]) -
         return ""
     top = f"{highest:.3g}" if highest < 1000 else f"{highest:.0f}"
     both = bool(lowest < -0.5 * highest)
-    return f"{labels[0]}:{f'-{top}' if both else '0'}..{top} = {'-100' if both else '0'}..100 %"
+    return f"{label}:{f'-{top}' if both else '0'}..{top} = {'-100' if both else '0'}..100 %"
 
 
 def _is_unused(quantity: str, column: Column, edge: MeteringEdge) -> bool:
@@ -229,7 +275,7 @@ def _is_clock(table: Table, label: str) -> bool:
 
 
 def _unit_of(table: Table, label: str) -> str:
-    return table.units.get(label) or split_label(label)[1]
+    return table.units.get(label) or split_column(table, label)[1]
 
 
 def _spellings(quantity: str) -> list[str]:
@@ -266,7 +312,7 @@ def _or_first_column(table: Table) -> str:
     One that counts the rows is no time: a unit would make a wrong one of it.
     """
     first = table.labels[0]
-    if not first or table.units.get(first) or names_a_quantity(split_label(first)[1]):
+    if not first or table.units.get(first) or names_a_quantity(split_column(table, first)[1]):
         return ""
     try:
         steps = np.diff(table.numbers(first))

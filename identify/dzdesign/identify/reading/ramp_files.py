@@ -168,7 +168,7 @@ def _read_recording(
     found = find_columns(table, chosen, sample_rate)
     _refuse_two_pressures(table, found, dp)
     _refuse_unequal_lengths(table, found)
-    table.load([column.label for column in found.values()])
+    table.load([each.label for column in found.values() for each in column.every])
     data, placeholders, failed = {}, {}, {}
     is_clock = sample_rate is None and table.is_clock(found["time"].label)
     stamp = table.started(found["time"].label) if sample_rate is None and not is_clock else None
@@ -176,15 +176,16 @@ def _read_recording(
         if quantity == "time" and is_clock:
             data[quantity], stamp = read_times_of_day(table, column.label)
             continue
-        numbers, placeholders[column.label] = without_placeholders(
-            table.numbers(column.label), rises=quantity == "time"
-        )
-        unclear = quantity == "time" and not column.unit and may_count_ms(numbers)
-        if not unclear:  # else the whole recording tells later what they count
-            scaling = scaling_of(table.path, quantity, column, u_max)
-            numbers, failed[column.label] = without_failed_signals(numbers, scaling)
-            numbers = _in_SI(table, quantity, column, numbers, scaling)
-        data[quantity] = numbers
+        for each in column.every:
+            numbers, placeholders[each.label] = without_placeholders(
+                table.numbers(each.label), rises=quantity == "time"
+            )
+            unclear = quantity == "time" and not each.unit and may_count_ms(numbers)
+            if not unclear:  # else the whole recording tells later what they count
+                scaling = scaling_of(table.path, quantity, each, u_max)
+                numbers, failed[each.label] = without_failed_signals(numbers, scaling)
+                numbers = _in_SI(table, quantity, each, numbers, scaling)
+            data[quantity] = numbers if each is column else data[quantity] - numbers
     if sample_rate is not None:
         data["time"] = np.arange(data["u"].size) / sample_rate
     edge, labels = metering_edge(found), {quantity: column.label for quantity, column in found.items()}
@@ -227,7 +228,7 @@ def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
     """Refuse columns that are not samples of one clock."""
     first = found["time" if "time" in found else "u"].label
     expected = table.length(first)
-    for column in found.values():
+    for column in [each for one in found.values() for each in one.every]:
         if table.length(column.label) != expected:
             raise InputError(
                 f"'{table.path}' column '{column.label}' has {table.length(column.label)} samples, but "

@@ -4,7 +4,8 @@ What a file is read into, text or binary; columns that nobody asks for are never
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -26,6 +27,24 @@ def clean_label(label: str) -> str:
     return label.strip(' \t"')
 
 
+def numbered(labels: Sequence[str]) -> tuple[str, ...]:
+    """Return labels, of which equal ones carry their number behind a ``#``; one that ends so in the file goes first.
+
+    Examples
+    --------
+    >>> numbered(["t_s", "Q_Lmin", "Q_Lmin"])
+    ('t_s', 'Q_Lmin#1', 'Q_Lmin#2')
+    """
+    times, seen, found = Counter(labels), Counter[str](), list[str]()
+    for label in labels:
+        seen[label] += 1
+        address = f"{label}#{seen[label]}" if label and times[label] > 1 else label
+        while address != label and address in times:
+            address = f"{label}#{address.removeprefix(label)}"
+        found.append(address)
+    return tuple(found)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table(ABC):
     """The labelled columns of a file.
@@ -35,7 +54,7 @@ class Table(ABC):
     path : Path
         The file, for messages.
     labels : tuple of str
-        In the order of the file; one may repeat.
+        In the order of the file; equal ones are `numbered`.
     units : mapping
         Label -> unit, where the file states it beside the label and not in it.
     comments : str
@@ -95,13 +114,25 @@ class Table(ABC):
         """Return the date and time at which a column of time counts zero; None if they are not known."""
         return None
 
+    def in_file(self, label: str) -> str:
+        """Return a label as it stands in the file: without its number, if it is one of equal ones."""
+        bare, _, number = label.rpartition("#")
+        equal = number.isdecimal() and f"{bare}#1" in self.labels and f"{bare}#2" in self.labels
+        return bare if equal else label
+
     def found_labels(self) -> str:
         """Return the labels for a message, the first `QUOTED_COLUMNS` of them."""
         labels = ", ".join(label[:QUOTED_CHARACTERS] for label in self.labels[:QUOTED_COLUMNS])
         return labels + (", ..." if len(self.labels) > QUOTED_COLUMNS else "")
 
-    def no_column(self, label: str, wanted_by: str) -> InputError:
-        """Return the error for a label that is none of the table's, with the nearest one."""
+    def no_column(self, label: str, wanted_by: str, quantity: str = "Q") -> InputError:
+        """Return the error for a label that is none of the table's, with the nearest one; or is that of several."""
+        equal = [each for each in self.labels if each != label and self.in_file(each) == label]
+        if equal:
+            return InputError(
+                f"'{self.path}'{self.header} has {len(equal)} columns '{label}'; choose one by its number, for example "
+                f'--columns "{quantity}={equal[1]}"'
+            )
         return InputError(
             f"'{self.path}' has no column '{label}', which {wanted_by} (columns found: {self.found_labels()})"
             f"{nearest(label, self.labels)}; write the label as it stands in the file"

@@ -114,6 +114,8 @@ def _command_unit(path: Path, column: Column, u_max: float) -> CommandUnit:
             scaling, unit = Scaling(gain=gain, offset=bottom - gain * low), name
     unit = name_of_unit(unit)
     factor, at_zero = significant(1 / scaling.gain), significant(-scaling.offset / scaling.gain)
+    if column.less is not None and at_zero:  # the difference of two currents from 4 mA on is none of that range
+        return CommandUnit()
     if not unit or _extreme(factor) or (measures(unit, "voltage") and (factor, at_zero) == (1.0, 0.0)):
         return CommandUnit()
     return CommandUnit(unit=unit, factor=factor, at_zero=at_zero + 0.0, declared=declared)

@@ -12,7 +12,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.binary.file_format import FileFormat
 from dzdesign.identify.reading.binary.reader_process import list_columns, read_columns
 from dzdesign.identify.reading.binary.reader_server import ListedColumn
-from dzdesign.identify.reading.table import Table
+from dzdesign.identify.reading.table import Table, numbered
 from dzdesign.identify.reading.time_stamps import Start, start_of
 
 
@@ -75,10 +75,10 @@ def read_binary_table(file: BinaryIO, path: Path, file_format: FileFormat) -> Ar
             f"'{path}' ({file_format.name}) holds no columns of numbers; "
             f"expected one vector per quantity, such as u_V{file_format.hint}"
         )
-    labels = _unique_labels(found, path, file_format.name)
+    labels = _unique_labels(found)
     return ArrayTable(
         path=path,
-        labels=tuple(labels),
+        labels=labels,
         units={label: column.unit for label, column in zip(labels, found, strict=True) if column.unit},
         file=file,
         file_format=file_format,
@@ -86,13 +86,8 @@ def read_binary_table(file: BinaryIO, path: Path, file_format: FileFormat) -> Ar
     )
 
 
-def _unique_labels(found: Sequence[ListedColumn], path: Path, format_name: str) -> list[str]:
+def _unique_labels(found: Sequence[ListedColumn]) -> tuple[str, ...]:
     """Return a label for each column: its name, and before it its group where another group has that name too."""
     names = Counter(column.name for column in found)
-    labels = [
-        f"{column.group}/{column.name}" if column.group and names[column.name] > 1 else column.name for column in found
-    ]
-    if len(set(labels)) < len(labels):
-        twice = next(name for name, count in names.items() if count > 1)
-        raise InputError(f"'{path}' ({format_name}) has two columns '{twice[:80]}'; keep one")
-    return labels
+    groups = [f"{column.group}/" if column.group and names[column.name] > 1 else "" for column in found]
+    return numbered([group + column.name for group, column in zip(groups, found, strict=True)])

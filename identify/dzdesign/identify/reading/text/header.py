@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import final
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label
+from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label, numbered
 from dzdesign.identify.reading.text.cells import BLANKS, cells_of, is_number, labels_of
 from dzdesign.identify.reading.text.header_search import (
     COMMENT,
@@ -198,13 +198,13 @@ def _header(number: int, line: str, separator: str, path: Path) -> Header:
             f"'{path}' row {number} has {columns} cells, expected the columns of a ramp test, at most {MOST_COLUMNS}; "
             "export only those"
         )
-    labels = tuple(clean_label(label) for label in labels_of(line, separator, number, path))
-    if _is_numbers(list(labels)):
+    labels = [clean_label(label) for label in labels_of(line, separator, number, path)]
+    if _is_numbers(labels):
         raise InputError(
             f"'{path}' has no header row (row {number} is '{line[:QUOTED_CHARACTERS]}'); "
             "expected names with units such as time_s,u_V,dP_MPa,Q_Lmin"
         )
-    return Header(line=number, labels=labels, separator=separator, repeats=frozenset({line}))
+    return Header(line=number, labels=numbered(labels), separator=separator, repeats=frozenset({line}))
 
 
 def _fitted(header: Header, rows: list[Line]) -> Header:
