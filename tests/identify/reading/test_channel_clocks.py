@@ -270,6 +270,13 @@ def test_a_column_that_ends_before_the_others_is_refused(read, blank):
         read(csv(**blank))
 
 
+def test_of_two_solenoids_either_may_end_before_the_others(read):
+    whole = [f"{line},0" for line in csv().decode().splitlines()]
+    lines = [whole[0].replace("u_V", "uA_V")[:-1] + "uB_V", *whole[1:-9], *(line[:-1] for line in whole[-9:])]
+    with pytest.raises(InputError, match=r"'uA_V' ends at row .*, 9 rows"):
+        read("\n".join(lines).encode(), columns={"u": "uA_V - uB_V"})
+
+
 def test_rows_that_a_logger_wrote_in_part_are_cut(read):
     assert read(csv(Q=1)).rows_read == 1399
     assert read(csv(u=1, dP=1, Q=1)).rows_read == 1399
@@ -339,6 +346,13 @@ def test_labview_measurement_files(read, name):
     np.testing.assert_allclose(test.q, L_MIN * flow(test.time), atol=0.12 * L_MIN)
     assert np.mean(test.q / L_MIN - flow(test.time)) == pytest.approx(0, abs=5e-3)
     assert test.started is not None and test.time[-1] > 6.5
+
+
+def test_of_a_labview_file_the_command_is_asked_for_and_no_rate(read):
+    for name in ("One", "No", "Multi"):
+        with pytest.raises(InputError, match="has no column of u") as caught:
+            read(LABVIEW[name])
+        assert "sample-rate" not in str(caught.value)
 
 
 def test_labview_channels_that_begin_at_different_times_of_one_X_column(read):

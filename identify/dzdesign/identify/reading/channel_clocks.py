@@ -175,6 +175,8 @@ def refuse_an_early_end(table: Table, found: Mapping[str, Column], data: Mapping
     It may have been laid beside them from its first row on with another clock. One that a logger wrote in part in its
     last row is none, nor one with a reading in every tenth row.
     """
+    if all(np.isfinite(data[quantity][-1:]).all() for quantity in found):
+        return
     last = {}
     for quantity, column in found.items():
         known = np.flatnonzero(np.isfinite(data[quantity]))
@@ -183,7 +185,8 @@ def refuse_an_early_end(table: Table, found: Mapping[str, Column], data: Mapping
     end = max((row for quantity, (row, _) in last.items() if quantity != "time"), default=0)
     for quantity, (row, usual) in last.items():
         allowed = max(1, min(LAST_ROWS, int(SHARE_OF_LAST * end))) * usual
-        if end - row <= allowed or not np.isnan(table.numbers(found[quantity].label)[row + 1 :]).all():
+        ended = (np.isnan(table.numbers(each.label)[row + 1 :]).all() for each in found[quantity].every)
+        if end - row <= allowed or not any(ended):
             continue  # what stands there is a number that means no value: the row is one
         time = data["time"]
         seconds = time[end] - time[row] if "time" in found and np.isfinite(time[[row, end]]).all() else np.nan

@@ -147,7 +147,8 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
             "P or T, or dP"
         )
     columns = {name: column for name, column in columns.items() if name not in PRESSURES or name in edge.quantities}
-    several = sample_rate is None and len(time_columns(table)) > 1  # then the command tells which is its own
+    # Of several times the command tells which is its own.
+    several = sample_rate is None and (table.clocks or len(time_columns(table)) > 1)
     for quantity in ("u", "time", "Q") if several else ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, columns)
@@ -477,7 +478,7 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> Mi
     kind = QUANTITY_OF_COLUMN[quantity]
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
-    rate = ', or --sample-rate "100 Hz"' if quantity == "time" and len(time_columns(table)) < 2 else ""
+    rate = ', or --sample-rate "100 Hz"' if quantity == "time" and not time_columns(table) else ""
     return MissingColumnError(
         f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}",
         f"; expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}",
