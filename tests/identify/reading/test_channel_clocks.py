@@ -192,6 +192,8 @@ NAMELESS = mat(EVEN).replace(b"t_u_s", b"t_x_s").replace(b"t_Q_s", b"t_y_s")
 REFUSED = {
     "starts stated for some": (tdms(LATE, stated=("u", "dP")), "ramp.csv': 'Q' has a clock of its own, and from when"),
     "no time in common": (mat({**LATE, "Q": clock() + 1e4}), "which begins 10000 s after that of 'u_V'"),
+    "other units": (mat(LATE).replace(b"t_Q_s", b"t_Q_h"), "so they have no time in common"),
+    "no units": (mat(LATE, "t_{}"), "has no unit"),
     "times behind, equal labels": (
         side_by_side(LATE, "Time (s)").replace(b"Time (s),u (V)", b"u (V),Time (s)", 1),
         "which is that of 'u (V)' can't be told",
@@ -233,6 +235,8 @@ def test_a_sample_rate_beside_several_times_is_refused_and_a_time_of_another_cha
     content = MAKERS[maker](LATE)
     with pytest.raises(InputError, match="leave it out"):
         read(content, sample_rate=20.0)
+    with pytest.raises(InputError, match="leave it out"):
+        read(mat(LATE, "t_{}"), sample_rate=20.0)
     label = {"mat names": "t_Q_s", "csv equal labels": "Time (s)#3", "tdms": "time of Q", "hdf5 groups": "Q/time_s"}
     with pytest.raises(InputError, match="is the column of time of 'u"):
         read(content, columns={"time": label[maker]})

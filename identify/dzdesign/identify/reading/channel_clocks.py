@@ -125,12 +125,12 @@ def _laid(
     times = reference.seconds
     where = f"'{table.path}': '{column.label}' has a clock of its own ('{clock.label}')"
     ours = times[np.isfinite(times)]
-    if its.size < 2 or ours.size < 2 or its[0] >= ours[-1] or its[-1] <= ours[0]:
-        late = its[0] - ours[0] if its.size and ours.size else np.nan
-        raise InputError(
-            f"{where}, which begins {late:.6g} s after that of '{command.label}', so they have no time in common; "
-            "export one recording with one clock"
-        )
+    none_in_common = InputError(
+        f"{where}, which begins {its[0] - ours[0] if its.size and ours.size else np.nan:.6g} s after that of "
+        f"'{command.label}', so they have no time in common; export one recording with one clock, and check the units"
+    )
+    if its.size < 2 or ours.size < 2:
+        raise none_in_common
     inner = np.searchsorted(its, times, side="right").clip(1, its.size - 1)
     tolerance = SAME * clock.step
     before, after = times - its[inner - 1], its[inner] - times
@@ -138,6 +138,8 @@ def _laid(
         on_it = (np.abs(before) <= tolerance) | (np.abs(after) <= tolerance)
         within = (before >= 0) & (after >= 0) & (before + after <= PAUSE * clock.step)
     laid = np.where(on_it | within, np.interp(times, its, samples[known]), np.nan)
+    if np.isnan(laid).all():
+        raise none_in_common
     missing = np.count_nonzero(np.isnan(laid) & np.isfinite(times))
     logger.log(
         logging.WARNING if missing > LOST * times.size else logging.INFO,

@@ -242,8 +242,10 @@ def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Colum
 
 
 def time_columns(table: Table) -> list[str]:
-    """Return the labels of the columns that are a time by label and unit, or by their cells."""
-    return [label for label in table.labels if (kind := _kind_of_clock(table, label)) and kind[1] != "?"]
+    """Return the labels of the columns that are a time by label and unit, by their cells, or by whose they are."""
+    units = {label: kind[1] for label in table.labels if (kind := _kind_of_clock(table, label))}
+    claimed = {clock_of(table, "", label) for label in table.labels} if "?" in units.values() else set()
+    return [label for label, unit in units.items() if unit != "?" or label in claimed]
 
 
 def clock_of(table: Table, quantity: str, label: str) -> str:
