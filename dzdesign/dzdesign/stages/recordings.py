@@ -166,6 +166,8 @@ def _with_columns(path: Path, chosen: Mapping[str, str], skip_rows: int | None, 
     unknown = " (LABEL: the one that you know)" if "=LABEL:" in look.to_paste else ""
     timeless = rate is None and "time" not in look.known | look.proposed
     clock = ', and --sample-rate "100 Hz" (the rate of your logger)' if timeless else ""
+    if timeless and look.times:
+        clock = f", and as time that of the command, for example time={look.times[0]}"
     return f'; by their units, give --columns "{look.to_paste}"{unknown}{clock}'
 
 

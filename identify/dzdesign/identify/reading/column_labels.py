@@ -35,6 +35,11 @@ TWINS = str.maketrans("ABab", "BAba")
 LESS = re.compile(r"\s[-\u2212\u2013]\s")
 #: Characters of a label in which a quantity is looked for.
 LONGEST_NAME = 80
+#: A column of time, and the quantity that it may name before or behind: Time, t_u, X_Value, time of Q, Flow Time.
+CLOCK_OF = re.compile(
+    r"((?i:time[ _]?stamp|time|zeit|x_?value)|[tT])(?:[\s_.:-]+|(?=[A-Z0-9]|d[pP]|$))(?:(?:of|for)\s)?(.*)"
+)
+OF_CLOCK = re.compile(r"(.*?)[\s_.:-]+(time[ _]?stamp|time|zeit|t)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,12 +54,15 @@ class Column:
         The unit that the file states, where ``--columns`` says another or a range.
     less : Column or None
         What is subtracted from it: the command of the other solenoid.
+    clock : Column or None
+        Its own column of time, where that is another than the command's.
     """
 
     label: str
     unit: str
     stated: str = ""
     less: "Column | None" = None
+    clock: "Column | None" = None
 
     @property
     def every(self) -> "tuple[Column, ...]":
@@ -144,15 +152,45 @@ def find_columns(table: Table, chosen: Mapping[str, str], sample_rate: float | N
     texts = [{name: getattr(column, text) for name, column in columns.items()} for text in ("label", "unit")]
     if why := gauge_beside_absolute(edge, *texts):
         raise InputError(f"'{table.path}'{table.header} has {why}")
-    for quantity in ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
+    # Of several times the command tells which is its own.
+    several = sample_rate is None and (table.clocks or len(time_columns(table)) > 1)
+    for quantity in ("u", "time", "Q") if several else ("time", "u", "Q") if sample_rate is None else ("u", "Q"):
         if quantity not in columns:
             raise _missing_column(quantity, table, columns)
+    return columns if sample_rate is not None else _with_own_clocks(table, columns)
+
+
+def _with_own_clocks(table: Table, columns: dict[str, Column]) -> dict[str, Column]:
+    """Return columns with those of time of their own; refuse another one for the command than its own."""
+    time = columns["time"]
+    for quantity, column in columns.items():
+        own = clock_of(table, quantity, column.label) if quantity != "time" else ""
+        for less in filter(None, (column.less,)):
+            if clock_of(table, quantity, less.label) != own:
+                raise InputError(
+                    f"'{table.path}': '{column.label}' and '{less.label}' have clocks of their own, and no difference "
+                    "of the two is taken; export the commands with one"
+                )
+        if not own or time.label in (own, table.dated(own)):
+            continue
+        if quantity == "u":
+            raise InputError(
+                f"'{table.path}': '{own}' is the column of time of '{column.label}', but --columns names "
+                f"'{time.label}'; name '{own}', or none"
+            )
+        clock = column_of_time(table, own)
+        columns[quantity] = replace(column, clock=clock if clock.unit else replace(clock, unit=time.unit))
     return columns
 
 
 def _without_time(table: Table, columns: dict[str, Column], sample_rate: float) -> dict[str, Column]:
     """Return columns without one of time whose unit nobody knows; refuse a clock."""
-    time = columns.get("time")
+    time, times = columns.get("time"), time_columns(table)
+    if len(times) > 1:
+        raise InputError(
+            f"'{table.path}' has columns of time ('{times[0]}', '{times[1]}'), and --sample-rate declares "
+            f"{sample_rate:g} Hz too; leave it out"
+        )
     if time is not None and fits(time.unit, "time"):
         raise InputError(
             f"'{table.path}' has a column of time ('{time.label}'), and --sample-rate declares {sample_rate:g} Hz too; "
@@ -163,10 +201,17 @@ def _without_time(table: Table, columns: dict[str, Column], sample_rate: float) 
 
 def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Column]:
     """Return what `find_columns` does, without a word on quantities that have no column."""
+    equal, unit = _label_and_unit(table, chosen.get("time", ""))
+    if equal not in table.labels and any(table.in_file(label) == equal for label in table.labels):
+        # Of equal columns of time the command's is meant, if it has one of them.
+        columns = labelled_columns(table, {name: text for name, text in chosen.items() if name != "time"})
+        if "time" in columns and table.in_file(columns["time"].label) == equal:
+            return columns | {"time": replace(columns["time"], unit=unit or columns["time"].unit)}
     columns = {quantity: _chosen_column(table, quantity, label) for quantity, label in chosen.items()}
     taken = {each.label for column in columns.values() for each in column.every}
     edge = metering_edge(chosen)
     pressures = set(PRESSURES) if edge.ambiguous or edge.quantities else set()
+    also_time = ""
     for label in table.labels:
         quantity, in_label = split_column(table, label)
         if quantity is None or label in taken or quantity in chosen.keys() | pressures:
@@ -178,6 +223,9 @@ def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Colum
             continue  # an oil temperature T_degC beside the time t_s, a set point Q_set beside Q_Lmin
         if quantity in ("pP", "pT") and unit and not fits(unit, quantity):
             continue  # a thermometer Pt_degC
+        if quantity == "time" and "time" in columns and fits(columns["time"].unit, "time"):
+            also_time = label
+            continue
         if quantity in columns and fits(columns[quantity].unit, quantity):
             raise InputError(
                 f"'{table.path}'{table.header} has two columns of {quantity}: '{columns[quantity].label}' and "
@@ -185,7 +233,111 @@ def labelled_columns(table: Table, chosen: Mapping[str, str]) -> dict[str, Colum
             )
         _refuse_two_units(table, quantity, label, in_label)
         columns[quantity] = Column(label=table.dated(label) if quantity == "time" else label, unit=unit)
+    if "time" not in chosen and "u" in columns and (clock := clock_of(table, "u", columns["u"].label)):
+        columns["time"] = column_of_time(table, clock)
+    elif also_time and "u" in columns:
+        raise InputError(
+            f"'{table.path}'{table.header} has columns of time '{columns['time'].label}' and '{also_time}', and which "
+            f"is that of '{columns['u'].label}' can't be told; name them by their quantity, such as t_u_s and t_Q_s, "
+            "or choose one by --columns"
+        )
+    elif also_time:
+        del columns["time"]  # the command will tell which it is
     return columns
+
+
+def time_columns(table: Table) -> list[str]:
+    """Return the labels of the columns that are a time by label and unit, by their cells, or by whose they are."""
+    units = {label: kind[1] for label in table.labels if (kind := _kind_of_clock(table, label))}
+    claimed = {clock_of(table, "", label) for label in table.labels} if "?" in units.values() else set()
+    return [label for label, unit in units.items() if unit != "?" or label in claimed]
+
+
+def clock_of(table: Table, quantity: str, label: str) -> str:
+    """Return the column of time of a quantity's column, in a file that has several; empty where nothing tells.
+
+    What the file states for each channel goes first. Else the time that names the quantity or its column (``t_u_s``,
+    ``Flow Time``), then the only one of its group, then the one before it where all columns of time are alike.
+    """
+    if table.clocks:
+        return table.clocks.get(label, "")
+    times = {each: kind for each in table.labels if (kind := _kind_of_clock(table, each))}
+    if len(times) < 2 or label in times:
+        return ""
+    names = {_name_and_unit(table, label)[0].casefold(), table.in_file(label).casefold(), quantity.casefold()}
+    named = [each for each, (*_, of) in times.items() if of.casefold() in names or _quantity_named(of) == quantity]
+    named = [each for each in named if table.group(each) == table.group(label)] or named
+    if named:
+        return named[0] if len(named) == 1 else ""
+    times = {each: kind for each, kind in times.items() if kind[1] != "?"}
+    group = table.group(label)
+    while len({table.group(each) for each in times}) > 1:
+        inside = [each for each in times if table.group(each) == group]
+        inside = [each for each in inside if not times[each][2]] or inside
+        if len(inside) == 1:
+            return inside[0]
+        if not group:
+            break
+        group = group.rpartition("/")[0]
+    return _clock_before(table, label, times)
+
+
+def are_alike(table: Table, one: str, other: str) -> bool:
+    """Tell whether the labels of two columns of time differ in nothing but the quantity or number that they name."""
+    kinds = [_kind_of_clock(table, label) for label in (one, other)]
+    return len({kind and (*kind[:2], bool(kind[2])) for kind in kinds}) == 1
+
+
+def _clock_before(table: Table, label: str, times: Collection[str]) -> str:
+    """Return the last column of time before a column, in a table in which each such column stands before quantities."""
+    at = [index for index, each in enumerate(table.labels) if each in times]
+    ends = [*at[1:], len(table.labels)]
+    apart = len(at) > 1 and at[0] == 0 and all(end - index > 1 for index, end in zip(at, ends, strict=True))
+    alike = all(are_alike(table, each, next(iter(times))) for each in times)
+    if not (apart and alike) or sorted(table.labels) == list(table.labels):  # the order of HDF5 is the alphabet's
+        return ""
+    return next(table.labels[index] for index in reversed(at) if index < table.labels.index(label))
+
+
+def _kind_of_clock(table: Table, label: str) -> tuple[str, str, str] | None:
+    """Return word, unit and quantity of a column of time; None for any other.
+
+    The unit of one that may be a time as well as a temperature is ``?``.
+    """
+    name, unit = _name_and_unit(table, label)
+    found, after = CLOCK_OF.fullmatch(name), OF_CLOCK.fullmatch(name)
+    if unit and not measures(unit, "time"):
+        return None
+    if found:
+        word, of = found.groups()
+    elif after:
+        of, word = after.groups()
+    else:
+        return None
+    if not unit:
+        try:
+            unit = "" if table.is_clock(label) else "?" if len(word) == 1 else "-"
+        except InputError:  # a date without a time of day
+            return None
+    return word.lower(), unit, of
+
+
+def _name_and_unit(table: Table, label: str) -> tuple[str, str]:
+    """Return a column's label without group and unit, and the unit if it is known."""
+    bare = table.in_file(label).removeprefix(f"{table.group(label)}/")[:LONGEST_NAME]
+    in_label = split_label(bare)[1]
+    bracket = re.compile(r"[\[(]").search(bare, 1)
+    if bracket:
+        return bare[: bracket.start()].rstrip(" _/"), table.units.get(label, "") or in_label
+    if in_label != bare and names_a_quantity_or_current(in_label):
+        return bare[: -len(in_label)].rstrip(" _/,").removesuffix(" in"), in_label
+    return bare, table.units.get(label, "")
+
+
+def column_of_time(table: Table, label: str) -> Column:
+    """Return a column of time with its unit, which is empty if nobody knows it."""
+    unit = _name_and_unit(table, label)[1]
+    return Column(label=table.dated(label), unit=unit if fits(unit, "time") else "s" if table.is_clock(label) else "")
 
 
 def _chosen_column(table: Table, quantity: str, text: str) -> Column:
@@ -339,7 +491,7 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> Mi
     kind = QUANTITY_OF_COLUMN[quantity]
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
-    rate = ', or --sample-rate "100 Hz"' if quantity == "time" else ""
+    rate = ', or --sample-rate "100 Hz"' if quantity == "time" and not time_columns(table) else ""
     return MissingColumnError(
         f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}",
         f"; expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}",

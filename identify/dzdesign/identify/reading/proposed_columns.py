@@ -23,12 +23,15 @@ from dzdesign.identify.reading.column_labels import (
     PRESSURES,
     QUANTITY_OF_COLUMN,
     Column,
+    clock_of,
+    column_of_time,
     fits,
     labelled_columns,
     names_a_quantity,
     same_unit,
     split_column,
     split_label,
+    time_columns,
 )
 from dzdesign.identify.reading.metering_edge import PORTS, MeteringEdge, metering_edge, which_edge
 from dzdesign.identify.reading.ramp_files import read_table
@@ -71,6 +74,8 @@ class ProposedColumns:
     command_range : str
         Column of an unclear command with the range of its numbers, ``duty:0..0.9 = 0..100 %``, for a person to correct;
         or of two columns that may drive a solenoid each the difference, ``uA_V - uB_V``.
+    times : tuple
+        Labels of the columns that are a time.
     """
 
     labels: tuple[str, ...]
@@ -80,6 +85,7 @@ class ProposedColumns:
     bare_pressures: tuple[str, ...]
     pressures: dict[str, str]
     command_range: str = ""
+    times: tuple[str, ...] = ()
 
     @property
     def to_paste(self) -> str:
@@ -133,7 +139,7 @@ def propose_columns(
     """
     with open_bytes(path, "ramp file") as file:
         table = read_table(file, path, skip_rows)
-        known = labelled_columns(table, chosen)
+        known, times = labelled_columns(table, chosen), time_columns(table)
         if "time" in known and known["time"].unit and not fits(known["time"].unit, "time"):
             del known["time"]  # T_degC is no time
         edge = metering_edge(known)
@@ -158,6 +164,12 @@ def propose_columns(
                 taken.add(label)
             elif why := _why_none(table, quantity, candidates):
                 unclear[quantity] = why
+        u = (known | proposed).get("u")
+        if "time" in unclear and u is not None and (clock := clock_of(table, "u", u.label)):
+            proposed["time"] = column_of_time(table, clock)
+            del unclear["time"]
+        elif "time" in unclear and u is None and len(times) > 1:
+            unclear["time"] += "; that of the command is taken as soon as u is known"
         command_range = _command_range(table, known, taken) if "u" in unclear else ""
         command_range = (_two_solenoids(table, known, taken) if "u" in unclear else "") or command_range
         pressures = {} if edge.quantities else _pressures(table, known, taken - {_label_of(proposed.get("dP"))})
@@ -170,7 +182,7 @@ def propose_columns(
     return ProposedColumns(
         labels=table.labels, known=known, proposed=proposed, unclear=unclear,
         bare_pressures=() if has_pressure else tuple(bare),
-        pressures=pressures, command_range=command_range,
+        pressures=pressures, command_range=command_range, times=tuple(times),
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from dzdesign.core.input_files import check_address_space
 from dzdesign.core.recorded_units import Quantity, Unit
 from dzdesign.identify.reading.binary.array_table import read_binary_table
 from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
+from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an_early_end
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
 from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
@@ -199,6 +200,8 @@ def _read_recording(
                 numbers = _in_SI(table, quantity, each, numbers, scaling)
                 q_range = scaling.ends if quantity == "Q" else q_range
             data[quantity] = numbers if each is column else data[quantity] - numbers
+    refuse_an_early_end(table, found, data)
+    lay_on_one_clock(table, found, data, u_max)
     if sample_rate is not None:
         data["time"] = np.arange(data["u"].size) / sample_rate
     edge, labels = metering_edge(found), {quantity: column.label for quantity, column in found.items()}
@@ -257,14 +260,14 @@ def _refuse_two_pressures(table: Table, found: Mapping[str, Column], dp: float |
 
 
 def _refuse_unequal_lengths(table: Table, found: Mapping[str, Column]) -> None:
-    """Refuse columns that are not samples of one clock."""
-    first = found["time" if "time" in found else "u"].label
-    expected = table.length(first)
+    """Refuse columns that are not samples of one clock, each of its own or the command's."""
     for column in [each for one in found.values() for each in one.every]:
+        first = (column.clock or found["time" if "time" in found else "u"]).label
+        expected = table.length(first)
         if table.length(column.label) != expected:
             raise InputError(
                 f"'{table.path}' column '{column.label}' has {table.length(column.label)} samples, but "
-                f"'{first}' has {expected}; expected one clock, so resample it before"
+                f"'{first}' has {expected}; expected one clock; export it with a time of its own"
             )
 
 

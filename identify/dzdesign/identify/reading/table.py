@@ -59,12 +59,16 @@ class Table(ABC):
         Label -> unit, where the file states it beside the label and not in it.
     comments : str
         The lines that stand above the labels, as they are in the file.
+    clocks : mapping
+        Label -> label of its own column of time, where the file states it for each channel; see
+        `column_labels.clock_of`.
     """
 
     path: Path
     labels: tuple[str, ...]
     units: Mapping[str, str] = field(default_factory=dict)
     comments: str = ""
+    clocks: Mapping[str, str] = field(default_factory=dict)
 
     @abstractmethod
     def load(self, labels: Collection[str]) -> None:
@@ -81,6 +85,10 @@ class Table(ABC):
     @abstractmethod
     def place(self, row: int) -> str:
         """Return where a sample stands, in the words of a person who opens the file: ``row 8``."""
+
+    def group(self, label: str) -> str:
+        """Return the group of the file in which a column stands, or nothing."""
+        return ""
 
     @property
     def header(self) -> str:

@@ -46,6 +46,10 @@ class ArrayTable(Table):
         """Return how many samples a column has."""
         return self.columns[label][1].size
 
+    def group(self, label: str) -> str:
+        """Return the group of a column, which its label may lack."""
+        return self.columns[label][1].group
+
     def numbers(self, label: str) -> np.ndarray:
         """Return a column as float64."""
         if label not in self._loaded:
@@ -80,6 +84,7 @@ def read_binary_table(file: BinaryIO, path: Path, file_format: FileFormat) -> Ar
         path=path,
         labels=labels,
         units={label: column.unit for label, column in zip(labels, found, strict=True) if column.unit},
+        clocks={label: labels[each.clock] for label, each in zip(labels, found, strict=True) if each.clock >= 0},
         file=file,
         file_format=file_format,
         columns={label: (number, column) for number, (label, column) in enumerate(zip(labels, found, strict=True))},

@@ -35,6 +35,8 @@ class FileColumn:
         Samples.
     read : callable
         Returns all samples, (size,).
+    clock : int
+        Number of the column of time of this one among all of the file, where the file states it; else -1.
     """
 
     name: str
@@ -44,6 +46,7 @@ class FileColumn:
     group: str = ""
     unit: str = ""
     start: str = ""
+    clock: int = -1
 
 
 @final

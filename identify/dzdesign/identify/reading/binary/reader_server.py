@@ -42,6 +42,7 @@ class ListedColumn(msgspec.Struct, frozen=True, kw_only=True):
     unit: str
     start: str
     size: int
+    clock: int = -1
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
@@ -82,7 +83,12 @@ def _read(request: Request) -> tuple[Answer, list[np.ndarray]]:
         if not request.numbers:
             listed = (
                 ListedColumn(
-                    group=column.group, name=column.name, unit=column.unit, start=column.start, size=int(column.size)
+                    group=column.group,
+                    name=column.name,
+                    unit=column.unit,
+                    start=column.start,
+                    size=int(column.size),
+                    clock=column.clock,
                 )
                 for column in found
             )

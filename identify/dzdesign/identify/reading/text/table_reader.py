@@ -17,6 +17,7 @@ from dzdesign.identify.reading.text.encoding import read_text
 from dzdesign.identify.reading.text.footer import Footer, is_no_sample
 from dzdesign.identify.reading.text.header import NO_VALUE, TABLE_LINE, Header, find_header
 from dzdesign.identify.reading.text.header_search import LONGEST_HEADER, LONGEST_LINE
+from dzdesign.identify.reading.text.logger_blocks import with_stated_times, without_blocks
 from dzdesign.identify.reading.text.text_table import TextTable
 
 #: The number of a line in its file (1 is the first), and the line.
@@ -55,7 +56,8 @@ def read_text_table(file: BinaryIO, path: Path, skip_rows: int | None = None) ->
     number = 1 + skipped.count(b"\n")
     text = text[len(skipped) :]
     _refuse_a_long_line(text, path)
-    found = find_header(text, number, path, at_first_line=skip_rows is not None)
+    text, segments, has_blocks = without_blocks(text, path)
+    found = find_header(text, number, path, at_first_line=has_blocks or skip_rows is not None)
     if found is None:
         raise _no_header(path, len(text), skip_rows)
     header, start = found
@@ -67,7 +69,7 @@ def read_text_table(file: BinaryIO, path: Path, skip_rows: int | None = None) ->
     if b"#" in rows and header.separator != BLANKS:
         rows = NO_VALUE.sub(rb"\1", rows)
     rows, separator, lines = _rows_alike(rows, number, header, path)
-    return TextTable(
+    table = TextTable(
         path=path,
         labels=header.labels,
         units=header.units,
@@ -78,6 +80,7 @@ def read_text_table(file: BinaryIO, path: Path, skip_rows: int | None = None) ->
         lines=lines,
         marks=DecimalMarks(path),
     )
+    return with_stated_times(table, segments)
 
 
 def _end_of_lines(text: bytes, count: int) -> int:

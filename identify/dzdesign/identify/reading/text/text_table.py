@@ -1,7 +1,7 @@
 """A table of text: its columns as numbers, as times, and as they stand in the file."""
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -51,6 +51,13 @@ class TextTable(Table):
         Numbers of the rows' lines.
     marks : DecimalMarks
         Of the file.
+    computed : mapping
+        Label of a column of time -> its seconds, (N,), which the file states by start and step; such columns may follow
+        those of the file.
+    starts : mapping
+        Label of a column of time -> date and time at which it counts zero, where a header states it.
+    width : int
+        Cells of a row; 0 for as many as there are labels.
     """
 
     rows: bytes
@@ -58,6 +65,9 @@ class TextTable(Table):
     header_line: int
     lines: range | np.ndarray
     marks: DecimalMarks
+    computed: Mapping[str, np.ndarray] = field(default_factory=dict)
+    starts: Mapping[str, str] = field(default_factory=dict)
+    width: int = 0
     _loaded: "dict[str, pl.Series]" = field(default_factory=dict)
 
     @property
@@ -75,6 +85,8 @@ class TextTable(Table):
 
     def cell(self, label: str, row: int) -> str:
         """Return a cell as it stands in the file."""
+        if label in self.computed:
+            return f"{self.computed[label][row]:g}"
         return str(self._texts(label, row + 1)[row])
 
     def load(self, labels: Collection[str]) -> None:
@@ -85,7 +97,10 @@ class TextTable(Table):
         likely = [
             label
             for label in labels
-            if len(self.lines) and label in self.labels and NUMBER.fullmatch(cells[self.labels.index(label)])
+            if len(self.lines)
+            and label in self.labels
+            and label not in self.computed
+            and NUMBER.fullmatch(cells[self.labels.index(label)])
         ]
         if likely:
             with suppress(pl.exceptions.PolarsError):  # a cell is not a number
@@ -95,6 +110,8 @@ class TextTable(Table):
         """Return a column as float64, NaN where the cell is blank."""
         import polars as pl
 
+        if label in self.computed:
+            return self.computed[label]
         if label not in self._loaded:
             self.load([label])
         if label in self._loaded:
@@ -123,7 +140,7 @@ class TextTable(Table):
 
     def is_clock(self, label: str) -> bool:
         """Tell whether the first cell of a column that is not blank holds a time of day."""
-        cell = self._first(label)
+        cell = "" if label in self.computed else self._first(label)
         if is_unclear(cell):
             raise InputError(
                 f"'{self.path}' column '{label}': '{cell}' is ambiguous, as it may be hours and minutes, minutes and "
@@ -136,11 +153,11 @@ class TextTable(Table):
 
         Any other date, as of a calibration, would give the recordings a false order.
         """
-        if label not in self.labels or not is_time_of_day(self._first(label)):
+        if label not in self.labels or label in self.computed or not is_time_of_day(self._first(label)):
             return label
         import polars as pl
 
-        columns = self._read({each: pl.String for each in self.labels}, FEW_ROWS)
+        columns = self._read({each: pl.String for each in self.labels[: self.width or None]}, FEW_ROWS)
         called = [each for each in self.labels if DATE_LABEL.fullmatch(each)]
         dates = [each for each in called if is_date(_first_filled(_cells(columns[each])))]
         both = f"{dates[0]}{AND}{label}" if len(dates) == 1 else label
@@ -165,6 +182,8 @@ class TextTable(Table):
 
     def started(self, label: str) -> Start | None:
         """Return the date and time of the first row; None where the column has no dates."""
+        if label in self.starts:
+            return start_of(self.starts[label])
         return start_of(self._first(label)) if self.is_clock(label) else None
 
     def seconds(self, label: str) -> np.ndarray:
@@ -205,7 +224,7 @@ class TextTable(Table):
         if len(self.lines) == 0:
             return {label: pl.Series(label, [], dtype=kind) for label, kind in types.items()}
         columns = {self.labels.index(label): kind for label, kind in types.items()}
-        schema = {f"c{index}": columns.get(index, pl.String) for index in range(len(self.labels))}
+        schema = {f"c{index}": columns.get(index, pl.String) for index in range(self.width or len(self.labels))}
         try:
             frame = pl.read_csv(
                 self.rows, separator=self.separator, has_header=False, schema=schema, columns=sorted(columns),

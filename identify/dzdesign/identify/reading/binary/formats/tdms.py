@@ -1,4 +1,4 @@
-"""TDMS, as LabVIEW and FlexLogger write it: a waveform channel brings a column of time; its dates are UTC."""
+"""TDMS, as LabVIEW and FlexLogger write it: each waveform brings a column of time; its dates are UTC."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -20,7 +20,8 @@ def _columns(file: BinaryIO, path: Path, stack: ExitStack) -> Iterator[FileColum
             f"'{path}' (TDMS) is cut off: its last segment is not whole; copy it again, or open it where it was "
             "recorded and save what is there"
         )
-    has_time = False
+    clocks: dict[tuple[Any, ...], int] = {}  # waveform -> number of its column of time
+    count = 0
     for group in tdms.groups():
         for channel in group.channels():
             size = len(channel)
@@ -29,24 +30,34 @@ def _columns(file: BinaryIO, path: Path, stack: ExitStack) -> Iterator[FileColum
                     group=group.name, name=channel.name, unit="s", kind="f", size=size, read=_seconds(channel),
                     start=stamp_of(channel[0], "Z") if size else "",
                 )  # fmt: skip
+                count += 1
                 continue
-            if channel.dtype.kind in "fiubSUO" and size >= 2:
+            # Read for each channel: tasks that are started one after the other state a start each.
+            stated = channel.properties
+            step, offset = (stated.get(key) or 0.0 for key in ("wf_increment", "wf_start_offset"))
+            start = stated.get("wf_start_time", "")
+            waveform = (step, offset, start, size)
+            is_column = channel.dtype.kind in "fiubSUO" and size >= 2
+            is_new = bool(step) and size > 0 and waveform not in clocks
+            if is_new:
+                clocks[waveform] = count + is_column
+            if is_column:
                 yield FileColumn(
                     group=group.name, name=channel.name, unit=unit_among(channel.properties), kind=channel.dtype.kind,
-                    size=size, read=_samples(channel),
+                    size=size, read=_samples(channel), clock=clocks.get(waveform, -1),
                 )  # fmt: skip
-            step = channel.properties.get("wf_increment")
-            if step and size and not has_time:
-                has_time = True
-                start = channel.properties.get("wf_start_offset", 0.0)
-                times = np.linspace(start, start + (size - 1) * step, size)
-                yield _of_time(group.name, times, channel.properties.get("wf_start_time"))
+                count += 1
+            if is_new:
+                times = np.linspace(offset, offset + (size - 1) * step, size)
+                name = "time_s" if len(clocks) == 1 else f"time of {channel.name}"
+                yield _of_time(group.name, name, times, start)
+                count += 1
 
 
-def _of_time(group: str, times: np.ndarray, start: Any) -> FileColumn:
+def _of_time(group: str, name: str, times: np.ndarray, start: Any) -> FileColumn:
     """Return the column of time of a waveform, which counts from the start that its channel states."""
     stamp = stamp_of(start, "Z") if isinstance(start, np.datetime64) else ""
-    return FileColumn(group=group, name="time_s", unit="s", kind="f", size=times.size, read=lambda: times, start=stamp)
+    return FileColumn(group=group, name=name, unit="s", kind="f", size=times.size, read=lambda: times, start=stamp)
 
 
 def _samples(channel: Any) -> Any:

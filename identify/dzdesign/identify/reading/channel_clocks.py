@@ -1,0 +1,199 @@
+"""Channels with clocks of their own: laid on the command's clock by linear interpolation, or refused by name.
+
+Channels of separate tasks, devices or rates stand beside one another row by row without belonging together; at 0.3 V/s
+a flow that is 0.24 s late moves a threshold by 80 mV. Nothing is extrapolated, nor interpolated over a pause.
+"""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.clock import never_back, read_times_of_day
+from dzdesign.identify.reading.column_labels import Column, are_alike, clock_of, time_columns
+from dzdesign.identify.reading.missing_values import without_placeholders
+from dzdesign.identify.reading.scaling import scaling_of
+from dzdesign.identify.reading.table import Table
+from dzdesign.identify.reading.time_stamps import DAY, Start, start_of
+
+#: Clocks are one where no sample is off by this share of a step: the jitter of a clock.
+SAME = 1e-3
+#: Over a pause of more than so many of its own usual steps a channel has no reading.
+PAUSE = 3.0
+#: Rows at the end in which a column may be blank beside others: the last one was written in part.
+LAST_ROWS, SHARE_OF_LAST = 2, 1e-3
+#: A channel that has no reading in more than this share of the command's rows is said in any case.
+LOST = 0.1
+logger = logging.getLogger(__name__)
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clock:
+    """The times of a channel, in s, NaN where one is missing, and from when they count.
+
+    `stamp` is the date and time of zero; without a date, `of_day` is its time of day.
+    """
+
+    label: str
+    seconds: np.ndarray
+    stamp: Start | None
+    of_day: float | None = None
+
+    @property
+    def step(self) -> float:
+        """The usual step."""
+        steps = np.diff(self.seconds[np.isfinite(self.seconds)])
+        steps = steps[steps > 0]
+        return float(np.median(steps)) if steps.size else 0.0
+
+    def is_the_same(self, other: "Clock") -> bool:
+        """Tell whether two clocks have the same numbers, whatever they count from."""
+        one, its = self.seconds, other.seconds
+        return one.size == its.size and bool(np.all(np.abs(one - its)[np.isfinite(one - its)] <= SAME * self.step))
+
+    def ahead_of(self, other: "Clock") -> float | None:
+        """Return by how much later the zero of this clock is than that of another, s; None if nobody knows."""
+        if self.stamp and other.stamp and self.stamp.has_zone == other.stamp.has_zone:
+            return round(self.stamp.seconds - other.stamp.seconds, 5)  # a float of seconds since year 1 has no more
+        if self.of_day is not None and other.of_day is not None:
+            return (self.of_day - other.of_day + DAY / 2) % DAY - DAY / 2
+        counted = (self.stamp, self.of_day, other.stamp, other.of_day)
+        return 0.0 if counted == (None,) * 4 else None
+
+
+def lay_on_one_clock(table: Table, found: Mapping[str, Column], data: dict[str, np.ndarray], u_max: float) -> None:
+    """Lay the channels that have a clock of their own on the command's, in place; NaN where there is no reading.
+
+    Raises
+    ------
+    InputError
+        If clocks differ and have no common zero, or no time in common; if one goes back.
+    """
+    if "time" not in found:
+        return
+    time = found["time"]
+    reference = _clock(table, time, u_max, data["time"])
+    _refuse_an_unclear_one(table, found, reference, u_max)
+    others = {column.clock.label: _clock(table, column.clock, u_max) for column in found.values() if column.clock}
+    differ = False
+    for quantity, column in found.items():
+        if column.clock is None:
+            continue
+        clock = others[column.clock.label]
+        ahead = clock.ahead_of(reference)
+        if clock.is_the_same(reference) and not (ahead and abs(ahead) > SAME * reference.step):
+            data[quantity] = np.where(np.isfinite(clock.seconds) | np.isnan(reference.seconds), data[quantity], np.nan)
+            continue
+        if ahead is None:
+            raise InputError(
+                f"'{table.path}': '{column.label}' has a clock of its own, and from when it counts is not stated as it "
+                f"is for '{found['u'].label}' ({time.label}); export both with date and time, or both from one zero"
+            )
+        differ = True
+        data[quantity] = _laid(table, column, clock, ahead, found["u"], reference, data[quantity])
+    clockless = [each.label for name, each in found.items() if name != "time" and each.label not in table.clocks]
+    if differ and table.clocks and clockless:
+        raise InputError(
+            f"'{table.path}': '{clockless[0]}' states no time of its own, and the clocks of the other channels differ; "
+            "export every channel with its start and step"
+        )
+
+
+def _clock(table: Table, column: Column, u_max: float, seconds: np.ndarray | None = None) -> Clock:
+    """Return a column of time as a clock; `seconds` are its times, where they were read before."""
+    if not table.is_clock(column.label):
+        if seconds is None:
+            seconds, _ = without_placeholders(table.numbers(column.label), rises=True)
+            seconds = seconds * scaling_of(table.path, "time", column, u_max).gain if column.unit else seconds
+        return Clock(label=column.label, seconds=seconds, stamp=table.started(column.label))
+    seconds, stamp = read_times_of_day(table, column.label)
+    known = np.flatnonzero(np.isfinite(seconds))
+    day = start_of(f"2000-01-01 {table.cell(column.label, int(known[0]))}") if known.size and not stamp else None
+    return Clock(label=column.label, seconds=seconds, stamp=stamp, of_day=day.seconds % DAY if day else None)
+
+
+def _laid(
+    table: Table, column: Column, clock: Clock, ahead: float, command: Column, reference: Clock, samples: np.ndarray
+) -> np.ndarray:
+    """Return a channel at the times of the command's clock."""
+    known = np.isfinite(clock.seconds) & np.isfinite(samples)
+    its = never_back(table, clock.seconds[known], known) + ahead
+    times = reference.seconds
+    where = f"'{table.path}': '{column.label}' has a clock of its own ('{clock.label}')"
+    ours = times[np.isfinite(times)]
+    none_in_common = InputError(
+        f"{where}, which begins {its[0] - ours[0] if its.size and ours.size else np.nan:.6g} s after that of "
+        f"'{command.label}', so they have no time in common; export one recording with one clock, and check the units"
+    )
+    if its.size < 2 or ours.size < 2:
+        raise none_in_common
+    inner = np.searchsorted(its, times, side="right").clip(1, its.size - 1)
+    tolerance = SAME * clock.step
+    before, after = times - its[inner - 1], its[inner] - times
+    with np.errstate(invalid="ignore"):
+        on_it = (np.abs(before) <= tolerance) | (np.abs(after) <= tolerance)
+        within = (before >= 0) & (after >= 0) & (before + after <= PAUSE * clock.step)
+    laid = np.where(on_it | within, np.interp(times, its, samples[known]), np.nan)
+    if np.isnan(laid).all():
+        raise none_in_common
+    missing = np.count_nonzero(np.isnan(laid) & np.isfinite(times))
+    logger.log(
+        logging.WARNING if missing > LOST * times.size else logging.INFO,
+        "%s: it begins %.6g s after that of '%s' and has a step of %.6g s, not %.6g s; laid on the command's clock, "
+        "with no reading in %d of %d rows", where, its[0] - ours[0], command.label, clock.step, reference.step, missing,
+        times.size,
+    )  # fmt: skip
+    return laid
+
+
+def _refuse_an_unclear_one(table: Table, found: Mapping[str, Column], reference: Clock, u_max: float) -> None:
+    """Refuse a channel without a time of its own beside a time that no channel claims and that differs."""
+    time = found["time"]
+    alone = [each.label for name, each in found.items() if name != "time" and not clock_of(table, name, each.label)]
+    if table.clocks or not alone or time.label not in table.labels:
+        return
+    claimed = {clock_of(table, "", label) for label in table.labels}
+    claimed |= {column.clock.label for column in found.values() if column.clock}
+    for label in time_columns(table):
+        if label == time.label or label in claimed or not are_alike(table, time.label, label):
+            continue
+        other = _clock(table, Column(label=label, unit=time.unit), u_max)
+        if not other.is_the_same(reference):
+            begin = other.seconds[:1] - reference.seconds[:1]
+            raise InputError(
+                f"'{table.path}' has times '{time.label}' and '{label}' that differ, by {float(begin[0]):.6g} s at "
+                f"first, and which is that of '{alone[-1]}' can't be told; put each directly before its quantity, "
+                "or name them t_u_s, t_Q_s"
+            )
+
+
+def refuse_an_early_end(table: Table, found: Mapping[str, Column], data: Mapping[str, np.ndarray]) -> None:
+    """Refuse a column without a time of its own that is blank to the end while others go on.
+
+    It may have been laid beside them from its first row on with another clock. One that a logger wrote in part in its
+    last row is none, nor one with a reading in every tenth row.
+    """
+    if all(np.isfinite(data[quantity][-1:]).all() for quantity in found):
+        return
+    last = {}
+    for quantity, column in found.items():
+        known = np.flatnonzero(np.isfinite(data[quantity]))
+        if column.clock is None and known.size > 1:
+            last[quantity] = int(known[-1]), float(np.median(np.diff(known)))
+    end = max((row for quantity, (row, _) in last.items() if quantity != "time"), default=0)
+    for quantity, (row, usual) in last.items():
+        allowed = max(1, min(LAST_ROWS, int(SHARE_OF_LAST * end))) * usual
+        ended = (np.isnan(table.numbers(each.label)[row + 1 :]).all() for each in found[quantity].every)
+        if end - row <= allowed or not any(ended):
+            continue  # what stands there is a number that means no value: the row is one
+        time = data["time"]
+        seconds = time[end] - time[row] if "time" in found and np.isfinite(time[[row, end]]).all() else np.nan
+        rows = f"{end - row} rows" + (f" ({seconds:.4g} s)" if np.isfinite(seconds) else "")
+        raise InputError(
+            f"'{table.path}' column '{found[quantity].label}' ends at {table.place(row)}, {rows} before the others, so "
+            "its rows may not be theirs; export it with its own time, or cut these rows if they are"
+        )
