@@ -144,7 +144,9 @@ def _swing(item: DescribedTest) -> float:
     shares = []
     for part in branch.ramps if branch.dp is not None else ():
         dp = branch.dp[part][branch.u[part] < 0.9 * knee]
-        away = dp - dp.mean() if dp.size else dp
+        if not dp.size:
+            continue
+        away = dp - dp.mean()
         beyond = away[np.abs(away) > np.std(away) / 2]
         swings = np.count_nonzero(np.diff(np.sign(beyond))) >= FEWEST_SWINGS
         shares.append(float(np.std(away) / dp.mean()) if swings and dp.mean() > 0 else 0.0)
