@@ -89,7 +89,7 @@ class BoundsBasis:
         Flow,
         Meta(
             description="Flow below which nothing is known at the guard's bounds. It is level_L_min. It is less if "
-            "low-flow readings at or above the guarded threshold of every test show that no more flows, and more if "
+            "low-flow readings at or above the guarded threshold of every test show that no more flows. It is more if "
             "the readings at rest may hide a larger zero error of the meter."
         ),
     ]
