@@ -259,6 +259,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
                 if certificate.zero_flow_L_min is None
                 else compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)
             ),
+            f"{label}{compensator.valve.sides[SIDE_NAMES[sign]].between_in_words(certificate.guard)}",
         ]
     if compensator.current_drive is not None:
         lines += compensator.current_drive.in_words(units)

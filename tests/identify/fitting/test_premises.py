@@ -292,3 +292,18 @@ class TestTrend:
 
 def test_the_share_of_the_premise_is_kept():
     assert confidence_at_tests(0.99) == pytest.approx(0.9925)
+
+
+@pytest.mark.parametrize(
+    ("pressures", "curve", "said"),
+    [
+        ((1.0,), None, "at one tested pressure drop"),
+        ((1.0, 5.0), None, "premise monotone, untested"),
+        ((1.0, 3.0, 5.0), "smooth", "premise smooth, untested"),
+        ((1.0, 2.0, 3.0, 5.0), "line", "premise line, not contradicted by the tests"),
+    ],
+)
+def test_what_the_bounds_rest_on_between_the_tests_is_said(pressures, curve, said):
+    tests = [synthetic_ramp(dp, Truth(knee_rising=5.4 - 0.05 * dp), rate_Hz=10.0) for dp in pressures]
+    model = identify(tests, IdentifyOptions(curve=curve))
+    assert said in model.positive.between_in_words("closing")

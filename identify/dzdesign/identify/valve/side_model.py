@@ -89,7 +89,7 @@ class BoundsBasis:
         Flow,
         Meta(
             description="Flow below which nothing is known at the guard's bounds. It is level_L_min. It is less if "
-            "low-flow readings at or above the guarded threshold of every test show that no more flows, and more if "
+            "low-flow readings at or above the guarded threshold of every test show that no more flows. It is more if "
             "the readings at rest may hide a larger zero error of the meter."
         ),
     ]
@@ -248,6 +248,16 @@ class SideModel:
         if len(self.tests) < 2:
             return "one pressure drop was tested: the bound holds there, and nothing is certified at another"
         return f"{len(self.tests)} pressure drops were tested. {self.curve.premise_in_words(units)}"
+
+    def between_in_words(self, guard: Guard) -> str:
+        """Return which premise a guard's bound rests on between the tests, and whether these could contradict it."""
+        curve = self.certified[guard]
+        if len(self.tests) < 2:
+            return "at one tested pressure drop: the bound holds there alone"
+        told = any(each.premise == curve.premise and each.lack_of_fit_p is not None for each in curve.premises)
+        declared = "declared, " if curve.premise == "smooth" and curve.curvature_is != "estimated" else ""
+        tested = "not contradicted by the tests" if told and len(self.tests) > 2 else "untested"
+        return f"between the tests: premise {curve.premise}, {declared}{tested}"
 
     @property
     def zero_flow_L_min(self) -> float | None:
