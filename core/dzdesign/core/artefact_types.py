@@ -145,8 +145,9 @@ def to_json_bytes(artefact: Artefact) -> bytes:
     """Return an artefact as the bytes of its file; the same artefact gives the same bytes.
 
     A number that is NaN or infinite is a ValueError; a type that no artefact has, such as a NumPy number, a TypeError.
+    Of a file's name that is no UTF-8, what can't be written is a question mark.
     """
-    return to_json(as_document(artefact)).encode()
+    return to_json(as_document(artefact)).encode(errors="replace")
 
 
 def _encoded(value: object) -> object:
