@@ -22,7 +22,11 @@ def open_port(name: str, baud: float, look_s: float) -> "serial.Serial":
 
     try:
         alone = {"exclusive": True} if sys.platform != "win32" else {}  # Windows knows nothing else
-        return serial.Serial(name, int(baud), timeout=look_s, write_timeout=WRITE_S, **alone)
+        port = serial.Serial(None, int(baud), timeout=look_s, write_timeout=WRITE_S, **alone)
+        port.dtr = port.rts = False  # on many boards they are wired to reset and boot mode: opening would restart it
+        port.port = name
+        port.open()
+        return port
     except (OSError, ValueError) as error:
         known = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
         raise InputError(

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from msgspec import Meta
 
+from dzdesign.core.artefact_files import write_files
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_schema import LARGEST_INTEGER, json_schema
 from dzdesign.core.artefact_types import (
@@ -325,3 +327,12 @@ def test_the_header_of_this_program_names_its_version():
     from dzdesign.core.version import __version__
 
     assert (THIS_TOOL.name, THIS_TOOL.version) == ("dzdesign", __version__)
+
+
+def test_a_name_that_is_no_utf_8_is_written_with_question_marks(tmp_path):
+    name = os.fsdecode(b"f\xe4rm")
+    made = SourceFile(source=name, sha256="0" * 64)
+    supply = Artefact(schema="dzdesign.supply/1", tool=THIS_TOOL, made_from=(made,))
+    assert json.loads(to_json_bytes(supply))["made_from"][0]["source"].isprintable()
+    write_files(tmp_path, {"page.html": name}, "-o")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == "f?rm"

@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dzdesign.core.errors import InputError
+from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from tests.support.repeatable_valves import identify_sides
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
@@ -101,3 +103,53 @@ def test_a_repeated_test_shrinks_the_error_by_the_root_of_two():
     assert np.exp(np.mean(np.log(ratios))) == pytest.approx(2**-0.5, rel=0.1)
     # The mean of two differs from the first by half of their difference: 0.7 standard errors.
     assert np.sqrt(np.mean(np.square(moves))) == pytest.approx(2**-0.5, rel=0.35)
+
+
+def by_hand(seed, nominal, repeats, off, gap=0.0, swing=0.0):
+    """Return ramps at pressures that a hand set: off by a share of each, `gap` MPa apart, or swinging with a pump."""
+    random = np.random.default_rng(seed)
+    drops = np.repeat(nominal, repeats) * (1 + off * random.uniform(-1, 1, len(nominal) * repeats))
+    ramps = []
+    for number, dp in enumerate(np.round(drops + gap * np.arange(drops.size), 6).tolist()):
+        truth = Truth(knee_rising=5.5 - 0.03 * dp, slope=4 * dp**0.5)
+        test = synthetic_ramp(dp, truth, seed=seed + number, rate_Hz=10, ramp_s=40, source=f"{number}.csv")
+        swings = 1 + swing * np.sin(2 * np.pi * 0.7 * test.time + seed)
+        ramps.append(dataclasses.replace(test, q=test.q * swings**0.5, dp=test.dp * swings, sha256=f"{number:064x}"))
+    return ramps
+
+
+def excess_of(tests, options=None):
+    """Return by how much the bounds of a valve of `by_hand` lie above its thresholds at most, V."""
+    side, excess = identify(tests, options).positive, [-np.inf]
+    for guard, curve in side.certified.items():
+        ceilings = [curve.bound(side.trend or "flat")]
+        if curve.above is not None and curve.above.certified:
+            ceilings.append(curve.above.bound())
+        below = {"closing": 0.1, "mean": 0.05, "opening": 0.0}[guard]
+        for bound in ceilings:
+            at = np.linspace(*map(float, bound.dp_MPa), 101)
+            excess.append(np.max(bound.in_doubles(at) - (5.5 - 0.03 * at - below)))
+    return max(excess)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pressures_set_by_hand_end_in_no_internal_error(seed):
+    assert excess_of(by_hand(seed, (1, 3, 5, 8, 12)[: 4 + seed % 2], 3 + seed // 4, off=0.03)) < 0
+
+
+@settings(max_examples=12, deadline=None, derandomize=True)
+@given(
+    seed=seeds,
+    nominal=st.lists(st.floats(0.5, 12), min_size=2, max_size=5),
+    repeats=st.integers(1, 3),
+    off=st.sampled_from([0.0, 0.03]),
+    gap=st.sampled_from([0.0, 1e-6, 1e-4, 0.02]),
+    swing=st.sampled_from([0.0, 0.1]),
+    curve=st.sampled_from([None, "line", "monotone"]),
+)
+def test_pressures_that_nearly_coincide_swing_or_repeat(seed, nominal, repeats, off, gap, swing, curve):
+    try:
+        excess = excess_of(by_hand(seed, nominal, repeats, off, gap, swing), IdentifyOptions(curve=curve))
+    except InputError:  # such as a line that few pressures do not support
+        return
+    assert excess < 0

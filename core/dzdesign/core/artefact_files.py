@@ -110,7 +110,7 @@ def write_file(path: Path, content: str | bytes, schema: str | None = None, opti
 
     With the `schema` of a JSON artefact, an existing file of another kind is left alone.
     """
-    data = content.encode() if isinstance(content, str) else content
+    data = content.encode(errors="replace") if isinstance(content, str) else content
     check_file_may_be_written(path, schema, option)
     with _refusing(f"'{path}'", option):
         # A link to an artefact stays, and its artefact is replaced; a link to anything else gives way.
@@ -203,7 +203,7 @@ def write_folder(
     mapping of str to bool
         The files that were kept, and whether dzdesign would write another text now than it did then.
     """
-    contents = {name: text.encode() if isinstance(text, str) else text for name, text in files.items()}
+    contents = {name: text.encode(errors="replace") if isinstance(text, str) else text for name, text in files.items()}
     listing = {name: sha256_of(data) for name, data in contents.items()}
     if isinstance(manifest, Mapping):
         document = manifest
@@ -211,7 +211,7 @@ def write_folder(
         from dzdesign.core.artefact_types import as_document  # here: msgspec costs a start that writes nothing
 
         document = as_document(manifest)
-    contents[MANIFEST_NAME] = to_json({**document, "files": listing}).encode()
+    contents[MANIFEST_NAME] = to_json({**document, "files": listing}).encode(errors="replace")
     named = folder = Path(folder)
     with _refusing(f"the folder '{folder}'", "-o"):
         folder = Path(os.path.realpath(folder))  # a link stays, its target is replaced

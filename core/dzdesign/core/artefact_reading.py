@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from msgspec import ValidationError, convert
 
 from dzdesign.core.artefact_schema import LARGEST_INTEGER, in_words, json_schema, node_at
-from dzdesign.core.artefact_types import Artefact, as_document, schema_of
+from dzdesign.core.artefact_types import Artefact, as_document, own_result, schema_of
 from dzdesign.core.documents import parse_document, written_by
 from dzdesign.core.errors import InputError, and_more, quoted
 
@@ -65,6 +65,7 @@ def read_artefact(
     return artefact
 
 
+@own_result()
 def rounded(artefact: Stored, decimals: int) -> Stored:
     """Return an artefact, or a part of one, with every float in it rounded, as its file is to have them."""
     return convert(_rounded(as_document(artefact), decimals), type(artefact), dec_hook=_decoded)

@@ -18,16 +18,17 @@ Examples
 b'{\\n "schema": "dzdesign.supply/1"'
 """
 
+import contextlib
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from fractions import Fraction
 from typing import Annotated, Any, ClassVar
 
-from msgspec import Meta, to_builtins
+from msgspec import Meta, ValidationError, to_builtins
 
 from dzdesign.core.documents import to_json
-from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.errors import InputError, InternalError, quoted
 from dzdesign.core.version import __version__
 
 
@@ -36,6 +37,18 @@ class RuleError(InputError, ValueError):
 
     The reader adds the file and the object's place in it; to an `InputError` that is no `RuleError`, the file alone.
     """
+
+
+@contextlib.contextmanager
+def own_result() -> Iterator[None]:
+    """Blame dzdesign where a result that it makes itself breaks a rule: no input is at fault then."""
+    try:
+        yield
+    except (RuleError, ValidationError) as error:
+        raise InternalError(
+            f"internal error of dzdesign {__version__}, which refuses its own result ({error}); the input is not to "
+            "blame: please report this line, with the command and its files"
+        ) from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,8 +145,9 @@ def to_json_bytes(artefact: Artefact) -> bytes:
     """Return an artefact as the bytes of its file; the same artefact gives the same bytes.
 
     A number that is NaN or infinite is a ValueError; a type that no artefact has, such as a NumPy number, a TypeError.
+    Of a file's name that is no UTF-8, what can't be written is a question mark.
     """
-    return to_json(as_document(artefact)).encode()
+    return to_json(as_document(artefact)).encode(errors="replace")
 
 
 def _encoded(value: object) -> object:

@@ -24,6 +24,10 @@ class RequirementError(DzdesignError):
     """A requirement does not hold, such as a failed proof or a wrong result; the command line exits with status 1."""
 
 
+class InternalError(DzdesignError):
+    """A result of dzdesign breaks its own rules: its fault, not that of the input; exit status 1 and one sentence."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return `` (did you mean 'x'?)`` for the known name nearest to `name`, or an empty string.
 

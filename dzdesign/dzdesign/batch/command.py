@@ -212,7 +212,7 @@ def _task(
         options["order"] = [os.fspath(item) for item in paths_of(options["order"])]
     recordings, refused = [], ""
     try:
-        recordings = [(path.name, read_recording(path, "ramp file")) for path in valve.recordings()]
+        recordings = [(path.name, _of_recording(path)) for path in valve.recordings()]
     except InputError as error:
         refused = str(error)
     return Task(
@@ -227,6 +227,13 @@ def _task(
         outputs=wanted,
         refused=refused,
     )
+
+
+def _of_recording(path: Path) -> bytes:
+    """Read a recording, which a batch does twice: what gives its content once is refused."""
+    if path.is_fifo():
+        raise InputError(f"ramp file '{path}' is a pipe, which a batch can't read twice; save it to a file")
+    return read_recording(path, "ramp file")
 
 
 def _record(valve: Valve, args: BatchArguments) -> dict[str, str]:

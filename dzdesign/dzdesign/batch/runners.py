@@ -2,6 +2,7 @@
 
 import logging
 import os
+import pydoc
 import signal
 import sys
 import warnings
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from dzdesign.batch.calibration import Outcome, Task, calibrate
 from dzdesign.batch.parent_watch import end_with
 from dzdesign.core.artefact_types import THIS_TOOL
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, and_more
 from dzdesign.report.lot.summary import FAILED
 from dzdesign.terminal.progress import say
 
@@ -28,6 +29,8 @@ Work = Callable[[Task], Outcome]
 #: Tasks on their way for each that runs: a batch of any length takes no more memory than these.
 AHEAD = 2
 CONNECT_S = 10
+#: Workers that a message names.
+MOST_NAMED = 10
 #: How often it is looked whether any worker is there: waiting for one looks like work.
 LOOK_S = 5.0
 #: Loggers of Dask that tell of a lost scheduler in pages of their own.
@@ -136,6 +139,7 @@ def run_on_cluster(tasks: Iterable[Task], address: str, work: Work = calibrate) 
     The workers must be able to import `work`.
     """
     with _scheduler_lost(address), _client(address) as client, _workers_missed(client, address):
+        _check_workers(client)
         suspects = []
         for task, future in _ended(client, iter(tasks), work):
             if _killed(future):
@@ -167,6 +171,25 @@ def _scheduler_lost(address: str) -> Iterator[None]:
     finally:
         for name, level in levels.items():
             logging.getLogger(name).setLevel(level)
+
+
+def _check_workers(client: "Client") -> None:
+    """Refuse workers without dzdesign, whose valves would be waited for for ever, and those of another version.
+
+    They are asked by a function of Python's own, which each of them has.
+    """
+    found = client.run(pydoc.locate, "dzdesign.core.version.__version__", on_error="return")
+    odd = {name: version for name, version in found.items() if version is None or isinstance(version, str)}
+    words = [
+        f"'{name}' has {'no dzdesign' if version is None else f'dzdesign {version}'}"
+        for name, version in odd.items()
+        if version != THIS_TOOL.version
+    ]
+    if words:
+        raise InputError(
+            f"of the Dask workers {and_more(words, MOST_NAMED)}; install dzdesign {THIS_TOOL.version} on each of them, "
+            "or end them"
+        )
 
 
 @contextmanager

@@ -87,7 +87,8 @@ def _of_folder(folder: Path, pattern: str | None) -> list[Valve]:
 
 def _recordings_in(folder: Path, pattern: str | None) -> list[str]:
     found = folder.glob(pattern) if pattern else (p for p in folder.iterdir() if p.suffix[1:].lower() in RECORDINGS)
-    return sorted(str(path) for path in found if path.is_file() and not path.name.startswith("."))
+    # Folders alone are left out: a valve of which a recording can't be read is refused, not calibrated on the rest.
+    return sorted(str(path) for path in found if not path.is_dir() and not path.name.startswith("."))
 
 
 def _of_table(path: Path, options: Collection[str]) -> list[Valve]:

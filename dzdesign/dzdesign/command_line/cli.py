@@ -1,7 +1,7 @@
 """The program: exit statuses and the handling of errors; the commands are listed in `command_table`.
 
-Exit status: 0 holds, 1 a requirement does not hold (the message says which), 2 bad input or usage. Every heavy import
-happens inside the stage that needs it.
+Exit status: 0 holds, 1 a requirement does not hold (the message says which) or dzdesign refuses its own result, 2 bad
+input or usage. Every heavy import happens inside the stage that needs it.
 """
 
 import errno
@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 
-from dzdesign.core.errors import DzdesignError, RequirementError, clear_line
+from dzdesign.core.errors import DzdesignError, InternalError, RequirementError, clear_line
 
 #: What the system says of an output that takes no more: full, beyond a quota, closed, a device that fails.
 UNPRINTABLE = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EBADF, errno.EIO, errno.EFBIG)
@@ -51,6 +51,9 @@ def main(argv: list[str] | None = None) -> int:
             return status
     except RequirementError as error:
         _tell(f"does not hold: {clear_line(str(error))}")
+        return DOES_NOT_HOLD
+    except InternalError as error:
+        _tell(clear_line(str(error)))
         return DOES_NOT_HOLD
     except DzdesignError as error:
         text = str(error)

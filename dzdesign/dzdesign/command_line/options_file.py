@@ -17,6 +17,8 @@ LONGEST_KEY = 80
 TABLES = (MACHINE,)
 #: The table of any names, for people.
 RECORD = "record"
+#: Entries of it that `init` proposes, though other commands have options of these names.
+PROPOSED = ("serial", "oil")
 #: Of an option in the file: text, a list of texts, or a table.
 Value = str | list[str] | dict[str, str]
 
@@ -77,7 +79,8 @@ def _refuse_options_in(path: str, table: str, entries: Mapping[str, object], kno
     for name in (name for name in entries if name.replace("-", "_") in known):
         where = f"'{path}': '{name}' stands in the table [{table}], which goes on to the next table or the end"
         if table == RECORD and "-" not in name and "_" not in name:
-            say(f"{where}, so it is an entry and no option")
+            if name not in PROPOSED:
+                say(f"{where}, so it is an entry and no option")
             continue
         raise InputError(f"{where}; the option belongs above all tables, move it there")
 

@@ -62,8 +62,6 @@ def run(arguments: Arguments, json: bool) -> int:
 
     output, read = Path(arguments.output), read_options(arguments, ["seconds", "baud"])
     check_file_may_be_written(output)
-    if output.exists() and output.stat().st_size:
-        raise InputError(f"'{output}' exists, and a recording is not to be had again; choose another name with -o")
     given = arguments.compensator
     scalings = scalings_of(Path(arguments.firmware), None if given is None else Path(given))
     baud = read["baud"] or scalings.link.baud
@@ -179,14 +177,16 @@ def _document(arguments: Arguments, recording: "Recording", reader: "FrameReader
         "bad_crc": reader.bad_crc,
         "octets_skipped": reader.skipped,
         "restarts": recording.restarts,
+        "doubled": recording.doubled,
         "faults": recording.faults,
     }
 
 
 def _print(arguments: Arguments, recording: "Recording", reader: "FrameReader") -> None:
+    doubled = f", {recording.doubled} came twice" if recording.doubled else ""
     print(
         f"{recording.frames} frames in {recording.duration_s:.2f} s: {recording.lost} lost, {reader.bad_crc} with a "
-        f"wrong CRC, {reader.skipped} octets skipped, {recording.restarts} restarts of the firmware"
+        f"wrong CRC, {reader.skipped} octets skipped, {recording.restarts} restarts of the firmware{doubled}"
     )
     print(f"Faults: {', '.join(recording.faults) or 'none'}")
     print(one_line(f"Written: {arguments.output}; add a column Q_Lmin from your flow meter for `dzdesign identify`"))

@@ -6,7 +6,7 @@ from dataclasses import replace
 from msgspec import UNSET
 
 from dzdesign.core.artefact_reading import rounded
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, own_result
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.worded import in_units
@@ -59,6 +59,7 @@ def identify(
     return identify_sides(tests, options, record).model
 
 
+@own_result()
 def identify_sides(
     tests: Sequence[RampTest],
     options: IdentifyOptions | None = None,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.worded import all_of, worded
@@ -41,6 +42,7 @@ REFERENCE_TOLERANCE = 0.1
 PAPER_DP0 = 1 * MPA
 
 
+@own_result()
 def identify_side(
     tests: Sequence[RampTest],
     options: IdentifyOptions,

@@ -64,7 +64,7 @@ def with_report(
     if name == place:  # in two folders of one name
         name = f"{name} (evidence)"
     new = {
-        f"{name}/{file}": content.encode() if isinstance(content, str) else content
+        f"{name}/{file}": content.encode(errors="replace") if isinstance(content, str) else content
         for file, content in files.items()
     }
     around = read_artefact_folder(firmware)

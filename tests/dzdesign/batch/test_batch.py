@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -37,6 +38,7 @@ from dzdesign.report.lot.valve_folder import read_manifest
 from dzdesign.stages.identify import IdentifyChoices
 from dzdesign.verify.requirements import RAMPS
 from tests.support.crashing_work import die_over_bad
+from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
 pytestmark = pytest.mark.slow
@@ -524,3 +526,30 @@ def test_a_board_file_that_was_filled_in_stays_and_its_valve_with_it(tmp_path, c
     assert board.read_text() == filled
     assert main(command) == 0
     assert board.read_text() == filled and (out / "lot_compensator.json").read_bytes() == common
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes and sockets of the file system")
+@pytest.mark.parametrize("pattern", [None, "*.csv*"])
+def test_no_valve_is_calibrated_on_a_part_of_its_recordings(tmp_path, pattern, capsys):
+    """What can't be read has a name like a recording's: the valve is refused, and the thing named."""
+    lot, out = tmp_path / "lot", tmp_path / "out"
+    makers = {
+        "dangling": lambda path: path.symlink_to(tmp_path / "gone.csv"),
+        "loop": lambda path: path.symlink_to(path),
+        "pipe": os.mkfifo,
+        "socket": lambda path: os.mknod(path, 0o600 | stat.S_IFSOCK),
+    }
+    for kind, make in makers.items():
+        (lot / kind).mkdir(parents=True)
+        for pressure in (1, 5):
+            name = f"ramp_dP{pressure}_1.csv.gz"
+            (lot / kind / name).symlink_to(ROOT / "examples" / "paper_valve" / "ramps" / name)
+        make(lot / kind / "ramp_dP3_1.csv")
+        (lot / kind / "old.csv").mkdir()
+    options = [] if pattern is None else ["--pattern", pattern]
+    begin = time.monotonic()
+    assert main(["batch", str(lot), "-o", str(out), "--jobs", "1", *OPTIONS, *options]) == 1
+    assert time.monotonic() - begin < 25, "nothing is waited for"
+    found = {row["name"]: (row["status"], row["reason"]) for row in rows(out)}
+    assert found.keys() == makers.keys()
+    assert all(status == "failed" and "ramp_dP3_1.csv" in reason for status, reason in found.values()), found

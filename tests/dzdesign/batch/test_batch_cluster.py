@@ -4,6 +4,7 @@ import csv
 import json
 import logging
 import os
+import pydoc
 import signal
 import subprocess
 import sys
@@ -11,15 +12,18 @@ import threading
 import time
 from concurrent.futures import CancelledError
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from distributed import Client
 from distributed.client import ClosedClientError
 from many_valves import write_lot
 
 from dzdesign.batch.calibration import Task
-from dzdesign.batch.runners import _scheduler_lost, run_on_cluster
+from dzdesign.batch.runners import _check_workers, _scheduler_lost, run_on_cluster
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.identify import IdentifyChoices
@@ -159,6 +163,26 @@ def test_a_lot_that_waits_for_a_worker_says_so_once_and_goes_on(cluster, monkeyp
     assert outcome.manifest.status == "ok"
     said = capsys.readouterr().err
     assert said.count("no worker is connected") == 1 and f"such as `dask worker {address} --nthreads 1`" in said
+
+
+def test_workers_without_dzdesign_or_of_another_version_are_named():
+    answers = {"tcp://a:1": THIS_TOOL.version, "tcp://b:1": None, "tcp://c:1": "0.1", "tcp://d:1": OSError("gone")}
+    with pytest.raises(InputError) as caught:
+        _check_workers(SimpleNamespace(run=lambda *_, **__: answers))
+    assert "'tcp://b:1' has no dzdesign" in str(caught.value) and "'tcp://c:1' has dzdesign 0.1" in str(caught.value)
+    assert "tcp://a" not in str(caught.value) and "tcp://d" not in str(caught.value)
+
+
+@pytest.mark.parametrize("version", [THIS_TOOL.version, None])
+def test_workers_are_asked_for_their_version_first(cluster, version):
+    """A Python without the package answers `None`, as of a name that there is not."""
+    address, worker, _ = cluster
+    worker("asked")
+    with Client(address, set_as_default=False) as client:
+        client.wait_for_workers(1, timeout=60)
+        name = "dzdesign.core.version.__version__" if version else "dzdesign_that_is_not.__version__"
+        assert set(client.run(pydoc.locate, name, on_error="return").values()) == {version}
+        _check_workers(client)
 
 
 @pytest.mark.parametrize("fault", [CancelledError(), OSError("a comm is closed"), ClosedClientError("closed")])

@@ -20,6 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
+from dzdesign import initial_options
 from dzdesign.codegen.other_targets import ALL_TARGET_NAMES
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.command_table import COMMANDS, EXAMPLES
@@ -348,6 +349,14 @@ def test_a_near_miss_is_named(line, hint, ramp_file, tmp_path, monkeypatch, caps
     assert sorted(path.name for path in tmp_path.iterdir()) == ["firmware", "ramp.csv", "ramps"]
 
 
+def test_what_init_proposes_for_the_record_is_no_mistake(tmp_path, capsys):
+    file, templates = tmp_path / "dz.toml", Path(initial_options.__file__).parent / "templates"
+    entries = (templates / "dzdesign.toml.jinja").read_text(encoding="utf-8").partition("# [record]\n")[2]
+    file.write_text("[record]\n" + entries.replace("# ", ""), encoding="utf-8")
+    assert {"serial", "oil"} <= parse(["identify", "a.csv", "--config", str(file)]).arguments.record.keys()
+    assert capsys.readouterr().err == ""
+
+
 def test_an_option_that_was_added_below_the_record_is_refused_and_an_entry_of_people_is_not(tmp_path, capsys):
     file = tmp_path / "dz.toml"
     file.write_text('[record]\nserial = "4711"\norder = "PO 12"\npressure-span = "250 bar"\n')
@@ -358,7 +367,8 @@ def test_an_option_that_was_added_below_the_record_is_refused_and_an_entry_of_pe
         parse(["identify", "a.csv", "--config", str(file)])
     file.write_text('pressure-span = "250 bar"\n[record]\nserial = "4711"\norder = "PO 12"\n')
     assert parse(["identify", "a.csv", "--config", str(file)]).arguments.record == {"serial": "4711", "order": "PO 12"}
-    assert "'order' stands in the table [record]" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "'order' stands in the table [record]" in said and "'serial'" not in said
     assert parse(["design", "valve.json", "--config", str(file)]).arguments.pressure_span == "250 bar"
 
 

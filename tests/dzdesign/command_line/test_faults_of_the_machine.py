@@ -9,6 +9,8 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import write_file
+from dzdesign.core.artefact_types import RuleError
+from dzdesign.identify.valve.above_tests import AboveTests
 from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="shells, devices and limits of Linux")
@@ -105,3 +107,17 @@ def test_a_working_folder_whose_name_is_not_utf_8(tmp_path):
     os.mkdir(folder)
     done = run("dz simulate --dp '1 MPa' -o ramps", Path(os.fsdecode(folder)))
     assert done.returncode == 0, done.stderr
+
+
+def test_a_result_that_dzdesign_refuses_itself_is_its_own_fault(tmp_path, monkeypatch, capsys):
+    """Not the recordings': one sentence, and not the exit status of bad input."""
+
+    def refuse(*_):
+        raise RuleError("the bound does not follow")
+
+    monkeypatch.setattr(AboveTests, "check", refuse)
+    ramps = [str(RAMPS / f"ramp_dP{dp}_1.csv.gz") for dp in (1, 5)]
+    assert main(["identify", *ramps, "-o", str(tmp_path / "valve.json")]) == 1
+    *_, last = capsys.readouterr().err.strip().splitlines()
+    assert "internal error" in last and "does not follow" in last
+    assert not list(tmp_path.iterdir())

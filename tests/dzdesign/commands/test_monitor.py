@@ -1,5 +1,6 @@
 """`dzdesign monitor` over a pseudo-terminal, against the firmware's own frame code, compiled on the host."""
 
+import contextlib
 import json
 import os
 import random
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import serial
 
 from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_CALIBRATION, STATUS_RELEASED, Frame
 from dzdesign.codegen.telemetry.recording import COLUMNS, Recording, scalings_of
@@ -22,6 +24,7 @@ from dzdesign.commands.monitor import _other_firmware
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.serial_port import open_port
 from tests.support.f28335_device import COMPILER, HERE, needs_compiler
 
 pytestmark = [
@@ -282,6 +285,68 @@ def test_a_full_disk_leaves_whole_lines(tmp_path, monkeypatch):
             file.write("1,2\n2,3\n3,4\n")
         monkeypatch.undo()
     assert (tmp_path / "ramp.csv").read_text() == "time_s,u_V\n0,1\n1,2\n2,3\n"
+
+
+@pytest.mark.slow
+def test_two_monitors_do_not_share_a_file(bench):
+    bench.listen()
+    master, slave = os.openpty()
+    try:
+        said = refused(os.ttyname(slave), "--firmware", bench.firmware, "-o", bench.output)
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert f"'{bench.output}' exists" in said and "-o" in said
+    bench.send([bench.frame(index) for index in range(30)])
+    assert bench.stop()[1]["frames"] == 30 and len(table(bench.output)) == 30
+
+
+@pytest.mark.parametrize("kind", ["file", "folder", "pipe", "link that dangles", "another recording"])
+def test_nothing_that_exists_is_recorded_into(tmp_path, kind):
+    place = tmp_path / "ramp.csv"
+    with contextlib.ExitStack() as stack:
+        if kind == "another recording":
+            stack.enter_context(recording_file(place))
+        else:
+            {"file": place.touch, "folder": place.mkdir, "pipe": lambda: os.mkfifo(place)}.get(
+                kind, lambda: place.symlink_to("gone.csv")
+            )()
+        with pytest.raises(InputError, match="exists"), recording_file(place):
+            pass
+        assert os.path.lexists(place)
+    assert os.path.lexists(place) == (kind != "another recording"), "one into which nothing came goes again"
+
+
+@pytest.mark.parametrize("first", [TICKS, 2**32 - 2 * TICKS], ids=["at the start", "around the wrap"])
+def test_a_doubled_frame_is_no_restart(firmware_folder, first):
+    recording = Recording(scalings_of(firmware_folder))
+    lines = [recording.add(frame_at(first + TICKS * step)) for step in (0, 0, 1, 1, 1, 2, 3, 3, 4)]
+    assert [bool(line) for line in lines] == [True, False, True, False, False, True, True, False, True]
+    assert (recording.frames, recording.doubled, recording.restarts, recording.lost) == (5, 4, 0, 0)
+    assert recording.duration_s == pytest.approx(0.04)
+
+
+def test_a_firmware_that_resets_itself_over_and_over_is_no_doubled_frame(firmware_folder):
+    recording = Recording(scalings_of(firmware_folder))
+    for ticks in (TICKS, 2 * TICKS) * 3:
+        recording.add(frame_at(ticks))
+    recording.add(replace(frame_at(2 * TICKS), u_adc=7))
+    assert recording.restarts == 3 and recording.doubled == 0
+
+
+def frame_at(ticks: int) -> Frame:
+    return Frame(
+        ticks=ticks % 2**32, origin=0, u_adc=0, p_a_adc=ZERO, p_b_adc=ZERO, beta=0, compare_a=0, compare_b=0,
+        status=STATUS_RELEASED,
+    )  # fmt: skip
+
+
+def test_a_port_is_opened_without_a_reset_of_the_board(monkeypatch):
+    """DTR and RTS are wired to reset and boot mode on many boards."""
+    states = []
+    monkeypatch.setattr(serial.Serial, "open", lambda port: states.append((port.port, port.dtr, port.rts)))
+    open_port("/dev/ttyUSB0", 115200, 0.1)
+    assert states == [("/dev/ttyUSB0", False, False)]
 
 
 @pytest.mark.slow

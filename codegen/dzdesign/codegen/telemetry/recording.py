@@ -60,6 +60,9 @@ class Recording:
         self.scalings = scalings
         #: Frames that came; those missing between others; how often the count of PWM periods went back, as by a reset.
         self.frames = self.lost = self.restarts = 0
+        #: Frames that came twice, octet for octet; the second one has no line.
+        self.doubled = 0
+        self._last_frame: Frame | None = None
         self._status = 0  # every bit that any frame has
         self._periods = 0  # since the first frame, and going on over a restart
         self._last = 0
@@ -75,7 +78,14 @@ class Recording:
         return [text for bit, text in STATUS_BITS.items() if self._status & bit]
 
     def add(self, frame: Frame) -> str:
-        """Count a frame and return its line; one whose time lies before the last one's begins anew, one frame later."""
+        """Count a frame and return its line, nothing of one that came twice.
+
+        One whose time lies before the last one's begins anew, one frame later.
+        """
+        if frame == self._last_frame:  # as a whole: a firmware that resets itself over and over counts alike too
+            self.doubled += 1
+            return ""
+        self._last_frame = frame
         due = self.scalings.link.frame_ticks
         step = (frame.ticks - self._last) % TICKS_MODULUS
         if self.frames and 0 < step < TICKS_MODULUS // 2:

@@ -16,14 +16,24 @@ SYNC_S = 1.0
 
 
 class RecordingFile:
-    """Whole lines, handed to the system at once and to the disk every second; the file is made with the first one."""
+    """Whole lines, handed to the system at once and to the disk every second.
+
+    The file is made at once, and none that exists is taken: another recording may be under way into it.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         #: Octets of the whole lines in the file.
         self.octets = 0
-        self._descriptor = -1
         self._synced = 0.0
+        try:
+            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | BINARY, 0o666)
+        except FileExistsError as error:
+            raise InputError(
+                f"'{path}' exists, and a recording is not to be had again; choose another name with -o"
+            ) from error
+        except OSError as error:
+            raise InputError(f"'{path}' can't be written: {reason_of(error)}") from error
 
     def write(self, lines: str) -> None:
         """Append whole lines, or none; what came a second before reaches the disk.
@@ -35,8 +45,7 @@ class RecordingFile:
         """
         data, done = lines.encode(), 0
         try:
-            if data and self._descriptor < 0:
-                self._descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | BINARY, 0o666)
+            if data and not self.octets:
                 note_written(self.path)
                 sync_folder(self.path.parent)
             while done < len(data):
@@ -50,18 +59,17 @@ class RecordingFile:
     def _sync(self) -> None:
         """Wait until all is on the disk, if the last time is a second ago."""
         now = time.monotonic()
-        if self._descriptor >= 0 and now - self._synced >= SYNC_S:
+        if now - self._synced >= SYNC_S:
             os.fsync(self._descriptor)
             self._synced = now
 
     def close(self) -> None:
-        """Sync and close the file, if there is one."""
-        if self._descriptor < 0:
-            return
-        descriptor, self._descriptor = self._descriptor, -1
+        """Sync and close the file; one into which nothing came goes again."""
         with contextlib.suppress(OSError):  # a full disk, which was said
-            os.fsync(descriptor)
-        os.close(descriptor)
+            os.fsync(self._descriptor)
+        os.close(self._descriptor)
+        if not self.octets:
+            self.path.unlink(missing_ok=True)
 
     def _end_with_a_whole_line(self, last: bytes) -> None:
         self.octets += last.rfind(b"\n") + 1

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from dzdesign.core.artefact_types import own_result
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import Worded, worded
 from dzdesign.identify.constants import MPA, REFUSED, Premise
@@ -130,6 +131,7 @@ def certify_thresholds(thresholds: Mapping[Guard, GuardedThreshold], tested: Tes
     return curves
 
 
+@own_result()
 def _certify(guarded: GuardedThreshold, tested: Tested) -> Certified:
     """Take the premise that is asked for, or the strongest of the default ones, unless the tests refuse it."""
     bounds = bounds_under_premises(guarded, tested)

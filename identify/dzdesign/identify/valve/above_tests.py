@@ -125,7 +125,9 @@ class AboveTests:
         continued = continued_threshold(premise, trend, dp_MPa, u_V, start, at)
         expected = continued - np.array(self.band_V) - largest_bend(self.curvature_V_MPa2, dp_MPa, start, at)
         expected = np.maximum(expected, LOWEST_V)
-        lever = (at - dp_MPa[-1]) / (dp_MPa[-1] - dp_MPa[start])
+        # The slope is of two tests: rounding turns it the more the closer they stand.
+        apart = float(np.diff(dp_MPa).min()) if premise == "monotone" else dp_MPa[-1] - dp_MPa[start]
+        lever = (at - dp_MPa[-1]) / apart
         steepest = float(np.abs(np.diff(u_V) / np.diff(dp_MPa)).max())
         bend = self.curvature_V_MPa2 * (at - dp_MPa[start])
         allowed = 8 * ROUNDING * (1 + lever) * (1 + steepest + bend) + largest_bend(ROUNDING, dp_MPa, start, at)
