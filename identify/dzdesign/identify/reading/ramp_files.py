@@ -6,7 +6,8 @@ A long recording is thinned: see `thinning`.
 import gzip
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -22,7 +23,12 @@ from dzdesign.identify.reading.binary.registry import LONGEST_MARK, format_of
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
 from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
-from dzdesign.identify.reading.missing_values import describe_missing, without_failed_signals, without_placeholders
+from dzdesign.identify.reading.missing_values import (
+    Missing,
+    describe_missing,
+    without_failed_signals,
+    without_placeholders,
+)
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, Table
@@ -50,6 +56,7 @@ def read_ramp_file(
     dp: float | None = None,
     sample_rate: float | None = None,
     skip_rows: int | None = None,
+    missing: Collection[str] = (),
 ) -> RampTest:
     """Read one recording from a file.
 
@@ -69,6 +76,8 @@ def read_ramp_file(
         Samples a second of a file that has no column of time.
     skip_rows : int, optional
         Lines above the header of a file of text. None: the header is found.
+    missing : collection of str
+        Texts and numbers that stand for no value, beside those that are known.
 
     Raises
     ------
@@ -79,7 +88,9 @@ def read_ramp_file(
     check_address_space("reading recordings")
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
-        recording = _read_recording(read_table(file, path, skip_rows), columns or {}, u_max, dp, sample_rate)
+        recording = _read_recording(
+            read_table(file, path, skip_rows, missing), columns or {}, u_max, dp, sample_rate, _numbers_among(missing)
+        )
     _refuse_too_few_rows(path, recording)
     thinned = thin(recording.rows)
     time, u, q, *measured = (np.array(column) for column in thinned.rows)
@@ -98,8 +109,7 @@ def read_ramp_file(
         run=thinned.run,
         clock_doubt=doubt,
         simulated=recording.simulated,
-        no_values=recording.no_values,
-        failed_signals=recording.failed_signals,
+        missing=recording.missing,
         stamp=recording.stamp,
         started=recording.stamp.seconds if recording.stamp else None,
         units=recording.units,
@@ -117,8 +127,7 @@ class _Recording:
     clock: Column
     simulated: bool
     may_count_ms: bool
-    no_values: str
-    failed_signals: str
+    missing: Mapping[str, str]
     stamp: Start | None
     dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]
     side_without_dp: str
@@ -137,7 +146,7 @@ def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.n
 def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
     rows = recording.rows.shape[1]
     if rows < MIN_ROWS:
-        found = ", ".join(filter(None, (recording.no_values, recording.failed_signals)))
+        found = ", ".join(recording.missing.values())
         missing = f"; {found} are missing samples" if found else ""
         raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{missing}")
 
@@ -147,7 +156,18 @@ def _is_marked(comments: str) -> bool:
     return re.search(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', comments, re.MULTILINE) is not None
 
 
-def read_table(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Table:
+def _numbers_among(missing: Collection[str]) -> list[float]:
+    """Return those of some texts that are numbers."""
+    numbers = []
+    for text in missing:
+        with suppress(ValueError):
+            numbers.append(float(text.replace(",", ".")))
+    return numbers
+
+
+def read_table(
+    file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
+) -> Table:
     """Read a table of any known format; its first bytes tell which, not its name.
 
     Raises
@@ -158,31 +178,40 @@ def read_table(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Tabl
     start = file.read(LONGEST_MARK)
     file.seek(0)
     kind = format_of(start, path)
-    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows)
+    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows, missing)
 
 
 def _read_recording(
-    table: Table, chosen: Mapping[str, str], u_max: float, dp: float | None, sample_rate: float | None
+    table: Table,
+    chosen: Mapping[str, str],
+    u_max: float,
+    dp: float | None,
+    sample_rate: float | None,
+    no_numbers: Sequence[float],
 ) -> _Recording:
     """Return the rows of a file that lack nothing."""
     found = find_columns(table, chosen, sample_rate)
     _refuse_two_pressures(table, found, dp)
     _refuse_unequal_lengths(table, found)
     table.load([column.label for column in found.values()])
-    data, placeholders, failed = {}, {}, {}
+    data: dict[str, np.ndarray] = {}
+    missing: dict[str, Missing] = {}
     is_clock = sample_rate is None and table.is_clock(found["time"].label)
     stamp = table.started(found["time"].label) if sample_rate is None and not is_clock else None
     for quantity, column in found.items():
         if quantity == "time" and is_clock:
             data[quantity], stamp = read_times_of_day(table, column.label)
+            missing[column.label] = table.marked.get(column.label, Missing())
             continue
-        numbers, placeholders[column.label] = without_placeholders(
-            table.numbers(column.label), rises=quantity == "time"
+        numbers, found_numbers = without_placeholders(
+            table.numbers(column.label), rises=quantity == "time", declared=no_numbers
         )
+        missing[column.label] = table.marked.get(column.label, Missing()) + found_numbers
         unclear = quantity == "time" and not column.unit and may_count_ms(numbers)
         if not unclear:  # else the whole recording tells later what they count
             scaling = scaling_of(table.path, quantity, column, u_max)
-            numbers, failed[column.label] = without_failed_signals(numbers, scaling)
+            numbers, failed = without_failed_signals(numbers, scaling.no_signal_below)
+            missing[column.label] += failed
             numbers = _in_SI(table, quantity, column, numbers, scaling)
         data[quantity] = numbers
     if sample_rate is not None:
@@ -202,8 +231,7 @@ def _read_recording(
         clock=found.get("time", DECLARED_CLOCK),
         simulated=_is_marked(table.comments),
         may_count_ms=sample_rate is None and not is_clock and may_count_ms(rows[0], longest_step=np.inf),
-        no_values=describe_missing(placeholders),
-        failed_signals=describe_missing(failed),
+        missing=describe_missing(missing),
         stamp=stamp,
         dp_from=edge.columns(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),

@@ -37,10 +37,8 @@ class RampTest:
         What is doubtful about the unit of the time, as `clock_doubt` gives it.
     simulated : bool
         True if a comment line above the labels begins with `SIMULATED_MARK`.
-    no_values : str
-        Numbers that were taken for missing samples, as `describe_missing` gives them.
-    failed_signals : str
-        Signals of failed transmitters that were, in the same words.
+    missing : mapping
+        What was taken for missing samples, by kind, as `describe_missing` gives it.
     """
 
     source: str
@@ -57,8 +55,7 @@ class RampTest:
     run: int = 1
     clock_doubt: str = ""
     simulated: bool = False
-    no_values: str = ""
-    failed_signals: str = ""
+    missing: Mapping[str, str] = field(default_factory=dict)
     #: Samples over which the command was averaged, as its column shows the dither; 0: it does not.
     dither_averaged: int = 0
     #: Peak of a square wave about the command that was not declared, V; 0: none is seen.

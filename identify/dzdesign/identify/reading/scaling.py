@@ -18,13 +18,13 @@ from dzdesign.identify.reading.column_labels import (
     Column,
     same_unit,
 )
+from dzdesign.identify.reading.missing_values import NO_CURRENT
 
 #: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, percent or bare numbers.
 TRANSMITTED = ("current", "voltage")
 SIGNALS = (*TRANSMITTED, "frequency")
-#: A signal from the first on has no current below the second, A: a broken wire, or a channel that is off. NAMUR NE 43
-#: calls less than 3.6 mA failed, but noise about a zero of 3.6 mA, cut off on one side, would raise thresholds.
-LIVE_ZERO, NO_CURRENT = 0.004, 0.002
+#: Where a signal begins that is never below it, A.
+LIVE_ZERO = 0.004
 #: Full scale in the examples of messages.
 FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.core.errors import InputError, nearest, one_line
+from dzdesign.identify.reading.missing_values import Missing
 from dzdesign.identify.reading.time_stamps import Start
 
 #: Characters of a cell, and columns of a file, that a message quotes.
@@ -46,6 +47,8 @@ class Table(ABC):
     labels: tuple[str, ...]
     units: Mapping[str, str] = field(default_factory=dict)
     comments: str = ""
+    #: Of columns that were read: what stood there for no value.
+    marked: dict[str, Missing] = field(default_factory=dict)
 
     @abstractmethod
     def load(self, labels: Collection[str]) -> None:

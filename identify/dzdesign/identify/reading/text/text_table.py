@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.missing_values import NO_VALUE, without_markers
 from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
 from dzdesign.identify.reading.text.decimal_marks import BETWEEN_THOUSANDS, FEW_ROWS, DecimalMarks
 from dzdesign.identify.reading.time_stamps import (
@@ -51,6 +52,8 @@ class TextTable(Table):
         Numbers of the rows' lines.
     marks : DecimalMarks
         Of the file.
+    missing : collection of str
+        What stands for no value by the engineer's word.
     """
 
     rows: bytes
@@ -58,6 +61,7 @@ class TextTable(Table):
     header_line: int
     lines: range | np.ndarray
     marks: DecimalMarks
+    missing: Collection[str] = ()
     _loaded: "dict[str, pl.Series]" = field(default_factory=dict)
 
     @property
@@ -102,7 +106,7 @@ class TextTable(Table):
             read = np.asarray(loaded.fill_null(np.nan).to_numpy())
             self.marks.check_points(label, read, partial(self._texts, label), self.place)
             return read
-        texts = self._texts(label)
+        texts, self.marked[label] = without_markers(self._texts(label), self.missing)
         column = self.marks.with_points(label, texts, self.place)
         numbers = column.cast(pl.Float64, strict=False)
         filled = ~(column.is_null() | (column == ""))
@@ -161,7 +165,7 @@ class TextTable(Table):
 
     def seconds(self, label: str) -> np.ndarray:
         """Return a column of dates or times of day as seconds since the first row of the file."""
-        texts = self._texts(label)
+        texts, self.marked[label] = without_markers(self._texts(label), self.missing)
         seconds = seconds_of_stamps(texts, f"'{self.path}' column '{label}'")
         bad = np.flatnonzero((~(texts.is_null() | (texts == ""))).to_numpy() & np.isnan(seconds))
         if bad.size:
@@ -217,7 +221,7 @@ class TextTable(Table):
         date = f" (a column of the time may hold stamps such as {EXAMPLE})" if DATE.search(cell) else ""
         return InputError(
             f"'{self.path}' {self.place(row)}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' is not a "
-            f"number{date}; correct it, or leave the cell blank if the sample is missing"
+            f"number{date}; correct it; if it stands for no value, leave the cell blank, or name it by --missing"
         )
 
 
@@ -227,8 +231,8 @@ def _cells(texts: "pl.Series") -> "pl.Series":
 
 
 def _first_filled(texts: "pl.Series") -> str:
-    """Return the first text that is not blank."""
-    filled = texts.filter(texts.is_not_null() & (texts != ""))
+    """Return the first text that is not blank, nor stands for no value."""
+    filled = texts.filter(texts.is_not_null() & (texts != "") & ~texts.str.contains(NO_VALUE))
     return str(filled[0]) if len(filled) else ""
 
 
