@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from math import isclose
 
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.core.units import measures, si_factor
+from dzdesign.core.units import RELATIVE, measures, si_factor
 from dzdesign.identify.reading.metering_edge import PORTS, metering_edge, which_edge
 from dzdesign.identify.reading.table import AND, Table, clean_label
 
@@ -244,7 +244,10 @@ def split_label(label: str) -> tuple[str | None, str]:
     bare = clean_label(label)
     # By hand: a regular expression for both brackets takes the cube of the label's length.
     bracket = re.compile(r"[\[(]").search(bare, 1)
-    if bracket and bare[-1] in "])":
+    relative = re.search(rf"(?<![^\W\d_]){RELATIVE.pattern}$", bare[-LONGEST_NAME:], re.IGNORECASE)
+    if relative:  # dP_bar_g, dP_MPa(g)
+        name, unit = bare[: len(bare) - len(relative[0])].rstrip(" _/,").removesuffix(" in"), relative[0]
+    elif bracket and bare[-1] in "])":
         name, unit = bare[: bracket.start()].rstrip(" /"), bare[bracket.end() : -1].strip()
     else:  # the unit follows the last underscore; L_min, as artefacts spell it, has one itself
         match = re.fullmatch(r"(.+?)_([lL]_min|[^_]*)", bare)
@@ -253,7 +256,7 @@ def split_label(label: str) -> tuple[str | None, str]:
         quantity = _quantity_named(candidate)
         if quantity:
             return quantity, its_unit
-    return _after_a_blank_or_slash(bare) if not bracket else (None, unit)
+    return (None, unit) if bracket or relative else _after_a_blank_or_slash(bare)
 
 
 def _quantity_named(name: str) -> str | None:

@@ -36,7 +36,7 @@ PLACEHOLDERS = (
 ENDS_OF_CONVERTERS, OVERFLOW = (-32768.0, 32767.0, 65535.0), 9e36
 #: Share of such a number that no other value in the column reaches: in a column of its size it may be a measurement.
 FAR = 0.5
-#: A transmitter's signal from 4 mA on has no current below this, A: a broken wire, or a channel that is off. NAMUR NE 43
+#: A signal from 4 mA on has no current below this, A: a broken wire, or a channel that is off. NAMUR NE 43
 #: calls less than 3.6 mA failed, but noise about a zero of 3.6 mA, cut off on one side, would raise thresholds.
 NO_CURRENT = 0.002
 #: What no signal is called.

@@ -9,7 +9,7 @@ from typing import final
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.signal_ranges import SignalRange, read_signal_range
-from dzdesign.core.units import measures, si_factor
+from dzdesign.core.units import SI_UNIT, measures, si_factor
 from dzdesign.identify.reading.column_labels import (
     EXAMPLE_LABELS,
     LONGEST_NAME,
@@ -20,9 +20,11 @@ from dzdesign.identify.reading.column_labels import (
 )
 from dzdesign.identify.reading.missing_values import NO_CURRENT
 
-#: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, percent or bare numbers.
+#: What a transmitter gives, or an amplifier takes; a range may be of any other unit, or of bare numbers.
 TRANSMITTED = ("current", "voltage")
 SIGNALS = (*TRANSMITTED, "frequency")
+#: Units of them in another case, for which no broken wire would be seen.
+MISTYPED = {"ma": "mA", "a": "A", "v": "V", "mv": "mV"}
 #: Where a signal begins that is never below it, A.
 LIVE_ZERO = 0.004
 #: Full scale in the examples of messages.
@@ -68,8 +70,8 @@ def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
     if found is None or found.meaning is None:
         raise InputError(f"'{text}' is no range, expected one such as '4..20 mA = {_full_scale(quantity)}'")
     meaning = found.meaning
-    if found.unit and found.unit not in PER_CENT and not any(measures(found.unit, kind) for kind in SIGNALS):
-        raise InputError(f"'{found.unit}' is no unit of a transmitter's signal, expected mA, A, V or mV")
+    if found.unit.lower() in MISTYPED and not any(measures(found.unit, kind) for kind in TRANSMITTED):
+        raise InputError(f"'{found.unit}' is no unit of a signal (did you mean '{MISTYPED[found.unit.lower()]}'?)")
     low, high = _ends_in_the_file(quantity, column, found)
     if low == high or meaning.bottom == meaning.top:
         raise InputError(f"the range '{text}' has no width, expected one such as '4..20 mA = 0..50 L/min'")
@@ -100,9 +102,10 @@ def _ends_in_the_file(quantity: str, column: Column, found: SignalRange) -> tupl
     stated = column.stated
     if not found.is_wired:
         of_signal = (found.unit, found.meaning.unit if found.meaning else "")
-        if any(measures(stated, kind) for kind in SIGNALS) and not any(
-            same_unit(stated, unit, quantity) for unit in of_signal
-        ):
+        kinds = [kind for kind in SI_UNIT if measures(stated, kind) and measures(found.unit, kind)]
+        is_same = [math.isclose(si_factor(stated, kind), si_factor(found.unit, kind)) for kind in kinds]
+        in_doubt = not all(is_same) if kinds else any(measures(stated, kind) for kind in SIGNALS)
+        if in_doubt and not any(same_unit(stated, unit, quantity) for unit in of_signal):
             raise InputError(
                 f"the range '{found.text}' is of a column in {found.unit or 'bare numbers'}, but the file says "
                 f"'{stated}'; write the range in {stated}, or correct the unit in the file"
