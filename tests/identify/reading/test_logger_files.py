@@ -152,6 +152,14 @@ def test_a_wrong_row_among_samples_is_found(here, where, line, wording):
     [
         ("X_Value;u (V);dP (bar);Q (l/min)", 'is it, say its unit, for example --columns "time=X_Value:s"'),
         ("Sample;u (V);dP (bar);Q (l/min)", "'Sample' counts the rows: export the time beside it"),
+        ("timestamp;path;value;unit", "row for each variable (path, value): export a column for each"),
+        ("Time;signal;Value;unit", "row for each variable (signal, Value): export a column for each"),
+        ("time_s;u_V;dP_MPa;Total_L", "'Total_L' is a volume and no flow: differentiate it"),
+        ("time_s;u_V;dP_MPa;V [cm³]", "'V [cm³]' is a volume and no flow: differentiate it"),
+        ("time_s;u_V;dP_MPa;pulses", "'pulses' counts pulses and is no flow: differentiate it"),
+        ("time_s;u_V;dP_MPa;pos_mm", "'pos_mm' is a position and no flow: differentiate it; of a cylinder,"),
+        ("time_s;u_V;dP_MPa;speed_mm_per_s", "\"Q=speed_mm_per_s:0..100 mm/s = 0..12 L/min\""),
+        ("time_s;u_V;dP_MPa;v (m/s)", "'v (m/s)' is a speed: of a cylinder, the flow is area x speed"),
         ("VarName;TimeString;VarValue;Time_ms", "row for each variable (VarName, VarValue): export a column for each"),
     ],
 )

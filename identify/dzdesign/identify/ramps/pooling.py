@@ -68,6 +68,7 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         dp_from=_different_columns(group),
         dp_sign=first.dp_sign,
         dp_is_declared=any(ramp.test.dp_is_declared for ramp in group),
+        columns=first.columns,
     )
     return PooledTest(
         test=test,

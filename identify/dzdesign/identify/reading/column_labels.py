@@ -29,6 +29,13 @@ MOST_MEANT = 200
 #: Units of a command that is a share of u_max.
 PER_CENT = ("%", "pct", "percent")
 QUANTITIES = ("time", "voltage", "pressure", "flow")
+#: Labels of a table with a row for each variable: what names it, and its value.
+VARIABLES = ("path", "name", "variable", "varname", "tag", "tagname", "signal", "channel", "sensor", "metric", "field")
+VALUES = ("value", "varvalue", "tagvalue", "wert")
+#: Units of a volume, and what a column of a meter's pulses is called.
+VOLUMES = ("l", "ml", "cl", "m3", "m³", "cm3", "cm³", "dm3", "dm³", "ccm", "cc", "gal", "liter", "litre", "in3", "in³")
+SPEEDS = re.compile(r"(?:^|[\W_\d])(?:[mcµ]?m|inch?)(?:/|_per_)s|speed|velocity|geschwindigkeit", re.IGNORECASE)
+COUNTS = re.compile(r"puls|impuls|\bcounts?\b|_counts?$|\bticks?\b", re.IGNORECASE)
 #: Characters of a label in which a quantity is looked for.
 LONGEST_NAME = 80
 
@@ -191,12 +198,38 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
     if quantity == "time" and not fits(unit, "time") and table.is_clock(label):
         unit = "s"
     if not unit:
+        if quantity == "Q" and (other := no_flow([label])):
+            raise InputError(f"'{table.path}'{other.replace(';', ':', 1)}")
         raise InputError(
             f"'{table.path}' column '{label}' has no unit; write for example "
             f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
             + (f', or what its numbers mean, --columns "u={label}:0..1 = 0..100 %"' if quantity == "u" else "")
         )
     return Column(label=label, unit=unit, stated=stated)
+
+
+def no_flow(labels: Collection[str]) -> str:
+    """Return what to do about the first label that is a volume, a count, a position or a speed; nothing if none is.
+
+    Examples
+    --------
+    >>> no_flow(["time_s", "Total_L"])
+    "; 'Total_L' is a volume and no flow: differentiate it over time"
+    >>> no_flow(["Q_Lmin"])
+    ''
+    """
+    for label in labels:
+        unit = split_label(label)[1].lower()
+        if SPEEDS.search(label):
+            example = f'--columns "Q={label}:0..100 mm/s = 0..12 L/min"'
+            return f"; '{label}' is a speed: of a cylinder, the flow is area x speed, for example {example}"
+        if unit in VOLUMES:
+            return f"; '{label}' is a volume and no flow: differentiate it over time"
+        if COUNTS.search(label):
+            return f"; '{label}' counts pulses and is no flow: differentiate it, or record the frequency"
+        if measures(unit, "length"):
+            return f"; '{label}' is a position and no flow: differentiate it; of a cylinder, the flow is area x speed"
+    return ""
 
 
 def _refuse_two_units(table: Table, quantity: str, label: str, in_label: str) -> None:
@@ -278,7 +311,7 @@ def names_a_quantity(unit: str) -> bool:
     return unit.lower() in PER_CENT or any(measures(unit, quantity) for quantity in QUANTITIES)
 
 
-def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> MissingColumnError:
+def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> InputError:
     """Return the error that names the columns found, and the one that may have been meant."""
     unused = [label for label in table.labels[:MOST_MEANT] if split_label(label)[0] not in columns]
     bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
@@ -286,12 +319,25 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> Mi
     meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]
     kind = QUANTITY_OF_COLUMN[quantity]
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
+    begin = f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()})"
+    if other := long_format(table.labels) or (no_flow(unused) if quantity == "Q" and not meant else ""):
+        return InputError(begin + other)
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
     rate = ', or --sample-rate "100 Hz"' if quantity == "time" else ""
     return MissingColumnError(
-        f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}",
+        begin + hint,
         f"; expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}",
     )
+
+
+def long_format(labels: Collection[str]) -> str:
+    """Return what to do about a table with a row for each variable; nothing for any other."""
+    words = [re.sub(r"[\s_]", "", label).lower() for label in list(labels)[:MOST_MEANT]]
+    value = next((label for label, word in zip(labels, words, strict=False) if word in VALUES), "")
+    name = next((label for label, word in zip(labels, words, strict=False) if word in VARIABLES), "")
+    if not (value and name):
+        return ""
+    return f"; the table has a row for each variable ({name}, {value}): export a column for each, or pivot it"
 
 
 def fits(unit: str, column: str) -> bool:

@@ -113,6 +113,7 @@ def read_ramp_file(
         stamp=recording.stamp,
         started=recording.stamp.seconds if recording.stamp else None,
         units=recording.units,
+        columns=recording.columns,
     )
 
 
@@ -132,6 +133,7 @@ class _Recording:
     dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]
     side_without_dp: str
     units: Mapping[Quantity, tuple[Unit, ...]]
+    columns: Mapping[str, Column]
 
 
 def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.ndarray) -> str:
@@ -236,6 +238,7 @@ def _read_recording(
         dp_from=edge.columns(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
         units=units_of_columns(table.path, found, u_max),
+        columns={quantity: found[quantity] for quantity in ("u", "Q")},
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dzdesign.core.recorded_units import Quantity, Unit
+from dzdesign.identify.reading.column_labels import Column
 from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.recorded_drop import DropColumns, DropSign
@@ -67,6 +68,8 @@ class RampTest:
     left_out: tuple[LeftOut, ...] = ()
     #: Ramps that this cuts, each with the branches of it that are lost: ``ramp 2, 12.3 to 62.1 s (falling)``.
     cut: tuple[str, ...] = ()
+    #: Columns of the command and the flow as they were found, by quantity.
+    columns: Mapping[str, Column] = field(default_factory=dict)
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
 

@@ -1,6 +1,7 @@
 """From the numbers of a column to SI: by its unit, or by the range of a transmitter, ``4..20 mA = 0..50 L/min``."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -139,6 +140,37 @@ def _hint(quantity: str, column: Column) -> str:
     if quantity == "time" or not any(measures(column.unit, kind) for kind in TRANSMITTED):
         return ""
     return f"; say what the signal means, {range_example(quantity, column.label, column.unit)}"
+
+
+def turned(quantity: str, column: Column, u_max: float) -> str:
+    """Return how --columns turns a command that opens the valve as it falls, or a flow of the wrong sign.
+
+    Examples
+    --------
+    >>> turned("u", Column(label="u_V", unit="V"), 10.0), turned("Q", Column(label="Q", unit="L/min"), 10.0)
+    ('u=u_V:10..0 V = 0..10 V', 'Q=Q:0..-1 L/min = 0..1 L/min')
+    >>> turned("Q", Column(label="I", unit="4..20 mA = 0..50 L/min"), 10.0)
+    'Q=I:4..20 mA = 0..-50 L/min'
+    """
+    unit, end = column.unit, "1"
+    if "=" in unit:
+        signal, _, meaning = (part.strip() for part in unit.partition("="))
+        if quantity == "u":
+            signal = re.sub(r"^(\S+?)\s*\.\.\s*([-+]?[\d.,]*\d)", r"\2..\1", signal)
+        else:
+            ends, _, last = meaning.rpartition("..")
+            ends = ends or "0"
+            first, last = (re.sub(r"^([-+]?)(?=0*[1-9.,])", _negated, each.strip()) for each in (ends, last))
+            meaning = f"{first}..{last}"
+        return f"{quantity}={column.label}:{signal} = {meaning}"
+    if quantity == "u":
+        end = "100" if unit.lower() in PER_CENT else f"{u_max / si_factor(unit, 'voltage'):g}"
+        return f"u={column.label}:{end}..0 {unit} = 0..{end} {unit}"
+    return f"{quantity}={column.label}:0..-1 {unit} = 0..1 {unit}"
+
+
+def _negated(sign: re.Match[str]) -> str:
+    return "" if sign[1] == "-" else "-"
 
 
 def range_example(quantity: str, label: str, unit: str) -> str:
