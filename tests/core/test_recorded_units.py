@@ -131,5 +131,5 @@ def test_the_case_of_a_unit_is_not_guessed(wording):
     """Seeded: of mpa both MPa and mPa would do, and of mPa a millipascal is what it says."""
     assert si_factor("mPa", "pressure") == 1e-3
     for unit in ("mpa", "Nl/min", "Nm3/h", "sccm"):
-        with wording.refusal(InputError, f"unit: {unit}"):
+        with wording.refusal(InputError, f"recorded units: {unit}"):
             si_factor(unit, "pressure" if unit == "mpa" else "flow")
