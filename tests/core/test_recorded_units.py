@@ -17,6 +17,7 @@ from dzdesign.core.recorded_units import (
     RecordedUnits,
     common_units,
 )
+from dzdesign.core.units import si_factor
 from dzdesign.core.worded import Worded, all_of, in_units, worded
 
 MA = RecordedUnits(command=CommandUnit(unit="mA", at_zero=4.0, factor=1.6))
@@ -108,3 +109,27 @@ def test_a_place_that_nobody_fills_or_that_is_no_format_is_an_error_at_once():
     with pytest.raises(ValueError, match="no format"):
         MA.text(1.0, ".2e V")
     assert isinstance(worded("nothing"), Worded)
+
+
+@pytest.mark.parametrize(
+    ("unit", "quantity", "plain"),
+    [
+        *((unit, "flow", "L/min") for unit in ("l/m", "Liter/min", "dm3/min", "dm³/min", "L·min⁻¹", "l/min.")),
+        ("in3/s", "flow", "in**3/s"), ("usgpm", "flow", "gpm"), ("mLmin", "flow", "mL/min"),
+        *((unit, "pressure", "MPa") for unit in ("Mpa", "MPA", "MPa(g)", "MPag", "MPa_a", "N/mm2", "N/mm²")),
+        *((unit, "pressure", "kPa") for unit in ("kpa", "KPA", "Kpa", "kPa(a)")),
+        *((unit, "pressure", "bar") for unit in ("bar_g", "bar g", "barg", "BAR", "bar(d)")),
+        ("kg/cm2", "pressure", "kgf/cm**2"), ("psi_g", "pressure", "psi"),
+        *((unit, "time", "s") for unit in ("Sec", "Sekunden", "sek.", "sec")),
+    ],
+)  # fmt: skip
+def test_a_unit_as_loggers_spell_it(unit, quantity, plain):
+    assert si_factor(unit, quantity) == si_factor(plain, quantity)
+
+
+def test_the_case_of_a_unit_is_not_guessed(wording):
+    """Seeded: of mpa both MPa and mPa would do, and of mPa a millipascal is what it says."""
+    assert si_factor("mPa", "pressure") == 1e-3
+    for unit in ("mpa", "Nl/min", "Nm3/h", "sccm"):
+        with wording.refusal(InputError, f"recorded units: {unit}"):
+            si_factor(unit, "pressure" if unit == "mpa" else "flow")

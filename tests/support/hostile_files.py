@@ -7,7 +7,6 @@ right, or any refusal of one line is.
 import gzip
 import io
 import struct
-import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +16,7 @@ import numpy as np
 import polars as pl
 
 from tests.identify.reading.test_file_formats import COLUMNS, frame, hdf5, mat, tdms
-from tests.identify.reading.test_ramp_files import ROWS, TIME, U, table
+from tests.identify.reading.test_ramp_files import ROWS, TIME, U, table, zipped
 
 CSV = table().encode()
 HEAD, _, BODY = CSV.partition(b"\n")
@@ -27,13 +26,6 @@ MIB = 1 << 20
 def repeated(piece: bytes, times: int, head: bytes = b"") -> bytes:
     """Return the gzip of a head and a piece many times over, in as many members."""
     return gzip.compress(head, mtime=0) + gzip.compress(piece, mtime=0) * times
-
-
-def zipped() -> bytes:
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        archive.writestr("a.csv", CSV)
-    return out.getvalue()
 
 
 def with_hdf5(make: Callable[[h5py.File], None]) -> bytes:
@@ -194,8 +186,8 @@ TEXTS: dict[str, tuple[Callable[[], bytes], str | None]] = {
     "gzip cut off": (lambda: gzip.compress(CSV, mtime=0)[:-8], "not a whole gzip file"),
     "gzip of nothing": (lambda: gzip.compress(b"", mtime=0), "is empty"),
     "half a gzip mark": (lambda: b"\x1f\x8b", "not a whole gzip file"),
-    "zip": (zipped, "zip archive"),
-    "zip behind gzip": (lambda: gzip.compress(zipped(), mtime=0), "zip archive"),
+    "zip": (lambda: zipped("a.csv", CSV), "zip archive"),
+    "zip behind gzip": (lambda: gzip.compress(zipped("a.csv", CSV), mtime=0), "zip archive"),
 }  # fmt: skip
 #: Of programs; what crashes or fills a library is refused in the words of `reader_process`.
 BINARIES: dict[str, tuple[Callable[[], bytes], str | None]] = {

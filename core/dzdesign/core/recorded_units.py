@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, final, overload
 from msgspec import UNSET, Meta, UnsetType
 
 from dzdesign.core.artefact_types import RuleError, quantity
+from dzdesign.core.units import without_reference
 
 if TYPE_CHECKING:
     import numpy as np
@@ -260,17 +261,15 @@ def _without_exponent(value: float, spec: str) -> str:
 AS_COMPUTED = RecordedUnits()
 
 
-#: Spellings of a unit that the name of which is another; of pressures, what they are relative to is no part of a drop.
+#: Spellings of a unit the name of which is another.
 _NAMES: dict[str, str] = {
-    **dict.fromkeys(("barg", "bara", "bard", "bar(g)", "bar(a)", "bar(d)"), "bar"),
-    **dict.fromkeys(("psig", "psia", "psid"), "psi"),
     "m3s": "m3/s", "lph": "L/h", "l/h": "L/h", "pct": "%", "percent": "%",
 }  # fmt: skip
 
 
 def name_of_unit(written: str) -> str:
     """Return the name of a unit as written somewhere; empty if that is no text for people."""
-    return _NAMES.get(written.lower(), plain_unit(written))
+    return _NAMES.get(written.lower(), plain_unit(without_reference(written)))
 
 
 def plain_unit(name: str) -> str:

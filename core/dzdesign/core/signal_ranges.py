@@ -12,7 +12,7 @@ LONGEST = 120
 _NUMBER = r"[-+]?\d{1,9}(?:[.,]\d{1,9})?"
 _POSITIVE = r"\d{1,9}(?:[.,]\d{1,9})?"
 SIGNAL = re.compile(
-    rf"\s*(?P<low>{_NUMBER})\s*\.\.\s*(?P<high>{_NUMBER})(?:\s*(?!on\b|x\b)(?P<unit>[A-Za-zµ]+|%))?"
+    rf"\s*(?P<low>{_NUMBER})\s*\.\.\s*(?P<high>{_NUMBER})(?:\s*(?!on\b|x\b)(?P<unit>[^\d\s=+.,_-][^\s=+,]*))?"
     rf"(?:\s+on\s+(?P<shunt>{_POSITIVE})\s*(?P<ohm>[A-Za-zΩ]+))?"
     rf"(?:\s+x\s+(?P<gain>{_POSITIVE}))?"
     rf"(?:\s*\+\s*(?P<offset>{_POSITIVE})\s*(?P<volt>[A-Za-z]+))?"

@@ -39,13 +39,22 @@ EXAMPLES = {
 }
 #: Spellings of data-acquisition programs that pint does not read.
 SPELLINGS = {
-    "lmin": "L/min", "l_min": "L/min", "lpm": "L/min", "l/min": "L/min", "gpm": "gallon/minute",
-    "m3/s": "m**3/s", "m3s": "m**3/s", "m3/h": "m**3/hour", "cm3/s": "cm**3/s", "%": "percent",
-    "pct": "percent", "kgf/cm2": "kgf/cm**2", "n/mm2": "N/mm**2", "vdc": "V", "volt": "V", "volts": "V",
-    "sek": "s", "sek.": "s", "bar": "bar", "barg": "bar", "bara": "bar",
-    "bard": "bar", "bar(g)": "bar", "bar(a)": "bar", "bar(d)": "bar", "ltr/min": "L/min",
-    "psi": "psi", "psig": "psi", "psia": "psi", "psid": "psi", "lph": "L/hour", "l/h": "L/hour",
+    **dict.fromkeys(("lmin", "l_min", "lpm", "l/min", "l/m", "liter/min", "litre/min", "ltr/min"), "L/min"),
+    **dict.fromkeys(("gpm", "usgpm", "gal/min"), "gallon/minute"), "mlmin": "mL/min", "m3s": "m**3/s",
+    "m3/h": "m**3/hour", "%": "percent", "pct": "percent", "vdc": "V", "volt": "V", "volts": "V",
+    **dict.fromkeys(("kg/cm**2", "kgf/cm**2", "kp/cm**2"), "kgf/cm**2"), "n/mm**2": "N/mm**2",
+    **dict.fromkeys(("sec", "sek", "sekunde", "sekunden"), "s"), "bar": "bar", "psi": "psi", "kpa": "kPa",
+    "lph": "L/hour", "l/h": "L/hour",
 }  # fmt: skip
+#: Spellings whose case tells: mPa is a millipascal, and mpa may be either.
+CASED = dict.fromkeys(("Mpa", "MPA"), "MPa")
+#: What a pressure is relative to, which is no part of a drop: barg, bar(a), bar_g, MPa(g).
+RELATIVE = re.compile(r"(bar|psi|[kMh]?pa|kgf?/cm[2²])(?:[gad]|[ _]?\([gad]\)|[ _][gad])", re.IGNORECASE)
+#: A power: m3, dm³, min⁻¹, min-1.
+POWER = re.compile(r"(?<=[a-zµ])(?:\^|\*\*)?(-?[123])(?![\w.])", re.IGNORECASE)
+SUPERSCRIPTS = str.maketrans("⁻¹²³", "-123")
+#: Flows at a gas's standard state.
+OF_A_GAS = re.compile(r"(?:N|S|norm|std)\s?(?:l|m3|m³|cm3|cm³|cuft)\b.*|NL?PM|slpm|sccm|scfm", re.IGNORECASE)
 #: Names with one-digit powers, times or per one another. A unit comes from a file, and pint computes what it reads:
 #: ``9**9**9**9`` would never end.
 FACTOR = r"[^\W\d]\w*(?:(?:\*\*|\^)-?\d)?"
@@ -80,6 +89,11 @@ def si_factor(unit: str, quantity: str) -> float:
     try:
         return _factor(unit, quantity)
     except Exception as error:  # pint and its tokenizer raise many kinds; all mean "not this unit"
+        if quantity == "flow" and OF_A_GAS.fullmatch(unit[:LONGEST_UNIT].strip()):
+            raise InputError(
+                f"'{unit[:LONGEST_UNIT]}' is the flow of a gas at its standard state; if it is a liquid's flow, say "
+                "its unit, such as L/min"
+            ) from error
         known = EXAMPLES[quantity].split(", ")
         hint = nearest(unit, known) or _near_unit(unit[:LONGEST_UNIT], quantity)
         raise InputError(
@@ -104,11 +118,43 @@ def measures(unit: str, quantity: str) -> bool:
 
 
 def _factor(unit: str, quantity: str) -> float:
-    spelled = SPELLINGS.get(unit.strip().lower(), unit.strip())
+    spelled = plainly_spelled(unit)
     if len(spelled) > LONGEST_UNIT or not UNIT.fullmatch(spelled):
         raise ValueError(f"{spelled!r} is not a product of units")
     # A unit scales from zero: gauge offsets (degC, dBm) have no place in these quantities.
     return float(_registry().Quantity(1.0, spelled).to(SI_UNIT[quantity]).magnitude)
+
+
+def plainly_spelled(unit: str) -> str:
+    """Return a unit as pint reads it, whatever a person or logger writes.
+
+    Examples
+    --------
+    >>> [plainly_spelled(unit) for unit in ("dm³/min", "L·min⁻¹", "l/min.", "MPa(g)", "KPA", "mPa")]
+    ['dm**3/min', 'L·min**-1', 'L/min', 'MPa', 'kPa', 'mPa']
+    """
+    bare = unit.strip()
+    if len(bare) > LONGEST_UNIT:
+        return bare
+    bare = without_reference(bare.removesuffix(".").translate(SUPERSCRIPTS))
+    powered = POWER.sub(r"**\1", bare)
+    for spelled in (bare, powered):
+        found = CASED.get(spelled) or SPELLINGS.get(spelled.lower())
+        if found:
+            return found
+    return powered
+
+
+def without_reference(unit: str) -> str:
+    """Return a unit of pressure without what it is relative to.
+
+    Examples
+    --------
+    >>> [without_reference(unit) for unit in ("barg", "bar(a)", "bar_g", "MPa(g)", "mA")]
+    ['bar', 'bar', 'bar', 'MPa', 'mA']
+    """
+    found = RELATIVE.fullmatch(unit)
+    return found[1] if found else unit
 
 
 def _near_unit(unit: str, quantity: str) -> str:

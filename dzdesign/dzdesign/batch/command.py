@@ -186,7 +186,7 @@ def _check_options(args: BatchArguments) -> None:
     identify_options(args)
     record_of(args.record)
     design_options(args, args.target)
-    read_options(args, ["skip_rows", "sample_rate"])
+    read_options(args, ["skip_rows", "sample_rate", "missing"])
     if args.columns:
         parse_columns(args.columns)
 

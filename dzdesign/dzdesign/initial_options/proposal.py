@@ -82,7 +82,7 @@ class _Remarks:
 
 def propose(
     ramps: Paths, *, columns: Table, dp: Table, sample_rate: str | None = None, skip_rows: int | None = None,
-    declared: Declared | None = None,
+    missing: Sequence[str] = (), declared: Declared | None = None,
 ) -> Proposal:  # fmt: skip
     """Look at recordings, and return the file of options that this gives."""
     from dzdesign.identify.reading.column_labels import PER_CENT, parse_columns
@@ -109,8 +109,9 @@ def propose(
     )
     if not remarks.opens:
         tests = read_recordings(
-            paths, u_max=u_max, columns=chosen, dp=table or None, sample_rate=sample_rate, skip_rows=skip_rows
-        )
+            paths, u_max=u_max, columns=chosen, dp=table or None, sample_rate=sample_rate, skip_rows=skip_rows,
+            missing=missing or None,
+        )  # fmt: skip
         if in_per_cent and not declared.u_max:
             remarks.notes.append('full command: in per cent, so not recorded; u-max = "10 V" is a guess, correct it')
         elif not in_per_cent:
@@ -120,7 +121,7 @@ def propose(
     seen, opens = tuple(_summary(looks, u_seen, valve, remarks.notes)), tuple(dict.fromkeys(remarks.opens))
     text = _rendered(
         seen=seen, opens=opens, u_max=u_max, u_seen=u_seen, in_per_cent=in_per_cent, skip_rows=skip_rows,
-        declared=declared, ends_at_full=ENDS_AT_FULL, sample_rate=sample_rate,
+        missing=missing, declared=declared, ends_at_full=ENDS_AT_FULL, sample_rate=sample_rate,
         meter=valve and valve.meter, negative_drop=_negative_drop(valve),
         first=paths[0].name, look=looks[0], columns=chosen,
         unclear=unclear, guessed_dp=guessed_dp, dp=table, readings=readings,

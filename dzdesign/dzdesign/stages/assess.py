@@ -97,7 +97,7 @@ def _read_set(name: str, patterns: Paths, columns: Table, arguments: AssessArgum
     try:
         return read_recordings(
             patterns, u_max=u_max, columns=columns, dp=arguments.dp, sample_rate=arguments.sample_rate,
-            skip_rows=arguments.skip_rows, what=f"reading recordings {name}",
+            skip_rows=arguments.skip_rows, missing=arguments.missing, what=f"reading recordings {name}",
         )  # fmt: skip
     except InputError as error:
         if name == "before" or "--columns" not in str(error):

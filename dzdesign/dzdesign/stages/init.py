@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.errors import InputError
 from dzdesign.core.options import AnyPath, Option, Paths, read_options
-from dzdesign.stages.recordings import ColumnArguments
+from dzdesign.stages.recordings import ColumnArguments, read_missing
 
 if TYPE_CHECKING:
     from dzdesign.initial_options.proposal import Declared, Proposal
@@ -74,5 +74,6 @@ def look(arguments: InitArguments, declared: "Declared | None" = None) -> "Propo
         dp=arguments.dp,
         sample_rate=arguments.sample_rate,
         skip_rows=read_options(arguments, ["skip_rows"])["skip_rows"],
+        missing=read_missing(arguments.missing),
         declared=declared,
     )

@@ -16,7 +16,7 @@ from dzdesign.core.artefact_files import (
     write_files,
 )
 from dzdesign.core.chosen_units import read_units
-from dzdesign.core.errors import InputError, nearest, neighbour
+from dzdesign.core.errors import InputError, nearest, neighbour, quoted
 from dzdesign.core.option_readers import percent_range, quantity, whole_number, with_tolerance
 from dzdesign.core.options import (
     FIT,
@@ -48,6 +48,19 @@ def read_sample_rate(text: str, option: str) -> float:
     return rate
 
 
+def read_missing(given: Texts | None, option: str = "--missing") -> tuple[str, ...]:
+    """Read --missing: texts with commas between them, or one or several an item."""
+    if given is None:
+        return ()
+    texts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+    if not all(isinstance(text, str) for text in texts):
+        raise InputError(f"{option} is {quoted(given)}, expected texts such as 'Sensor off, -500'")
+    found = tuple(part.strip() for text in texts for part in text.split(","))
+    if not all(found):
+        raise InputError(f"{option} is {quoted(given)}, with nothing between two commas; expected texts such as 'OFF'")
+    return found
+
+
 #: Reads --skip-rows.
 read_skip_rows = whole_number("how many rows stand above the header, such as 12 (0: none)")
 
@@ -68,6 +81,9 @@ class ColumnArguments:
     """Sampling rate of files without a time column, such as "100 Hz"."""
     skip_rows: Annotated[int | str | None, Option("N", RECORDINGS, read=read_skip_rows)] = None
     """Number of rows above the header of a text file, such as a logger's preamble (default: found)."""
+    missing: Annotated[Texts | None, Option("TEXT", RECORDINGS, read=read_missing)] = None
+    """Further texts or numbers that stand for no value, such as "Sensor off, -500". Repeatable; in the options file
+    also a list. ---, n/a, OL, -9999 and similar entries are known."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +120,7 @@ def read_recordings(
     dp: Table,
     sample_rate: Text = None,
     skip_rows: int | str | None = None,
+    missing: Texts | None = None,
     what: str = "reading recordings",
     names: Sequence[str] = (),
 ) -> "list[RampTest]":
@@ -127,7 +144,7 @@ def read_recordings(
         try:
             test = read_ramp_file(
                 path, u_max, columns=chosen, dp=declared and parse_quantity(declared[0], "pressure", declared[1]),
-                sample_rate=rate, skip_rows=skipped,
+                sample_rate=rate, skip_rows=skipped, missing=read_missing(missing),
             )  # fmt: skip
         except MissingColumnError as error:
             option = _with_columns(path, chosen, skipped, rate)

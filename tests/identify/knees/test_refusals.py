@@ -1,14 +1,19 @@
 """Recordings that show no threshold are refused with the reason; weak sweeps are said to be weak."""
 
 import dataclasses
+import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dzdesign.command_line.cli import main
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.ramp_test import Switch
+from tests.dzdesign.command_line.test_bad_input import csv
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 
@@ -166,6 +171,70 @@ def test_what_loggers_write_is_refused_with_what_to_do(tmp_path, text, wording):
     path.write_text(text)
     with wording.refusal(InputError):
         read_ramp_file(path)
+
+
+@pytest.fixture
+def refused(tmp_path, monkeypatch, capsys):
+    """Return the message about a recording of some columns, the label with its unit -> what stands in it."""
+    monkeypatch.chdir(tmp_path)
+
+    def refused_(columns, *options):
+        Path("ramp.csv").write_text(csv(np.column_stack(list(columns.values())), ",".join(columns)))
+        assert main(["-q", "identify", "ramp.csv", "--meter-lag", "0 s", *options]) == 2
+        return capsys.readouterr().err
+
+    return refused_
+
+
+#: A reversed or normally open valve, a meter mounted backwards, or both: labels of command and flow, and what --columns
+#: says of them at first.
+TURNED = {
+    "valve": ("u_V", "Q_Lmin", lambda u, q: (10 - u, q), ""),
+    "valve in percent": ("u [%]", "Q_Lmin", lambda u, q: (100 - 10 * u, q), ""),
+    "valve in mV": ("u_mV", "Q_Lmin", lambda u, q: (1e4 - 1e3 * u, q), ""),
+    "valve in mA": ("I", "Q_Lmin", lambda u, q: (20 - 1.6 * u, q), "u=I:4..20 mA = 0..10 V"),
+    "meter": ("u_V", "Q_Lmin", lambda u, q: (u, -q), ""),
+    "meter in m3/h": ("u_V", "Q (m3/h)", lambda u, q: (u, -0.06 * q), ""),
+    "meter in mA": ("u_V", "I", lambda u, q: (u, 12 - 0.32 * q), "Q=I:4..20 mA = -25..25 L/min"),
+    "meter in volts": ("u_V", "I", lambda u, q: (u, -0.2 * q), "Q=I:0..10 V = 50 L/min"),
+    "both": ("u_V", "Q_Lmin", lambda u, q: (10 - u, -q), ""),
+    "both, with a zero error": ("u_V", "Q_Lmin", lambda u, q: (10 - u, -q - 0.5), ""),
+}
+
+
+@pytest.mark.parametrize("name", TURNED)
+def test_the_message_says_how_to_turn_it_and_that_works(refused, name, wording):
+    label, of_flow, make, columns = TURNED[name]
+    test = synthetic_ramp(1.0, Truth(), ramp_s=20.0)
+    u, q = make(test.u, test.q / L_MIN)
+    table = {"time_s": test.time, label: u, "dP_MPa": test.dp / 1e6, of_flow: q}
+    text = refused(table, *(["--columns", columns] if columns else []))
+    wording.of_test(text)
+    option = re.search(r'--columns "([^"]+)"', text)[1]
+    assert {part.partition("=")[0].strip() for part in re.split(r",\s*(?=Q=)", option)} == {
+        "v": {"u"}, "m": {"Q"}, "b": {"u", "Q"}
+    }[name[0]]  # fmt: skip
+    assert main(["-q", "identify", "ramp.csv", "--meter-lag", "0 s", "--columns", option, "-o", "v.json"]) == 0
+    (found,) = json.loads(Path("v.json").read_text())["sides"]["positive"]["tests"]
+    (truth,) = identify([test], IdentifyOptions(meter_lag=0.0)).positive.tests
+    assert found["u_knee_falling_V"] == pytest.approx(truth.u_knee_falling_V, abs=0.015)
+    assert found["u_knee_rising_V"] == pytest.approx(truth.u_knee_rising_V, abs=0.015)
+
+
+@pytest.mark.parametrize(
+    ("label", "make"),
+    [
+        ("Total_L:L/min", lambda q: q),
+        ("Total_L:L/min", lambda q: 1e4 - q),
+        ("pulses:0..500 = 0..60 L/min", lambda q: np.floor(300 * q)),
+        ("pos_mm:L/min", lambda q: 900 * q + 0.05 * np.random.default_rng(1).standard_normal(q.size)),
+    ],
+)
+def test_a_total_is_no_flow(refused, label, make):
+    test = synthetic_ramp(1.0, Truth(), ramp_s=20.0)
+    volume = np.cumsum(np.maximum(test.q, 0) / L_MIN) * np.median(np.diff(test.time)) / 60
+    table = {"time_s": test.time, "u_V": test.u, "dP_MPa": test.dp / 1e6, label.partition(":")[0]: make(volume)}
+    assert "never goes back, though the command does: a volume, a count of" in refused(table, "--columns", f"Q={label}")
 
 
 @pytest.mark.parametrize("way", ["opening", "closing"])

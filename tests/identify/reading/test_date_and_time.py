@@ -169,6 +169,89 @@ def test_what_is_no_date_leaves_the_time_of_day(proposed, read, dates):
     assert test.stamp is None
 
 
+def one_column(spelled):
+    return text("time;u [V];dP [MPa];Q [l/min]", *rows(spelled, U, DP, Q))
+
+
+def named(month, form="{day}{month}{year} %H:%M:%S,"):
+    """Return stamps over midnight, from the last day of a year to the first of the next."""
+    start = datetime.datetime(2026, 12, 31, 23, 59, 50, 123000)
+    found = []
+    for row in range(TIME.size):
+        at = start + datetime.timedelta(seconds=0.04 * row)
+        day, name, year = f"{at.day:02}", month[at.month == 1], at.year
+        found.append(at.strftime(form.format(day=day, month=name, year=year)) + f"{at.microsecond // 1000:03}")
+    return found
+
+
+SECONDS = [f"{second:.3f}" for second in TIME]
+SPELLED = {
+    "MATLAB": named(("-Dec-", "-Jan-")),
+    "German": named((". Dezember ", ". Januar ")),
+    "German, short": named((". Dez. ", ". Jan. ")),
+    "French": named((" décembre ", " janvier ")),
+    "English": named(("Dec ", "Jan "), "{month}{day}, {year} %H:%M:%S,"),
+    "year first": named(("-Dec-", "-Jan-"), "{year}{month}{day} %H:%M:%S,"),
+    "compact": stamps("%Y%m%dT%H%M%S.", LATE),
+    "compact without a T": stamps("%Y%m%d%H%M%S.", LATE),
+    "IEC date": stamps("DT#%Y-%m-%d-%H:%M:%S.", LATE),
+    "IEC time of day": stamps("TOD#%H:%M:%S.", LATE),
+    "seconds": [f"{second} sec" for second in SECONDS],
+    "seconds, or milliseconds": [f"{1000 * t:.0f} ms" if t < 1 else f"{t:.3f} s".replace(".", ",") for t in TIME],
+    "pandas": [f"0 days 23:59:{50 + t:06.3f}" if t < 10 else f"1 days 00:00:{t - 10:06.3f}" for t in TIME],
+    "IEC duration": [f"T#{1000 * t:.0f}ms" if t < 1 else f"T#{int(t)}s{1000 * (t % 1):.0f}ms" for t in TIME],
+    "IEC duration, long": [f"TIME#0d_0h_{int(t // 60)}m_{t % 60:.3f}s" for t in TIME],
+}
+
+
+@pytest.mark.parametrize("name", SPELLED)
+def test_a_time_as_programs_spell_it(read, name):
+    test = read(one_column(SPELLED[name]), {})
+    np.testing.assert_allclose(test.time, TIME, atol=6e-4)
+    if name in ("MATLAB", "German", "French", "English", "year first"):
+        assert test.stamp == start_of("2026-12-31 23:59:50.123")
+    assert (test.stamp is None) == name.startswith(("IEC t", "IEC du", "sec", "pandas"))
+
+
+@pytest.mark.parametrize(
+    "spelled",
+    [
+        [f"Tue Feb  3 08:00:{second:06.3f} 2026" for second in TIME % 60],
+        [f"2026年2月3日 8時{second:.3f}" for second in TIME],
+        [f"3/2/2026 8.00.{second:06.3f}" for second in TIME % 60],
+    ],
+)
+def test_what_only_looks_like_a_date_is_named_so(read, spelled, wording):
+    with wording.refusal(InputError):
+        read(one_column(spelled), {"time": "time"})
+
+
+@pytest.mark.parametrize(("hours", "form"), [(1, "25.10.2026 %H:%M:%S,"), (1, "%H:%M:%S,"), (12, "%I:%M:%S,")])
+def test_a_clock_that_is_set_back_is_named(read, hours, form, wording):
+    start = datetime.datetime(2026, 10, 25, 12 if hours == 12 else 2, 59, 50)
+    spelled = stamps(form, start)
+    if hours == 1:
+        spelled = [each.replace("03:00:", "02:00:") for each in spelled]
+    with wording.refusal(InputError):
+        read(one_column(spelled), {})
+
+
+@pytest.mark.parametrize("cell", ["05. Mrz", "1. Jan", "Mrz 05", "5-Mar", "Mar-05", "3 mai"])
+def test_dates_that_a_spreadsheet_made_are_named(read, cell):
+    lines = text("time_s;u [V];dP [MPa];Q [l/min]", *rows(TIME, U, DP, Q)).split(b"\n")
+    lines[9] = lines[9].rpartition(b";")[0] + b";" + cell.encode()
+    with pytest.raises(InputError, match=f"'{cell}' is a date, which a spreadsheet makes of numbers"):
+        read(b"\n".join(lines), {})
+
+
+@pytest.mark.parametrize("cell", ["0.0 mV", "12,5 l/min", "3 %", "1.5e-3V"])
+def test_a_unit_in_a_cell_is_named(read, cell):
+    lines = text("time_s;u [V];dP [MPa];Q [l/min]", *rows(TIME, U, DP, Q)).split(b"\n")
+    lines[9] = lines[9].rpartition(b";")[0] + b";" + cell.encode()
+    with pytest.raises(InputError, match=r"row 10, column 'Q .*has its unit in the cell"):
+        read(b"\n".join(lines), {})
+
+
 def test_recordings_that_overlap_are_seen(read):
     first, early = read(two_columns()), read(two_columns(start=LATE + datetime.timedelta(seconds=20)), name="b.csv")
     after = read(two_columns(days=1), name="c.csv")

@@ -152,6 +152,14 @@ def test_a_wrong_row_among_samples_is_found(here, where, line, wording):
     [
         ("X_Value;u (V);dP (bar);Q (l/min)", 'is it, say its unit, for example --columns "time=X_Value:s"'),
         ("Sample;u (V);dP (bar);Q (l/min)", "'Sample' counts the rows: export the time beside it"),
+        ("timestamp;path;value;unit", "row for each variable (path, value): export a column for each"),
+        ("Time;signal;Value;unit", "row for each variable (signal, Value): export a column for each"),
+        ("time_s;u_V;dP_MPa;Total_L", "'Total_L' is a volume and no flow: differentiate it"),
+        ("time_s;u_V;dP_MPa;V [cm³]", "'V [cm³]' is a volume and no flow: differentiate it"),
+        ("time_s;u_V;dP_MPa;pulses", "'pulses' counts pulses and is no flow: differentiate it"),
+        ("time_s;u_V;dP_MPa;pos_mm", "'pos_mm' is a position and no flow: differentiate it; of a cylinder,"),
+        ("time_s;u_V;dP_MPa;speed_mm_per_s", "\"Q=speed_mm_per_s:0..100 mm/s = 0..12 L/min\""),
+        ("time_s;u_V;dP_MPa;v (m/s)", "'v (m/s)' is a speed: of a cylinder, the flow is area x speed"),
         ("VarName;TimeString;VarValue;Time_ms", "row for each variable (VarName, VarValue): export a column for each"),
     ],
 )
@@ -363,7 +371,8 @@ def test_whole_numbers_without_a_unit_that_can_only_be_milliseconds(here, capsys
         ("mA", 'for example --columns "Q=F (mA):4..20 mA = 0..50 L/min"'),
         ("4..20 mA", "'4..20 mA' is no range, expected one such as '4..20 mA = 0..50 L/min'"),
         ("4..20 mA = 0..50 bar", "'bar' is not a unit of flow"),
-        ("4..20 s = 0..50 L/min", "'s' is no unit of a transmitter's signal"),
+        ("4..20 s = 0..50 L/min", "the range '4..20 s = 0..50 L/min' is of a column in s, but the file says 'mA'"),
+        ("4..20 ma = 0..50 L/min", "'ma' is no unit of a signal (did you mean 'mA'?)"),
         ("4..4 mA = 0..50 L/min", "has no width"),
         ("4..20 mA = 0..25.000 mL/min", "'25.000' may be 25000 or 25.0; write 25000 or 25.0"),
         ("4..20 mA = 0..25,000 mL/min", "'25,000' may be 25000 or 25.0; write 25000 or 25.0"),
@@ -386,6 +395,32 @@ def test_a_range_may_fall_and_hold_other_signals(here):
     table = rows(TIME, 20 - 1.6 * U, DP, 0.2 * Q, separator=",", comma=False, form="{:.6f}")
     columns = {"u": "I:20..4 mA = 0..100 %", "Q": "F:0..10 V = 0..50 L/min"}
     assert_is_the_ramp(read(text("t_s,I,dP_MPa,F", *table), columns=columns))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "label", "meaning", "numbers"),
+    [
+        ("u", "pulse_us", "1500..1900 us = 0..10 V", 1500 + 40 * U),
+        ("u", "pulse", "1500..1900 µs = 0..10 V", 1500 + 40 * U),
+        ("Q", "speed_mm_per_s", "0..100 mm/s = 0..20 L/min", 5 * Q),
+        ("Q", "f (Hz)", "0..500 Hz = 0..60 L/min", Q / 0.12),
+        ("Q", "Q_Lmin", "0..-1 L/min = 0..1 L/min", -Q),
+        ("u", "u [‰]", "0..1000 ‰ = 0..10 V", 100 * U),
+    ],
+)
+def test_a_signal_may_have_any_unit(here, quantity, label, meaning, numbers):
+    labels = {"u": "u_V", "Q": "Q_Lmin"} | {quantity: label}
+    columns = {"u": U, "Q": Q} | {quantity: numbers}
+    table = rows(TIME, columns["u"], DP, columns["Q"], separator=",", comma=False, form="{:.6f}")
+    content = text(f"t_s,{labels['u']},dP_MPa,{labels['Q']}", *table)
+    assert_is_the_ramp(read(content, columns={quantity: f"{label}:{meaning}"}))
+
+
+def test_a_signal_in_another_unit_of_its_kind_is_refused(here):
+    content = text("t_s,pulse_ms,dP_MPa,Q_Lmin", *rows(TIME, 1.5 + 0.04 * U, DP, Q, separator=",", comma=False))
+    assert "is of a column in us, but the file says 'ms'" in refusal(
+        content, columns={"u": "pulse_ms:1500..1900 us = 0..10 V"}
+    )
 
 
 # what is no recording

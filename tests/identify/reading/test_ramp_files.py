@@ -1,7 +1,9 @@
 """Ramp files: every reading that must work, every one that must not and says where, and the round trip."""
 
 import gzip
+import io
 import re
+import zipfile
 
 import numpy as np
 import pytest
@@ -23,6 +25,14 @@ def table(header=HEADER, columns=(TIME, U, DP, Q), separator=",", comma=False, e
     rows = [[f"{value:.6g}" for value in row] for row in zip(*columns, strict=True)]
     lines = [header, *(separator.join(cells).replace(".", "," if comma else ".") for cells in rows)]
     return end.join(lines) + end
+
+
+def zipped(name, content="") -> bytes:
+    """Return a zip archive of one file."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        archive.writestr(name, content)
+    return out.getvalue()
 
 
 @pytest.fixture
@@ -215,7 +225,7 @@ def spoiled(row, column, cell, before=""):
     return before + "\n".join(lines)
 
 
-@pytest.mark.parametrize("cell", ["n/a", "1.2.3", "1e", "--", "0x10", "1_0", "OVERFLOW"])
+@pytest.mark.parametrize("cell", ["soon", "1.2.3", "1e", "0x10", "1_0"])
 def test_text_in_a_number_is_found_in_its_row_of_the_file(refusal, cell, wording):
     # Three lines before the header, which is line 4; four rows on: row 8.
     wording.of_test(refusal(spoiled(4, 1, cell, before="# one\n\n# two\n")))
@@ -226,7 +236,7 @@ def test_rows_are_counted_as_an_editor_does(refusal, separator):
     assert "row 6," in refusal(spoiled(4, 1, "x", before=f"# a{separator}b\n"))
 
 
-@pytest.mark.parametrize("cell", ["inf", "-inf", "1e400", "1e38", "-1e10"])
+@pytest.mark.parametrize("cell", ["1e20", "-1e10"])
 def test_numbers_that_no_valve_gives(refusal, cell, wording):
     wording.of_test(refusal(spoiled(4, 2, cell)))
 
@@ -246,7 +256,7 @@ def test_long_cells_and_many_columns_are_cut(refusal):
         (table("time,u,dP,Q"), "column 'time' has no unit; write for example time_s"),
         (table("time_s,u_V,dP,Q_Lmin"), "column 'dP' has no unit; write for example dP_MPa"),
         (table("time_s,u_V,dP_MPa,Q"), "column 'Q' has no unit; write for example Q_Lmin"),
-        (table("time_s,u_V,dP_MPA,Q_Lmin"), "column 'dP_MPA': 'MPA' is not a unit of pressure"),
+        (table("time_s,u_V,dP_mpa,Q_Lmin"), "column 'dP_mpa': 'mpa' is not a unit of pressure"),
         (table("time_s,u_V,dP [barr],Q_Lmin"), "(did you mean 'bar'?)"),
         (table("time_s,u_V,dP [Lmin],Q_Lmin"), "column 'dP [Lmin]': 'Lmin' is not a unit of pressure"),
         (table("time_s,u [mA],dP_MPa,Q_Lmin"), "column 'u [mA]': 'mA' is not a unit of voltage"),
@@ -270,14 +280,35 @@ def test_long_cells_and_many_columns_are_cut(refusal):
         (table().encode("utf-16-le"), "is UTF-16 without a byte order mark, or no text at all"),
         (b"# \x81l\n" + table().encode(), "neither in UTF-8 nor in Windows-1252 (byte 3)"),
         (b"\xef\xbb\xbf# \xd6l\n" + table().encode(), "is not a text file in UTF-8 throughout (byte 6)"),
-        (b"PK\x03\x04\x14\x00\x06\x00\x08\x00\x00\x00!\x00\xff", "is an Excel workbook (xlsx) or a zip archive; in "),
+        (zipped("[Content_Types].xml"), "is an Excel workbook (xlsx); in the spreadsheet program"),
+        (zipped("mimetype", "application/vnd.oasis.opendocument.spreadsheet"), "is a workbook (ods); in the spreads"),
+        (zipped("u_V.npy"), "is a NumPy archive (npz); save its arrays"),
+        (zipped("ramp.csv"), "is a zip archive; unpack it"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "is an Excel workbook (xls); in the spreadsheet program"),
+        (b"MDF     4.10    TGT 15.0", "is an MDF recording (mf4, mdf); save it as MATLAB or CSV"),
+        (b"UnFinMF 4.10    TGT 15.0", "is an MDF recording (mf4, mdf); save it as MATLAB or CSV"),
+        (b"LOGG\x90\0\0\0\x01", "is a BLF log of a CAN bus; export"),
+        (b"|CF,2,1,1;|CK,1,3,1,1;", "is an imc recording; export"),
+        (b"SQLite format 3\0\x10", "is an SQLite database; export"),
+        (b"\x93NUMPY\x01\0v\0", "is a NumPy array (npy); save it by"),
+        (b"7z\xbc\xaf\x27\x1c\0\x04", "is a packed archive; unpack it"),
     ],
 )  # fmt: skip
 def test_refused_with_the_reason_and_the_place(refusal, content, words):
     message = refusal(content)
     assert words in message
     assert "ramp.csv'" in message and "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("a.dxd", "DEWESoft"), ("a.D7D", "DEWESoft"), ("a.psdata", "of an oscilloscope")]
+)
+def test_a_binary_recording_is_named_by_its_suffix(tmp_path, name, words):
+    (tmp_path / name).write_bytes(zipped("data") if name == "a.psdata" else b"\x03\0\0DX" + bytes(90))
+    with pytest.raises(InputError, match=f"{name}' is a recording {words}|{name}' is a {words} recording; export it"):
+        read_ramp_file(tmp_path / name)
+    (tmp_path / name).write_text(table())
+    assert_is_the_ramp(read_ramp_file(tmp_path / name))  # text is text, whatever it is called
 
 
 def test_gzip_with_a_changed_byte_is_refused(refusal):

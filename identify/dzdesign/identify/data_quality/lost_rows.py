@@ -29,7 +29,7 @@ class Gap:
 def about_lost_rows(tests: Sequence[RampTest]) -> Iterator[Finding]:
     """Yield one warning for all recordings together, if any lacks rows."""
     # Samples that were taken for missing have a warning of their own: no logger lost them.
-    gaps = [gap for test in tests if not (test.no_values or test.failed_signals) for gap in find_gaps(test)]
+    gaps = [gap for test in tests if not test.missing for gap in find_gaps(test)]
     if not gaps:
         return
     longest = max(gaps, key=lambda gap: gap.seconds)

@@ -53,10 +53,8 @@ def _about_one(test: RampTest) -> Iterator[Finding]:
             f"{' or '.join(' and '.join(edge) for edge in edges)} too, or of dP"
         )
         yield warn("side-refused", test.source, side=test.side_without_dp, reason=reason)
-    if test.no_values:
-        yield warn("missing-samples", test.source, "number", numbers=test.no_values)
-    if test.failed_signals:
-        yield warn("missing-samples", test.source, "signal", signals=test.failed_signals)
+    for kind, samples in test.missing.items():
+        yield warn("missing-samples", test.source, kind, samples=samples)
     if test.cut:
         yield warn("cut-ramp", test.source, ramps="; ".join(test.cut))
     if test.undeclared_dither:

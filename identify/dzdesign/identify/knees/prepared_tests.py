@@ -22,8 +22,10 @@ from dzdesign.identify.knees.readings_at_rest import find_rest_flows, hidden_zer
 from dzdesign.identify.knees.refusals import (
     refuse_a_jump,
     refuse_a_shut_valve,
+    refuse_a_total,
     refuse_a_wrong_pressure,
     refuse_an_impossible_knee,
+    refuse_an_open_valve,
     refuse_two_directions,
     refuse_two_signs_of_flow,
 )
@@ -32,6 +34,7 @@ from dzdesign.identify.ramps.command import despiked
 from dzdesign.identify.ramps.pooling import PooledTest, name_of_ramp, pool_ramps
 from dzdesign.identify.ramps.splitting import Ramp, dp_under_flow, nominal_dp, split_ramps
 from dzdesign.identify.ramps.sweep_pressure import NO_PRESSURE
+from dzdesign.identify.reading.column_labels import PER_CENT
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.reading.series_order import with_clock_of_series
 from dzdesign.identify.reading.units_of_columns import shown_units
@@ -52,6 +55,9 @@ def describe_tests(tests: Sequence[RampTest], options: IdentifyOptions) -> Descr
         For a test that holds no ramp or no flow, and for tests that can't stand beside one another.
     """
     refuse_two_directions(tests)
+    for test in tests:
+        refuse_a_total(test)
+        refuse_an_open_valve(test, options.u_max)
     rest = find_rest_flows(tests, options.u_max)
     as_read = tests
     tests = [replace(test, q=test.q - flow) for test, flow in zip(tests, rest.flows, strict=True)]
@@ -116,7 +122,7 @@ def split_recordings(tests: Sequence[RampTest], options: IdentifyOptions, lag: f
             _refuse_what_has_no_pressure(ramp, options.u_max)
             refuse_a_wrong_pressure(name_of_ramp(ramp), ramp.dp, ramp.test.dp_sign)
         for item in pool_ramps(found) if top >= FULL_SWEEP * max(tops) else ():  # a fragment may well see no flow
-            refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
+            refuse_a_shut_valve(item.test, item.branches, options.u_max)
         ramps += found
     return ramps
 
@@ -132,19 +138,29 @@ def _refuse_what_has_no_pressure(ramp: Ramp, u_max: float) -> None:
     if under_flow >= 0 and ramp.dp >= max(SMALLEST_DP, NO_PRESSURE * under_flow):
         return
     refuse_a_wrong_pressure(name_of_ramp(ramp), under_flow, ramp.test.dp_sign)
-    refuse_a_shut_valve(ramp.test.source, ramp.branches, u_max)
+    refuse_a_shut_valve(ramp.test, ramp.branches, u_max)
 
 
 def _no_ramp(test: RampTest) -> InputError:
     return InputError(
         worded(
             "'{source}' holds no ramp of the command from near zero up: it runs from {low:.2f #V} to {high:.2f V}, "
-            "expected a sweep over half of the command at least, without jumps; record it so, from below the threshold",
+            "expected a sweep over half of the command at least, without jumps; record it so, from below the threshold"
+            "{share}",
             source=test.source,
             low=test.u.min(),
             high=test.u.max(),
+            share=_if_it_is_a_share(test),
         )
     )
+
+
+def _if_it_is_a_share(test: RampTest) -> str:
+    """Return how a command of 0 to 1 that is labelled in percent is declared; nothing for any other."""
+    column = test.columns.get("u")
+    if column is None or column.unit.lower() not in PER_CENT or test.units["command"][0].factor * test.u.max() > 1.01:
+        return ""
+    return f'; if it is a share of 1, declare --columns "u={column.label}:0..1 = 0..100 %"'
 
 
 def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyOptions) -> None:
@@ -152,7 +168,7 @@ def _refuse_what_shows_no_dead_zone(pooled: list[PooledTest], options: IdentifyO
     for item in pooled:
         if item.branches == (None, None):
             raise _no_ramp(item.test)
-        refuse_a_shut_valve(item.test.source, item.branches, options.u_max)
+        refuse_a_shut_valve(item.test, item.branches, options.u_max)
 
 
 def found_floor(pooled: list[PooledTest], options: IdentifyOptions) -> float:

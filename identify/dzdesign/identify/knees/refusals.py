@@ -15,6 +15,7 @@ from dzdesign.identify.ramps.medians import median
 from dzdesign.identify.ramps.pooling import name_of_ramp
 from dzdesign.identify.ramps.splitting import Ramp
 from dzdesign.identify.reading.ramp_test import RampTest
+from dzdesign.identify.reading.scaling import turned
 from dzdesign.identify.valve.recorded_drop import DropSign
 
 #: A flow that rises with the command has readings between these shares of the largest where its mean is between them.
@@ -26,6 +27,12 @@ FEWEST_IN_THE_MIDDLE, WIDEST_JUMP = 0.25, 0.05
 #: Shares of a ramp's largest command up to which it rests, and from which on its flow is compared; and share of the
 #: largest flow that has a sign.
 AT_REST, AT_TOP, SMALL_FLOW = 0.05, 0.9, 0.1
+#: A flow at zero command of this share of its change is no zero error of a meter; one at full command of less than the
+#: other is that of a shut valve.
+OPEN_AT_REST, SHUT = 0.5, 0.2
+#: A command that goes back to this share of the largest lets the flow fall; what then falls by no more than this share
+#: of its span, and has one of so many times the noise, is a total.
+BACK, NEVER, TOTAL_NOISES = 0.1, 0.02, 20.0
 #: So far below the lowest command of a ramp, over u_max, a knee may lie: it is extrapolated, and a warning says so.
 EXTRAPOLATED = 0.1
 
@@ -107,8 +114,50 @@ def refuse_a_wrong_pressure(source: str, dp: float | None, sign: DropSign = 1) -
         )
 
 
-def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: float) -> None:
+def refuse_an_open_valve(test: RampTest, u_max: float) -> None:
+    """Refuse a valve that is open at zero command and shut at full command: a reversed signal, or normally open."""
+    top = float(test.u.max())
+    low, high = test.q[test.u <= 0.05 * u_max], test.q[test.u >= 0.95 * top]
+    if not low.size or top < 0.5 * u_max:
+        return
+    rest, full = median(low), median(high)
+    change = abs(full - rest)
+    if change <= TOTAL_NOISES * robust_sigma(np.diff(test.q)) or abs(rest) < OPEN_AT_REST * change or (
+        abs(full) > SHUT * change
+    ):  # fmt: skip
+        return
+    raise InputError(
+        worded(
+            "'{source}': the flow is {rest:.3f L/min} at zero command and {full:.3f L/min} at {top:.2f V}, expected it "
+            "to rise from zero; if the valve is normally open or its command reversed, turn the command round{option}",
+            source=test.source,
+            rest=rest / L_MIN,
+            full=full / L_MIN,
+            top=top,
+            option=_by_columns(test, ["u"] if rest > 0 else ["u", "Q"], u_max),
+        )
+    )
+
+
+def refuse_a_total(test: RampTest) -> None:
+    """Refuse what rises as long as oil flows and never falls: a volume, pulses, or the position of a cylinder."""
+    after = int(np.argmax(test.u))
+    if test.u[after:].min() > BACK * test.u[after]:
+        return
+    least = max(TOTAL_NOISES * robust_sigma(np.diff(test.q)), 0.01 * L_MIN)
+    for q in (test.q, -test.q):
+        span = q[-1] - q[0]
+        if span > least and np.max(np.maximum.accumulate(q) - q) < NEVER * span:
+            label = f" '{test.columns['Q'].label}'" if "Q" in test.columns else ""
+            raise InputError(
+                f"'{test.source}': the column of Q{label} never goes back, though the command does: a volume, a count "
+                "of pulses or a position is no flow; differentiate it over time (of a cylinder: area x speed)"
+            )
+
+
+def refuse_a_shut_valve(test: RampTest, branches: Sequence[Branch | None], u_max: float) -> None:
     """Refuse a test whose flow at full command does not stand out of the meter's noise, or has the wrong sign."""
+    source = test.source
     for branch in filter(None, branches):
         bottom = branch.q[branch.u <= branch.u.min() + 0.05 * np.ptp(branch.u)]
         noise = robust_sigma(bottom)
@@ -120,11 +169,12 @@ def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: f
             raise InputError(
                 worded(
                     "'{source}': the flow falls with the command, by {fall:.3f L/min} from zero to {top:.2f V}, "
-                    "expected one that rises; reverse the sign of Q, or leave cells blank where the logger wrote a "
-                    "number for a missing sample",
+                    "expected one that rises; reverse the sign of Q{option}, or leave cells blank where the logger "
+                    "wrote a number for a missing sample",
                     source=source,
                     fall=-rise / L_MIN,
                     top=branch.u.max(),
+                    option=_by_columns(test, ["Q"], u_max),
                 )
             )
         raise InputError(
@@ -139,6 +189,12 @@ def refuse_a_shut_valve(source: str, branches: Sequence[Branch | None], u_max: f
                 noise=noise / L_MIN,
             )
         )
+
+
+def _by_columns(test: RampTest, quantities: Sequence[str], u_max: float) -> str:
+    """Return the option that turns columns round; nothing where they are not known."""
+    columns = [turned(name, test.columns[name], u_max) for name in quantities if name in test.columns]
+    return f' by --columns "{", ".join(columns)}"' if columns else ""
 
 
 def refuse_a_jump(read: PreparedBranch, u_max: float) -> None:

@@ -71,6 +71,7 @@ def _pooled(group: list[Ramp]) -> PooledTest:
         dp_sign=first.dp_sign,
         dp_is_declared=any(ramp.test.dp_is_declared for ramp in group),
         unseen=(min(ramp.test.unseen[0] for ramp in group), max(ramp.test.unseen[1] for ramp in group)),
+        columns=first.columns,
     )
     return PooledTest(
         test=test,

@@ -20,6 +20,11 @@ MILLISECONDS = re.compile(r"[\[(]?(?:ms|msec|millis|milli-?se[ck]\w{0,6})[\])]?"
 FRACTION = re.compile(r":\d\d:\d\d[.,:]\d")
 #: What is doubtful about a clock: its column has no unit and was taken as ms; or it states another, and is like ms.
 ASSUMED_MS, LIKE_MS = "taken as ms", "like ms"
+#: By how much a clock is set back, s, and why.
+SET_BACK = {
+    3600.0: "as of a clock that is set back from daylight saving time; export the time in UTC or in seconds",
+    MIDNIGHT: "as of a 12-hour clock without AM and PM; export the time with 24 hours or in seconds",
+}
 #: Times of day of a recording that begins within so many seconds after midnight are counted from its own beginning.
 ELAPSED = 1.0
 logger = logging.getLogger(__name__)
@@ -98,13 +103,17 @@ def never_back(table: Table, time: np.ndarray, complete: np.ndarray) -> np.ndarr
     The times are those of the table's complete rows.
     """
     latest = np.maximum.accumulate(time)
-    backwards = np.flatnonzero(latest - time > _usual_step(time))
+    step = _usual_step(time)
+    backwards = np.flatnonzero(latest - time > step)
     if backwards.size:
         row = int(np.flatnonzero(complete)[backwards[0]])
-        raise InputError(
-            f"'{table.path}' {table.place(row)}: the time goes back; expected one recording in the order it was "
-            "taken; where ramps with clocks of their own follow one another, make a file of each"
-        )
+        back = float(latest[backwards[0]] - time[backwards[0]])
+        cause = next((cause for size, cause in SET_BACK.items() if abs(back + step - size) < 1 + step), "")
+        how = f"by {back / 3600:.3g} h, {cause}" if cause else (
+            "; expected one recording in the order it was taken; where ramps with clocks of their own follow one "
+            "another, make a file of each"
+        )  # fmt: skip
+        raise InputError(f"'{table.path}' {table.place(row)}: the time goes back{' ' if cause else ''}{how}")
     return latest
 
 

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from math import isclose
 
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.core.units import measures, si_factor
+from dzdesign.core.units import RELATIVE, measures, si_factor
 from dzdesign.identify.reading.metering_edge import PORTS, gauge_beside_absolute, metering_edge, which_edge
 from dzdesign.identify.reading.table import AND, Table, clean_label
 
@@ -33,6 +33,13 @@ QUANTITIES = ("time", "voltage", "pressure", "flow")
 TWINS = str.maketrans("ABab", "BAba")
 #: Stands between the commands of two solenoids whose difference is the signed command.
 LESS = re.compile(r"\s[-\u2212\u2013]\s")
+#: Labels of a table with a row for each variable: what names it, and its value.
+VARIABLES = ("path", "name", "variable", "varname", "tag", "tagname", "signal", "channel", "sensor", "metric", "field")
+VALUES = ("value", "varvalue", "tagvalue", "wert")
+#: Units of a volume, and what a column of a meter's pulses is called.
+VOLUMES = ("l", "ml", "cl", "m3", "m³", "cm3", "cm³", "dm3", "dm³", "ccm", "cc", "gal", "liter", "litre", "in3", "in³")
+SPEEDS = re.compile(r"(?:^|[\W_\d])(?:[mcµ]?m|inch?)(?:/|_per_)s|speed|velocity|geschwindigkeit", re.IGNORECASE)
+COUNTS = re.compile(r"puls|impuls|\bcounts?\b|_counts?$|\bticks?\b", re.IGNORECASE)
 #: Characters of a label in which a quantity is looked for.
 LONGEST_NAME = 80
 #: A column of time, and the quantity that it may name before or behind: Time, t_u, X_Value, time of Q, Flow Time.
@@ -364,6 +371,8 @@ def _chosen_column(table: Table, quantity: str, text: str) -> Column:
     if quantity == "time" and not fits(unit, "time") and table.is_clock(label):
         unit = "s"
     if not unit:
+        if quantity == "Q" and (other := no_flow([label])):
+            raise InputError(f"'{table.path}'{other.replace(';', ':', 1)}")
         raise InputError(
             f"'{table.path}' column '{label}' has no unit; write for example "
             f'--columns "{quantity}={label}:{EXAMPLE_UNITS[quantity]}"'
@@ -391,6 +400,30 @@ def _two_solenoids(table: Table, text: str) -> tuple[str, str] | None:
         if label in table.labels and its_label in table.labels and label != its_label:
             return (f"{label}:{its_unit}" if its_unit and not unit else one), other
     return None
+
+
+def no_flow(labels: Collection[str]) -> str:
+    """Return what to do about the first label that is a volume, a count, a position or a speed; nothing if none is.
+
+    Examples
+    --------
+    >>> no_flow(["time_s", "Total_L"])
+    "; 'Total_L' is a volume and no flow: differentiate it over time"
+    >>> no_flow(["Q_Lmin"])
+    ''
+    """
+    for label in labels:
+        unit = split_label(label)[1].lower()
+        if SPEEDS.search(label):
+            example = f'--columns "Q={label}:0..100 mm/s = 0..12 L/min"'
+            return f"; '{label}' is a speed: of a cylinder, the flow is area x speed, for example {example}"
+        if unit in VOLUMES:
+            return f"; '{label}' is a volume and no flow: differentiate it over time"
+        if COUNTS.search(label):
+            return f"; '{label}' counts pulses and is no flow: differentiate it, or record the frequency"
+        if measures(unit, "length"):
+            return f"; '{label}' is a position and no flow: differentiate it; of a cylinder, the flow is area x speed"
+    return ""
 
 
 def _refuse_two_units(table: Table, quantity: str, label: str, in_label: str) -> None:
@@ -438,7 +471,10 @@ def split_label(label: str) -> tuple[str | None, str]:
     bare = clean_label(label)
     # By hand: a regular expression for both brackets takes the cube of the label's length.
     bracket = re.compile(r"[\[(]").search(bare, 1)
-    if bracket and bare[-1] in "])":
+    relative = re.search(rf"(?<![^\W\d_]){RELATIVE.pattern}$", bare[-LONGEST_NAME:], re.IGNORECASE)
+    if relative:  # dP_bar_g, dP_MPa(g)
+        name, unit = bare[: len(bare) - len(relative[0])].rstrip(" _/,").removesuffix(" in"), relative[0]
+    elif bracket and bare[-1] in "])":
         name, unit = bare[: bracket.start()].rstrip(" /"), bare[bracket.end() : -1].strip()
     else:  # the unit follows the last underscore; L_min, as artefacts spell it, has one itself
         match = re.fullmatch(r"(.+?)_([lL]_min|[^_]*)", bare)
@@ -447,7 +483,7 @@ def split_label(label: str) -> tuple[str | None, str]:
         quantity = _quantity_named(candidate)
         if quantity:
             return quantity, its_unit
-    return _after_a_blank_or_slash(bare) if not bracket else (None, unit)
+    return (None, unit) if bracket or relative else _after_a_blank_or_slash(bare)
 
 
 def split_column(table: Table, label: str) -> tuple[str | None, str]:
@@ -482,7 +518,7 @@ def names_a_quantity(unit: str) -> bool:
     return unit.lower() in PER_CENT or any(measures(unit, quantity) for quantity in QUANTITIES)
 
 
-def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> MissingColumnError:
+def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> InputError:
     """Return the error that names the columns found, and the one that may have been meant."""
     unused = [label for label in table.labels[:MOST_MEANT] if split_column(table, label)[0] not in columns]
     bare = {re.split(r"[_\[(]", label)[0].strip().lower(): label for label in unused}
@@ -490,12 +526,25 @@ def _missing_column(quantity: str, table: Table, columns: Collection[str]) -> Mi
     meant = [bare[near] for name in spellings for near in get_close_matches(name, bare, n=1)]
     kind = QUANTITY_OF_COLUMN[quantity]
     meant += [label for label in unused if measures(table.units.get(label, "") or split_label(label)[1], kind)]
+    begin = f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()})"
+    if other := long_format(table.labels) or (no_flow(unused) if quantity == "Q" and not meant else ""):
+        return InputError(begin + other)
     hint = f" (did you mean '{meant[0]}'? name it {EXAMPLE_LABELS[quantity]})" if meant else ""
     rate = ', or --sample-rate "100 Hz"' if quantity == "time" and not time_columns(table) else ""
     return MissingColumnError(
-        f"'{table.path}' has no column of {quantity} (columns found: {table.found_labels()}){hint}",
+        begin + hint,
         f"; expected names with units such as time_s,u_V,dP_MPa,Q_Lmin, or --columns{rate}",
     )
+
+
+def long_format(labels: Collection[str]) -> str:
+    """Return what to do about a table with a row for each variable; nothing for any other."""
+    words = [re.sub(r"[\s_]", "", label).lower() for label in list(labels)[:MOST_MEANT]]
+    value = next((label for label, word in zip(labels, words, strict=False) if word in VALUES), "")
+    name = next((label for label, word in zip(labels, words, strict=False) if word in VARIABLES), "")
+    if not (value and name):
+        return ""
+    return f"; the table has a row for each variable ({name}, {value}): export a column for each, or pivot it"
 
 
 def fits(unit: str, column: str) -> bool:

@@ -27,7 +27,9 @@ from dzdesign.identify.reading.column_labels import (
     column_of_time,
     fits,
     labelled_columns,
+    long_format,
     names_a_quantity,
+    no_flow,
     same_unit,
     split_column,
     split_label,
@@ -312,9 +314,7 @@ def _why_none(table: Table, quantity: str, candidates: list[str]) -> str:
     if currents and quantity != "time":
         declared = range_example(quantity, currents[0], _unit_of(table, currents[0]))
         why += f"; if {' or '.join(map(repr, currents))} is it, say what the current means, {declared}"
-    words = " ".join(table.labels).lower()
-    if "varname" in words and "varvalue" in words:  # an archive of WinCC
-        why += "; the table has a row for each variable (VarName, VarValue): export a column for each"
+    why += long_format(table.labels) or (no_flow(table.labels) if quantity == "Q" else "")
     return f'{why}{_or_first_column(table)}; if there is none, --sample-rate "100 Hz"' if quantity == "time" else why
 
 

@@ -6,7 +6,7 @@ A long recording is thinned: see `thinning`.
 import gzip
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +24,12 @@ from dzdesign.identify.reading.channel_clocks import lay_on_one_clock, refuse_an
 from dzdesign.identify.reading.clock import ASSUMED_MS, clock_doubt, may_count_ms, never_back, read_times_of_day
 from dzdesign.identify.reading.column_labels import PRESSURES, QUANTITY_OF_COLUMN, Column, find_columns
 from dzdesign.identify.reading.metering_edge import metering_edge, side_without_dp
-from dzdesign.identify.reading.missing_values import describe_missing, without_failed_signals, without_placeholders
+from dzdesign.identify.reading.missing_values import (
+    Missing,
+    describe_missing,
+    without_failed_signals,
+    without_placeholders,
+)
 from dzdesign.identify.reading.ramp_test import RampTest, Switch
 from dzdesign.identify.reading.scaling import Scaling, scaling_of
 from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
@@ -54,6 +59,7 @@ def read_ramp_file(
     dp: float | None = None,
     sample_rate: float | None = None,
     skip_rows: int | None = None,
+    missing: Collection[str] = (),
 ) -> RampTest:
     """Read one recording from a file.
 
@@ -73,6 +79,8 @@ def read_ramp_file(
         Samples a second of a file that has no column of time.
     skip_rows : int, optional
         Lines above the header of a file of text. None: the header is found.
+    missing : collection of str
+        Texts and numbers that stand for no value, beside those that are known.
 
     Raises
     ------
@@ -83,7 +91,9 @@ def read_ramp_file(
     check_address_space("reading recordings")
     with open_bytes(path, "ramp file") as file:
         sha256 = sha256_of_file(file)
-        recording = _read_recording(read_table(file, path, skip_rows), columns or {}, u_max, dp, sample_rate)
+        recording = _read_recording(
+            read_table(file, path, skip_rows, missing), columns or {}, u_max, dp, sample_rate, _numbers_among(missing)
+        )
     _refuse_too_few_rows(path, recording)
     thinned = thin(recording.rows)
     time, u, q, *measured = (np.array(column) for column in thinned.rows)
@@ -102,8 +112,7 @@ def read_ramp_file(
         run=thinned.run,
         clock_doubt=doubt,
         simulated=recording.simulated,
-        no_values=recording.no_values,
-        failed_signals=recording.failed_signals,
+        missing=recording.missing,
         stamp=recording.stamp,
         started=recording.stamp.seconds if recording.stamp else None,
         q_range=recording.q_range,
@@ -112,6 +121,7 @@ def read_ramp_file(
         switches=tuple(
             replace(each, changes=each.changes / (1e3 if doubt == ASSUMED_MS else 1.0)) for each in recording.switches
         ),
+        columns=recording.columns,
     )
 
 
@@ -126,8 +136,7 @@ class _Recording:
     clock: Column
     simulated: bool
     may_count_ms: bool
-    no_values: str
-    failed_signals: str
+    missing: Mapping[str, str]
     stamp: Start | None
     dp_from: tuple[tuple[DropColumns, ...], tuple[DropColumns, ...]]
     side_without_dp: str
@@ -135,6 +144,7 @@ class _Recording:
     q_range: tuple[float, float] | None
     unseen: tuple[float, float]
     switches: tuple[Switch, ...]
+    columns: Mapping[str, Column]
 
 
 def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.ndarray) -> str:
@@ -149,7 +159,7 @@ def _doubt_of_clock(path: Path, recording: _Recording, time: np.ndarray, u: np.n
 def _refuse_too_few_rows(path: Path, recording: _Recording) -> None:
     rows = recording.rows.shape[1]
     if rows < MIN_ROWS:
-        found = ", ".join(filter(None, (recording.no_values, recording.failed_signals)))
+        found = ", ".join(recording.missing.values())
         missing = f"; {found} are missing samples" if found else ""
         raise InputError(f"'{path}' has {rows} complete rows, expected at least {MIN_ROWS} of a ramp test{missing}")
 
@@ -159,7 +169,18 @@ def _is_marked(comments: str) -> bool:
     return re.search(rf'^[ \t,;"]*#[ \t"]*{SIMULATED_MARK}\b', comments, re.MULTILINE) is not None
 
 
-def read_table(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Table:
+def _numbers_among(missing: Collection[str]) -> list[float]:
+    """Return those of some texts that are numbers."""
+    numbers = []
+    for text in missing:
+        with suppress(ValueError):
+            numbers.append(float(text.replace(",", ".")))
+    return numbers
+
+
+def read_table(
+    file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
+) -> Table:
     """Read a table of any known format; its first bytes tell which, not its name.
 
     Raises
@@ -170,33 +191,42 @@ def read_table(file: BinaryIO, path: Path, skip_rows: int | None = None) -> Tabl
     start = file.read(LONGEST_MARK)
     file.seek(0)
     kind = format_of(start, path)
-    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows)
+    return read_binary_table(file, path, kind) if kind else read_text_table(file, path, skip_rows, missing)
 
 
 def _read_recording(
-    table: Table, chosen: Mapping[str, str], u_max: float, dp: float | None, sample_rate: float | None
+    table: Table,
+    chosen: Mapping[str, str],
+    u_max: float,
+    dp: float | None,
+    sample_rate: float | None,
+    no_numbers: Sequence[float],
 ) -> _Recording:
     """Return the rows of a file that lack nothing."""
     found = find_columns(table, chosen, sample_rate)
     _refuse_two_pressures(table, found, dp)
     _refuse_unequal_lengths(table, found)
     table.load([each.label for column in found.values() for each in column.every])
-    data, placeholders, failed = {}, {}, {}
+    data: dict[str, np.ndarray] = {}
+    missing: dict[str, Missing] = {}
     q_range = None
     is_clock = sample_rate is None and table.is_clock(found["time"].label)
     stamp = table.started(found["time"].label) if sample_rate is None and not is_clock else None
     for quantity, column in found.items():
         if quantity == "time" and is_clock:
             data[quantity], stamp = read_times_of_day(table, column.label)
+            missing[column.label] = table.marked.get(column.label, Missing())
             continue
         for each in column.every:
-            numbers, placeholders[each.label] = without_placeholders(
-                table.numbers(each.label), rises=quantity == "time"
+            numbers, found_numbers = without_placeholders(
+                table.numbers(each.label), rises=quantity == "time", declared=no_numbers
             )
+            missing[each.label] = table.marked.get(each.label, Missing()) + found_numbers
             unclear = quantity == "time" and not each.unit and may_count_ms(numbers)
             if not unclear:  # else the whole recording tells later what they count
                 scaling = scaling_of(table.path, quantity, each, u_max)
-                numbers, failed[each.label] = without_failed_signals(numbers, scaling)
+                numbers, failed = without_failed_signals(numbers, scaling.no_signal_below)
+                missing[each.label] += failed
                 numbers = _in_SI(table, quantity, each, numbers, scaling)
                 q_range = scaling.ends if quantity == "Q" else q_range
             data[quantity] = numbers if each is column else data[quantity] - numbers
@@ -220,8 +250,7 @@ def _read_recording(
         clock=found.get("time", DECLARED_CLOCK),
         simulated=_is_marked(table.comments),
         may_count_ms=sample_rate is None and not is_clock and may_count_ms(rows[0], longest_step=np.inf),
-        no_values=describe_missing(placeholders),
-        failed_signals=describe_missing(failed),
+        missing=describe_missing(missing),
         stamp=stamp,
         dp_from=edge.columns(labels),
         side_without_dp=side_without_dp(edge, labels, table.path, data["u"], u_max),
@@ -229,6 +258,7 @@ def _read_recording(
         q_range=q_range,
         unseen=(float(without_flow.min(initial=0.0)), float(without_flow.max(initial=0.0))),
         switches=tuple(_switches(table, found, rows[0], complete)),
+        columns={quantity: found[quantity] for quantity in ("u", "Q")},
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dzdesign.core.recorded_units import Quantity, Unit
+from dzdesign.identify.reading.column_labels import Column
 from dzdesign.identify.reading.time_stamps import Start
 from dzdesign.identify.valve.left_out import LeftOut
 from dzdesign.identify.valve.recorded_drop import DropColumns, DropSign
@@ -52,10 +53,8 @@ class RampTest:
         What is doubtful about the unit of the time, as `clock_doubt` gives it.
     simulated : bool
         True if a comment line above the labels begins with `SIMULATED_MARK`.
-    no_values : str
-        Numbers that were taken for missing samples, as `describe_missing` gives them.
-    failed_signals : str
-        Signals of failed transmitters that were, in the same words.
+    missing : mapping
+        What was taken for missing samples, by kind, as `describe_missing` gives it.
     """
 
     source: str
@@ -72,8 +71,7 @@ class RampTest:
     run: int = 1
     clock_doubt: str = ""
     simulated: bool = False
-    no_values: str = ""
-    failed_signals: str = ""
+    missing: Mapping[str, str] = field(default_factory=dict)
     #: Samples over which the command was averaged, as its column shows the dither; 0: it does not.
     dither_averaged: int = 0
     #: Peak of a square wave about the command that was not declared, V; 0: none is seen.
@@ -92,6 +90,8 @@ class RampTest:
     unseen: tuple[float, float] = (0.0, 0.0)
     #: Rows whose flow lies beyond what the meter can show, (N,) bool; None: none does.
     beyond: np.ndarray | None = None
+    #: Columns of the command and the flow as they were found, by quantity.
+    columns: Mapping[str, Column] = field(default_factory=dict)
     #: Units of the file's columns, each once; `u`, `dp` and `q` are in SI.
     units: Mapping[Quantity, tuple[Unit, ...]] = field(default_factory=dict)
 

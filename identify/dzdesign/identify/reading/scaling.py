@@ -1,6 +1,7 @@
 """From the numbers of a column to SI: by its unit, or by the range of a transmitter, ``4..20 mA = 0..50 L/min``."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -9,7 +10,7 @@ from typing import final
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.signal_ranges import SignalRange, read_signal_range
-from dzdesign.core.units import measures, si_factor
+from dzdesign.core.units import SI_UNIT, measures, si_factor
 from dzdesign.identify.reading.column_labels import (
     EXAMPLE_LABELS,
     LONGEST_NAME,
@@ -18,13 +19,15 @@ from dzdesign.identify.reading.column_labels import (
     Column,
     same_unit,
 )
+from dzdesign.identify.reading.missing_values import NO_CURRENT
 
-#: What a transmitter gives, or an amplifier takes; a range may also be of a frequency, percent or bare numbers.
+#: What a transmitter gives, or an amplifier takes; a range may be of any other unit, or of bare numbers.
 TRANSMITTED = ("current", "voltage")
 SIGNALS = (*TRANSMITTED, "frequency")
-#: A signal from the first on has no current below the second, A: a broken wire, or a channel that is off. NAMUR NE 43
-#: calls less than 3.6 mA failed, but noise about a zero of 3.6 mA, cut off on one side, would raise thresholds.
-LIVE_ZERO, NO_CURRENT = 0.004, 0.002
+#: Units of them in another case, for which no broken wire would be seen.
+MISTYPED = {"ma": "mA", "a": "A", "v": "V", "mv": "mV"}
+#: Where a signal begins that is never below it, A.
+LIVE_ZERO = 0.004
 #: Full scale in the examples of messages.
 FULL_SCALE: Mapping[str, str] = {"u": "0..10 V", "Q": "0..50 L/min"}
 
@@ -69,8 +72,8 @@ def _of_range(quantity: str, column: Column, u_max: float) -> Scaling:
     if found is None or found.meaning is None:
         raise InputError(f"'{text}' is no range, expected one such as '4..20 mA = {_full_scale(quantity)}'")
     meaning = found.meaning
-    if found.unit and found.unit not in PER_CENT and not any(measures(found.unit, kind) for kind in SIGNALS):
-        raise InputError(f"'{found.unit}' is no unit of a transmitter's signal, expected mA, A, V or mV")
+    if found.unit.lower() in MISTYPED and not any(measures(found.unit, kind) for kind in TRANSMITTED):
+        raise InputError(f"'{found.unit}' is no unit of a signal (did you mean '{MISTYPED[found.unit.lower()]}'?)")
     low, high = _ends_in_the_file(quantity, column, found)
     if low == high or meaning.bottom == meaning.top:
         raise InputError(f"the range '{text}' has no width, expected one such as '4..20 mA = 0..50 L/min'")
@@ -102,9 +105,10 @@ def _ends_in_the_file(quantity: str, column: Column, found: SignalRange) -> tupl
     stated = column.stated
     if not found.is_wired:
         of_signal = (found.unit, found.meaning.unit if found.meaning else "")
-        if any(measures(stated, kind) for kind in SIGNALS) and not any(
-            same_unit(stated, unit, quantity) for unit in of_signal
-        ):
+        kinds = [kind for kind in SI_UNIT if measures(stated, kind) and measures(found.unit, kind)]
+        is_same = [math.isclose(si_factor(stated, kind), si_factor(found.unit, kind)) for kind in kinds]
+        in_doubt = not all(is_same) if kinds else any(measures(stated, kind) for kind in SIGNALS)
+        if in_doubt and not any(same_unit(stated, unit, quantity) for unit in of_signal):
             raise InputError(
                 f"the range '{found.text}' is of a column in {found.unit or 'bare numbers'}, but the file says "
                 f"'{stated}'; write the range in {stated}, or correct the unit in the file"
@@ -138,6 +142,37 @@ def _hint(quantity: str, column: Column) -> str:
     if quantity == "time" or not any(measures(column.unit, kind) for kind in TRANSMITTED):
         return ""
     return f"; say what the signal means, {range_example(quantity, column.label, column.unit)}"
+
+
+def turned(quantity: str, column: Column, u_max: float) -> str:
+    """Return how --columns turns a command that opens the valve as it falls, or a flow of the wrong sign.
+
+    Examples
+    --------
+    >>> turned("u", Column(label="u_V", unit="V"), 10.0), turned("Q", Column(label="Q", unit="L/min"), 10.0)
+    ('u=u_V:10..0 V = 0..10 V', 'Q=Q:0..-1 L/min = 0..1 L/min')
+    >>> turned("Q", Column(label="I", unit="4..20 mA = 0..50 L/min"), 10.0)
+    'Q=I:4..20 mA = 0..-50 L/min'
+    """
+    unit, end = column.unit, "1"
+    if "=" in unit:
+        signal, _, meaning = (part.strip() for part in unit.partition("="))
+        if quantity == "u":
+            signal = re.sub(r"^(\S+?)\s*\.\.\s*([-+]?[\d.,]*\d)", r"\2..\1", signal)
+        else:
+            ends, _, last = meaning.rpartition("..")
+            ends = ends or "0"
+            first, last = (re.sub(r"^([-+]?)(?=0*[1-9.,])", _negated, each.strip()) for each in (ends, last))
+            meaning = f"{first}..{last}"
+        return f"{quantity}={column.label}:{signal} = {meaning}"
+    if quantity == "u":
+        end = "100" if unit.lower() in PER_CENT else f"{u_max / si_factor(unit, 'voltage'):g}"
+        return f"u={column.label}:{end}..0 {unit} = 0..{end} {unit}"
+    return f"{quantity}={column.label}:0..-1 {unit} = 0..1 {unit}"
+
+
+def _negated(sign: re.Match[str]) -> str:
+    return "" if sign[1] == "-" else "-"
 
 
 def range_example(quantity: str, label: str, unit: str) -> str:

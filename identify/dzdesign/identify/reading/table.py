@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.core.errors import InputError, nearest, one_line
+from dzdesign.identify.reading.missing_values import Missing
 from dzdesign.identify.reading.time_stamps import Start
 
 #: Characters of a cell, and columns of a file, that a message quotes.
@@ -69,6 +70,8 @@ class Table(ABC):
     units: Mapping[str, str] = field(default_factory=dict)
     comments: str = ""
     clocks: Mapping[str, str] = field(default_factory=dict)
+    #: Of columns that were read: what stood there for no value.
+    marked: dict[str, Missing] = field(default_factory=dict)
 
     @abstractmethod
     def load(self, labels: Collection[str]) -> None:

@@ -1,8 +1,9 @@
-"""Dates and times of day in a column of text, as seconds since the first row.
+"""Dates, times of day and durations in a column of text, as seconds since the first row.
 
 ``2026-11-22T03:04:05.123+01:00``, ``22.11.2026 03:04:05,123``, ``11/22/2026 03:04:05:123``, ``3:04:05.1 PM``,
-``03:04:05``; an apostrophe before it, by which loggers keep a spreadsheet from reading it, counts for nothing. Which
-part of a date is the day and which the month matters only where a recording goes over midnight.
+``03:04:05``, ``22-Nov-2026 03:04:05``, ``20261122T030405``, ``DT#2026-11-22-03:04:05``; ``0.020 sec``, ``T#1s20ms``,
+``0 days 00:00:00.02``. An apostrophe before it, by which loggers keep a spreadsheet from reading it, counts for
+nothing. Which part of a date is the day and which the month matters only where a recording goes over midnight.
 """
 
 import datetime
@@ -17,16 +18,47 @@ from dzdesign.core.errors import InputError
 if TYPE_CHECKING:
     import polars as pl
 
-#: A stamp: date (may lack), hours, minutes, seconds with their fraction, half of the day, zone.
+#: How the names of months begin in English, German, French, Spanish, Italian, Portuguese and Dutch.
+MONTHS = {
+    **dict.fromkeys(("jan", "ene", "gen"), 1), **dict.fromkeys(("feb", "fév", "fev"), 2),
+    **dict.fromkeys(("mar", "mär", "mrz", "mrt"), 3), **dict.fromkeys(("apr", "avr", "abr"), 4),
+    **dict.fromkeys(("may", "mai", "mag", "mei"), 5), **dict.fromkeys(("jun", "juin", "giu"), 6),
+    **dict.fromkeys(("jul", "juil", "lug"), 7), **dict.fromkeys(("aug", "aoû", "aou", "ago"), 8),
+    **dict.fromkeys(("sep", "set"), 9), **dict.fromkeys(("oct", "okt", "ott", "out"), 10), "nov": 11,
+    **dict.fromkeys(("dec", "dez", "déc", "dic"), 12),
+}  # fmt: skip
+MONTH = rf"(?i:{'|'.join(MONTHS)})[^\W\d_]{{0,7}}\.?"
+NAMED_DATE = rf"\d{{1,4}}\.?[-/ ]?{MONTH}[-/ ,]\s?\d{{1,4}}|{MONTH}[-/ ]\d{{1,2}}[-/ ,]\s?\d{{4}}"
+#: Other spellings of a stamp, and the usual one: of IEC 61131, and with no mark between the parts.
+SPELLINGS = (
+    (r"^(?:'|(?i:L?DT|L?DATE_AND_TIME|L?TOD|L?TIME_OF_DAY)#)", ""),
+    (r"^(\d{4}-\d{1,2}-\d{1,2})-(\d)", "${1} ${2}"),
+    (r"^((?:19|20)\d\d)(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])[T _-]?([01]\d|2[0-3])([0-5]\d)([0-5]\d)",
+     "${1}-${2}-${3} ${4}:${5}:${6}"),
+)  # fmt: skip
+#: A stamp: days or a date (both may lack), hours, minutes, seconds with their fraction, half of the day, zone.
 STAMP = (
-    r"^'?(?:(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T ,]\s?)?(\d{1,3}):([0-5]?\d):([0-6]?\d(?:[.,:]\d{1,9})?)"
+    rf"^(?:(-?\d{{1,4}}) days?,? \+?|(\d{{1,4}}[-./]\d{{1,2}}[-./]\d{{1,4}}|{NAMED_DATE})[T ,]\s?)?"
+    r"(\d{1,3}):([0-5]?\d):([0-6]?\d(?:[.,:]\d{1,9})?)"
     r"(?:\s?([AaPp])\.?[Mm]\.?)?\s?(Z|UTC|[-+]\d\d:?\d\d)?$"
+)
+#: Units of a duration, in s: as IEC 61131 writes several in one (``T#1m2s``), or one with a blank before it (MATLAB).
+_PART = r"\d+(?:[.,]\d+)?\s?"
+DURATION_UNITS = {
+    "d|days?": 86_400.0, "h|hrs?|hours?": 3600.0, "m|mins?|minutes?": 60.0, "s|secs?|seconds?": 1.0, "ms": 1e-3,
+    "us|µs|μs": 1e-6, "ns": 1e-9,
+}  # fmt: skip
+DURATION = (
+    rf"^(?i:L?T(?:IME)?#-?(?:{_PART}(?:d|h|m|s|ms|us|ns)_?)+"
+    rf"|-?{_PART}(?:days|hrs?|min|secs?|s|ms|us|µs|μs|ns))$"
 )
 #: What looks like one and lacks seconds or the time: which of the two numbers are minutes can't be told.
 UNCLEAR = re.compile(r"\d{1,3}:[0-5]?\d(?:[.,]\d+)?|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ]\d{1,2}:\d\d)?")
-#: A date with its year first or last, and what begins as one.
+#: A date with its year first or last.
 DATE = re.compile(r"'?(?:\d{4}[-./]\d{1,2}[-./]\d{1,2}|\d{1,2}[-./]\d{1,2}[-./](?:\d{4}|\d{2}))")
-START_OF_DATE = re.compile(r"'?\d{1,4}[-./]")
+#: What may be a date or a time, in whatever form; what a spreadsheet makes of a number such as 5.3: 05. Mrz, Mar-05.
+LIKE_A_DATE = re.compile(rf"\d[-/.:]\d+[-/.:]\d|\d\W{{0,3}}{MONTH}|{MONTH}\W{{0,3}}\d|\d\s?[年月日時]")
+DATE_OF_A_NUMBER = re.compile(rf"\d{{1,2}}\W{{1,2}}{MONTH}|{MONTH}\W{{1,2}}\d{{1,2}}")
 LONGEST_STAMP = 48
 DAY = 86_400.0
 #: A time of day that goes back by more than this is one of the next day, s.
@@ -46,14 +78,16 @@ class Start:
 
 
 def is_stamp(cell: str) -> bool:
-    """Tell whether a cell holds a time of day, with a date or without.
+    """Tell whether a cell holds a time of day, with a date or without, or a duration with its unit.
 
     Examples
     --------
     >>> is_stamp("22.11.2026 03:04:05,123"), is_stamp("03:04:05"), is_stamp("03:04"), is_stamp("3.04")
     (True, True, False, False)
+    >>> is_stamp("03-Feb-2026 08:00:00"), is_stamp("20260203T080000"), is_stamp("T#1s20ms"), is_stamp("0.020 sec")
+    (True, True, True, True)
     """
-    return len(cell) <= LONGEST_STAMP and re.match(STAMP, cell) is not None
+    return len(cell) <= LONGEST_STAMP and (_parts(cell) is not None or re.match(DURATION, cell) is not None)
 
 
 def is_time_of_day(cell: str) -> bool:
@@ -64,7 +98,15 @@ def is_time_of_day(cell: str) -> bool:
     >>> is_time_of_day("03:04:05,123"), is_time_of_day("22.11.2026 03:04:05,123")
     (True, False)
     """
-    return is_stamp(cell) and START_OF_DATE.match(cell) is None
+    parts = _parts(cell) if len(cell) <= LONGEST_STAMP else None
+    return parts is not None and parts[1] is None and parts[2] is None
+
+
+def _parts(cell: str) -> re.Match[str] | None:
+    """Return the parts of a stamp, however it is spelled."""
+    for pattern, usual in SPELLINGS:
+        cell = re.sub(pattern, re.sub(r"\$\{(\d)\}", r"\\g<\1>", usual), cell)
+    return re.match(STAMP, cell)
 
 
 def is_date(cell: str) -> bool:
@@ -93,8 +135,11 @@ def seconds_of_stamps(cells: "pl.Series", where: str) -> np.ndarray:
     """
     import polars as pl
 
-    parts = cells.str.extract_groups(STAMP).struct.unnest()
-    date, hour, minute, second, half, zone = (parts.to_series(index) for index in range(6))
+    plain = cells
+    for pattern, usual in SPELLINGS:
+        plain = plain.str.replace(pattern, usual)
+    parts = plain.str.extract_groups(STAMP).struct.unnest()
+    days, date, hour, minute, second, half, zone = (parts.to_series(index) for index in range(7))
     number = pl.Float64
     hours = hour.cast(number, strict=False)
     if half.null_count() < half.len():  # 12 AM is midnight, 12 PM noon
@@ -102,13 +147,15 @@ def seconds_of_stamps(cells: "pl.Series", where: str) -> np.ndarray:
         hours = (hours % 12) + 12.0 * afternoon.cast(number).fill_null(0.0)
     point = second.str.replace(r"[,:]", ".").cast(number, strict=False)
     of_day = 3600.0 * hours + 60.0 * minute.cast(number, strict=False) + point
-    seconds: np.ndarray = of_day.fill_null(np.nan).to_numpy()
+    seconds: np.ndarray = (of_day + DAY * days.cast(number, strict=False).fill_null(0.0)).fill_null(np.nan).to_numpy()
     if zone.null_count() < zone.len():
         seconds = seconds - _replaced(zone, {text: _zone(text) for text in _different(zone)})
     if date.null_count() < date.len():
         seconds = seconds + _replaced(date, _days_since_the_first(_different(date), where))
     else:
         seconds = _over_midnight(seconds)
+    if np.isnan(seconds).any():
+        seconds = np.where(np.isnan(seconds), _durations(cells), seconds)
     known = seconds[np.isfinite(seconds)]
     return seconds - known[0] if known.size else seconds
 
@@ -121,14 +168,27 @@ def start_of(cell: str) -> Start | None:
     >>> start_of("2026-11-22 03:04:05").seconds - start_of("22.11.2026 03:04:04,5").seconds, start_of("03:04:05")
     (0.5, None)
     """
-    found = re.match(STAMP, cell)
-    days = set(_days(found[1]).values()) if found and found[1] else set()
+    found = _parts(cell) if len(cell) <= LONGEST_STAMP else None
+    days = set(_days(found[2]).values()) if found and found[2] else set()
     if found is None or len(days) != 1:
         return None
-    _, hour, minute, second, half, zone = found.groups()
+    _, _, hour, minute, second, half, zone = found.groups()
     hours = int(hour) % 12 + 12 * (half in ("P", "p")) if half else int(hour)
     of_day = 3600.0 * hours + 60.0 * int(minute) + float(re.sub("[,:]", ".", second))
     return Start(DAY * days.pop() + of_day - (_zone(zone) if zone else 0.0), has_zone=bool(zone))
+
+
+def _durations(cells: "pl.Series") -> np.ndarray:
+    """Return durations with their units in s; NaN where a cell is none."""
+    import polars as pl
+
+    texts = cells.str.to_lowercase()
+    seconds = np.zeros(texts.len())
+    for units, factor in DURATION_UNITS.items():
+        part = texts.str.extract(rf"(\d+(?:[.,]\d+)?)\s?(?:{units})(?:[^a-z]|$)").str.replace(",", ".")
+        seconds += factor * part.cast(pl.Float64, strict=False).fill_null(0.0).to_numpy()
+    sign = np.where(texts.str.contains("^(?:[a-z]+#)?-").fill_null(False).to_numpy(), -1.0, 1.0)
+    return np.where(cells.str.contains(DURATION).fill_null(False).to_numpy(), sign * seconds, np.nan)
 
 
 def _different(texts: "pl.Series") -> list[str]:
@@ -179,9 +239,14 @@ def _alike(one: str, other: str) -> list[tuple[int, int]]:
 
 def _days(date: str) -> dict[str, int]:
     """Return order of day, month and year -> days, for each order that a date can be read in."""
-    numbers = [int(part) for part in re.split(r"[-./]", date)]
-    if len(date.split(".")) == 3 and numbers[0] <= 31:
-        orders: tuple[str, ...] = ("dmy",) if numbers[2] > 31 else ("dmy", "ymd")
+    numbers = [int(part) for part in re.findall(r"\d+", date)]
+    month = re.search(MONTH, date)
+    if month:
+        of_name = MONTHS[max((name for name in MONTHS if month[0].lower().startswith(name)), key=len)]
+        numbers.insert(0 if month.start() == 0 else 1, of_name)
+        orders: tuple[str, ...] = ("mdy",) if month.start() == 0 else ("ymd",) if numbers[0] > 31 else ("dmy",)
+    elif len(date.split(".")) == 3 and numbers[0] <= 31:
+        orders = ("dmy",) if numbers[2] > 31 else ("dmy", "ymd")
     elif numbers[0] > 31:
         orders = ("ymd",)
     elif numbers[2] > 31:

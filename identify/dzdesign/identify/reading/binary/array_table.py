@@ -9,7 +9,7 @@ from typing import BinaryIO, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
-from dzdesign.identify.reading.binary.file_format import FileFormat
+from dzdesign.identify.reading.binary.file_format import NO_NUMBERS_UNIT, FileFormat
 from dzdesign.identify.reading.binary.reader_process import list_columns, read_columns
 from dzdesign.identify.reading.binary.reader_server import ListedColumn
 from dzdesign.identify.reading.table import Table, numbered
@@ -59,6 +59,10 @@ class ArrayTable(Table):
     def started(self, label: str) -> Start | None:
         """Return the date and time at which a column of time counts zero, where the file states them."""
         return start_of(self.columns[label][1].start)
+
+    def found_labels(self) -> str:
+        """Return the labels for a message, and what to do about what could not be read."""
+        return Table.found_labels(self) + (self.file_format.hint if NO_NUMBERS_UNIT in self.units.values() else "")
 
     def place(self, row: int) -> str:
         """Return ``sample 8``: such files have no rows that an editor would count."""

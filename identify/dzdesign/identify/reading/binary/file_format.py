@@ -14,6 +14,8 @@ UNIT_PROPERTIES = ("unit_string", "unit", "units", "Unit", "Units", "NI_UnitDesc
 FIRST_LOGGER = np.datetime64("1980-01-02", "us")
 #: A matrix has at most this many columns, or rows: its longer side is time.
 MOST_COLUMNS = 256
+#: Stands for the unit of what a file holds beside its columns, and can't be read, such as a table of MATLAB.
+NO_NUMBERS_UNIT = "no numbers"
 #: Kinds of NumPy's types that are columns: numbers, texts, objects and times; and those of them that are numbers.
 COLUMN_KINDS, NUMBER_KINDS = "fiubSUOMm", "fiub"
 
@@ -67,7 +69,7 @@ class FileFormat:
     suffix : str
         Of the file's name, lower case, for a format without a mark.
     hint : str
-        What to do about a file that holds no columns of numbers, as the rest of a sentence.
+        What to do about a file that holds no columns of numbers, or other things too, as the rest of a sentence.
     """
 
     name: str

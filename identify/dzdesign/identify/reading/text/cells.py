@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.missing_values import is_no_value
 from dzdesign.identify.reading.table import clean_label
 from dzdesign.identify.reading.text.decimal_marks import BETWEEN_THOUSANDS
 from dzdesign.identify.reading.time_stamps import is_stamp, is_unclear
@@ -13,8 +14,7 @@ from dzdesign.identify.reading.time_stamps import is_stamp, is_unclear
 BLANKS = " "
 #: A number with any decimal mark, or with blanks or the like between thousands.
 NUMBER = re.compile(
-    rf"[-+\u2212]?\s?(?:\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:[.,]\d*)?|[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?)"
-    r"|nan|[-+]?inf(?:inity)?|[-+]?∞",
+    rf"[-+\u2212]?\s?(?:\d{{1,3}}(?:[{BETWEEN_THOUSANDS}]\d{{3}})+(?:[.,]\d*)?|[\d.,]*\d[.,]?(?:[eE][-+]?\d+)?)|nan",
     re.IGNORECASE,
 )
 
@@ -40,6 +40,11 @@ def _words(line: str) -> list[str]:
 def is_number(cell: str) -> bool:
     """Tell whether a cell is a number, with any decimal mark, a date or a time of day."""
     return NUMBER.fullmatch(cell) is not None or is_stamp(cell) or is_unclear(cell)
+
+
+def is_value(cell: str) -> bool:
+    """Tell whether a cell is a number, or what stands for none."""
+    return is_number(cell) or is_no_value(cell)
 
 
 def labels_of(header: str, separator: str, number: int, path: Path) -> list[str]:

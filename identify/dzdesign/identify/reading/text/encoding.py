@@ -22,10 +22,32 @@ LARGEST_TEXT, PIECE_BYTES = 1 << 32, 1 << 23
 #: A gzip file that holds more than this many times its bytes, and `FREE_BYTES`, is made to fill a memory or a day:
 #: of a recording, whose clock runs and whose meter is noisy, some five to fifteen times are usual.
 LARGEST_RATIO, FREE_BYTES = 64, 1 << 26
+#: Bytes at the beginning of a file that tell what it is.
+LONGEST_MARK = 512
 #: Bytes that no text in Windows-1252 has: control codes, and the five that it leaves open.
 NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x19\x1b\x7f\x81\x8d\x8f\x90\x9d]")
-#: First bytes of what a spreadsheet program saves, and what it is.
-WORKBOOKS = {b"PK": "an Excel workbook (xlsx) or a zip archive", b"\xd0\xcf\x11\xe0": "an Excel workbook (xls)"}
+#: Ways out of a file that is no table of text.
+FROM_A_SPREADSHEET = "in the spreadsheet program, save the sheet of the recording by 'Save as', 'CSV UTF-8'"
+FROM_ITS_PROGRAM = "export it from the program that recorded it as CSV or MATLAB"
+UNPACK = "unpack it, and give the recording that is in it"
+#: What is often given in place of a table, by the end of its name where it is no text, or by its first bytes, and the
+#: way out. A zip archive tells what it is by the name of its first file.
+NO_TABLES = (
+    (rb"\.(?:dxd|dxz|d7d)", "a DEWESoft recording", "export it from DEWESoft as MATLAB, HDF5 or CSV"),
+    (rb"\.(?:psdata|wfm|trc|wdf)", "a recording of an oscilloscope", FROM_ITS_PROGRAM),
+    (rb"PK\x03\x04.{26,80}?(?:\[Content_Types\]|xl/|_rels)", "an Excel workbook (xlsx)", FROM_A_SPREADSHEET),
+    (rb"PK\x03\x04.{26,80}?opendocument", "a workbook (ods)", FROM_A_SPREADSHEET),
+    (rb"PK\x03\x04.{26,80}?\.npy", "a NumPy archive (npz)", "save its arrays by scipy.io.savemat, or as CSV"),
+    (rb"PK[\x03\x05][\x04\x06]", "a zip archive", UNPACK),
+    (rb"7z\xbc\xaf|Rar!\x1a|BZh[1-9]1AY|\xfd7zXZ|\x28\xb5\x2f\xfd", "a packed archive", UNPACK),
+    (rb"\xd0\xcf\x11\xe0", "an Excel workbook (xls)", FROM_A_SPREADSHEET),
+    (rb"MDF     |UnFinMF ", "an MDF recording (mf4, mdf)", "save it as MATLAB or CSV, for example by asammdf"),
+    (rb"LOGG.\0\0\0", "a BLF log of a CAN bus", "export its decoded signals as CSV or MATLAB"),
+    (rb"\|CF,[12],", "an imc recording", FROM_ITS_PROGRAM),
+    (rb"SQLite format 3\0", "an SQLite database", "export the table of the recording as CSV"),
+    (rb"\x93NUMPY", "a NumPy array (npy)", "save it by numpy.savetxt with a header of labels"),
+    (rb"%PDF-", "a PDF document", FROM_ITS_PROGRAM),
+)
 SAVE_AS_CSV = "; save it again as 'CSV UTF-8'"
 
 logger = logging.getLogger(__name__)
@@ -40,7 +62,7 @@ def read_text(file: BinaryIO, path: Path) -> bytes:
         If it is no text, or too much of it.
     """
     data = _unpacked(file, path)
-    _refuse_a_workbook(data, path)
+    _refuse_no_table(data, path)
     text = _in_utf_8(data, path)
     if b"\0" in text:
         raise InputError(
@@ -80,13 +102,14 @@ def _unpacked(file: BinaryIO, path: Path) -> bytes:
     return out.getvalue()
 
 
-def _refuse_a_workbook(data: bytes, path: Path) -> None:
-    for mark, name in WORKBOOKS.items():
-        if data.startswith(mark):
-            raise InputError(
-                f"'{path}' is {name}; in the spreadsheet program, save the sheet of the recording by 'Save as', 'CSV "
-                "UTF-8', and give that file"
-            )
+def _refuse_no_table(data: bytes, path: Path) -> None:
+    """Refuse a file whose first bytes, or whose name where they hold what no text does, say what it is."""
+    start, name = data[:LONGEST_MARK], path.suffix.lower().encode(errors="replace")
+    is_text = NO_TEXT.search(start) is None or start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    for mark, what, way_out in NO_TABLES:
+        by_name = mark.startswith(rb"\.") and not is_text and re.fullmatch(mark, name)
+        if by_name or re.match(mark, start, re.DOTALL):
+            raise InputError(f"'{path}' is {what}; {way_out}")
 
 
 def _in_utf_8(data: bytes, path: Path) -> bytes:

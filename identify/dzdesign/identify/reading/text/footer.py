@@ -8,7 +8,7 @@ from typing import final
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label
-from dzdesign.identify.reading.text.cells import is_number
+from dzdesign.identify.reading.text.cells import is_number, is_value
 from dzdesign.identify.reading.text.header import Header
 from dzdesign.identify.reading.text.header_search import MOST_LINES
 
@@ -20,6 +20,8 @@ STATISTIC = re.compile(
     r"|rms|eff(?:ektiv)?wert|sum|summe|count|anzahl",
     re.IGNORECASE,
 )
+#: What a logger draws below a table, where nothing else stands in the row.
+RULE = re.compile(r"[-*=_\u2013\u2014]{2,}")
 logger = logging.getLogger(__name__)
 
 
@@ -32,7 +34,7 @@ def is_no_sample(cells: Sequence[str]) -> bool:
     (True, True, False)
     """
     first = clean_label(cells[0])
-    if not first or is_number(first):
+    if not first or (is_value(first) and not RULE.fullmatch(first)):
         return False
     return not any(map(clean_label, cells[1:])) or _is_statistic(first)
 

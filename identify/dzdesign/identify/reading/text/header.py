@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import final
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.missing_values import OF_A_SPREADSHEET
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS, clean_label, numbered
 from dzdesign.identify.reading.text.cells import BLANKS, cells_of, is_number, labels_of
 from dzdesign.identify.reading.text.header_search import (
@@ -29,12 +30,11 @@ from dzdesign.identify.reading.text.header_search import (
 MOST_BROKEN = 40
 #: Rows below the header, without any number, that say the columns' types and units.
 MOST_BELOW = 4
+#: How a comment begins, and what names the separator to a spreadsheet. A cell without a value is no comment.
+COMMENT_LINE = re.compile(rf'[ \t"]*(?:#(?!{OF_A_SPREADSHEET[1:]} *(?:[,;\t|"]|$))|[sS][eE][pP]=.?"?$)')
+COMMENTS = re.compile(rb"^(?:%b)" % COMMENT_LINE.pattern.encode(), re.MULTILINE)
 #: A line that is neither a comment nor blank; what a spreadsheet makes of either has quotes or separators.
-TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?![ \t"]*#).+', re.MULTILINE)
-#: What a spreadsheet writes where it has no value, in English and German: a blank cell, and no comment.
-NO_VALUE = re.compile(
-    rb'(^|[,;\t|"]) *#(?:N/A|NV|(?:DIV/0|VALUE|WERT|REF|BEZUG|NUM|ZAHL|NULL)!|NAME\?)(?= *(?:[,;\t|"]|$))', re.MULTILINE
-)
+TABLE_LINE = re.compile(rb'^(?![ \t,;"]*$)(?!%b).+' % COMMENT_LINE.pattern.encode(), re.MULTILINE)
 #: An artefact of dzdesign begins with its schema.
 ARTEFACT = re.compile(rb'\s*\{\s*"(?:[^"{}]*"\s*:\s*"[^"]*",?\s*")*?schema"\s*:\s*"(dzdesign\.[\w.-]+/\d+)"')
 #: First characters of text that is not a table.

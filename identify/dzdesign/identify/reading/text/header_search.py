@@ -12,7 +12,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.units import measures
 from dzdesign.identify.reading.column_labels import QUANTITIES, names_a_quantity, split_label
 from dzdesign.identify.reading.table import QUOTED_CHARACTERS
-from dzdesign.identify.reading.text.cells import BLANKS, cells_of, is_number
+from dzdesign.identify.reading.text.cells import BLANKS, cells_of, is_number, is_value
 
 #: A recording has some ten columns; a header beyond this is not a table, and would take minutes to be searched.
 MOST_COLUMNS, LONGEST_HEADER = 4096, 1 << 20
@@ -86,7 +86,7 @@ def _first_row(lines: list[Line], separator: str) -> int | None:
 def is_row_of_numbers(cells: list[str]) -> bool:
     """Tell whether cells are a row of samples: mostly numbers, the first one too."""
     filled = [cell for cell in cells if cell]
-    numbers = sum(map(is_number, filled))
+    numbers = sum(map(is_value, filled))
     return numbers >= 2 and is_number(filled[0]) and numbers >= SHARE_OF_NUMBERS * len(filled)
 
 

@@ -4,7 +4,7 @@ Rows that all look alike are taken as they are; where one does not, each line of
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -15,7 +15,7 @@ from dzdesign.identify.reading.text.cells import BLANKS, split_line
 from dzdesign.identify.reading.text.decimal_marks import DecimalMarks
 from dzdesign.identify.reading.text.encoding import read_text
 from dzdesign.identify.reading.text.footer import Footer, is_no_sample
-from dzdesign.identify.reading.text.header import NO_VALUE, TABLE_LINE, Header, find_header
+from dzdesign.identify.reading.text.header import COMMENT_LINE, COMMENTS, TABLE_LINE, Header, find_header
 from dzdesign.identify.reading.text.header_search import LONGEST_HEADER, LONGEST_LINE
 from dzdesign.identify.reading.text.logger_blocks import with_stated_times, without_blocks
 from dzdesign.identify.reading.text.text_table import TextTable
@@ -32,7 +32,9 @@ PIECE_BYTES = 1 << 23
 logger = logging.getLogger(__name__)
 
 
-def read_text_table(file: BinaryIO, path: Path, skip_rows: int | None = None) -> TextTable:
+def read_text_table(
+    file: BinaryIO, path: Path, skip_rows: int | None = None, missing: Collection[str] = ()
+) -> TextTable:
     """Read a table of text.
 
     Parameters
@@ -45,6 +47,8 @@ def read_text_table(file: BinaryIO, path: Path, skip_rows: int | None = None) ->
         For messages.
     skip_rows : int, optional
         Lines of the file that stand above the header. None: the header is found.
+    missing : collection of str
+        What stands for no value, beside what `missing_values` knows.
 
     Raises
     ------
@@ -66,8 +70,6 @@ def read_text_table(file: BinaryIO, path: Path, skip_rows: int | None = None) ->
     above, rows = text[:start], text[start : _end_of_samples(text)]
     del text  # it is in memory once
     number += above.count(b"\n")
-    if b"#" in rows and header.separator != BLANKS:
-        rows = NO_VALUE.sub(rb"\1", rows)
     rows, separator, lines = _rows_alike(rows, number, header, path)
     table = TextTable(
         path=path,
@@ -79,6 +81,7 @@ def read_text_table(file: BinaryIO, path: Path, skip_rows: int | None = None) ->
         header_line=header.line,
         lines=lines,
         marks=DecimalMarks(path),
+        missing=missing,
     )
     return with_stated_times(table, segments)
 
@@ -173,7 +176,9 @@ def _pieces(rows: bytes) -> Iterator[bytes]:
 def _are_alike(rows: bytes, header: Header) -> bool:
     """Tell whether rows are nothing but samples, in which a separator is no part of a cell, and have one width."""
     separator, width = header.separator, len(header.labels)
-    if separator == BLANKS or width < 2 or b"#" in rows or b'"' in rows or _has_other_lines(rows, header):
+    if separator == BLANKS or width < 2 or b'"' in rows or _has_other_lines(rows, header):
+        return False
+    if b"#" in rows and COMMENTS.search(rows):
         return False
     rows = rows.removesuffix(b"\n")
     if not rows or rows.endswith(b"\n"):
@@ -204,7 +209,7 @@ def _table_lines(text: str, first: int, header: Header) -> Lines:
     return [
         (number, line)
         for number, line in enumerate(text.split("\n"), start=first)
-        if line.strip(' \t,;"') and not line.lstrip(' \t"').startswith("#") and line not in header.repeats
+        if line.strip(' \t,;"') and not COMMENT_LINE.match(line) and line not in header.repeats
     ]
 
 

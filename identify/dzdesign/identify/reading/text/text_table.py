@@ -10,10 +10,14 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from dzdesign.core.errors import InputError
+from dzdesign.identify.reading.missing_values import NO_VALUE, without_markers
 from dzdesign.identify.reading.table import AND, QUOTED_CHARACTERS, Table
+from dzdesign.identify.reading.text.cells import is_number
 from dzdesign.identify.reading.text.decimal_marks import BETWEEN_THOUSANDS, FEW_ROWS, DecimalMarks
 from dzdesign.identify.reading.time_stamps import (
+    DATE_OF_A_NUMBER,
     EXAMPLE,
+    LIKE_A_DATE,
     Start,
     is_date,
     is_stamp,
@@ -30,6 +34,8 @@ if TYPE_CHECKING:
 DATE_LABEL = re.compile(r"(?:log|mess|test)?[ _-]?(?:date|datum)|day|tag|fecha|data", re.IGNORECASE)
 #: A cell with a date.
 DATE = re.compile(r"\d[-/.:]\d+[-/.:]\d")
+#: A number with its unit.
+WITH_UNIT = re.compile(r"[-+]?[\d.,]*\d(?:[eE][-+]?\d+)?\s?((?![eE]$)[^\W\d_][^\s\d]{0,9}|%)")
 #: A cell whose column most likely holds nothing but numbers.
 NUMBER = re.compile(r"\s*[-+]?[\d.]+([eE][-+]?\d+)?")
 
@@ -58,6 +64,8 @@ class TextTable(Table):
         Label of a column of time -> date and time at which it counts zero, where a header states it.
     width : int
         Cells of a row; 0 for as many as there are labels.
+    missing : collection of str
+        What stands for no value by the engineer's word.
     """
 
     rows: bytes
@@ -68,6 +76,7 @@ class TextTable(Table):
     computed: Mapping[str, np.ndarray] = field(default_factory=dict)
     starts: Mapping[str, str] = field(default_factory=dict)
     width: int = 0
+    missing: Collection[str] = ()
     _loaded: "dict[str, pl.Series]" = field(default_factory=dict)
 
     @property
@@ -119,7 +128,11 @@ class TextTable(Table):
             read = np.asarray(loaded.fill_null(np.nan).to_numpy())
             self.marks.check_points(label, read, partial(self._texts, label), self.place)
             return read
-        texts = self._texts(label)
+        texts, self.marked[label] = without_markers(self._texts(label), self.missing)
+        # Before anything is said of its decimal mark: 05. Mrz, 5.0 mV.
+        strange = (texts.str.contains(r"[\p{L}--[eE]]") & ~texts.str.contains("(?i)^[-+]?nan$")).fill_null(False)
+        if len(row := strange.arg_true().head(1)):
+            raise self._no_number(label, int(row[0]), texts[int(row[0])])
         column = self.marks.with_points(label, texts, self.place)
         numbers = column.cast(pl.Float64, strict=False)
         filled = ~(column.is_null() | (column == ""))
@@ -145,6 +158,11 @@ class TextTable(Table):
             raise InputError(
                 f"'{self.path}' column '{label}': '{cell}' is ambiguous, as it may be hours and minutes, minutes and "
                 f"seconds, or a date; expected seconds as a number, or a time such as {EXAMPLE}"
+            )
+        if not is_number(cell) and LIKE_A_DATE.search(cell):
+            raise InputError(
+                f"'{self.path}' column '{label}': '{cell[:QUOTED_CHARACTERS]}' looks like a date or time, in a form "
+                f"that is not read; export it such as {EXAMPLE}, or as seconds"
             )
         return is_stamp(cell)
 
@@ -188,7 +206,7 @@ class TextTable(Table):
 
     def seconds(self, label: str) -> np.ndarray:
         """Return a column of dates or times of day as seconds since the first row of the file."""
-        texts = self._texts(label)
+        texts, self.marked[label] = without_markers(self._texts(label), self.missing)
         seconds = seconds_of_stamps(texts, f"'{self.path}' column '{label}'")
         bad = np.flatnonzero((~(texts.is_null() | (texts == ""))).to_numpy() & np.isnan(seconds))
         if bad.size:
@@ -241,11 +259,19 @@ class TextTable(Table):
         return {label: frame[f"c{self.labels.index(label)}"] for label in types}
 
     def _no_number(self, label: str, row: int, cell: str) -> InputError:
-        date = f" (a column of the time may hold stamps such as {EXAMPLE})" if DATE.search(cell) else ""
-        return InputError(
-            f"'{self.path}' {self.place(row)}, column '{label}': '{cell[:QUOTED_CHARACTERS]}' is not a "
-            f"number{date}; correct it, or leave the cell blank if the sample is missing"
-        )
+        what = "is not a number"
+        advice = "correct it; if it stands for no value, leave the cell blank, or name it by --missing"
+        unit = WITH_UNIT.fullmatch(cell)
+        if DATE_OF_A_NUMBER.fullmatch(cell):
+            what = "is a date, which a spreadsheet makes of numbers such as 5.3"
+            advice = "export the recording again, and do not save it in the spreadsheet"
+        elif unit:
+            what = f"has its unit in the cell, '{unit[1]}'"
+            advice = "write plain numbers, all in one unit that the label or --columns says"
+        elif DATE.search(cell):
+            what += f" (a column of the time may hold stamps such as {EXAMPLE})"
+        place = f"'{self.path}' {self.place(row)}, column '{label}'"
+        return InputError(f"{place}: '{cell[:QUOTED_CHARACTERS]}' {what}; {advice}")
 
 
 def _cells(texts: "pl.Series") -> "pl.Series":
@@ -254,8 +280,8 @@ def _cells(texts: "pl.Series") -> "pl.Series":
 
 
 def _first_filled(texts: "pl.Series") -> str:
-    """Return the first text that is not blank."""
-    filled = texts.filter(texts.is_not_null() & (texts != ""))
+    """Return the first text that is not blank, nor stands for no value."""
+    filled = texts.filter(texts.is_not_null() & (texts != "") & ~texts.str.contains(NO_VALUE))
     return str(filled[0]) if len(filled) else ""
 
 
