@@ -412,7 +412,7 @@ CELLS = {
     "missing-undeclared": Form(write=one(with_marker("kaputt"), pressures=(3.0,)), refused=("kaputt", "--missing")),
     **{f"time-{name}": Form(write=one(lambda bench, spell=spell: stamped(bench, spell), pressures=(3.0,)))
        for name, spell in SPELLINGS.items()},
-    "clock-set-back": Form(write=one(lambda bench: stamped(bench, set_back)), refused=("r1_0.csv", "summer time")),
+    "clock-set-back": Form(write=one(lambda bench: stamped(bench, set_back)), refused=("r1_0.csv", "daylight saving")),
     "excel-dates": Form(write=one(excel_dates), refused=("r1_0.csv", "Q_Lmin", "date")),
     "long-format": Form(write=one(long_format), refused=("r1_0.csv",)),
     "units-in-cells": Form(write=one(mixed_units), refused=("r1_0.csv", "Q_Lmin")),

@@ -73,8 +73,7 @@ def _left_out_lines(valve: "ValveModel") -> list[str]:
             most = max(_covered(each) for each in spans.values())
             which = f"'{next(iter(spans))}'" if len(spans) == 1 else f"{len(spans)} recordings"
             most_of = "" if len(spans) == 1 else "up to "
-            other = ", which may include the other side" if len(valve.sides) > 1 else ""
-            lines.append(f"left out of {which}: {most_of}{most:.1f} s, {words}{other} (listed by -v)")
+            lines.append(f"left out of {which}: {most_of}{most:.1f} s, {words} (listed by -v)")
     return lines
 
 

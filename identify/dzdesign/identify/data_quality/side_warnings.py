@@ -141,8 +141,10 @@ def _about_swings(tests: tuple[DescribedTest, ...]) -> Iterator[Finding]:
 def _swing(item: DescribedTest) -> float:
     """Return the spread of the pressure drop over its mean while the valve is shut; 0 of one that drifts or steps."""
     branch, knee = item.closing_branch.prepared.branch, item.closing_branch.knee
-    shares = []
-    for part in branch.ramps if branch.dp is not None else ():
+    shares: list[float] = []
+    if branch.dp is None:
+        return 0.0
+    for part in branch.ramps:
         dp = branch.dp[part][branch.u[part] < 0.9 * knee]
         if not dp.size:
             continue

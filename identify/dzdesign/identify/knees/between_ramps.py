@@ -285,7 +285,9 @@ def knees_of_ramps(
     columns = np.array(told).reshape(-1, 6).T
     test, number = columns[:2].astype(int)
     marks = [switched[row][ramp] for row, ramp in zip(test, number, strict=True)]
-    return RampKnees(test, number, *columns[2:], switched=marks)
+    return RampKnees(
+        test=test, number=number, knee=columns[2], noise=columns[3], when=columns[4], least=columns[5], switched=marks
+    )
 
 
 def _series_clock(known: RampKnees, count: int) -> tuple[np.ndarray, NoDrift]:

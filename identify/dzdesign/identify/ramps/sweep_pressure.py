@@ -177,11 +177,16 @@ def stretches(test: RampTest, rows: np.ndarray, reason: Reason) -> list[LeftOut]
 
 
 def joined(parts: Sequence[LeftOut], test: RampTest) -> list[LeftOut]:
-    """Return what was left out of a recording in the order of time, stretches that follow each other as one."""
+    """Return what was left out of a recording in the order of time, stretches that follow each other as one.
+
+    What lies between two where the command was on the other side of zero is that side's, and left out of none.
+    """
     found: list[LeftOut] = []
     for part in sorted(parts, key=lambda part: part.from_s):
         last = found[-1] if found else None
-        if last and last.reason == part.reason and not np.any((test.time > last.to_s) & (test.time < part.from_s)):
+        crossed = last is not None and any(last.to_s < time <= part.from_s for time in test.crossed)
+        follows = last and not crossed and not np.any((test.time > last.to_s) & (test.time < part.from_s))
+        if last and follows and last.reason == part.reason:
             dp = (*(last.dp_MPa or ()), *(part.dp_MPa or ()))
             found[-1] = replace(last, to_s=part.to_s, dp_MPa=(min(dp), max(dp)) if dp else None)
         else:

@@ -119,9 +119,10 @@ def with_stated_times(table: TextTable, segments: tuple[Segment, ...]) -> TextTa
     """Return the table of a LabVIEW file with the units and the times that its headers state."""
     if not segments:
         return table
-    units, starts, clocks, computed = dict(table.units), {}, {}, {}
-    labels, first = list(table.labels), segments[0]
-    clock, waveforms = "", {}
+    units, starts, computed = dict(table.units), {}, {}
+    clocks: dict[str, str] = {}
+    waveforms: dict[tuple[str, str], str] = {}
+    labels, first, clock = list(table.labels), segments[0], ""
     for column, label in enumerate(table.labels):
         if table.in_file(label) == X_VALUE:
             clock = label
@@ -169,8 +170,9 @@ def _times(table: TextTable, label: str, segments: tuple[Segment, ...], column: 
     shift, before = 0.0, 0.0
     times = numbers.copy()
     for index, (begin, end) in enumerate(zip(begins, [*begins[1:], count], strict=True)):
-        if index and end > begin and numbers[begin] <= before and moments[index] and moments[0]:
-            shift = moments[index].seconds - moments[0].seconds
+        start, moment = moments[0], moments[index]
+        if index and end > begin and numbers[begin] <= before and start and moment:
+            shift = moment.seconds - start.seconds
             times[begin:end] += round(shift, 5)
         before = numbers[end - 1] if end > begin else before
     return times

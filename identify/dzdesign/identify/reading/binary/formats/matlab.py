@@ -34,7 +34,8 @@ def _columns(file: BinaryIO, path: Path, stack: ExitStack) -> Iterator[FileColum
         # Tables, dates and other objects have no name that SciPy knows, and it calls them all so.
         warnings.filterwarnings("ignore", 'Duplicate variable name "None"', MatReadWarning)
         variables = loadmat(file, squeeze_me=False, struct_as_record=True)
-    found, objects = [], []
+    found: list[FileColumn] = []
+    objects: list[FileColumn] = []
     for name, value in variables.items():
         if isinstance(value, MatlabOpaque):
             title = value.reshape(-1)[0]["s0"].decode(errors="replace")
@@ -65,7 +66,7 @@ def _columns_in(value: np.ndarray, name: str, group: str, depth: int) -> Iterato
 
 def _text(record: np.void, field: str) -> str:
     """Return the text in a field of a struct, or nothing."""
-    value = np.asarray(record[field]) if field in record.dtype.names else np.empty(0)
+    value = np.asarray(record[field]) if field in (record.dtype.names or ()) else np.empty(0)
     return str(value.reshape(-1)[0]).strip() if value.dtype.kind == "U" and value.size == 1 else ""
 
 
