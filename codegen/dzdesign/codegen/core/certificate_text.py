@@ -23,10 +23,11 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     """Return comment lines that say what the offset of one sign of command is certified for."""
     certificate, units = compensator.side(sign).certificate, compensator.valve.recorded_units
     low, high = certificate.dp_MPa
-    where = units.span(float(low), float(high), ".2f MPa") + (", between the tests too" if low < high else "")
+    where = units.span(float(low), float(high), ".2f MPa")
+    between = compensator.valve.sides[SIDE_NAMES[sign]].between_in_words(certificate.guard)
     text = (
         f"Certificate of {compensator.certified_of}: {where}, this value lies below the "
-        f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold. The least margin is "
+        f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold ({between}). The least margin is "
         f"{units.text(1e3 * float(certificate.smallest_margin_V), '.3g mV')}, in addition to {_counted(compensator)}."
     )
     if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:

@@ -64,14 +64,14 @@
  * A pressure drop, A minus B, below -0.196 MPa means a failed sensor and gives the smallest beta too.
  *
  * At zero command it is 14636 to 20628, depending on the pressure drop.
- * Certificate of the valve as recorded: from 1.00 to 5.00 MPa, between the tests too, this value lies below the 99%
- * lower bound of the closing threshold. The least margin is 0.0182 mV, in addition to the rounding of readings to codes
- * and of the drive to counts. The flow is less than 0.13 L/min, which is less than the recordings can show. Above 5.00
- * MPa the offset falls with the continued bound. Up to 21.8 MPa this offset is certified if the threshold continues
- * from the last tests' value and slope, with curvature at most M = 0 mV/MPa^2. Below 1.00 MPa the offset of the lowest
- * test is held and nothing is certified. A threshold that keeps rising towards zero pressure drop stays above this
- * offset. No machine was declared: the certificate does not cover coil temperature, supply voltage, pressure sensors,
- * converters beyond rounding, oil or ageing.
+ * Certificate of the valve as recorded: from 1.00 to 5.00 MPa, this value lies below the 99% lower bound of the closing
+ * threshold (between the tests: premise smooth, declared, untested). The least margin is 0.0182 mV, in addition to the
+ * rounding of readings to codes and of the drive to counts. The flow is less than 0.13 L/min, which is less than the
+ * recordings can show. Above 5.00 MPa the offset falls with the continued bound. Up to 21.8 MPa this offset is
+ * certified if the threshold continues from the last tests' value and slope, with curvature at most M = 0 mV/MPa^2.
+ * Below 1.00 MPa the offset of the lowest test is held and nothing is certified. A threshold that keeps rising towards
+ * zero pressure drop stays above this offset. No machine was declared: the certificate does not cover coil temperature,
+ * supply voltage, pressure sensors, converters beyond rounding, oil or ageing.
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
