@@ -31,7 +31,7 @@ SPDX = {
     "Mozilla Public License 2.0 (MPL 2.0)": "MPL-2.0",
 }
 #: What of others is in the wheel itself: name, version, licence.
-BUNDLED = (("fmi2-headers", "2.0.4", "BSD-2-Clause"), ("fmi3-headers", "3.0", "BSD-2-Clause"))
+BUNDLED = (("fmi2-headers", "2.0.4", "BSD-2-Clause"),)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,7 @@ from output_targets import compensator
 from target import Target
 
 from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.block_files import READERS, placed_in_file
-from dzdesign.codegen.calibration.block_images import image_of
+from dzdesign.codegen.calibration.block_files import FORMATS, image_of, placed_in_file
 from dzdesign.codegen.calibration.packing import CRC_OCTETS, OCTETS, pack, unpack
 from dzdesign.codegen.calibration.place_text import place_in_words
 from dzdesign.codegen.calibration.reading import reading_of
@@ -91,11 +90,11 @@ def _calibration_file(data: bytes) -> None:
     path = Path(_folder()) / "block"
     path.write_bytes(data)
     sectors = {target.name: target.block_place for target in targets() if target.sector}
-    for form in (ending.removeprefix(".") for ending in READERS):
+    for form in FORMATS:
         try:
             octets, place = placed_in_file(path, form)
             if place is not None:
-                place_in_words(place, form, sectors)
+                place_in_words(place, sectors)
             unpack(octets)
         except InputError:
             continue
@@ -108,7 +107,7 @@ def _calibration_block(data: bytes) -> None:
 
 
 def _calibration_seeds() -> Iterator[bytes]:
-    for form in ("bin", "hex", "txt"):
+    for form in FORMATS:
         yield image_of(_block(), form, target_named(OF).block_place)
         yield image_of(_block(), form, target_named("cortex-m4").block_place)
 

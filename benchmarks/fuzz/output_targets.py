@@ -106,7 +106,7 @@ def _matlab(data: bytes) -> None:
 
 
 def _fmu(data: bytes) -> None:
-    made_by_another_compiler({"dz_compensator_fmi2.fmu": data})
+    made_by_another_compiler({"dz_compensator.fmu": data})
     path = _place("given.fmu")
     path.write_bytes(data)
     _look_into(path)

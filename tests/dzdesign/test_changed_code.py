@@ -225,7 +225,7 @@ def fmus():
         return fmus_of(full_compensator(), None)
 
 
-FMU = "dz_compensator_fmi2.fmu"
+FMU = "dz_compensator.fmu"
 
 
 @pytest.mark.parametrize("compiler", [True, False])

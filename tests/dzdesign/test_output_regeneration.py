@@ -13,7 +13,7 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.regeneration import output_regenerated
 from tests.support.host_fmus import fmus_of, full_compensator, host_platforms
 
-NAME = "dz_compensator_fmi2.fmu"
+NAME = "dz_compensator.fmu"
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,6 @@ def output():
 @pytest.fixture
 def folder(output, tmp_path, monkeypatch):
     monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
-    monkeypatch.setattr("dzdesign.codegen.fmu.files.VERSIONS", (2, 3))
     write_output(output, tmp_path / "fmus")
     yield tmp_path / "fmus"
     binaries._version.cache_clear()

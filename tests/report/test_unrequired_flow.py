@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.report.language import in_language
 from dzdesign.report.unrequired_flow import unrequired_flow
 from dzdesign.report.valve_report import report_of_folder
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
@@ -55,13 +54,10 @@ def test_what_is_no_unrequired_flow_is_not_said(change):
 
 
 @needs_compiler
-@pytest.mark.parametrize("language", ["en", "de"])
-def test_it_stands_open_with_a_good_verdict_and_follows_from_the_scenarios(reported_demo, language):
-    with in_language(language):
-        html = report_of_folder(reported_demo).html
+def test_it_stands_open_with_a_good_verdict_and_follows_from_the_scenarios(reported_demo):
+    html = report_of_folder(reported_demo).html
     evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
     passing = [each["q_zero_L_min"] for each in evidence["scenarios"] if not each["must_shut"]]
     verdict = html[html.index('<div class="verdict good"') :].partition("<details")[0]
-    (line,) = re.findall(r'<li class="unrequired"([^>]*>.*?)</li>', verdict)
+    (line,) = re.findall(r'<li class="unrequired">(.*?)</li>', verdict)
     assert f"{max(passing):.3g} L/min" in line and max(passing) > 1
-    assert "lang=" not in line.partition(">")[0]  # it is of the page's own language

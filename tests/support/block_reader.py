@@ -1,6 +1,5 @@
-"""Calibration files read by the documents of their formats alone: no code of dzdesign, and not by intelhex."""
+"""Calibration files read and written by the document of their format alone: no code of dzdesign, and not by bincopy."""
 
-import re
 import struct
 import zlib
 
@@ -32,12 +31,16 @@ def hex_memory(text: str, *, of_words: bool) -> dict[int, int]:
     return memory
 
 
-def ti_txt_memory(text: str) -> dict[int, int]:
-    """Return address -> octet of TI-TXT."""
-    start, *rows, end, last = text.split("\n")
-    assert (end, last) == ("q", "") and all(re.fullmatch(r"[0-9A-F]{2}( [0-9A-F]{2}){0,15}", row) for row in rows)
-    octets = bytes.fromhex(" ".join(rows))
-    return {int(start.removeprefix("@"), 16) + place: octet for place, octet in enumerate(octets)}
+def hex_text(*runs: tuple[int, bytes]) -> str:
+    """Return Intel HEX of runs of octets, each with its address."""
+
+    def record(at: int, kind: int, data: bytes) -> str:
+        octets = bytes((len(data), *at.to_bytes(2, "big"), kind, *data))
+        return f":{octets.hex()}{-sum(octets) % 256:02x}\n".upper()
+
+    rows = [(begin + at, octets[at : at + 16]) for begin, octets in runs for at in range(0, len(octets), 16)]
+    lines = (record(0, 4, (at >> 16).to_bytes(2, "big")) + record(at % (1 << 16), 0, row) for at, row in rows)
+    return "".join((*lines, ":00000001FF\n"))
 
 
 def members_of(octets: bytes) -> dict[str, object]:

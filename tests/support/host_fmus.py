@@ -26,8 +26,8 @@ def full_compensator() -> Compensator:
 
 def host_platforms() -> tuple[binaries.Platform, ...]:
     """Return the platform of this machine, of those that FMUs have."""
-    folder = next(value[1] for (system, _), value in HERE.items() if sys.platform == system)
-    return tuple(each for each in binaries.PLATFORMS if each.folders[3] == folder)
+    folder, _ = next(value for (system, _), value in HERE.items() if sys.platform == system)
+    return tuple(each for each in binaries.PLATFORMS if each.folder == folder)
 
 
 def plant_setting(plant: Plant = PLANT) -> str:

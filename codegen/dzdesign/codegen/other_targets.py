@@ -57,7 +57,7 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         ),
         OtherTarget(
             name="fmu",
-            description="FMUs for simulation tools, FMI 2.0 and 3.0: the compensator and, with --plant, the plant",
+            description="FMUs for simulation tools, FMI 2.0: the compensator and, with --plant, the plant",
             module="dzdesign.codegen.fmu.files",
             options={"plant": ()},
         ),

@@ -27,7 +27,7 @@ def write_block(compensator: "Compensator", target: str, folder: Path) -> tuple[
     A compensator that a block has no room for is an `InputError`.
     """
     from dzdesign.codegen.calibration.block import block_of
-    from dzdesign.codegen.calibration.block_images import image_of
+    from dzdesign.codegen.calibration.block_files import image_of
     from dzdesign.codegen.calibration.built_for import built_for
     from dzdesign.codegen.calibration.packing import pack
     from dzdesign.codegen.project import target_named

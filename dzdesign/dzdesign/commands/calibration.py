@@ -6,13 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.core.options import AnyPath, Option, flag_of
-from dzdesign.stages.calibration import (
-    READABLE,
-    CalibrationArguments,
-    ReadCalibrationArguments,
-    calibration,
-    read_calibration,
-)
+from dzdesign.stages.calibration import CalibrationArguments, ReadCalibrationArguments, calibration, read_calibration
 from dzdesign.terminal.page import print_json
 
 if TYPE_CHECKING:
@@ -20,7 +14,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = (
     "dzdesign calibration compensator.json -o valve.hex",
-    "dzdesign calibration compensator.json -o valve.txt --serial 4711",
+    "dzdesign calibration compensator.json -o valve.bin --serial 4711",
     "dzdesign calibration --read valve.hex",
     "dzdesign calibration --read valve.hex firmware      # compare it with this firmware's compensator",
 )
@@ -55,14 +49,11 @@ def run(arguments: Arguments, json: bool) -> int:
         print_json(document)
         return 0
     at = f", at {document['address']} of {made.target}" if made.address is not None else ""
-    what = f"{document['octets']} octets" if document["octets"] is not None else "the layout of a block, of any valve"
-    print(one_line(f"Written: {document['file']}, {what}{at}"))
+    print(one_line(f"Written: {document['file']}, {document['octets']} octets{at}"))
     target = target_named(made.target)
     sector = target.block_place if target.sector else None
     if made.address is not None and sector and (wrong := elsewhere(made.target, made.address, sector)):
         print(wrong)
-    if document["octets"] is None:
-        return 0
     print(one_line(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}"))
     print(f"CRC-32 {document['crc32']}; SHA-256 of its compensator.json {document['compensator_sha256']}")
     return 0
@@ -85,19 +76,15 @@ def _read(arguments: Arguments, json: bool) -> int:
 
 
 def _document(made: "CalibrationImage", file: str) -> dict[str, Any]:
-    """Return what was written; of a file without a block nothing that only a block has."""
+    """Return what was written."""
     from dzdesign.codegen.calibration.packing import OCTETS, octets_of, text_of
 
     block = made.block
-    place = {
+    return {
         "file": file,
         "format": made.format,
         "target": made.target,
         "address": None if made.address is None else f"{made.address:#x}",
-    }
-    if made.format not in READABLE:
-        return place | dict.fromkeys(("octets", "serial", "record", "crc32", "compensator_sha256"))
-    return place | {
         "octets": OCTETS,
         "serial": text_of(block.serial),
         "record": text_of(block.record),

@@ -1,13 +1,12 @@
 """`calibration`: Compensator -> the calibration block of one valve as a file, and back."""
 
-from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dzdesign.block_checks import other_numbers
 from dzdesign.block_identity import of_another_valve
-from dzdesign.core.artefact_files import check_file_may_be_written, read_bytes, write_file
+from dzdesign.core.artefact_files import check_file_may_be_written, write_file
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.options import AnyPath, Option, Text
 from dzdesign.stages.design import TARGETS
@@ -21,11 +20,7 @@ if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
 
 #: Where the names of the formats stand.
-FORMATS = "dzdesign.codegen.calibration.block_images:FORMATS"
-#: Formats that hold a block.
-READABLE = ("hex", "bin", "txt")
-#: Texts of a block, and the entries of the test record that they are taken from.
-TEXTS = ("serial", "record")
+FORMATS = "dzdesign.codegen.calibration.block_files:FORMATS"
 
 
 @dataclass(frozen=True)
@@ -36,10 +31,9 @@ class CalibrationArguments:
     """The compensator.json of the valve. Its numbers are first derived again."""
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
-    """File to write. Its ending selects the format: .hex Intel HEX, .bin raw octets, .txt TI-TXT, .a2l the layout for
-    XCP tools."""
+    """File to write. Its ending selects the format: .hex Intel HEX, .bin raw octets."""
     format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
-    """Format of a file with another ending: hex, bin, txt or a2l (default: by the file's ending)."""
+    """Format of a file with another ending: hex or bin (default: by the file's ending)."""
     target: Annotated[Text, Option("NAME", choices=TARGETS)] = None
     """Microcontroller whose addresses the file states (default: that of the design)."""
     address: Annotated[Text, Option("N", example="0x330000")] = None
@@ -60,8 +54,8 @@ class ReadCalibrationArguments:
     compensator: Annotated["Compensator | AnyPath | None", Option("COMPENSATOR.json")] = None
     """The compensator.json to compare the block with, or a firmware folder that holds one."""
     _: KW_ONLY
-    format: Annotated[Text, Option("NAME", choices=READABLE)] = None
-    """Format of a file with another ending: hex, bin or txt (default: by the file's ending)."""
+    format: Annotated[Text, Option("NAME", choices=FORMATS)] = None
+    """Format of a file with another ending: hex or bin (default: by the file's ending)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,18 +99,15 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
         file can't be written, or dzdesign did not create it.
     """
     from dzdesign.codegen.calibration.block import block_of
-    from dzdesign.codegen.calibration.block_images import WITH_ADDRESS, image_of
+    from dzdesign.codegen.calibration.block_files import image_of
     from dzdesign.codegen.calibration.packing import OCTETS, pack, unpack
 
     output = None if arguments.output is None else Path(arguments.output)
     form = _format_of(output, arguments.format)
     if output is not None:
         _check_output(output, form)
-    if arguments.address is not None and form not in WITH_ADDRESS:
-        raise InputError(f"--address is given, but a file of format {form} states none; leave it out")
-    for name in TEXTS:
-        if getattr(arguments, name) is not None and form not in READABLE:
-            raise InputError(f"--{name} is given, but an A2L has the layout of a block alone; leave it out")
+    if arguments.address is not None and form == "bin":
+        raise InputError("--address is given, but a file of format bin states none; leave it out")
     compensator, digest, source = given_compensator(arguments.compensator)
     target = _target_of(compensator, arguments.target)
     place = _place(target, arguments.address, OCTETS)
@@ -129,7 +120,7 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
         block=unpack(octets),
         format=form,
         target=target,
-        address=place.address if form in WITH_ADDRESS else None,
+        address=None if form == "bin" else place.address,
     )
     if output is not None:
         write_file(output, made.content)
@@ -158,10 +149,9 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
     from dzdesign.core.recorded_units import AS_COMPUTED
 
     path = Path(arguments.file)
-    form = _known_format(arguments.format, READABLE) or path.suffix.lower().removeprefix(".")
-    octets, place = placed_in_file(path, arguments.format)
+    octets, place = placed_in_file(path, _known_format(arguments.format))
     sectors = {target.name: target.block_place for target in targets() if target.sector}
-    block, placed = unpack(octets, f"'{path}'"), place_in_words(place, form, sectors) if place else ""
+    block, placed = unpack(octets, f"'{path}'"), place_in_words(place, sectors) if place else ""
     reading = reading_of(block, f"'{path}'")
     if arguments.compensator is None:
         return ReadCalibration(
@@ -179,24 +169,26 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
     )
 
 
-def _known_format(name: str | None, known: Iterable[str]) -> str | None:
-    if name is not None and name not in known:
-        raise InputError(f"--format is {quoted(name)}{nearest(name, known)}, expected one of {', '.join(known)}")
+def _known_format(name: str | None) -> str | None:
+    from dzdesign.codegen.calibration.block_files import FORMATS as KNOWN
+
+    if name is not None and name not in KNOWN:
+        raise InputError(f"--format is {quoted(name)}{nearest(name, KNOWN)}, expected {' or '.join(KNOWN)}")
     return name
 
 
 def _format_of(output: Path | None, given: str | None) -> str:
     """Return the format that is asked for; a file whose ending says another could not be read back."""
-    from dzdesign.codegen.calibration.block_images import FORMATS as KNOWN
+    from dzdesign.codegen.calibration.block_files import FORMATS as KNOWN
 
     ending = output.suffix.lower().removeprefix(".") if output is not None else ""
-    if _known_format(given, KNOWN) is None:
+    if _known_format(given) is None:
         if output is None:
             return "bin"
         if ending not in KNOWN:
             what = f"ends with '{output.suffix}'{nearest(ending, KNOWN)}" if ending else "has no ending"
             raise InputError(
-                f"'{output}' {what}, expected {', '.join(f'.{name}' for name in KNOWN)}; choose another -o, or say "
+                f"'{output}' {what}, expected {' or '.join(f'.{name}' for name in KNOWN)}; choose another -o, or say "
                 "--format"
             )
         return ending
@@ -206,8 +198,7 @@ def _format_of(output: Path | None, given: str | None) -> str:
 
 
 def _check_output(output: Path, form: str) -> None:
-    """Refuse to write over what is not a calibration block: a recording may end with .txt too."""
-    from dzdesign.codegen.calibration.a2l import HEAD
+    """Refuse to write over what is not a calibration block."""
     from dzdesign.codegen.calibration.block_files import octets_in_file
     from dzdesign.codegen.calibration.layout import MAGIC
 
@@ -215,10 +206,7 @@ def _check_output(output: Path, form: str) -> None:
     if not output.exists() or not output.stat().st_size:
         return
     try:
-        if form in READABLE:
-            is_block = octets_in_file(output, form).startswith(MAGIC)
-        else:
-            is_block = read_bytes(output, "calibration file").startswith(HEAD.encode())
+        is_block = octets_in_file(output, form).startswith(MAGIC)
     except InputError:
         is_block = False
     if not is_block:

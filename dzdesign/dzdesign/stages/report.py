@@ -12,9 +12,6 @@ from dzdesign.core.options import AnyPath, Option
 if TYPE_CHECKING:
     from dzdesign.report.page import Report
 
-#: Languages of a report; English needs no table of words.
-LANGUAGES = "dzdesign.report.language:LANGUAGES"
-
 
 @dataclass(frozen=True)
 class ReportArguments:
@@ -25,8 +22,6 @@ class ReportArguments:
     _: KW_ONLY
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default of the command: report.html with the evidence, or in the folder)."""
-    language: Annotated[str, Option("CODE", choices=LANGUAGES)] = "en"
-    """Language of headings and labels. Sentences that state findings are in English."""
     logo: Annotated[AnyPath | None, Option("IMAGE")] = None
     """Logo beside the title. The page embeds a PNG, JPEG or GIF."""
 
@@ -44,7 +39,6 @@ def report(arguments: ReportArguments) -> "Report":
     InputError
         If there is nothing to report, or a file is not an artefact. A requirement that does not hold is not an error.
     """
-    from dzdesign.report.language import in_language
     from dzdesign.report.logo import logo_uri
     from dzdesign.report.lot.folder import is_lot, refuse_uncalibrated
     from dzdesign.report.lot.report import report_of_lot
@@ -52,12 +46,11 @@ def report(arguments: ReportArguments) -> "Report":
 
     folder = Path(arguments.folder)
     logo = "" if arguments.logo is None else logo_uri(Path(arguments.logo))
-    with in_language(arguments.language):
-        if is_lot(folder):
-            made = report_of_lot(folder, logo)
-        else:
-            refuse_uncalibrated(folder)
-            made = report_of_folder(folder, logo)
+    if is_lot(folder):
+        made = report_of_lot(folder, logo)
+    else:
+        refuse_uncalibrated(folder)
+        made = report_of_folder(folder, logo)
     if arguments.output is not None:
         _write_report(Path(arguments.output), made.html)
     return made

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.options import Set
 from dzdesign.report.characteristic.curves import BRANCHES, origin_of
-from dzdesign.report.language import word
 from dzdesign.report.page import Figure
 from dzdesign.report.sections.cells import counted
 
@@ -36,7 +35,7 @@ def _dead_zone(items: Sequence[PressureAssessment], branch: str, of: str) -> Fig
             both = f"{max(bare):.1f} % → {max(driven):.1f} %" if bare else f"{max(driven):.1f} %"
             sets = "without → with" if bare else "with the compensator"
             return Figure(
-                label=word(f"Dead zone on {branch}, {of}"),
+                label=f"Dead zone on {branch}, {of}",
                 value=both,
                 note=f"of command {where}, {sets}; the worst of {_places(items)}{with_span(driven)}",
             )
@@ -55,7 +54,7 @@ def _at_zero(items: Sequence[PressureAssessment], assessment: Assessment, of: st
     limited = [limit for limit in assessment.limits if limit.quantity == "flow_at_zero"]
     return (
         Figure(
-            label=word(f"Flow at zero command, {of}"),
+            label=f"Flow at zero command, {of}",
             value=f"≤ {units.text(unseen, '.2f L/min')}" if hidden else units.text(worst, ".2g L/min"),
             note=("with the compensator, after closing: the meter shows none, and nothing below that" if hidden
                   else "with the compensator, after closing") + f"; the largest of {_places(items)}",

@@ -13,22 +13,18 @@ from dzdesign.core.artefact_files import TOOL
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.presentation.writer import anchor
 from dzdesign.report.figures.figure import PALETTE, ReportFigure, data_uri
-from dzdesign.report.language import current_language, stays_english, word
 from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
-from dzdesign.report.sections.cells import Cell, Table
+from dzdesign.report.sections.cells import Table
 
 if TYPE_CHECKING:
     import markupsafe
 
     from dzdesign.report.sections.law import LawAccount
 
-#: Characters of a word of the language, and of one of letters alone, as German has them; what is longer is a name or a
-#: hash.
-LONGEST_WORD, LONGEST_OF_LETTERS = 18, 30
+#: Characters of an English word; what is longer is a name or a hash.
+LONGEST_WORD = 18
 #: An option of the command line, and a command between backticks.
 OPTION, COMMAND = r"(?<![\w-])--[a-z][\w-]*", r"`([^`<>\s][^`<>]*)`"
-#: Kinds of cells whose words are the report's own.
-TRANSLATED = ("good", "bad", "open", "number")
 #: Kind of a verdict -> the sign before it.
 SIGNS = {"good": "✓", "bad": "✗", "open": "?"}
 
@@ -165,34 +161,11 @@ def render(page: Page) -> str:
     """Return a page as HTML."""
     environment = strict_templates("dzdesign.report", lstrip_blocks=True, autoescape=True)
     environment.filters.update(
-        data_uri=data_uri, anchor=anchor, words=_words, cell=_cell, translated=word, css_text=_css_text, lang=_lang,
-        tied=_tied, finding=_finding,
-        in_words=_in_words, has_english=_has_english,
+        data_uri=data_uri, anchor=anchor, words=_words, cell=_cell, css_text=_css_text, tied=_tied, finding=_finding
     )
     content = {each.name: getattr(page, each.name) for each in fields(page)}
-    html: str = environment.get_template(page.template).render(
-        tool=TOOL, palette=PALETTE, language=current_language(), **content
-    )
+    html: str = environment.get_template(page.template).render(tool=TOOL, palette=PALETTE, **content)
     return html
-
-
-def _lang(text: str) -> "markupsafe.Markup":
-    """Return the attribute of a sentence that stays English in a report of another language; empty of others."""
-    from markupsafe import Markup
-
-    return Markup(' lang="en"') if stays_english(text) else Markup("")
-
-
-def _has_english(section: Section) -> bool:
-    """Return whether sentences of a section stay English in a report of another language."""
-    groups = (line for _, lines in section.groups for line in lines)
-    notes = (note for table in section.tables if table for note in table.notes)
-    return any(map(stays_english, (section.missing, *section.lines, *groups, *notes)))
-
-
-def _in_words(cell: Cell) -> str:
-    """Return the text of a cell; a plain one may be somebody's name, so only what makes it translates it."""
-    return cell.text if cell.kind not in TRANSLATED else word(cell.text)
 
 
 def _css_text(text: str) -> "markupsafe.Markup":
@@ -234,10 +207,7 @@ def _cell(text: str) -> "markupsafe.Markup":
     def broken(word: str) -> Markup:
         return Markup("<wbr>").join(escape(part) for part in re.findall(r"[^/._,=]*[/._,=]*", word) if part)
 
-    def is_name(word: str) -> bool:
-        return len(word) > (LONGEST_OF_LETTERS if word.strip(",.;:()").isalpha() else LONGEST_WORD)
-
     return Markup("").join(
-        Markup('<span class="breaks">{}</span>').format(broken(word)) if is_name(word) else escape(word)
+        Markup('<span class="breaks">{}</span>').format(broken(word)) if len(word) > LONGEST_WORD else escape(word)
         for word in re.split(r"(\s+)", text)
     )

@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 
-from dzdesign.report.language import word
-
 #: How a record may name them, in the words of those who keep one; case, dashes and blanks do not count.
 SERIAL = (
     "serial", "serial number", "serial no", "serial no.", "s/n", "sn", "seriennummer", "serien nr", "serien nr.",
@@ -27,8 +25,8 @@ def valve_name(record: Mapping[str, str]) -> str:
     """
     serial, kind = (_first(record, names) for names in (SERIAL, TYPE))
     if serial:
-        return f"{kind or word('Valve')}, {word('serial number')} {serial}"
-    return f"{word('Valve')}: {kind}" if kind else ""
+        return f"{kind or 'Valve'}, serial number {serial}"
+    return f"Valve: {kind}" if kind else ""
 
 
 def _first(record: Mapping[str, str], names: tuple[str, ...]) -> str:

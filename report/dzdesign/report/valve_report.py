@@ -16,7 +16,6 @@ from dzdesign.report.characteristic.curves import characteristic_curves
 from dzdesign.report.characteristic.quantities import characteristic_quantities
 from dzdesign.report.figures.characteristic import characteristic_figure
 from dzdesign.report.figures.figure import figure_style
-from dzdesign.report.language import word
 from dzdesign.report.outputs.folder_outputs import outputs_of_folder
 from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
 from dzdesign.report.outputs.section import outputs_sections, with_outputs
@@ -149,7 +148,7 @@ def _title(chain: Chain) -> str:
     count = len(chain.compensator.lot) if chain.compensator else 0
     what = f"Lot setting of {count} valves: dead-zone compensator" if count else "Dead-zone compensator"
     if chain.firmware:
-        return word(f"{what} for {chain.firmware.target}, law “{chain.firmware.law}”")
+        return f"{what} for {chain.firmware.target}, law “{chain.firmware.law}”"
     if chain.compensator:
-        return word(what)
-    return word("Valve, identified from ramp tests" if chain.valve else "Evidence of a dead-zone compensator")
+        return what
+    return "Valve, identified from ramp tests" if chain.valve else "Evidence of a dead-zone compensator"

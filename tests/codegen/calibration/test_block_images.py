@@ -1,13 +1,12 @@
-"""A block as Intel HEX, TI-TXT and octets: where each octet lies, read by a reader of the formats' documents alone."""
+"""A block as Intel HEX and as octets: where each octet lies, read by a reader of the format's document alone."""
 
 import pytest
 
-from dzdesign.codegen.calibration.block_files import octets_in_file
-from dzdesign.codegen.calibration.block_images import FORMATS, image_of
+from dzdesign.codegen.calibration.block_files import FORMATS, image_of, octets_in_file
 from dzdesign.codegen.calibration.places import Place
 from dzdesign.codegen.project import target_named
 from dzdesign.core.errors import InputError
-from tests.support.block_reader import hex_memory, ti_txt_memory
+from tests.support.block_reader import hex_memory
 
 OCTETS = bytes(range(256)) * 10 + b"last"
 PLACES = {
@@ -21,7 +20,7 @@ PLACES = {
 
 
 @pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
-@pytest.mark.parametrize("name", sorted(FORMATS.keys() - {"a2l"}))
+@pytest.mark.parametrize("name", FORMATS)
 def test_a_file_gives_the_octets_back(name, place, tmp_path):
     for file in (tmp_path / f"block.{name}", tmp_path / "block.other"):
         file.write_bytes(image_of(OCTETS, name, place))
@@ -32,16 +31,14 @@ def test_a_file_gives_the_octets_back(name, place, tmp_path):
 def test_each_octet_lies_at_its_address(place):
     expected = {place.address * place.unit_octets + at: octet for at, octet in enumerate(OCTETS)}
     assert hex_memory(image_of(OCTETS, "hex", place).decode(), of_words=place.unit_octets == 2) == expected
-    assert ti_txt_memory(image_of(OCTETS, "txt", place).decode()) == expected
 
 
 def test_a_c28x_has_words_of_which_the_high_octet_comes_first():
-    """As `hex2000 --romwidth=16 --intel` writes 0x2211, 0x4433 at word 0x330000; TI-TXT is of octets."""
+    """As `hex2000 --romwidth=16 --intel` writes 0x2211, 0x4433 at word 0x330000."""
     place = PLACES["f28335"]
     assert image_of(bytes.fromhex("11223344"), "hex", place).decode().split() == [
         ":020000040033C7", ":040000002211443352", ":00000001FF",
     ]  # fmt: skip
-    assert image_of(bytes.fromhex("11223344"), "txt", place) == b"@660000\n11 22 33 44\nq\n"
     second = image_of(bytes(64), "hex", place).decode().split()[2]
     assert second.startswith(":20001000"), "the second row of 32 octets is 16 words further"
 
@@ -82,7 +79,7 @@ def test_rows_may_come_in_any_order(tmp_path):
         (Place(), 2**32 - 8, False),
     ],
 )
-def test_an_address_has_room_behind_it_in_every_format(place, address, right):
+def test_an_address_has_room_behind_it(place, address, right):
     if right:
         assert place.at(address, 12) == Place(address=address, unit_octets=place.unit_octets)
         return

@@ -21,9 +21,8 @@ from tests.support.host_fmus import PLANT, fmus_of, full_compensator, host_platf
 
 @pytest.fixture
 def one_binary(monkeypatch):
-    """Make FMUs for FMI 3 with this machine's binary alone."""
+    """Make FMUs with this machine's binary alone."""
     monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
-    monkeypatch.setattr(files, "VERSIONS", (3,))
 
 
 @pytest.fixture
@@ -61,11 +60,11 @@ def test_every_fmu_has_a_token_of_its_own_and_of_its_compensator(no_binary):
         }
 
     first = tokens(full_compensator())
-    assert len(set(first.values())) == 4
-    assert tokens(golden_compensator("host"))["dz_compensator_fmi2.fmu"] != first["dz_compensator_fmi2.fmu"]
+    assert len(set(first.values())) == 2
+    assert tokens(golden_compensator("host"))["dz_compensator.fmu"] != first["dz_compensator.fmu"]
     moved = tokens(full_compensator(), replace(PLANT, L_c_H=0.05))
     changed = {name for name in first if moved[name] != first[name]}
-    assert changed == {"dz_plant_fmi2.fmu", "dz_plant_fmi3.fmu"}
+    assert changed == {"dz_plant.fmu"}
 
 
 def test_the_core_in_an_fmu_is_that_of_the_firmware(no_binary):
@@ -74,7 +73,7 @@ def test_the_core_in_an_fmu_is_that_of_the_firmware(no_binary):
     compensator = full_compensator()
     core = {path.removeprefix("core/"): text.encode() for path, text in
             generate_project(compensator, "host").files.items() if path.startswith("core/")}  # fmt: skip
-    inside = opened(fmus_of(compensator, None).files["dz_compensator_fmi3.fmu"])
+    inside = opened(fmus_of(compensator, None).files["dz_compensator.fmu"])
     assert {name: inside[f"sources/{name}"] for name in core} == core
 
 
@@ -93,7 +92,7 @@ def test_nothing_but_the_functions_of_fmi_leaves_the_one_unit(no_binary, tmp_pat
         subprocess.run([*words_of(host_compiler()), *strict], cwd=folder, check=True)
         symbols = subprocess.run(["nm", "-g", "dz_fmu.o"], cwd=folder, check=True, capture_output=True, text=True)
         shown = [line.split()[-1] for line in symbols.stdout.splitlines() if " U " not in line]
-        assert shown and all(symbol.startswith(("fmi2", "fmi3")) for symbol in shown)
+        assert shown and all(symbol.startswith("fmi2") for symbol in shown)
 
 
 def test_units_of_the_recordings_are_display_units(no_binary):
@@ -106,29 +105,23 @@ def test_units_of_the_recordings_are_display_units(no_binary):
     from dzdesign.codegen.fmu.description import model_description
 
     model = replace(compensator_model(compensator), units=valve.recorded_units)
-    for fmi in (2, 3):
-        text = model_description(model, fmi, "{token}")
-        assert '<DisplayUnit name="bar" factor="10.0"/>' in text and 'displayUnit="bar"' in text
+    text = model_description(model, "{token}")
+    assert '<DisplayUnit name="bar" factor="10.0"/>' in text and 'displayUnit="bar"' in text
 
 
 def displayed(model, name):
-    """Return unit and display unit of a variable, and factor and offset of that, in both versions."""
+    """Return unit and display unit of a variable, and factor and offset of that."""
     from xml.etree import ElementTree
 
     from dzdesign.codegen.fmu.description import model_description
 
-    found = []
-    for fmi in (2, 3):
-        document = ElementTree.fromstring(model_description(model, fmi, "{token}"))
-        variable = next(each for each in document.find("ModelVariables") if each.get("name") == name)
-        variable = variable[0] if fmi == 2 else variable
-        unit, shown = variable.get("unit"), variable.get("displayUnit")
-        entries = document.iterfind(f"UnitDefinitions/Unit[@name='{unit}']/DisplayUnit")
-        units = {each.get("name"): each for each in entries}
-        found.append((unit, shown) + ((float(units[shown].get("factor")), float(units[shown].get("offset", "0")))
-                                      if shown else ()))  # fmt: skip
-    assert found[0] == found[1]
-    return found[0]
+    document = ElementTree.fromstring(model_description(model, "{token}"))
+    (typed,) = next(each for each in document.find("ModelVariables") if each.get("name") == name)
+    unit, shown = typed.get("unit"), typed.get("displayUnit")
+    entries = document.iterfind(f"UnitDefinitions/Unit[@name='{unit}']/DisplayUnit")
+    units = {each.get("name"): each for each in entries}
+    scaled = (float(units[shown].get("factor")), float(units[shown].get("offset", "0"))) if shown else ()
+    return (unit, shown, *scaled)
 
 
 def test_the_display_unit_of_a_command_is_that_of_its_side_and_of_no_other_voltage():
@@ -210,7 +203,7 @@ def test_a_ziglang_that_is_too_old_is_refused(monkeypatch):
 def test_c_that_does_not_compile_is_named_with_the_platform(monkeypatch):
     monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
     with pytest.raises(InputError, match="can't compile"):
-        binaries.binaries_of("dz_wrong", 3, {"dz_fmu.c": b"int x = ;"})
+        binaries.binaries_of("dz_wrong", {"dz_fmu.c": b"int x = ;"})
 
 
 def test_a_plant_is_of_the_target_fmu_alone(example_compensator, example_folder, tmp_path):
@@ -229,8 +222,8 @@ def test_binaries_of_every_platform_need_no_library(tmp_path):
 
     compensator = golden_compensator("host")
     output = fmus_of(compensator, None)
-    for name in ("dz_compensator_fmi2.fmu", "dz_compensator_fmi3.fmu"):
-        (tmp_path / name).write_bytes(output.files[name])
-        fmu = read_fmu(tmp_path / name)
-        assert not list(library_faults(fmu))
-        assert not list(file_faults(fmu, compensator, output.manifest.origin.compensator_json))
+    path = tmp_path / "dz_compensator.fmu"
+    path.write_bytes(output.files[path.name])
+    fmu = read_fmu(path)
+    assert not list(library_faults(fmu))
+    assert not list(file_faults(fmu, compensator, output.manifest.origin.compensator_json))

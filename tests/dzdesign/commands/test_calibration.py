@@ -11,7 +11,7 @@ import pytest
 
 from dzdesign import api
 from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.block_images import image_of
+from dzdesign.codegen.calibration.block_files import image_of
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
@@ -22,7 +22,7 @@ from dzdesign.core.documents import sha256_of
 from dzdesign.core.recorded_units import CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot.valves import LotValve
-from tests.support.block_reader import hex_memory, members_of, ti_txt_memory
+from tests.support.block_reader import hex_memory, members_of
 from tests.support.core_variants import variant
 from tests.support.paths import ROOT
 
@@ -41,7 +41,6 @@ def written(tmp_path_factory):
     assert main([*words, str(folder / "valve.hex")]) == 0
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(*UNPROVEN)
-        assert main([*words, str(folder / "valve.txt")]) == 0
         api.calibration(compensator, output=folder / "valve.bin", serial="V-7")
     return folder
 
@@ -62,7 +61,6 @@ def test_the_formats_hold_the_same_block_at_the_targets_sector(written, block):
     place = 0x33_0000 * 2
     expected = {place + at: octet for at, octet in enumerate(block)}
     assert hex_memory((written / "valve.hex").read_text(), of_words=True) == expected
-    assert ti_txt_memory((written / "valve.txt").read_text()) == expected
     members = members_of(block)
     digest = sha256_of((written / "compensator.json").read_bytes())
     assert members == {
@@ -73,12 +71,12 @@ def test_the_formats_hold_the_same_block_at_the_targets_sector(written, block):
 
 
 def test_the_same_input_gives_the_same_bytes(written, tmp_path, unproven):
-    for name in ("valve.hex", "valve.txt", "valve.bin"):
+    for name in ("valve.hex", "valve.bin"):
         again = api.calibration(written / "compensator.json", output=tmp_path / name, serial="V-7")
         assert (tmp_path / name).read_bytes() == again.content == (written / name).read_bytes()
 
 
-@pytest.mark.parametrize("name", ["valve.hex", "valve.txt", "valve.bin"])
+@pytest.mark.parametrize("name", ["valve.hex", "valve.bin"])
 def test_a_file_is_read_back(written, name, capsys):
     assert main(["calibration", "--read", str(written / name), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -93,7 +91,6 @@ def test_a_file_is_read_back(written, name, capsys):
     ("name", "words", "placed"),
     [
         ("a.hex", [], "word 0x330000, where f28335"),
-        ("a.txt", [], "octet 0x660000, where f28335"),
         ("a.hex", ["--address", "0x300000"], "word 0x300000, WHERE NO"),
         ("a.hex", ["--target", "host", "--address", "0x660000"], "octet 0x660000, WHERE NO"),
         ("a.bin", [], None),
@@ -141,7 +138,7 @@ def test_another_compensator_and_a_changed_number_are_found(written, tmp_path, b
         (lambda octets: b'{"schema": "dzdesign.valve/1"}', "DZC1"),
     ],
 )
-@pytest.mark.parametrize("form", ["hex", "txt", "bin"])
+@pytest.mark.parametrize("form", ["hex", "bin"])
 def test_a_damaged_block_is_one_sentence(block, tmp_path, form, damage, named, capsys):
     file = tmp_path / f"valve.{form}"
     octets = damage(block)
@@ -177,7 +174,7 @@ def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, bloc
         ["compensator.json"],
         ["compensator.json", "-o", "valve.s19"],
         ["compensator.json", "-o", "valve"],
-        ["compensator.json", "-o", "new.hex", "--format", "txt"],
+        ["compensator.json", "-o", "new.hex", "--format", "bin"],
         ["compensator.json", "-o", "new.img", "--format", "hexx"],
         ["compensator.json", "-o", "new.bin", "--address", "0x330000"],
         ["compensator.json", "-o", "new.hex", "--address", "sector B"],
@@ -194,14 +191,12 @@ def test_a_serial_number_that_steers_a_terminal_is_shown_as_blanks(written, bloc
         ["--read", "valve.hex", "--serial", "8"],
         ["--read", "valve.hex", "--target", "f28335"],
         ["--read", "."],
-        ["--read", "layout.a2l"],
-        ["compensator.json", "-o", "new.a2l", "--serial", "8"],
         ["compensator.json", "-o", "new.hex", "--serial", "  "],
+        ["--read", "valve.bin", "--format", "hex"],
         ["--read", "valve.hex", "--format", "txt"],
-        ["--read", "valve.hex", "--format", "a2l"],
         ["--read", "nothing.hex"],
         ["--read", "compensator.json"],
-        ["--read", "valve.hex", "valve.txt"],
+        ["--read", "valve.hex", "valve.bin"],
     ],
     ids=" ".join,
 )
@@ -217,7 +212,7 @@ def test_bad_usage_is_one_sentence_and_writes_nothing(written, words, monkeypatc
 def test_only_a_block_is_written_over(written, tmp_path, monkeypatch, capsys, unproven):
     monkeypatch.chdir(tmp_path)
     words = ["calibration", str(written / "compensator.json"), "-q"]
-    for name, content in (("ramp.txt", b"time_s\tu_V\n0\t0\n"), ("tool.bin", b"\x7fELF"), ("other.hex", b"")):
+    for name, content in (("ramp.hex", b"time_s\tu_V\n0\t0\n"), ("tool.bin", b"\x7fELF"), ("other.hex", b"")):
         (tmp_path / name).write_bytes(content)
         assert main([*words, "-o", name]) == (0 if content == b"" else 2)  # an empty file is nobody's
         assert content == b"" or (tmp_path / name).read_bytes() == content
@@ -233,32 +228,14 @@ def test_only_a_block_is_written_over(written, tmp_path, monkeypatch, capsys, un
     assert main([*words, "-o", "link.hex"]) == 0 and (tmp_path / "other.hex").read_bytes() == kept
     assert not (tmp_path / "link.hex").is_symlink() and (tmp_path / "link.hex").read_bytes() == first
     assert not [name for name in os.listdir() if name.startswith(".")]
-    (tmp_path / "tool.a2l").write_text("ASAP2_VERSION 1 71\n/begin PROJECT other")
-    assert main([*words, "-o", "tool.a2l"]) == 2
-    for _ in range(2):
-        assert main([*words, "-o", "new.a2l"]) == 0 and main(["calibration", "--read", "new.a2l"]) == 2
     capsys.readouterr()
-
-
-def test_of_an_a2l_nothing_is_said_that_it_does_not_hold(written, tmp_path, capsys, unproven):
-    """It has the layout alone, of any valve: neither octets nor a serial number, a CRC-32 or a compensator."""
-    words = ["calibration", str(written / "compensator.json"), "-o", str(tmp_path / "drive.a2l")]
-    assert main(words) == 0
-    (line,) = capsys.readouterr().out.splitlines()
-    assert line.endswith(", at 0x330000 of f28335") and not re.search("octets|CRC|SHA", line)
-    assert main([*words, "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    place = {name: said.pop(name) for name in ("schema", "file", "format", "target", "address") if name in said}
-    assert (place["format"], place["address"]) == ("a2l", "0x330000") and set(said.values()) == {None}
-    assert main(["calibration", str(written / "compensator.json"), "-o", str(tmp_path / "valve.hex"), "--json"]) == 0
-    assert None not in json.loads(capsys.readouterr().out).values()
 
 
 def test_address_target_and_ending_can_be_chosen(written, tmp_path, capsys, unproven):
     words = ["calibration", str(written / "compensator.json"), "--json"]
     for given, address in ((["--address", "0x320000"], 0x32_0000 * 2), (["--target", "host"], 0)):
-        assert main([*words, "-o", str(tmp_path / "a.txt"), *given]) == 0
-        assert min(ti_txt_memory((tmp_path / "a.txt").read_text())) == address
+        assert main([*words, "-o", str(tmp_path / "a.hex"), *given]) == 0
+        assert min(hex_memory((tmp_path / "a.hex").read_text(), of_words=address > 0)) == address
         assert json.loads(capsys.readouterr().out)["address"] == (hex(address // 2) if address else "0x0")
     assert main([*words, "-o", str(tmp_path / "a.image"), "--format", "hex", "--serial", "V-7"]) == 0
     assert (tmp_path / "a.image").read_bytes() == (written / "valve.hex").read_bytes()

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
-from intelhex import IntelHex
 
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
 from dzdesign.serial_port import PortLine, open_port
+from tests.support.block_reader import hex_text
 from tests.support.documented_commands import agrees
 from tests.support.loading.bench import SLOTS, build_drive
 from tests.support.loading.device import Device, build_device, firmware_files
@@ -85,9 +85,7 @@ def drive(program, tmp_path):
 def block_file(folder: Path, block: bytes = NEW, name: str = "valve.bin") -> Path:
     path = folder / name
     if name.endswith(".hex"):
-        image = IntelHex()
-        image.frombytes(block, offset=0x330000)
-        image.write_hex_file(str(path))
+        path.write_text(hex_text((0x330000, block)))
     else:
         path.write_bytes(block)
     return path

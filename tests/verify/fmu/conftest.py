@@ -21,19 +21,13 @@ def fmu_folder(tmp_path_factory, compensator):
         return written(fmus_of(compensator), tmp_path_factory.mktemp("fmus"))
 
 
-@pytest.fixture(scope="session", params=(2, 3), ids=("fmi2", "fmi3"))
-def fmi(request):
-    """Return a version of FMI."""
-    return request.param
-
-
 @pytest.fixture(scope="session")
-def fmu(fmu_folder, fmi):
+def fmu(fmu_folder):
     """Return the compensator's FMU."""
-    return read_fmu(fmu_folder / f"dz_compensator_fmi{fmi}.fmu")
+    return read_fmu(fmu_folder / "dz_compensator.fmu")
 
 
 @pytest.fixture(scope="session")
-def plant_fmu(fmu_folder, fmi):
+def plant_fmu(fmu_folder):
     """Return the plant's FMU."""
-    return read_fmu(fmu_folder / f"dz_plant_fmi{fmi}.fmu")
+    return read_fmu(fmu_folder / "dz_plant.fmu")

@@ -6,7 +6,6 @@ import pytest
 
 from dzdesign.verify.fmu import exchange
 from dzdesign.verify.fmu.exchange import compensator_exchange_check, plant_exchange_check, starts_check
-from dzdesign.verify.fmu.fmu_file import read_fmu
 from tests.support.host_fmus import PLANT, edited
 
 
@@ -15,16 +14,6 @@ def fewer_samples(monkeypatch):
     """Run fewer samples than `verify` does."""
     monkeypatch.setattr(exchange, "SAMPLES", 300)
     monkeypatch.setattr(exchange, "STATES", 60)
-
-
-@pytest.fixture(scope="module")
-def one(fmu_folder):
-    return read_fmu(fmu_folder / "dz_compensator_fmi2.fmu")
-
-
-@pytest.fixture(scope="module")
-def one_plant(fmu_folder):
-    return read_fmu(fmu_folder / "dz_plant_fmi2.fmu")
 
 
 def test_right_ones_hold(fmu, plant_fmu, compensator):
@@ -48,8 +37,8 @@ def test_right_ones_hold(fmu, plant_fmu, compensator):
     ),
     ids=("scale", "sign", "late", "next event", "discrete"),
 )
-def test_a_wrong_compensator_is_found(one, compensator, old, new):
-    assert compensator_exchange_check(one, edited(one, "dz_fmu.c", old, new), compensator).holds is False
+def test_a_wrong_compensator_is_found(fmu, compensator, old, new):
+    assert compensator_exchange_check(fmu, edited(fmu, "dz_fmu.c", old, new), compensator).holds is False
 
 
 @pytest.mark.parametrize(
@@ -69,12 +58,12 @@ def test_a_wrong_compensator_is_found(one, compensator, old, new):
     ),
     ids=("coil", "held", "damping", "pressure", "droop", "lets go", "stop", "bounce", "edge", "play", "changed"),
 )
-def test_a_wrong_plant_is_found(one_plant, compensator, old, new):
-    wrong = edited(one_plant, "dz_fmu.c", old, new)
-    assert plant_exchange_check(one_plant, wrong, asdict(PLANT), compensator).holds is False
+def test_a_wrong_plant_is_found(plant_fmu, compensator, old, new):
+    wrong = edited(plant_fmu, "dz_fmu.c", old, new)
+    assert plant_exchange_check(plant_fmu, wrong, asdict(PLANT), compensator).holds is False
 
 
-def test_another_first_value_is_found(one, one_plant):
-    assert starts_check(one, edited(one, "dz_fmu.c", "ALWAYS, 0.0,", "ALWAYS, 1.0,")).holds is False
-    slow = edited(one_plant, "dz_fmu.c", "BEFORE_START, 0.04,", "BEFORE_START, 0.05,")
-    assert starts_check(one_plant, slow).holds is False
+def test_another_first_value_is_found(fmu, plant_fmu):
+    assert starts_check(fmu, edited(fmu, "dz_fmu.c", "ALWAYS, 0.0,", "ALWAYS, 1.0,")).holds is False
+    slow = edited(plant_fmu, "dz_fmu.c", "BEFORE_START, 0.04,", "BEFORE_START, 0.05,")
+    assert starts_check(plant_fmu, slow).holds is False

@@ -42,8 +42,6 @@ class Words:
     unit: str = ""
     #: True of numbers that stand in pairs: in C an array of `struct dz_calibration_node`.
     pairs: bool = False
-    #: True of a number that may be below zero: in C and here a word, in two's complement.
-    signed: bool = False
     #: Key of compensator.json; empty for what no single key holds.
     key: str = ""
 
@@ -62,9 +60,7 @@ class SideBlock:
     """The law of one sign of command, and what of the drive functions differs between the signs."""
 
     offset: Annotated[int, _one("coefficient of beta in the sum", key="sides.*.u_min0_over_u_max", bits=32)]
-    slope: Annotated[
-        int, Words(bits=32, signed=True, text="coefficient of beta times command in the sum, two's complement")
-    ]
+    slope: Annotated[int, _one("coefficient of beta times command in the sum, two's complement", bits=32)]
     transition: Annotated[
         int, _one("coefficient of (beta - beta at zero command) for each code short of the transition's end", bits=32)
     ]

@@ -11,24 +11,20 @@ from dzdesign.codegen.calibration.places import Place
 ELSEWHERE = "right only if your linker file places it there"
 
 
-def place_in_words(place: Place, form: str, sectors: Mapping[str, Place]) -> str:
-    """Say where a file of a format places a block; `sectors` are where targets' firmware has it, by their names.
+def place_in_words(place: Place, sectors: Mapping[str, Place]) -> str:
+    """Say where a file places a block; `sectors` are where targets' firmware has it, by their names.
 
     Examples
     --------
     >>> sectors = {"f28335": Place(address=0x33_0000, unit_octets=2)}
-    >>> place_in_words(Place(address=0x33_0000, unit_octets=2), "hex", sectors)
+    >>> place_in_words(Place(address=0x33_0000, unit_octets=2), sectors)
     "word 0x330000, where f28335's firmware has its block"
-    >>> place_in_words(Place(address=0x66_0000), "txt", sectors)
-    "octet 0x660000, where f28335's firmware has its block"
-    >>> place_in_words(Place(address=0x30_0000, unit_octets=2), "hex", sectors)
+    >>> place_in_words(Place(address=0x30_0000, unit_octets=2), sectors)
     'word 0x300000, WHERE NO GENERATED FIRMWARE HAS ITS BLOCK: right only if your linker file places it there'
     """
     where = f"{'word' if place.unit_octets > 1 else 'octet'} {place.address:#x}"
     for target, sector in sectors.items():
-        # TI-TXT counts octets on every target; Intel HEX as the target does.
-        counts_alike = form == "txt" or place.unit_octets == sector.unit_octets
-        if counts_alike and place.address * place.unit_octets == sector.address * sector.unit_octets:
+        if place == sector:
             return f"{where}, where {target}'s firmware has its block"
     return f"{where}, WHERE NO GENERATED FIRMWARE HAS ITS BLOCK: {ELSEWHERE}"
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from dzdesign.core.errors import InputError
 
-#: Addresses of 32 bits, which TI-TXT counts in octets on every target.
+#: Octets that addresses of 32 bits tell apart.
 ADDRESSES = 1 << 32
 #: Numbers of 32 bits must begin where the processor can read them.
 ALIGNED_OCTETS = 4
@@ -18,7 +18,7 @@ class Place:
     unit_octets: int = 1
 
     def at(self, address: int, octets: int) -> "Place":
-        """Return the same memory at another address, where so many octets must have room in every format."""
+        """Return the same memory at another address, where so many octets must have room."""
         last, step = (ADDRESSES - octets) // self.unit_octets, ALIGNED_OCTETS // self.unit_octets
         if not 0 <= address <= last or address % step:
             unit = "words of 16 bits" if self.unit_octets > 1 else "octets"

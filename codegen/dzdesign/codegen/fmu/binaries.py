@@ -12,7 +12,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
-from dzdesign.codegen.fmu.description import SOURCE, Fmi
+from dzdesign.codegen.fmu.description import SOURCE
 from dzdesign.core.errors import MissingToolError
 from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import scratch_folder
@@ -36,20 +36,20 @@ WORKERS = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Platform:
-    """Where an FMU runs: ziglang's name of it, the folders of the binaries in FMI 2 and 3, and their ending."""
+    """Where an FMU runs: ziglang's name of it, the folder of its binary, and that one's ending."""
 
     triple: str
-    folders: Mapping[Fmi, str]
+    folder: str
     ending: str
 
 
-#: FMI 2 has no names for processors but those of the PC.
+#: FMI 2.0.4 (2.3) takes the names of FMI 3 for all processors but those of the PC.
 PLATFORMS = (
-    Platform(triple="x86_64-linux-gnu", folders={2: "linux64", 3: "x86_64-linux"}, ending="so"),
-    Platform(triple="aarch64-linux-gnu", folders={3: "aarch64-linux"}, ending="so"),
-    Platform(triple="x86_64-windows-gnu", folders={2: "win64", 3: "x86_64-windows"}, ending="dll"),
-    Platform(triple="x86_64-macos", folders={2: "darwin64", 3: "x86_64-darwin"}, ending="dylib"),
-    Platform(triple="aarch64-macos", folders={3: "aarch64-darwin"}, ending="dylib"),
+    Platform(triple="x86_64-linux-gnu", folder="linux64", ending="so"),
+    Platform(triple="aarch64-linux-gnu", folder="aarch64-linux", ending="so"),
+    Platform(triple="x86_64-windows-gnu", folder="win64", ending="dll"),
+    Platform(triple="x86_64-macos", folder="darwin64", ending="dylib"),
+    Platform(triple="aarch64-macos", folder="aarch64-darwin", ending="dylib"),
 )  # fmt: skip
 
 
@@ -73,19 +73,18 @@ def _version() -> str:
     return found
 
 
-def binaries_of(identifier: str, fmi: Fmi, sources: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Compile the sources for every platform of a version of FMI; path in the FMU to bytes."""
+def binaries_of(identifier: str, sources: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Compile the sources for every platform; path in the FMU to bytes."""
     ziglang_version()
-    wanted = [each for each in PLATFORMS if fmi in each.folders]
     with scratch_folder() as folder, ThreadPoolExecutor(WORKERS) as pool:
         for name, content in sources.items():
             (folder / name).write_bytes(content)
         (folder / NO_LIBRARY).mkdir()
         (folder / NO_LIBRARY / "stdlib.h").write_bytes(b"")
-        compiled = pool.map(lambda platform: _compiled(folder, identifier, platform), wanted)
+        compiled = pool.map(lambda platform: _compiled(folder, identifier, platform), PLATFORMS)
         return {
-            f"binaries/{platform.folders[fmi]}/{identifier}.{platform.ending}": content
-            for platform, content in zip(wanted, compiled, strict=True)
+            f"binaries/{platform.folder}/{identifier}.{platform.ending}": content
+            for platform, content in zip(PLATFORMS, compiled, strict=True)
         }
 
 

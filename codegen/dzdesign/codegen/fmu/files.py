@@ -1,4 +1,4 @@
-"""FMUs of a compensator, and of a plant where one is given: `output_files` returns them, a file a version of FMI."""
+"""FMUs of a compensator, and of a plant where one is given: `output_files` returns them."""
 
 import json
 import struct
@@ -14,7 +14,7 @@ from dzdesign.codegen.banner import banner_of
 from dzdesign.codegen.fmu.archive import archive
 from dzdesign.codegen.fmu.binaries import binaries_of, ziglang_version
 from dzdesign.codegen.fmu.compensator import compensator_core, compensator_model, compensator_values
-from dzdesign.codegen.fmu.description import SOURCE, Fmi, Model, build_description, model_description
+from dzdesign.codegen.fmu.description import SOURCE, Model, model_description
 from dzdesign.codegen.fmu.plant import plant_model, plant_of, plant_values
 from dzdesign.core.artefact_files import TOOL, sha256_of
 from dzdesign.core.artefact_types import to_json_bytes
@@ -24,7 +24,6 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 
 PACKAGE = "dzdesign.codegen.fmu"
-VERSIONS: tuple[Fmi, ...] = (2, 3)
 #: Where an FMU keeps what belongs to no tool but this one.
 EXTRA = "extra/dzdesign"
 SCHEMA = "dzdesign.fmu/1"
@@ -73,8 +72,7 @@ def output_files(
                 extra={"plant.json": (json.dumps(dict(plant), indent=2) + "\n").encode()},
             )
         )
-    return {f"{part.model.identifier}_fmi{fmi}.fmu": _fmu(part, compensator, origin, fmi)
-            for part in parts for fmi in VERSIONS}  # fmt: skip
+    return {f"{part.model.identifier}.fmu": _fmu(part, compensator, origin) for part in parts}
 
 
 def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
@@ -98,30 +96,27 @@ def made_by_another_compiler(files: Mapping[str, bytes]) -> str:
     return ""
 
 
-def _fmu(part: Parts, compensator: Compensator, origin: FirmwareOrigin, fmi: Fmi) -> bytes:
+def _fmu(part: Parts, compensator: Compensator, origin: FirmwareOrigin) -> bytes:
     """Return one FMU."""
     model, digest = part.model, origin.compensator_json
-    token = _token(part, digest, fmi)
+    token = _token(part, digest)
     values = {
         **part.values,
         "banner": banner_of(compensator, digest).lines("dz_fmu.c.jinja"),
         "title": model.title.replace("dzdesign ", "").capitalize(),
-        "fmi": fmi,
         "token": token,
-        "variables": model.of(fmi),
+        "variables": model.variables,
         "indicators": model.indicators,
         "states": model.states,
         "rates": [each for each in model.variables if each.derivative_of],
         "model_template": part.template,
-        "interface_template": f"fmi{fmi}.c.jinja",
     }
     template = strict_templates(PACKAGE, autoescape=False).get_template("dz_fmu.c.jinja")
-    sources = {SOURCE: str(template.render(values)).encode(), **part.core, **_headers(fmi)}
+    sources = {SOURCE: str(template.render(values)).encode(), **part.core, **_headers()}
     files = {
-        "modelDescription.xml": model_description(model, fmi, token).encode(),
+        "modelDescription.xml": model_description(model, token).encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
-        **({"sources/buildDescription.xml": build_description(model).encode()} if fmi == 3 else {}),
-        **binaries_of(model.identifier, fmi, sources),
+        **binaries_of(model.identifier, sources),
         **{f"{EXTRA}/{name}": content for name, content in part.extra.items()},
     }
     manifest = {
@@ -129,7 +124,6 @@ def _fmu(part: Parts, compensator: Compensator, origin: FirmwareOrigin, fmi: Fmi
         "tool": TOOL,
         "compiler": f"ziglang {ziglang_version()}",
         "compensator_json": digest,
-        "fmi": f"{fmi}.0",
         "token": token,
         "files": {path: sha256_of(files[path]) for path in sorted(files)},
     }
@@ -137,14 +131,14 @@ def _fmu(part: Parts, compensator: Compensator, origin: FirmwareOrigin, fmi: Fmi
     return archive(files)
 
 
-def _token(part: Parts, digest: str, fmi: Fmi) -> str:
+def _token(part: Parts, digest: str) -> str:
     """Return what ties a binary to its modelDescription.xml: from the compensator's hash and the variables."""
-    made_from = (digest, fmi, part.model.identifier, part.model.variables, sorted(part.extra.items()), TOOL)
+    made_from = (digest, part.model.identifier, part.model.variables, sorted(part.extra.items()), TOOL)
     return f"{{{uuid.UUID(sha256_of(repr(made_from).encode())[:32])}}}"
 
 
-def _headers(fmi: Fmi) -> dict[str, bytes]:
+def _headers() -> dict[str, bytes]:
     """Return the headers of the standard, which carry their licence."""
-    folder = files_of(PACKAGE) / "headers" / f"fmi{fmi}"
+    folder = files_of(PACKAGE) / "headers"
     names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".h"))
     return {name: (folder / name).read_bytes() for name in names}

@@ -72,7 +72,7 @@ def plant_of(text: str, compensator: Compensator) -> Mapping[str, float] | None:
 
 
 def plant_model(plant: Mapping[str, float], compensator: Compensator) -> Model:
-    """Return what the FMU is called, and its variables: event indicators last, which FMI 2 has no variables for."""
+    """Return what the FMU is called, and its variables."""
     found = list[Variable]()
     signals = compensator.signals
 
@@ -103,17 +103,12 @@ def plant_model(plant: Mapping[str, float], compensator: Compensator) -> Model:
     add("der(i)", "Its rate.", "local", unit="A/s", derivative_of="i", follows=("i", *inputs))
     add("der(x)", "Its rate.", "local", unit="m/s", derivative_of="x", follows=("v",))
     add("der(v)", "Its rate.", "local", unit="m/s2", derivative_of="v", follows=("i", "x", "v", "supply"))
-    states = ("i", "x", "v", "supply")
-    indicators = ("z_closed", "z_open", "z_edge")
-    add("z_closed", "Event indicator of the closed end.", "local", follows=states)
-    add("z_open", "Event indicator of the open end.", "local", follows=states)
-    add("z_edge", "Event indicator of the metering edge.", "local", follows=("x",))
     return Model(
         identifier="dz_plant",
         title="dzdesign plant",
         description="Proportional valve by Eqs. (19)-(24): amplifier, coil, spool with stops and play, metering edge.",
         variables=tuple(found),
-        indicators=indicators,
+        indicators=3,  # of the closed end, the open end and the metering edge
         follows_integrator=True,
         step_s=1 / signals.tick_Hz,
         stop_s=STOP_S,

@@ -1,13 +1,13 @@
 """The variables of the FMUs: one table each for the compensator and for the plant, from which C and XML are printed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from dzdesign.design.compensator import Compensator
 
 Kind = Literal["real", "integer", "boolean"]
-Causality = Literal["input", "output", "parameter", "local", "independent"]
+Causality = Literal["input", "output", "parameter", "local"]
 #: In C: who may set a variable of that causality.
 SETTINGS: Mapping[str, str] = {"input": "ALWAYS", "parameter": "BEFORE_START"}
 
@@ -74,9 +74,6 @@ class Variable:
         return "discrete" if self.discrete or self.kind != "real" else "continuous"
 
 
-TIME = Variable(name="time", reference=0, description="Simulation time.", causality="independent", unit="s")
-
-
 def compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
     """Return the variables of a compensator's FMU; of two solenoids the law's outputs are there for either."""
     c, found = compensator, list[Variable]()
@@ -128,8 +125,3 @@ def full_output(compensator: Compensator) -> tuple[str, float]:
     if (drive := compensator.current_drive) is not None:
         return "A", float(drive.circuit.rated_A)
     return "V", float(compensator.u_max_V)
-
-
-def named(variables: Sequence[Variable]) -> dict[str, Variable]:
-    """Return variables by their names."""
-    return {each.name: each for each in variables}

@@ -17,7 +17,6 @@ from dzdesign.report.figures.figure import (
     new_figure,
     to_report_figure,
 )
-from dzdesign.report.language import word
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +60,7 @@ def _drawn(curves: Sequence[CharacteristicCurve], units: RecordedUnits, *, narro
     for curve in curves:
         _draw(axes, curve, hues[id(curve)], units)
     axes.set(
-        xlabel=word("command (% of full)"), ylabel=f"{word('flow')} Q ({units.label('L/min')})",
+        xlabel="command (% of full)", ylabel=f"flow Q ({units.label('L/min')})",
         xlim=(-100 - (1 + narrow) * LEFT_ROOM if low else 0, 100 if high else 0),
         xticks=range(-100 if low else 0, 101 if high else 1, 50 if narrow and low and high else 20),
     )  # fmt: skip
@@ -130,22 +129,22 @@ def _legend(figure: "Figure", axes: "Axes", curves: Sequence[CharacteristicCurve
         if of_set:
             dash, width = DASHES[name]
             origin = ORIGIN_WORDS[of_set[0].origin]
-            label = f"{word(WITH_WORDS[name])} ({word(origin)})"
+            label = f"{WITH_WORDS[name]} ({origin})"
             handles += axes.plot([], [], linestyle=dash, lw=width, color=LIGHT["soft"], label=label)
     if any(curve.samples for curve in curves):
-        handles += axes.plot([], [], color=LIGHT["soft"], label=word("samples"), **SAMPLE)
+        handles += axes.plot([], [], color=LIGHT["soft"], label="samples", **SAMPLE)
     figure.legend(handles=handles, loc="lower center", ncols=columns, columnspacing=1.4, borderpad=0.1,
                   borderaxespad=0.1)  # fmt: skip
 
 
 def _caption(curves: Sequence[CharacteristicCurve]) -> str:
     sides = {curve.side for curve in curves}
-    lines = [word("Flow against command, opening and closing, at every pressure drop.")]
+    lines = ["Flow against command, opening and closing, at every pressure drop."]
     if len(sides) == 1:
         none = "negative" if "positive" in sides else "positive"
-        lines.append(word(f"No {none} commands were tested."))
+        lines.append(f"No {none} commands were tested.")
     if any(curve.samples for curve in curves):
-        lines.append(word("Of the samples a few of each branch are drawn, at equal steps of the command."))
+        lines.append("Of the samples a few of each branch are drawn, at equal steps of the command.")
     return " ".join(lines)
 
 

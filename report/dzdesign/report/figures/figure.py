@@ -16,7 +16,6 @@ from urllib.parse import quote
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.style import HUES, plot_style
-from dzdesign.report.language import word
 
 if TYPE_CHECKING:
     import numpy as np
@@ -191,10 +190,8 @@ def to_report_figure(
     figure: "Figure", name: str, caption: str, description: str, csv: str, narrow: "Figure | None" = None
 ) -> ReportFigure:
     """Return a figure as the page shows it; see `ReportFigure`."""
-    caption, description = word(caption), word(description)
     for each in (figure, narrow):
         if each is not None:
-            _translate(each)
             _make_room_for_ticks(each)
             _make_room_for_legend(each)
     return ReportFigure(
@@ -205,15 +202,6 @@ def to_report_figure(
         csv=csv,
         narrow_svg=_svg_of(narrow, f"{name}-narrow", description, "drawing narrow") if narrow else "",
     )
-
-
-def _translate(figure: "Figure") -> None:
-    """Put the texts of a figure into the language of the report, before it is laid out."""
-    from matplotlib.text import Text
-
-    for each in figure.findobj(Text):
-        if isinstance(each, Text) and each.get_text() != word(each.get_text()):
-            each.set_text(word(each.get_text()))
 
 
 def _make_room_for_ticks(figure: "Figure") -> None:

@@ -11,7 +11,6 @@ from dzdesign.core.artefact_types import quantity
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.compensator_sides import laws_of
-from dzdesign.report.language import word
 from dzdesign.report.sections.cells import Cell, Table, number, recorded, table_of
 
 #: Of a number in mV and of a price in percent: finer than any error here.
@@ -104,8 +103,8 @@ def lot_budget_table(budget: LotBudget | None, units: RecordedUnits) -> Table | 
     return table_of(
         "Uncertainty budgets of the valves: what each component takes at most, and what it costs",
         budget.lines,
-        ("component", lambda line: Cell(text=word(line.component), more=", ".join(map(word, line.origin)))),
-        *((("commands", lambda line: word(line.side)),) if both else ()),
+        ("component", lambda line: Cell(text=line.component, more=", ".join(line.origin))),
+        *((("commands", lambda line: line.side),) if both else ()),
         (f"largest contribution ({units.label('mV')})", lambda line: recorded(line.contribution_mV, ".2f mV", units)),
         *((f"price, {which} (% of command)", price(place)) for place, which in enumerate(ENDS)),
     )

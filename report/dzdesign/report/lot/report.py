@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from dzdesign.core.errors import and_more
-from dzdesign.report.language import word
 from dzdesign.report.lot.budget import lot_budget_lines
 from dzdesign.report.lot.folder import Lot, read_lot
 from dzdesign.report.lot.sections import sections_of
@@ -34,7 +33,7 @@ def make_lot_report(lot: Lot, logo: str = "") -> Report:
     if lot.summary and lot.calibrated and not lot.summary.verified:
         missing.append("the evidence of each valve: `dzdesign batch --verify` makes it")
     page = Page(
-        title=word(f"Lot of {whole(lot.expected)} {'valve' if lot.expected == 1 else 'valves'}"),
+        title=f"Lot of {whole(lot.expected)} {'valve' if lot.expected == 1 else 'valves'}",
         verdict=verdict,
         figures=key_figures_of_lot(lot, spreads),
         template="lot.html.jinja",

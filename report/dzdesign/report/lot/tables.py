@@ -6,7 +6,6 @@ from dataclasses import astuple, fields, replace
 from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.figures.figure import csv_text
-from dzdesign.report.language import word
 from dzdesign.report.lot.folder import Lot
 from dzdesign.report.lot.outputs import output_verdicts
 from dzdesign.report.lot.reasons import ReasonGroup
@@ -75,7 +74,7 @@ def spread_table(spreads: Sequence[Spread]) -> Table:
     return table_of(
         "How the calibrated valves scatter",
         spreads,
-        ("quantity", lambda spread: word(spread.heading)),
+        ("quantity", lambda spread: spread.heading),
         ("valves", lambda spread: in_number_font(whole(len(spread.values)))),
         ("least", end("least", 0)),
         ("5 %", quantile("q05")),
@@ -101,7 +100,7 @@ def far_table(spreads: Sequence[Spread]) -> Table | None:
         f"Far from the rest, the first {ROWS} of {len(found)}" if len(found) > ROWS else "Far from the rest",
         found[:ROWS],
         ("valve", lambda one: one[1]),
-        ("quantity", lambda one: word(one[0].heading)),
+        ("quantity", lambda one: one[0].heading),
         ("value", lambda one: _cell(one[0].quantity, one[2], one[0].units)),
         ("median of the lot", lambda one: _cell(one[0].quantity, one[0].at.median, one[0].units)),
         ("robust s.d. from the median", lambda one: number(one[0].distance(one[2]), 1, "+")),
@@ -132,7 +131,7 @@ def warnings_table(lot: Lot) -> Table | None:
         ("code", lambda one: Cell(text=one[0], kind="symbol")),
         ("valves", lambda one: in_number_font(f"{whole(len(one[1]))} of {whole(count)}")),
         ("in the first of them it says", lambda one: lot.warning_texts.get(one[0], "–")),
-        ("names", lambda one: word("all") if len(one[1]) == count > 1 else and_more(one[1], NAMED)),
+        ("names", lambda one: "all" if len(one[1]) == count > 1 else and_more(one[1], NAMED)),
         csv=csv_text(("code", "valve"), ((code, name) for code, names in ordered for name in names)),
         name="warnings",
     )

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from dzdesign.core.verdicts import verdict_words
 from dzdesign.report.chain import Chain
-from dzdesign.report.language import word
 from dzdesign.report.outputs.made_output import MadeOutput, MadeOutputs
 from dzdesign.report.page import Headline, Section
 from dzdesign.report.sections.cells import Cell, counted, table_of, verdict, whole
@@ -29,7 +28,7 @@ def _outputs_section(made: MadeOutputs) -> Section:
         table = table_of(
             "Every output made of this compensator.json, with the SHA-256 of its manifest, or of a file alone",
             made.listed,
-            ("output", lambda each: Cell(text=word(each.kind), more=each.settings)),
+            ("output", lambda each: Cell(text=each.kind, more=each.settings)),
             ("folder or file", lambda each: each.place),
             ("SHA-256", lambda each: Cell(text=each.sha256, kind="hash")),
             ("check", _check),

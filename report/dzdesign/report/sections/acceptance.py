@@ -6,7 +6,6 @@ from dzdesign.assess.assessment import Assessment
 from dzdesign.assess.limits import LimitResult
 from dzdesign.assess.quantities import Quantity, Reading
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
 from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, recorded, table_of, verdict
@@ -69,7 +68,7 @@ def _verdict(row: PaperNumber) -> Cell | str:
         return verdict(False)
     if row.kind != "predicted":
         return "–"
-    return word("agrees" if row.agrees else "missed")
+    return "agrees" if row.agrees else "missed"
 
 
 def _ours(outcome: Outcome) -> str:
@@ -85,10 +84,10 @@ def _limits_table(assessment: Assessment) -> Table:
         "The limits that were set",
         assessment.limits,
         ("verdict", lambda one: verdict(one.holds)),
-        ("quantity", lambda one: word(_quantity(assessment, one.quantity).name)),
-        ("where", lambda one: word(one.place)),
+        ("quantity", lambda one: _quantity(assessment, one.quantity).name),
+        ("where", lambda one: one.place),
         ("limit", lambda one: in_number_font(_limit(one, assessment.recorded_units))),
-        ("found", lambda one: word(one.text)),
+        ("found", lambda one: one.text),
     )
 
 
@@ -110,8 +109,8 @@ def _before_after_table(assessment: Assessment) -> Table:
         "Recordings without and with the compensator, at the pressure drops that have both",
         [row for row in rows if {row[2], row[3]} - {"–", "not seen"}],
         (f"dP ({units.label('MPa')})", lambda row: recorded(row[0].dp_MPa, ".2f MPa", units)),
-        ("commands", lambda row: word(row[0].side)),
-        ("quantity", lambda row: word(row[1].name)),
+        ("commands", lambda row: row[0].side),
+        ("quantity", lambda row: row[1].name),
         ("before", lambda row: in_number_font(row[2])),
         ("after", lambda row: in_number_font(row[3])),
         ("unit", lambda row: units.label(row[1].unit) if row[1].unit in IN_RECORDED_UNITS else row[1].unit),

@@ -9,7 +9,6 @@ from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.budget import budget_figure
 from dzdesign.report.figures.figure import csv_text
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, recorded, table_of
 
@@ -42,7 +41,7 @@ def budget_table(budget: Budget, name: str, both: bool, units: RecordedUnits) ->
     return table_of(
         f"Uncertainty budget{f', {name} commands' if both else ''}",
         budget.lines,
-        ("component", lambda line: Cell(text=word(line.component), more=_origin(line))),
+        ("component", lambda line: Cell(text=line.component, more=_origin(line))),
         ("half-width", lambda line: in_number_font(_half_width(line, units))),
         (f"sensitivity ({millivolts} per unit of it)", lambda line: in_number_font(_sensitivity(line, units))),
         *(

@@ -14,7 +14,6 @@ from dzdesign.report.characteristic.quantities import (
     Found,
     PressureQuantities,
 )
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, recorded
 
@@ -97,7 +96,7 @@ def _row(
 ) -> tuple[Cell, ...]:
     unit = (LIMITED | QUANTITIES)[key].unit
     shown = units.label(unit) if unit in IN_RECORDED_UNITS else unit
-    cells = [Cell(text=word(NAMES[key])), in_number_font(shown)]
+    cells = [Cell(text=NAMES[key]), in_number_font(shown)]
     driven = any(each.after for each in pressures)
     cells += [_pair(key, each, unit, units, driven=driven) for each in pressures]
     if with_limits:

@@ -9,7 +9,6 @@ from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.figures.law import law_figure
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, recorded, table_of
 
@@ -122,8 +121,8 @@ def rounding_table(compensator: Compensator) -> Table:
     return table_of(
         "What the integers cost",
         rows,
-        ("number", lambda row: word(row[0])),
-        ("in the C code", lambda row: word(row[1])),
-        ("exact, or what is done", lambda row: word(row[2])),
+        ("number", lambda row: row[0]),
+        ("in the C code", lambda row: row[1]),
+        ("exact, or what is done", lambda row: row[2]),
         (f"difference, at most ({units.label('mV')})", lambda row: recorded(row[3], "+.3f mV", units)),
     )

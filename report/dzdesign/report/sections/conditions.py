@@ -10,7 +10,6 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.model import ValveModel, lag_in_words
 from dzdesign.identify.valve.ramp_conditions import RampConditions
 from dzdesign.report.characteristic.curves import measured_curve_of
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, in_number_font
 
@@ -44,7 +43,7 @@ def conditions_section(valve: ValveModel | None, assessment: Assessment | None) 
     else:
         meter, floor = (valve.meter.lag_in_words(), valve.meter.floor_L_min) if valve else ("", 0.0)
     rows += [
-        ("Flow meter", [f"{word(meter)}; {word('floor')} {units.text(floor, '.2f L/min')}"]),
+        ("Flow meter", [f"{meter}; floor {units.text(floor, '.2f L/min')}"]),
         *([("Dither", [valve.dither_in_words])] if valve and valve.dither else []),
         *((name, [_entry(valve.record if valve else {}, known)]) for name, known in RECORDED.items()),
     ]
@@ -60,7 +59,7 @@ def conditions_section(valve: ValveModel | None, assessment: Assessment | None) 
                 caption="Recordings",
                 columns=("", *heads),
                 rows=tuple(
-                    (Cell(text=word(name)), *(_cell(values[min(i, len(values) - 1)]) for i in range(len(heads))))
+                    (Cell(text=name), *(_cell(values[min(i, len(values) - 1)]) for i in range(len(heads))))
                     for name, values in rows
                 ),
             ),
@@ -98,4 +97,4 @@ def _entry(record: Mapping[str, str], known: Sequence[str]) -> str:
 
 
 def _cell(text: str) -> Cell:
-    return in_number_font(text) if text and text[0].isdigit() else Cell(text=text or word("not recorded"))
+    return in_number_font(text) if text and text[0].isdigit() else Cell(text=text or "not recorded")

@@ -1,7 +1,6 @@
 """Tables on a drive by current: its loop at every corner of coil and supply, faults, the valve behind it."""
 
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.report.language import word
 from dzdesign.report.sections.cells import Cell, Table, in_number_font, number, recorded, table_of
 from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.loop_results import flow_in_words
@@ -15,7 +14,7 @@ def current_tables(result: CurrentLoopResult | None, units: RecordedUnits) -> tu
 
 
 def _optional(value: float | None, places: int, factor: float = 1.0) -> Cell:
-    return Cell(text=word("not carried")) if value is None else number(factor * value, places)
+    return Cell(text="not carried") if value is None else number(factor * value, places)
 
 
 def _corners(result: CurrentLoopResult) -> Table:
@@ -44,10 +43,10 @@ def _faults(result: CurrentLoopResult) -> Table:
         ("bit", lambda one: Cell(text=f"DZ_CURRENT_{one.expected}", kind="symbol")),
         (
             "seen after (ms)",
-            lambda one: Cell(text=word("not seen")) if one.seen_after_s is None else number(1e3 * one.seen_after_s, 1),
+            lambda one: Cell(text="not seen") if one.seen_after_s is None else number(1e3 * one.seen_after_s, 1),
         ),
         ("at most (ms)", lambda one: number(1e3 * one.limit_s, 1)),
-        ("output stays off", lambda one: word("yes" if one.latched else "no")),
+        ("output stays off", lambda one: "yes" if one.latched else "no"),
     )
 
 

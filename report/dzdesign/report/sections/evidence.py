@@ -12,7 +12,6 @@ from dzdesign.report.figures.closed_loop import dead_zone_figure, loop_figure
 from dzdesign.report.figures.figure import Curves, ReportFigure
 from dzdesign.report.figures.input_map import map_figure
 from dzdesign.report.figures.zero_command import zero_figure
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import (
     Cell,
@@ -153,7 +152,7 @@ def readings_table(pressures: Sequence[PressureResult], units: RecordedUnits) ->
         f"Dead zones read {units.span(min(flows), max(flows), '.2f L/min')}, in per cent of command; an ideal line "
         "rises straight from zero command",
         pressures,
-        ("side", lambda one: word(one.side)),
+        ("side", lambda one: one.side),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         ("opening without (%)", lambda one: number(100 * one.reading_opening_without, 1)),
         ("opening with (%)", lambda one: number(100 * one.reading_opening, 1)),
@@ -169,7 +168,7 @@ def loops_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Ta
     return table_of(
         f"Dead zones at the onset of flow in per cent of command, flows in {flow}",
         pressures,
-        ("side", lambda one: word(one.side)),
+        ("side", lambda one: one.side),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         ("opening without (%)", lambda one: number(100 * one.dead_zone_opening, 1)),
         ("opening with (%)", lambda one: number(100 * one.residual_opening, 1)),
@@ -198,7 +197,7 @@ def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -
         (f"behind the edge ({units.label('MPa')})", lambda one: recorded(one.back_MPa, ".2f MPa", units)),
         (f"at zero, at the end ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
         (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
-        ("required", lambda one: word(_required(one, units) if one.must_shut else f"{one.not_required}: not required")),
+        ("required", lambda one: _required(one, units) if one.must_shut else f"{one.not_required}: not required"),
     )
 
 
@@ -213,8 +212,7 @@ def _where(row: ScenarioResult, scenarios: Sequence[ScenarioResult], units: Reco
             drops.setdefault(each.side, {})[units.number(each.dp_MPa, ".2f MPa")] = None
     two_sided = len({each.side for each in scenarios}) > 1
     return "; ".join(
-        (f"{word(f'{side} commands')}, " if two_sided else "")
-        + word(f"at {', '.join(found)} {units.label('MPa')}")
+        (f"{side} commands, " if two_sided else "") + f"at {', '.join(found)} {units.label('MPa')}"
         for side, found in drops.items()
     )
 
@@ -243,7 +241,7 @@ def series_table(series: MonteCarlo | None, units: RecordedUnits) -> Table | Non
     return table_of(
         "Series of plants: median (1 to 99 %). No requirement: the certificate covers the tested valve",
         series.pressures,
-        ("side", lambda one: word(one.side)),
+        ("side", lambda one: one.side),
         (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
         ("opening with (%)", lambda one: spread(one.residual_opening, percent)),
         ("closing with (%)", lambda one: spread(one.residual_closing, percent)),
@@ -258,12 +256,12 @@ def checks_section(evidence: Evidence | None) -> Section:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
     tried: list[tuple[Cell | str, str, str]] = []
     for check in evidence.checks:
-        tried.append((verdict(check.holds), word(check.name), check.text))
-        tried += [(word(NOT_REQUIRED), word(check.name), found) for found in check.not_required]
+        tried.append((verdict(check.holds), check.name, check.text))
+        tried += [(NOT_REQUIRED, check.name, found) for found in check.not_required]
     untried = untried_requirements(evidence)
-    how = [word(f"to try it: {each.how}") for each in untried]
+    how = [f"to try it: {each.how}" for each in untried]
     labels = [unasked(label_of_untried(each)) for each in untried]
-    titles = [word(each.title) for each in untried]
+    titles = [each.title for each in untried]
     rows = [*tried, *zip(labels, titles, how, strict=True)]
     table = table_of(
         f"{len(evidence.checks)} requirements tried, {len(untried)} not",

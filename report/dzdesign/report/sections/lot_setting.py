@@ -14,7 +14,6 @@ from dzdesign.design.lot.valves import LotSide
 from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import csv_text
-from dzdesign.report.language import word
 from dzdesign.report.page import Figure, Section
 from dzdesign.report.sections.cells import Cell, in_number_font, number, recorded, table_of
 from dzdesign.verify.evidence import Evidence
@@ -145,7 +144,7 @@ def lot_section(compensator: Compensator) -> Section:
         f"What the lot setting costs each valve, the dearest first{more}",
         costs[:ROWS],
         ("valve", lambda one: one.valve),
-        ("commands", lambda one: word(one.side)),
+        ("commands", lambda one: one.side),
         (f"tested ({pressure})", tested),
         (f"least bound ({command})", least_bound),
         ("confidence (%)", lambda one: in_number_font(f"{100 * one.bounds.confidence:.6g}")),

@@ -6,7 +6,6 @@ from dzdesign.design.signal_descriptions import signals_in_words
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import KINDS, Chain
 from dzdesign.report.compensator_sides import standing_warnings
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, counted, table_of, whole
 from dzdesign.report.sections.remaining import other_costs
@@ -45,14 +44,14 @@ def _provenance_table(chain: Chain) -> Table:
             place, tool = chain.places[role], artefact.tool
             sources = ", ".join(each.source for each in artefact.made_from) or "–"
             if role == "valve":
-                sources = word(counted(len(artefact.made_from), "recording"))
+                sources = counted(len(artefact.made_from), "recording")
             rows.append((kind.label, place.name, _hash(place.sha256), f"{tool.name} {tool.version}", sources))
         elif kind.command:
             rows.append((kind.label, Cell(text="missing or not used", kind="open"), "", "", ""))
     return table_of(
         "Each artefact with the SHA-256 of its bytes, and what it was made from",
         rows,
-        ("artefact", lambda row: word(row[0])),
+        ("artefact", lambda row: row[0]),
         ("file", lambda row: row[1]),
         ("SHA-256", lambda row: row[2]),
         ("made by", lambda row: row[3]),
@@ -81,9 +80,9 @@ def _hashes_table(chain: Chain) -> Table | None:
     rows = []
     for each in chain.evidence.inputs if chain.evidence else ():
         rows += [
-            (word(f"C of the {each.side} core that was compiled"), each.core_sha256),
-            (word(f"object of the {each.side} core that was tried"), each.object_sha256),
-            (word(f"compare values of all {whole(each.inputs)} inputs, 64 bits"), each.outputs_hash),
+            (f"C of the {each.side} core that was compiled", each.core_sha256),
+            (f"object of the {each.side} core that was tried", each.object_sha256),
+            (f"compare values of all {whole(each.inputs)} inputs, 64 bits", each.outputs_hash),
         ]
     rows += chain.firmware.files.items() if chain.firmware else ()
     if not rows:

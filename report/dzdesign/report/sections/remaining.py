@@ -8,7 +8,6 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import CostAtTest, costs_at_tests
 from dzdesign.design.signals import SIDE_NAMES
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, in_number_font, recorded, table_of
 
@@ -60,14 +59,14 @@ def _table(compensator: Compensator, sign: int, costs: Sequence[CostAtTest]) -> 
 
 def _percent(share: float | None) -> Cell:
     if share is not None and share > 1:
-        return in_number_font(word(NEVER))
+        return in_number_font(NEVER)
     return in_number_font("–" if share is None else f"{100 * share:.2f}")
 
 
 def _drive(cost: CostAtTest) -> Cell:
     """Return the drive at full command, and the command from which it no longer rises."""
     reached = "" if cost.limited_from is None else f" from {100 * cost.limited_from:.1f} % on"
-    return in_number_font(word(f"{100 * cost.full:.2f}{reached}"))
+    return in_number_font(f"{100 * cost.full:.2f}{reached}")
 
 
 def _read(branch: str) -> Callable[[CostAtTest], Cell]:
@@ -81,6 +80,6 @@ def _onset(branch: str, units: RecordedUnits) -> Callable[[CostAtTest], Cell]:
         above = one.above_knee_V.get(branch)
         if above is None:
             return _percent(one.onset.get(branch))
-        return Cell(text=word(f"none: {units.text(above, '.3f dV')} above the knee"))
+        return Cell(text=f"none: {units.text(above, '.3f dV')} above the knee")
 
     return cell

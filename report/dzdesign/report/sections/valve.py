@@ -10,7 +10,6 @@ from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.valve import beta_figure, lines_figure, thresholds_figure
-from dzdesign.report.language import word
 from dzdesign.report.page import Section
 from dzdesign.report.sections.cells import Cell, Table, counted, recorded, table_of
 
@@ -87,7 +86,7 @@ def low_flow_table(side: SideModel, title: str, units: RecordedUnits) -> Table:
         title,
         side.low_flow,
         ("reading", lambda row: row.source),
-        ("branch", lambda row: word(IN_WORDS[row.branch])),
+        ("branch", lambda row: IN_WORDS[row.branch]),
         (f"command ({command})", lambda row: recorded(row.u_V, ".3f V", units)),
         (f"dP ({dp})", lambda row: recorded(row.dp_MPa, ".3f MPa", units)),
         (f"flow ({flow})", lambda row: recorded(row.q_L_min, ".4f L/min", units)),
@@ -113,7 +112,7 @@ def _trend(name: str, side: SideModel, units: RecordedUnits) -> str:
 
 def _first_of(ramps: Sequence[str]) -> str:
     """Return the first ramp of a test, and how many more there are; valve.json names them all."""
-    return word(f"{ramps[0]} and {len(ramps) - 1} more") if len(ramps) > 1 else ramps[0]
+    return f"{ramps[0]} and {len(ramps) - 1} more" if len(ramps) > 1 else ramps[0]
 
 
 def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUnits) -> Table:

@@ -26,10 +26,10 @@ SLOW_S = 900.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Simulated:
-    """Another platform than this machine's: its binaries' folders in FMI 2 and 3, ending, and what runs a program."""
+    """Another platform than this machine's: its binaries' folder and ending, and what runs a program."""
 
     name: str
-    folders: tuple[str, str]
+    folder: str
     ending: str
     target: str
     runner: tuple[str, ...]
@@ -61,9 +61,9 @@ class Simulated:
 WINE = next((str(path) for path in map(Path, ("/usr/bin/wine64", "/usr/lib/wine/wine64")) if path.exists()), "wine64")
 ARM_ROOT = "/usr/aarch64-linux-gnu"
 SIMULATED = (
-    Simulated(name="x86_64 Windows in Wine", folders=("win64", "x86_64-windows"), ending="dll",
+    Simulated(name="x86_64 Windows in Wine", folder="win64", ending="dll",
               target="x86_64-windows-gnu", runner=(WINE,), drive="Z:", needs={WINE: "wine64"}),
-    Simulated(name="aarch64 Linux in QEMU", folders=("", "aarch64-linux"), ending="so", target="aarch64-linux-gnu.2.36",
+    Simulated(name="aarch64 Linux in QEMU", folder="aarch64-linux", ending="so", target="aarch64-linux-gnu.2.36",
               runner=("qemu-aarch64", "-L", ARM_ROOT), link_flags=("-ldl",),
               needs={"qemu-aarch64": "qemu-user", f"{ARM_ROOT}/lib/ld-linux-aarch64.so.1": "libc6-arm64-cross"}),
 )  # fmt: skip
@@ -79,7 +79,6 @@ def fmu_flags(fmu: FmuFile, binary: bytes, drive: str = "", prefix: str = "FMU")
     """Return the flags that say which binary to load, and how."""
     return (
         text_flag(f"{prefix}_PATH", f"{drive}{stored(binary)}"),
-        f"-DFMU_VERSION={fmu.fmi}",
         text_flag(f"{prefix}_TOKEN", fmu.token),
     )
 

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from fractions import Fraction
 from math import floor
 from pathlib import Path
@@ -32,8 +31,6 @@ from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
 from dzdesign.verify.requirements import Check
 
 Say = Callable[[str], None]
-#: Versions of FMI in the names of files.
-VERSIONS = (2, 3)
 #: Of the drive: samples and their seed; of V and MPa: rows.
 DRIVE_SAMPLES, SEED, PHYSICAL_ROWS = 3000, 25, 4000
 #: Of a code, as near its border as this the rounding of a double decides.
@@ -47,41 +44,33 @@ def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say
     """
     plant = plant_of(manifest)
     kinds = ["dz_compensator"] + (["dz_plant"] if plant else [])
-    fmus = {(kind, fmi): read_fmu(folder / f"{kind}_fmi{fmi}.fmu") for kind in kinds for fmi in VERSIONS}
+    fmu, *of_plant = fmus = [read_fmu(folder / f"{kind}.fmu") for kind in kinds]
     digest = sha256_of((folder / Compensator.FILE_NAME).read_bytes())
-    found = list(_read_checks(list(fmus.values()), compensator, digest, plant))
+    found = list(_read_checks(fmus, compensator, digest, plant))
     tried: list[TriedInputs] = []
     units, two = compensator.valve.recorded_units, len(compensator.signals.signs) == 2
-    for fmi in VERSIONS:
-        fmu = fmus["dz_compensator", fmi]
-        binary, name = fmu.binary_here(), f"FMI {fmi}.0: "
-        if binary is None:
-            text = "the FMU has no binary for this machine; verify on x86_64 Linux or Windows, or on macOS"
-            found.append(requirements.EXACT_LAW.check(holds=None, text=text, name=name + requirements.EXACT_LAW.title))
-            continue
-        say(f"trying every input of {fmu.name}")
-        for sign in compensator.signals.signs:
-            try:
-                inputs = every_input(FmuCore(fmu, sign, binary), compensator, sign)
-            except RequirementError as error:
-                found.append(requirements.EXACT_LAW.check(holds=False, text=str(error), name=name + fmu.name))
-                continue
-            found += [named(check, name) for check in input_checks(inputs, units, both_signs=two)]
-            tried.append(_tried(name, inputs))
-        found += [drive_check(fmu, binary, compensator), physical_check(fmu, binary, compensator)]
-        found += [starts_check(fmu, binary), compensator_exchange_check(fmu, binary, compensator)]
-        if plant:
-            found += _of_plant(fmus["dz_plant", fmi], plant, compensator)
-            say(f"running {fmu.name} with the plant's FMU")
-            found.append(closed_loop_check(fmu, fmus["dz_plant", fmi], plant, compensator))
-    return OutputChecks(checks=tuple(found), inputs=tuple(tried))
-
-
-def _of_plant(fmu: FmuFile, plant: Mapping[str, float], compensator: Compensator) -> list[Check]:
-    """Return the checks of a plant by itself; without a binary for this machine the closed loop says so."""
     if (binary := fmu.binary_here()) is None:
-        return []
-    return [starts_check(fmu, binary), plant_exchange_check(fmu, binary, plant, compensator)]
+        text = "the FMU has no binary for this machine; verify on Linux, on x86_64 Windows, or on macOS"
+        found.append(requirements.EXACT_LAW.check(holds=None, text=text))
+        return OutputChecks(checks=tuple(found), inputs=())
+    say(f"trying every input of {fmu.name}")
+    for sign in compensator.signals.signs:
+        try:
+            inputs = every_input(FmuCore(fmu, sign, binary), compensator, sign)
+        except RequirementError as error:
+            found.append(requirements.EXACT_LAW.check(holds=False, text=str(error), name=fmu.name))
+            continue
+        found += input_checks(inputs, units, both_signs=two)
+        tried.append(_tried(inputs))
+    found += [drive_check(fmu, binary, compensator), physical_check(fmu, binary, compensator)]
+    found += [starts_check(fmu, binary), compensator_exchange_check(fmu, binary, compensator)]
+    for plant_fmu in of_plant:
+        if (plant_binary := plant_fmu.binary_here()) is not None:
+            found.append(starts_check(plant_fmu, plant_binary))
+            found.append(plant_exchange_check(plant_fmu, plant_binary, plant, compensator))
+        say(f"running {fmu.name} with the plant's FMU")
+        found.append(closed_loop_check(fmu, plant_fmu, plant, compensator))
+    return OutputChecks(checks=tuple(found), inputs=tuple(tried))
 
 
 def plant_of(manifest: OutputManifest) -> dict[str, float]:
@@ -102,14 +91,9 @@ def every_input(core: FmuCore, compensator: Compensator, sign: int) -> InputChec
     return input_check(prepared, core.sha256, core.check(prepared.everything()))
 
 
-def named(check: Check, prefix: str) -> Check:
-    """Return a check with the version of FMI before its name."""
-    return replace(check, name=prefix + check.name)
-
-
-def _tried(name: str, inputs: InputCheck) -> TriedInputs:
+def _tried(inputs: InputCheck) -> TriedInputs:
     return TriedInputs(
-        name=f"{name}codes, {inputs.side} commands",
+        name=f"codes, {inputs.side} commands",
         inputs=inputs.inputs,
         wrong=inputs.wrong,
         outputs_hash=inputs.outputs_hash,
@@ -160,17 +144,16 @@ def drive_check(fmu: FmuFile, binary: bytes, compensator: Compensator) -> Check:
             expected.append(model.outputs)
     rows = np.repeat(np.array(samples, dtype=float), held, axis=0)
     outputs = ("compare_a", "compare_b", "drive_status")
-    name = f"FMI {fmu.fmi}.0: {requirements.FMU_DRIVE.title}"
     try:
         found = stepped(fmu, binary, rows, outputs, 1 / signals.tick_Hz, codes=True)
     except RequirementError as error:
-        return requirements.FMU_DRIVE.check(holds=False, text=str(error), name=name)
+        return requirements.FMU_DRIVE.check(holds=False, text=str(error))
     wrong = np.flatnonzero((found != np.array(expected)).any(axis=1))
     text = f"{len(expected)} steps of a PWM period, {wrong.size} differ from the exact drive"
     if wrong.size:
         first = int(wrong[0])
         text += f"; the first after step {first}: {found[first].tolist()}, expected {list(expected[first])}"
-    return requirements.FMU_DRIVE.check(holds=not wrong.size, text=text, name=name)
+    return requirements.FMU_DRIVE.check(holds=not wrong.size, text=text)
 
 
 def physical_check(fmu: FmuFile, binary: bytes, compensator: Compensator) -> Check:
@@ -187,11 +170,10 @@ def physical_check(fmu: FmuFile, binary: bytes, compensator: Compensator) -> Che
     inside = [index for index, code in enumerate(codes) if code is not None]
     laws = {sign: ExactLaw(compensator, sign) for sign in signals.signs}
     outputs = [f"compare{ENDINGS[sign]}" for sign in signals.signs]
-    name = f"FMI {fmu.fmi}.0: {requirements.FMU_UNITS.title}"
     try:
         found = stepped(fmu, binary, rows, outputs, 1 / signals.tick_Hz, codes=False)
     except RequirementError as error:
-        return requirements.FMU_UNITS.check(holds=False, text=str(error), name=name)
+        return requirements.FMU_UNITS.check(holds=False, text=str(error))
     wrong = []
     for index in inside:
         command, p_a, p_b = codes[index] or (0, 0, 0)
@@ -200,9 +182,9 @@ def physical_check(fmu: FmuFile, binary: bytes, compensator: Compensator) -> Che
             wrong.append(f"{rows[index].round(6).tolist()} gives {found[index].tolist()}, expected {expected}")
     text = f"{len(inside)} random inputs in V and MPa, {len(wrong)} differ from the exact law of their codes"
     return requirements.FMU_UNITS.check(
-        holds=not wrong and len(inside) > PHYSICAL_ROWS // 2, text=f"{text}{': ' * bool(wrong)}{and_more(wrong, 1)}"
-        if wrong else text, name=name,
-    )  # fmt: skip
+        holds=not wrong and len(inside) > PHYSICAL_ROWS // 2,
+        text=f"{text}: {and_more(wrong, 1)}" if wrong else text,
+    )
 
 
 def _law(law: ExactLaw, command: int, p_a: int, p_b: int) -> int:

@@ -26,13 +26,12 @@ def closed_loop_check(
     fmu: FmuFile, plant_fmu: FmuFile, plant: Mapping[str, float], compensator: Compensator
 ) -> Check:
     """Compare the flow at the end of every PWM period, at the least and the largest tested pressure drop."""
-    name = f"FMI {fmu.fmi}.0: {FMU_CLOSED_LOOP.title}"
     try:
         worst, periods, text = _compared(fmu, plant_fmu, Plant(**plant), compensator)
     except RequirementError as error:
-        return FMU_CLOSED_LOOP.check(holds=False, text=str(error), name=name)
+        return FMU_CLOSED_LOOP.check(holds=False, text=str(error))
     words = f"{periods} PWM periods, flows differ by at most {worst:.2g} of the largest; {TOLERANCE:g} is allowed{text}"
-    return FMU_CLOSED_LOOP.check(holds=worst <= TOLERANCE, text=words, name=name)
+    return FMU_CLOSED_LOOP.check(holds=worst <= TOLERANCE, text=words)
 
 
 def _compared(

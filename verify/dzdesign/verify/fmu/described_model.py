@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
-from xml.etree.ElementTree import Element
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.fmu.expected_variables import Expected, of_compensator, of_plant
@@ -27,19 +26,17 @@ CLOSE = 1e-12
 
 def compensator_faults(fmu: FmuFile, compensator: Compensator) -> Iterator[str]:
     """Yield what the description of a compensator's FMU says otherwise than compensator.json."""
-    yield from _faults(fmu, of_compensator(compensator), compensator, indicators=())
+    yield from _faults(fmu, of_compensator(compensator), compensator, indicators=0)
 
 
 def plant_faults(fmu: FmuFile, plant: Mapping[str, float], compensator: Compensator) -> Iterator[str]:
     """Yield what the description of a plant's FMU says otherwise than the plant's parameters."""
-    yield from _faults(fmu, of_plant(plant, fmu.fmi), compensator, indicators=("z_closed", "z_open", "z_edge"))
+    yield from _faults(fmu, of_plant(plant), compensator, indicators=3)
 
 
 def _faults(
-    fmu: FmuFile, expected: dict[str, Expected], compensator: Compensator, indicators: tuple[str, ...]
+    fmu: FmuFile, expected: dict[str, Expected], compensator: Compensator, indicators: int
 ) -> Iterator[str]:
-    if fmu.fmi == 3:
-        expected["time"] = Expected(causality="independent", unit="s")
     for name in sorted(expected.keys() ^ fmu.variables.keys()):
         yield f"{DESCRIPTION}: variable {name} is {'missing' if name in expected else 'too many'}"
     if expected.keys() != fmu.variables.keys():
@@ -49,8 +46,8 @@ def _faults(
     for name, each in expected.items():
         yield from _variable_faults(fmu, name, each, compensator)
     yield from _unit_faults(fmu, expected, compensator)
-    yield from _frame_faults(fmu, compensator, len(indicators))
-    yield from _structure_faults(fmu, expected, indicators)
+    yield from _frame_faults(fmu, compensator, indicators)
+    yield from _structure_faults(fmu, expected)
 
 
 def _variable_faults(fmu: FmuFile, name: str, expected: Expected, compensator: Compensator) -> Iterator[str]:
@@ -88,8 +85,8 @@ def _number(text: str) -> float:
 
 
 def _key(fmu: FmuFile, name: str) -> int:
-    """Return by what the description refers to a variable: FMI 2 counts them, FMI 3 takes the value reference."""
-    return fmu.reference(name) if fmu.fmi == 3 else 1 + list(fmu.variables).index(name)
+    """Return by what the description refers to a variable: it counts them."""
+    return 1 + list(fmu.variables).index(name)
 
 
 def _shown(compensator: Compensator, expected: Expected) -> tuple[str, tuple[float, float]] | None:
@@ -143,54 +140,42 @@ def _unit_faults(fmu: FmuFile, expected: Mapping[str, Expected], compensator: Co
 def _frame_faults(fmu: FmuFile, compensator: Compensator, indicators: int) -> Iterator[str]:
     """Yield what stands otherwise around the variables: versions, capabilities, default step."""
     document, step_s = fmu.document, 1 / compensator.signals.tick_Hz
-    head = {"fmiVersion": f"{fmu.fmi}.0", "variableNamingConvention": "structured"}
-    head |= {"guid": fmu.token, "numberOfEventIndicators": str(indicators)} if fmu.fmi == 2 else {}
-    head |= {"instantiationToken": fmu.token} if fmu.fmi == 3 else {}
+    head = {"fmiVersion": "2.0", "variableNamingConvention": "structured", "guid": fmu.token}
+    head["numberOfEventIndicators"] = str(indicators)
     if {key: value for key, value in document.attrib.items() if key not in FOR_PEOPLE} != head:
         yield f"{DESCRIPTION}: its own attributes are {', '.join(sorted(document.attrib))}, or have other values"
     if tuple(each.tag for each in document) != CHILDREN:
         yield f"{DESCRIPTION}: its elements are {', '.join(each.tag for each in document)}"
         return
-    moves = str(indicators > 0).lower()
-    can = {"modelIdentifier": fmu.identifier}
-    stepped = {**can, "canHandleVariableCommunicationStepSize": "true"}
-    if fmu.fmi == 2:
-        plain = {"canNotUseMemoryManagementFunctions": "true"}
-        still = str(not indicators).lower()
-        offered = ({**can, **plain, "completedIntegratorStepNotNeeded": still}, {**stepped, **plain})
-    else:
-        offered = {**can, "needsCompletedIntegratorStep": moves}, {**stepped, "hasEventMode": "true"}
+    can = {"modelIdentifier": fmu.identifier, "canNotUseMemoryManagementFunctions": "true"}
+    still = {"completedIntegratorStepNotNeeded": str(not indicators).lower()}
+    offered = {**can, **still}, {**can, "canHandleVariableCommunicationStepSize": "true"}
     for element, attributes in zip(document, offered, strict=False):
         sources = [each.attrib for each in element.iterfind("SourceFiles/File")]
-        if element.attrib != attributes or sources != [{"name": "dz_fmu.c"}] * (fmu.fmi == 2):
+        if element.attrib != attributes or sources != [{"name": "dz_fmu.c"}]:
             yield f"{DESCRIPTION}: {element.tag} has attributes {element.attrib}, expected {attributes}"
     times = {key: _number(value) for key, value in document[4].attrib.items()}
     if not times.pop("stopTime", 0.0) > 0 or times != {"startTime": 0.0, "stepSize": step_s}:
         yield f"{DESCRIPTION}: DefaultExperiment is {times}, expected steps of {step_s:g} s from 0 on"
 
 
-def _structure_faults(fmu: FmuFile, expected: Mapping[str, Expected], indicators: tuple[str, ...]) -> Iterator[str]:
-    """Yield outputs, derivatives, unknowns and indicators that follow others than they must."""
+def _structure_faults(fmu: FmuFile, expected: Mapping[str, Expected]) -> Iterator[str]:
+    """Yield outputs, derivatives and unknowns that follow others than they must."""
     outputs = {name: each.follows for name, each in expected.items() if each.causality == "output"}
     rates = {name: each.follows for name, each in expected.items() if each.derivative_of}
     unknown = {name: None for name in (*outputs, *rates) if expected[name].start is None}
     must: dict[str, Mapping[str, frozenset[str] | None]] = {"Output": outputs, "Derivative": rates, "Initial": unknown}
-    signs = {name: expected[name].follows for name in indicators if name in expected}
-    must |= {"Indicator": signs}
     found: dict[str, dict[str, frozenset[str] | None]] = {name: {} for name in must}
-    tags = {"Outputs": "Output", "Derivatives": "Derivative", "InitialUnknowns": "Initial", "Output": "Output",
-            "ContinuousStateDerivative": "Derivative", "InitialUnknown": "Initial",
-            "EventIndicator": "Indicator"}  # fmt: skip
+    tags = {"Outputs": "Output", "Derivatives": "Derivative", "InitialUnknowns": "Initial"}
     names = {str(_key(fmu, name)): name for name in fmu.variables}
     for element in fmu.document[-1]:
-        entries: list[Element] = list(element) if fmu.fmi == 2 else [element]
-        for entry in entries:
+        for entry in element:
             follows = entry.get("dependencies")
-            name = names.get(entry.get("index" if fmu.fmi == 2 else "valueReference", ""), "")
+            name = names.get(entry.get("index", ""), "")
             group = found.get(tags.get(element.tag, ""), {})
             repeated = name in group
             group[name] = None if follows is None else frozenset(names.get(key, "") for key in follows.split())
-            if repeated or set(entry.attrib) - {"index", "valueReference", "dependencies"}:
+            if repeated or set(entry.attrib) - {"index", "dependencies"}:
                 yield f"{DESCRIPTION}: ModelStructure has {name} twice, or with other attributes"
         if element.tag not in tags:
             yield f"{DESCRIPTION}: ModelStructure has {element.tag}"

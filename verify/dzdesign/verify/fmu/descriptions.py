@@ -11,20 +11,14 @@ from dzdesign.verify.fmu.needed_libraries import machine_of, needed_libraries
 MANIFEST = f"{EXTRA}/manifest.json"
 #: What a platform's binary may ask for: every process of these systems has it.
 ALWAYS_THERE = {"dll": {"kernel32.dll"}, "dylib": {"/usr/lib/libSystem.B.dylib"}, "so": set[str]()}
-#: Folders of binaries that each version has, to their ending.
-PLATFORMS: Mapping[int, Mapping[str, str]] = {
-    2: {"linux64": "so", "win64": "dll", "darwin64": "dylib"},
-    3: {
-        "x86_64-linux": "so", "aarch64-linux": "so", "x86_64-windows": "dll", "x86_64-darwin": "dylib",
-        "aarch64-darwin": "dylib",
-    },
-}  # fmt: skip
-#: Folder of a binary to the machine that it is for, as `machine_of` names them.
-MACHINES: Mapping[str, str] = {
-    "linux64": "x86_64 ELF", "x86_64-linux": "x86_64 ELF", "aarch64-linux": "aarch64 ELF", "win64": "x86_64 PE",
-    "x86_64-windows": "x86_64 PE", "darwin64": "x86_64 Mach-O", "x86_64-darwin": "x86_64 Mach-O",
-    "aarch64-darwin": "aarch64 Mach-O",
-}  # fmt: skip
+#: Folder of a binary to its ending, and to the machine that it is for, as `machine_of` names them.
+PLATFORMS: Mapping[str, tuple[str, str]] = {
+    "linux64": ("so", "x86_64 ELF"),
+    "aarch64-linux": ("so", "aarch64 ELF"),
+    "win64": ("dll", "x86_64 PE"),
+    "darwin64": ("dylib", "x86_64 Mach-O"),
+    "aarch64-darwin": ("dylib", "aarch64 Mach-O"),
+}
 
 
 def file_faults(fmu: FmuFile, compensator: Compensator, digest: str) -> Iterator[str]:
@@ -39,7 +33,6 @@ def file_faults(fmu: FmuFile, compensator: Compensator, digest: str) -> Iterator
     for key, expected in (
         ("tool", as_document(THIS_TOOL)),
         ("compensator_json", digest),
-        ("fmi", f"{fmu.fmi}.0"),
         ("token", fmu.token),
     ):
         if fmu.manifest.get(key) != expected:
@@ -47,7 +40,7 @@ def file_faults(fmu: FmuFile, compensator: Compensator, digest: str) -> Iterator
     document = fmu.files.get(f"{EXTRA}/{Compensator.FILE_NAME}")
     if document is not None and document != to_json_bytes(compensator):
         yield f"its {Compensator.FILE_NAME} is another"
-    if fmu.identifier != fmu.name.partition("_fmi")[0]:
+    if fmu.identifier != fmu.name.removesuffix(".fmu"):
         yield f"{DESCRIPTION}: the model is {fmu.identifier!r}, another than the file's"
     expected_files = _expected_files(fmu, compensator)
     for path in sorted(expected_files - fmu.files.keys()):
@@ -58,16 +51,14 @@ def file_faults(fmu: FmuFile, compensator: Compensator, digest: str) -> Iterator
 
 def _expected_files(fmu: FmuFile, compensator: Compensator) -> set[str]:
     """Return the paths that an FMU has: what else a tool finds in it, it would load or compile too."""
-    types = {2: "fmi2TypesPlatform.h", 3: "fmi3PlatformTypes.h"}[fmu.fmi]
-    sources = {"dz_fmu.c", f"fmi{fmu.fmi}Functions.h", f"fmi{fmu.fmi}FunctionTypes.h", types}
-    sources |= {"buildDescription.xml"} if fmu.fmi == 3 else set()
+    sources = {"dz_fmu.c", "fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"}
     if fmu.name.startswith("dz_compensator"):
         sources |= {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h"}
         sources |= {"dz_comp_negative.c"} if len(compensator.signals.signs) == 2 else set()
         data = Compensator.FILE_NAME
     else:
         data = "plant.json"
-    binaries = (f"binaries/{folder}/{fmu.identifier}.{ending}" for folder, ending in PLATFORMS[fmu.fmi].items())
+    binaries = (f"binaries/{folder}/{fmu.identifier}.{ending}" for folder, (ending, _) in PLATFORMS.items())
     return {DESCRIPTION, MANIFEST, f"{EXTRA}/{data}", *(f"sources/{name}" for name in sources), *binaries}
 
 
@@ -80,7 +71,7 @@ def library_faults(fmu: FmuFile) -> Iterator[str]:
         except ValueError as error:
             yield f"{path}: {error}"
             continue
-        if machine != MACHINES.get(path.split("/")[1]):
+        if machine != PLATFORMS.get(path.split("/")[1], ("", ""))[1]:
             yield f"{path} is for {machine}"
         known = ALWAYS_THERE.get(ending, set())
         if others := [name for name in needed if name not in known and name.lower() not in known]:

@@ -26,7 +26,7 @@ def starts_check(fmu: FmuFile, binary: bytes) -> Check:
     names = [name for name, each in fmu.variables.items() if each.start is not None and each.kind in GETTERS]
     calls = Calls(fmu)
     calls.get(*names)
-    title = f"FMI {fmu.fmi}.0, {fmu.identifier}: {FMU_STARTS.title}"
+    title = f"{fmu.identifier}: {FMU_STARTS.title}"
     try:
         found = calls.made(binary)
     except RequirementError as error:
@@ -52,7 +52,7 @@ def plant_exchange_check(fmu: FmuFile, binary: bytes, plant: Mapping[str, float]
 
 
 def _check(fmu: FmuFile, text: str, faults: Iterator[str]) -> Check:
-    name = f"FMI {fmu.fmi}.0, {fmu.identifier}: {FMU_EXCHANGE.title}"
+    name = f"{fmu.identifier}: {FMU_EXCHANGE.title}"
     try:
         found = list(faults)
     except RequirementError as error:

@@ -30,7 +30,7 @@ class Expected:
     unit: str = ""
     #: None of what is computed.
     start: float | None = None
-    #: Of an output, a rate or an event indicator: what it follows at once.
+    #: Of an output or a rate: what it follows at once.
     follows: frozenset[str] = frozenset()
     derivative_of: str = ""
     #: Further attributes.
@@ -67,8 +67,8 @@ def of_compensator(compensator: Compensator) -> dict[str, Expected]:
     return found | dict.fromkeys(("compare_a", "compare_b", "drive_status"), Expected(kind="integer"))
 
 
-def of_plant(plant: Mapping[str, float], fmi: int) -> dict[str, Expected]:
-    """Return the variables of a plant's FMU; FMI 2 has no variables for event indicators."""
+def of_plant(plant: Mapping[str, float]) -> dict[str, Expected]:
+    """Return the variables of a plant's FMU."""
     moved = frozenset({"i", "x", "v", "supply"})
     flow = frozenset({"x", "supply"})
     found = {
@@ -91,8 +91,4 @@ def of_plant(plant: Mapping[str, float], fmi: int) -> dict[str, Expected]:
         found[f"der({state})"] = Expected(
             causality="local", unit=unit, follows=frozenset(follows), derivative_of=state
         )
-    if fmi == 3:
-        for name in ("z_closed", "z_open"):
-            found[name] = Expected(causality="local", follows=moved)
-        found["z_edge"] = Expected(causality="local", follows=frozenset({"x"}))
     return found

@@ -7,31 +7,30 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any
 from xml.etree import ElementTree
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.verify.fmu.fmu_archive import unpacked
 
-Fmi = Literal[2, 3]
 #: What ties a binary to the description: plain enough to stand in a program's text.
 TOKEN = re.compile(r"\{[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}\}")
 #: How the description begins.
 BEGIN = b'<?xml version="1.0" encoding="UTF-8"?>\n'
 DESCRIPTION = "modelDescription.xml"
 EXTRA = "extra/dzdesign"
-#: Elements of FMI 2 and 3, to what a variable of theirs holds.
-KINDS = {"Real": "real", "Float64": "real", "Integer": "integer", "Int32": "integer", "Boolean": "boolean"}
+#: Elements of the description, to what a variable of theirs holds.
+KINDS = {"Real": "real", "Integer": "integer", "Boolean": "boolean"}
 #: Attributes of a variable that have a place of their own, or are for people.
 NAMED = {"name", "valueReference", "causality", "unit", "start", "description"}
-#: System and processor of this machine to the folder of its binaries in FMI 2 and 3, and their ending.
-HERE: Mapping[tuple[str, str], tuple[str, str, str]] = {
-    ("linux", "x86_64"): ("linux64", "x86_64-linux", "so"),
-    ("linux", "aarch64"): ("", "aarch64-linux", "so"),
-    ("win32", "amd64"): ("win64", "x86_64-windows", "dll"),
-    ("darwin", "x86_64"): ("darwin64", "x86_64-darwin", "dylib"),
-    ("darwin", "arm64"): ("", "aarch64-darwin", "dylib"),
+#: System and processor of this machine to the folder of its binaries, and their ending.
+HERE: Mapping[tuple[str, str], tuple[str, str]] = {
+    ("linux", "x86_64"): ("linux64", "so"),
+    ("linux", "aarch64"): ("aarch64-linux", "so"),
+    ("win32", "amd64"): ("win64", "dll"),
+    ("darwin", "x86_64"): ("darwin64", "dylib"),
+    ("darwin", "arm64"): ("aarch64-darwin", "dylib"),
 }
 
 
@@ -44,7 +43,7 @@ class DescribedVariable:
     causality: str
     unit: str | None
     start: str | None
-    #: Every other attribute, of both elements that FMI 2 has for one; but for name and description.
+    #: Every other attribute, of both of its elements; but for name and description.
     others: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -65,7 +64,6 @@ class FmuFile:
 
     name: str
     files: Mapping[str, bytes]
-    fmi: Fmi
     token: str
     identifier: str
     variables: Mapping[str, DescribedVariable]
@@ -88,7 +86,7 @@ class FmuFile:
     def binary_here(self) -> bytes | None:
         """Return the binary for this machine, or None."""
         place = HERE.get((sys.platform, platform.machine().lower()))
-        return self.binary(place[self.fmi - 2], place[2]) if place else None
+        return self.binary(*place) if place else None
 
 
 def read_fmu(path: Path) -> FmuFile:
@@ -103,16 +101,15 @@ def read_fmu(path: Path) -> FmuFile:
         raise InputError(f"'{path}' is not an FMU of dzdesign: {error}; make it again with `dzdesign "
         "codegen`") from error
     version = document.get("fmiVersion", "")
-    if version not in ("2.0", "3.0") or not isinstance(manifest, dict):
-        raise InputError(f"'{path}' is for FMI '{version[:20]}', expected 2.0 or 3.0")
-    token = document.get("guid" if version == "2.0" else "instantiationToken", "")
+    if version != "2.0" or not isinstance(manifest, dict):
+        raise InputError(f"'{path}' is for FMI '{version[:20]}', expected 2.0")
+    token = document.get("guid", "")
     if not TOKEN.fullmatch(token):
         raise InputError(f"'{path}' has the token {quoted(token)}, expected a UUID in braces; make it again")
     simulation = document.find("CoSimulation")
     return FmuFile(
         name=path.name,
         files=files,
-        fmi=cast(Fmi, int(version[0])),
         token=token,
         identifier=simulation.get("modelIdentifier", "") if simulation is not None else "",
         variables=variables,

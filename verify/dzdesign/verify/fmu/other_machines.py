@@ -8,7 +8,7 @@ from dzdesign.core.processes.programs import find_program
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify.fmu.binary_core import SIMULATED, FmuCore, Simulated
-from dzdesign.verify.fmu.checks import VERSIONS, every_input
+from dzdesign.verify.fmu.checks import every_input
 from dzdesign.verify.fmu.fmu_file import read_fmu
 from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
 from dzdesign.verify.requirements import MACHINE_CODE, Check
@@ -18,37 +18,34 @@ from dzdesign.verify.toolchain.host_compiler import find_zig
 def checks(
     folder: Path, _manifest: OutputManifest, compensator: Compensator, say: Callable[[str], None]
 ) -> OutputChecks:
-    """Try every input of the compensator's FMUs on each platform that a simulator is here for."""
+    """Try every input of the compensator's FMU on each platform that a simulator is here for."""
     found: list[Check] = []
     tried: list[TriedInputs] = []
+    fmu = read_fmu(folder / "dz_compensator.fmu")
     for simulated in SIMULATED:
-        for fmi in VERSIONS:
-            fmu = read_fmu(folder / f"dz_compensator_fmi{fmi}.fmu")
-            if not simulated.folders[fmi - 2]:
+        name = f"{simulated.name}: {MACHINE_CODE.title}"
+        binary, missing = fmu.binary(simulated.folder, simulated.ending), _missing(simulated)
+        if binary is None or missing:
+            text = missing or f"{fmu.name} has no such binary"
+            found.append(MACHINE_CODE.check(holds=None if missing else False, text=text, name=name))
+            continue
+        for sign in compensator.signals.signs:
+            say(f"trying every input of {fmu.name} on {simulated.name}")
+            core = FmuCore(fmu, sign, binary, simulated.machine, simulated.drive)
+            try:
+                inputs = every_input(core, compensator, sign)
+            except RequirementError as error:
+                found.append(MACHINE_CODE.check(holds=False, text=str(error), name=name))
                 continue
-            name = f"FMI {fmi}.0 on {simulated.name}: {MACHINE_CODE.title}"
-            binary, missing = fmu.binary(simulated.folders[fmi - 2], simulated.ending), _missing(simulated)
-            if binary is None or missing:
-                text = missing or f"{fmu.name} has no such binary"
-                found.append(MACHINE_CODE.check(holds=None if missing else False, text=text, name=name))
-                continue
-            for sign in compensator.signals.signs:
-                say(f"trying every input of {fmu.name} on {simulated.name}")
-                core = FmuCore(fmu, sign, binary, simulated.machine, simulated.drive)
-                try:
-                    inputs = every_input(core, compensator, sign)
-                except RequirementError as error:
-                    found.append(MACHINE_CODE.check(holds=False, text=str(error), name=name))
-                    continue
-                text = f"{inputs.inputs} inputs, {inputs.wrong} wrong; hash of all answers {inputs.outputs_hash}"
-                faults = inputs.wrong + inputs.odd_pairs + inputs.bad_fallbacks + inputs.bad_status + inputs.bad_betas
-                found.append(MACHINE_CODE.check(holds=faults == 0, text=text, name=name))
-                tried.append(
-                    TriedInputs(
-                        name=f"FMI {fmi}.0 on {simulated.name}, {inputs.side} commands", inputs=inputs.inputs,
-                        wrong=inputs.wrong, outputs_hash=inputs.outputs_hash,
-                    )
-                )  # fmt: skip
+            text = f"{inputs.inputs} inputs, {inputs.wrong} wrong; hash of all answers {inputs.outputs_hash}"
+            faults = inputs.wrong + inputs.odd_pairs + inputs.bad_fallbacks + inputs.bad_status + inputs.bad_betas
+            found.append(MACHINE_CODE.check(holds=faults == 0, text=text, name=name))
+            tried.append(
+                TriedInputs(
+                    name=f"{simulated.name}, {inputs.side} commands", inputs=inputs.inputs,
+                    wrong=inputs.wrong, outputs_hash=inputs.outputs_hash,
+                )
+            )  # fmt: skip
     return OutputChecks(checks=tuple(found), inputs=tuple(tried))
 
 

@@ -21,58 +21,34 @@ static void put_real(double value)
     fprintf(results, "%llu ", (unsigned long long)bits);
 }
 
-static void alone(const struct fmu *fmu, const char *name_2, const char *name_3)
+static void alone(const struct fmu *fmu, const char *name)
 {
-    need(((status_2 *)found(fmu, fmu->version == 2 ? name_2 : name_3))(fmu->instance), name_2);
+    need(((status *)found(fmu, name))(fmu->instance), name);
 }
 
-static void numbers(const struct fmu *fmu, const char *name_2, const char *name_3, double *values, size_t count)
+static void numbers(const struct fmu *fmu, const char *name, double *values, size_t count)
 {
-    need(((array_of *)found(fmu, fmu->version == 2 ? name_2 : name_3))(fmu->instance, values, count), name_2);
+    need(((array_of *)found(fmu, name))(fmu->instance, values, count), name);
 }
 
 /* Event Mode: whether states changed, and the next event. */
 static void discrete(const struct fmu *fmu)
 {
-    double time = -1.0;
-    int changed, defined;
+    typedef int update(void *, struct event_info *);
+    struct event_info info = {1, 1, 1, 1, 1, -1.0};
 
-    if (fmu->version == 2) {
-        typedef int update(void *, struct event_info_2 *);
-        struct event_info_2 info = {1, 1, 1, 1, 1, -1.0};
-
-        need(((update *)found(fmu, "fmi2NewDiscreteStates"))(fmu->instance, &info), "fmi2NewDiscreteStates");
-        need(info.needed || info.terminate, "fmi2NewDiscreteStates asks for more, or for the end");
-        changed = info.values;
-        defined = info.defined;
-        time = info.time;
-    } else {
-        typedef int update(void *, bool *, bool *, bool *, bool *, bool *, double *);
-        bool more = true, end = true, nominals = true, values = true, next = true;
-
-        need(((update *)found(fmu, "fmi3UpdateDiscreteStates"))(fmu->instance, &more, &end, &nominals, &values, &next, &time),
-             "fmi3UpdateDiscreteStates");
-        need(more || end, "fmi3UpdateDiscreteStates asks for more, or for the end");
-        changed = values;
-        defined = next;
-    }
-    fprintf(results, "%d %d ", changed != 0, defined != 0);
-    put_real(defined ? time : 0.0);
+    need(((update *)found(fmu, "fmi2NewDiscreteStates"))(fmu->instance, &info), "fmi2NewDiscreteStates");
+    need(info.needed || info.terminate, "fmi2NewDiscreteStates asks for more, or for the end");
+    fprintf(results, "%d %d ", info.values != 0, info.defined != 0);
+    put_real(info.defined ? info.time : 0.0);
 }
 
 static void completed(const struct fmu *fmu)
 {
-    if (fmu->version == 2) {
-        typedef int call(void *, int, int *, int *);
-        int event = 0, end = 0;
+    typedef int call(void *, int, int *, int *);
+    int event = 0, end = 0;
 
-        need(((call *)found(fmu, "fmi2CompletedIntegratorStep"))(fmu->instance, 1, &event, &end), "a completed step");
-    } else {
-        typedef int call(void *, bool, bool *, bool *);
-        bool event = false, end = false;
-
-        need(((call *)found(fmu, "fmi3CompletedIntegratorStep"))(fmu->instance, true, &event, &end), "a completed step");
-    }
+    need(((call *)found(fmu, "fmi2CompletedIntegratorStep"))(fmu->instance, 1, &event, &end), "a completed step");
 }
 
 int main(int count, char **arguments)
@@ -83,7 +59,7 @@ int main(int count, char **arguments)
 
     begin_results(count, arguments);
     each = read_whole(arguments[1]);
-    if (!fmu_instantiate(&fmu, FMU_PATH, FMU_VERSION, FMU_TOKEN, each[1] != 0.0)) {
+    if (!fmu_instantiate(&fmu, FMU_PATH, FMU_TOKEN, each[1] != 0.0)) {
         fail("the binary refuses the token of its modelDescription.xml");
     }
     for (int64_t left = (int64_t)*each; left > 0; left--) {
@@ -107,24 +83,24 @@ int main(int count, char **arguments)
             break;
         case INITIALIZE: fmu_initialize(&fmu); break;
         case STEP: step(&fmu, time, each[3]); break;
-        case CONTINUE: alone(&fmu, "fmi2EnterContinuousTimeMode", "fmi3EnterContinuousTimeMode"); break;
-        case EVENT: alone(&fmu, "fmi2EnterEventMode", "fmi3EnterEventMode"); break;
+        case CONTINUE: alone(&fmu, "fmi2EnterContinuousTimeMode"); break;
+        case EVENT: alone(&fmu, "fmi2EnterEventMode"); break;
         case DISCRETE: discrete(&fmu); fputs("\n", results); break;
         case STATE: held[reference % MOST] = real; break;
-        case STATES: numbers(&fmu, "fmi2SetContinuousStates", "fmi3SetContinuousStates", held, reference); break;
+        case STATES: numbers(&fmu, "fmi2SetContinuousStates", held, reference); break;
         case COMPLETED: completed(&fmu); break;
         case TIME: {
             typedef int set_time(void *, double);
 
-            need(((set_time *)found(&fmu, fmu.version == 2 ? "fmi2SetTime" : "fmi3SetTime"))(fmu.instance, time), "a time");
+            need(((set_time *)found(&fmu, "fmi2SetTime"))(fmu.instance, time), "a time");
             break;
         }
         case RATES:
         case INDICATORS:
             if ((int)each[0] == RATES) {
-                numbers(&fmu, "fmi2GetDerivatives", "fmi3GetContinuousStateDerivatives", values, reference);
+                numbers(&fmu, "fmi2GetDerivatives", values, reference);
             } else {
-                numbers(&fmu, "fmi2GetEventIndicators", "fmi3GetEventIndicators", values, reference);
+                numbers(&fmu, "fmi2GetEventIndicators", values, reference);
             }
             for (int place = 0; place < MOST; place++) {
                 put_real(values[place]);

@@ -17,7 +17,7 @@ static void give(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
     int32_t codes[3] = {u_adc, p_a_adc, p_b_adc};
 
     if (fmu.instance == NULL) {
-        if (!fmu_instantiate(&fmu, FMU_PATH, FMU_VERSION, FMU_TOKEN, 0)) {
+        if (!fmu_instantiate(&fmu, FMU_PATH, FMU_TOKEN, 0)) {
             fail("the binary refuses the token of its modelDescription.xml");
         }
         set_bool(&fmu, REF_CODES, 1);

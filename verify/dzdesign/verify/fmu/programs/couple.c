@@ -21,8 +21,8 @@ int main(int count, char **arguments)
     commands = &head[4];
     double pressure[2] = {head[1], head[2]};
 
-    if (!fmu_instantiate(&compensator, FMU_PATH, FMU_VERSION, FMU_TOKEN, 1) ||
-        !fmu_instantiate(&plant, PLANT_PATH, FMU_VERSION, PLANT_TOKEN, 1)) {
+    if (!fmu_instantiate(&compensator, FMU_PATH, FMU_TOKEN, 1) ||
+        !fmu_instantiate(&plant, PLANT_PATH, PLANT_TOKEN, 1)) {
         fail("a binary refuses the token of its modelDescription.xml");
     }
     set_reals(&plant, supplies, 2u, pressure);

@@ -1,10 +1,9 @@
-/* An FMU's binary, loaded, and what of FMI 2 and 3 the checks call: written from the standard. A call that fails ends the
+/* An FMU's binary, loaded, and what of FMI 2 the checks call: written from the standard. A call that fails ends the
  * program, but for those that ask whether it does. */
 #ifndef FMI_CALLS_H
 #define FMI_CALLS_H
 
 #include <math.h>
-#include <stdbool.h>
 
 #include "results.h"
 
@@ -14,16 +13,15 @@
 #include <dlfcn.h>
 #endif
 
-typedef int status_2(void *instance);
-typedef int values_2(void *instance, const uint32_t *references, size_t count, void *values);
-typedef int values_3(void *instance, const uint32_t *references, size_t count, void *values, size_t sizes);
+typedef int status(void *instance);
+typedef int values_of(void *instance, const uint32_t *references, size_t count, void *values);
 
-struct event_info_2 {
+struct event_info {
     int needed, terminate, nominals, values, defined;
     double time;
 };
 
-struct callbacks_2 {
+struct callbacks {
     void (*log)(void *environment, const char *name, int status, const char *category, const char *message, ...);
     void *(*allocate)(size_t count, size_t size);
     void (*release)(void *memory);
@@ -33,14 +31,9 @@ struct callbacks_2 {
 
 struct fmu {
     void *library;
-    int version;
-    int reason; /* why there is no instance: 1: refused */
     void *instance;
-    values_2 *get_real_2, *set_real_2, *get_int_2, *set_int_2, *set_bool_2;
-    values_3 *get_real_3, *set_real_3, *get_int_3, *set_int_3, *set_bool_3;
-    int (*step_2)(void *instance, double time, double step, int no_return);
-    int (*step_3)(void *instance, double time, double step, bool no_return, bool *event, bool *terminate, bool *early,
-                  double *last);
+    values_of *get_real, *set_real, *get_int, *set_int, *set_bool;
+    int (*step)(void *instance, double time, double step, int no_return);
 };
 
 /* A function of the binary, as a pointer of another type of function. */
@@ -68,20 +61,12 @@ static void log_nothing(void *environment, const char *name, int status, const c
     (void)message;
 }
 
-static void log_nothing_3(void *environment, int status, const char *category, const char *message)
-{
-    (void)environment;
-    (void)status;
-    (void)category;
-    (void)message;
-}
-
 /* Loads a binary and makes an instance; whether it was made. */
-static int fmu_instantiate(struct fmu *fmu, const char *path, int version, const char *token, int co_simulation)
+static int fmu_instantiate(struct fmu *fmu, const char *path, const char *token, int co_simulation)
 {
-    static struct callbacks_2 callbacks;
+    typedef void *make(const char *, int, const char *, const char *, const struct callbacks *, int, int);
+    static struct callbacks callbacks;
 
-    fmu->version = version;
 #ifdef _WIN32
     fmu->library = (void *)LoadLibraryA(path);
 #else
@@ -93,85 +78,44 @@ static int fmu_instantiate(struct fmu *fmu, const char *path, int version, const
     callbacks.log = log_nothing;
     callbacks.allocate = calloc;
     callbacks.release = free;
-    if (version == 2) {
-        typedef void *make(const char *, int, const char *, const char *, const struct callbacks_2 *, int, int);
-
-        fmu->get_real_2 = (values_2 *)found(fmu, "fmi2GetReal");
-        fmu->set_real_2 = (values_2 *)found(fmu, "fmi2SetReal");
-        fmu->get_int_2 = (values_2 *)found(fmu, "fmi2GetInteger");
-        fmu->set_int_2 = (values_2 *)found(fmu, "fmi2SetInteger");
-        fmu->set_bool_2 = (values_2 *)found(fmu, "fmi2SetBoolean");
-        fmu->step_2 = (int (*)(void *, double, double, int))found(fmu, "fmi2DoStep");
-        fmu->instance = ((make *)found(fmu, "fmi2Instantiate"))("checked", co_simulation, token, "", &callbacks, 0, 0);
-    } else {
-        typedef void *exchange(const char *, const char *, const char *, bool, bool, void *, void *);
-        typedef void *simulation(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *,
-                                 size_t, void *, void *, void *);
-
-        fmu->get_real_3 = (values_3 *)found(fmu, "fmi3GetFloat64");
-        fmu->set_real_3 = (values_3 *)found(fmu, "fmi3SetFloat64");
-        fmu->get_int_3 = (values_3 *)found(fmu, "fmi3GetInt32");
-        fmu->set_int_3 = (values_3 *)found(fmu, "fmi3SetInt32");
-        fmu->set_bool_3 = (values_3 *)found(fmu, "fmi3SetBoolean");
-        fmu->step_3 =
-            (int (*)(void *, double, double, bool, bool *, bool *, bool *, double *))found(fmu, "fmi3DoStep");
-        fmu->instance =
-            co_simulation
-                ? ((simulation *)found(fmu, "fmi3InstantiateCoSimulation"))("checked", token, "", false, false, false,
-                                                                            false, NULL, 0u, NULL,
-                                                                            (void *)log_nothing_3, NULL)
-                : ((exchange *)found(fmu, "fmi3InstantiateModelExchange"))("checked", token, "", false, false, NULL,
-                                                                           (void *)log_nothing_3);
-    }
+    fmu->get_real = (values_of *)found(fmu, "fmi2GetReal");
+    fmu->set_real = (values_of *)found(fmu, "fmi2SetReal");
+    fmu->get_int = (values_of *)found(fmu, "fmi2GetInteger");
+    fmu->set_int = (values_of *)found(fmu, "fmi2SetInteger");
+    fmu->set_bool = (values_of *)found(fmu, "fmi2SetBoolean");
+    fmu->step = (int (*)(void *, double, double, int))found(fmu, "fmi2DoStep");
+    fmu->instance = ((make *)found(fmu, "fmi2Instantiate"))("checked", co_simulation, token, "", &callbacks, 0, 0);
     return fmu->instance != NULL;
 }
 
 static void set_bool(struct fmu *fmu, uint32_t reference, int value)
 {
-    int of_2 = value;
-    bool of_3 = (value != 0);
-
-    need(fmu->version == 2 ? fmu->set_bool_2(fmu->instance, &reference, 1u, &of_2)
-                           : fmu->set_bool_3(fmu->instance, &reference, 1u, &of_3, 1u),
-         "a boolean can't be set");
+    need(fmu->set_bool(fmu->instance, &reference, 1u, &value), "a boolean can't be set");
 }
 
 /* From instantiation through initialization: then in Event Mode, or ready for steps. */
 static void fmu_initialize(struct fmu *fmu)
 {
-    if (fmu->version == 2) {
-        typedef int setup(void *, int, double, double, int, double);
+    typedef int setup(void *, int, double, double, int, double);
 
-        need(((setup *)found(fmu, "fmi2SetupExperiment"))(fmu->instance, 0, 0.0, 0.0, 0, 0.0), "fmi2SetupExperiment");
-        need(((status_2 *)found(fmu, "fmi2EnterInitializationMode"))(fmu->instance), "fmi2EnterInitializationMode");
-        need(((status_2 *)found(fmu, "fmi2ExitInitializationMode"))(fmu->instance), "fmi2ExitInitializationMode");
-    } else {
-        typedef int enter(void *, bool, double, double, bool, double);
-
-        need(((enter *)found(fmu, "fmi3EnterInitializationMode"))(fmu->instance, false, 0.0, 0.0, false, 0.0),
-             "fmi3EnterInitializationMode");
-        need(((status_2 *)found(fmu, "fmi3ExitInitializationMode"))(fmu->instance), "fmi3ExitInitializationMode");
-    }
+    need(((setup *)found(fmu, "fmi2SetupExperiment"))(fmu->instance, 0, 0.0, 0.0, 0, 0.0), "fmi2SetupExperiment");
+    need(((status *)found(fmu, "fmi2EnterInitializationMode"))(fmu->instance), "fmi2EnterInitializationMode");
+    need(((status *)found(fmu, "fmi2ExitInitializationMode"))(fmu->instance), "fmi2ExitInitializationMode");
 }
 
 static void set_ints(struct fmu *fmu, const uint32_t *references, size_t count, int32_t *values)
 {
-    need(fmu->version == 2 ? fmu->set_int_2(fmu->instance, references, count, values)
-                           : fmu->set_int_3(fmu->instance, references, count, values, count),
-         "integers can't be set");
+    need(fmu->set_int(fmu->instance, references, count, values), "integers can't be set");
 }
 
 static void get_ints(struct fmu *fmu, const uint32_t *references, size_t count, int32_t *values)
 {
-    need(fmu->version == 2 ? fmu->get_int_2(fmu->instance, references, count, values)
-                           : fmu->get_int_3(fmu->instance, references, count, values, count),
-         "integers can't be got");
+    need(fmu->get_int(fmu->instance, references, count, values), "integers can't be got");
 }
 
 static inline int try_reals(struct fmu *fmu, const uint32_t *references, size_t count, double *values)
 {
-    return fmu->version == 2 ? fmu->set_real_2(fmu->instance, references, count, values)
-                             : fmu->set_real_3(fmu->instance, references, count, values, count);
+    return fmu->set_real(fmu->instance, references, count, values);
 }
 
 static inline void set_reals(struct fmu *fmu, const uint32_t *references, size_t count, double *values)
@@ -181,18 +125,12 @@ static inline void set_reals(struct fmu *fmu, const uint32_t *references, size_t
 
 static inline void get_reals(struct fmu *fmu, const uint32_t *references, size_t count, double *values)
 {
-    need(fmu->version == 2 ? fmu->get_real_2(fmu->instance, references, count, values)
-                           : fmu->get_real_3(fmu->instance, references, count, values, count),
-         "reals can't be got");
+    need(fmu->get_real(fmu->instance, references, count, values), "reals can't be got");
 }
 
 static inline int try_step(struct fmu *fmu, double time, double size)
 {
-    bool event, terminate, early;
-    double last;
-
-    return fmu->version == 2 ? fmu->step_2(fmu->instance, time, size, 1)
-                             : fmu->step_3(fmu->instance, time, size, true, &event, &terminate, &early, &last);
+    return fmu->step(fmu->instance, time, size, 1);
 }
 
 static inline void step(struct fmu *fmu, double time, double size)

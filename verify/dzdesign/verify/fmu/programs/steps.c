@@ -12,13 +12,13 @@ int main(int count, char **arguments)
 
     begin_results(count, arguments);
     head = read_whole(arguments[1]);
-    if (!fmu_instantiate(&fmu, FMU_PATH, FMU_VERSION, FMU_TOKEN, 1)) {
+    if (!fmu_instantiate(&fmu, FMU_PATH, FMU_TOKEN, 1)) {
         fail("the binary refuses the token of its modelDescription.xml");
     }
     {
         struct fmu other = {0};
 
-        if (fmu_instantiate(&other, FMU_PATH, FMU_VERSION, FMU_TOKEN "x", 1)) {
+        if (fmu_instantiate(&other, FMU_PATH, FMU_TOKEN "x", 1)) {
             fail("the binary takes another token than that of its modelDescription.xml");
         }
     }
