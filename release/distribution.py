@@ -30,7 +30,8 @@ def build_packages(source: Path, output: Path) -> tuple[Path, Path]:
     _hatchling("sdist", source, output)
     archive = output / f"{NAME}-{__version__}.tar.gz"
     with tempfile.TemporaryDirectory() as folder, tarfile.open(archive) as packed:
-        packed.extractall(folder, filter="data")
+        packed.extraction_filter = getattr(tarfile, "data_filter", lambda member, _: member)  # of Python 3.11.4
+        packed.extractall(folder)
         _hatchling("wheel", Path(folder) / f"{NAME}-{__version__}", output)
     return archive, output / f"{NAME}-{__version__}-py3-none-any.whl"
 

@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from dzdesign.core.processes.running import run_program
@@ -34,11 +35,14 @@ def program(tmp_path):
 
 
 def running(folder: Path) -> list[int]:
-    found = []
-    for path in folder.iterdir():
-        done = subprocess.run(["ps", "-o", "stat=", "-p", path.name], capture_output=True, text=True, check=False)
-        found += [int(path.name)] if done.stdout.strip() and not done.stdout.startswith("Z") else []
-    return found
+    return [int(path.name) for path in folder.iterdir() if is_running(int(path.name))]
+
+
+def is_running(number: int) -> bool:
+    try:
+        return psutil.Process(number).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
 
 
 def wait_for(count: int, folder: Path) -> None:

@@ -63,7 +63,8 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys, monkeypatch):
         f"Inputs checked: {INPUTS}, wrong: 0",
     ):
         assert words in out
-    assert str(demo) in out and AS_STATED not in out
+    assert f"Open first: {demo}/evidence/report.html" in out and AS_STATED not in out
+    assert (demo / "evidence/report.html").is_file()
     # What README.md says of the example in words.
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     rows = re.findall(r"^ +\d\.\d\d +\d\.\d{3} / \d\.\d{3} +([\d.]+) % +([\d.]+) %", out, re.MULTILINE)
@@ -71,8 +72,7 @@ def test_demo_prints_the_table_and_where_things_are(demo, capsys, monkeypatch):
     assert len(rows) == 6 and all(45 < share < 55 for share in without) and {round(share) for share in left} == {1}
     assert "the first half of the command gives no flow" in readme
     assert "flow starts at about 1 % of full command" in readme
-    inputs = f"all {round(INPUTS / 1e6)} million inputs: every command code with every pressure-difference code"
-    assert inputs in readme
+    assert f"all {round(INPUTS / 1e6)} million inputs" in readme
 
 
 @needs_compiler
