@@ -250,13 +250,17 @@ class SideModel:
         return f"{len(self.tests)} pressure drops were tested. {self.curve.premise_in_words(units)}"
 
     def between_in_words(self, guard: Guard) -> str:
-        """Return which premise a guard's bound rests on between the tests, and whether these could contradict it."""
+        """Return which premise a guard's bound rests on between the tests, and whether these could contradict it.
+
+        No test shows that the threshold runs one way between two neighbours, nor the bend that was estimated from them.
+        """
         curve = self.certified[guard]
         if len(self.tests) < 2:
             return "at one tested pressure drop: the bound holds there alone"
         told = any(each.premise == curve.premise and each.lack_of_fit_p is not None for each in curve.premises)
-        declared = "declared, " if curve.premise == "smooth" and curve.curvature_is != "estimated" else ""
-        tested = "not contradicted by the tests" if told and len(self.tests) > 2 else "untested"
+        stated = curve.premise == "line" or (curve.premise == "smooth" and curve.curvature_is != "estimated")
+        declared = "declared, " if curve.premise == "smooth" and stated else ""
+        tested = "not contradicted by the tests" if told and stated and len(self.tests) > 2 else "untested"
         return f"between the tests: premise {curve.premise}, {declared}{tested}"
 
     @property
