@@ -111,6 +111,7 @@ SHAPE = (
         "slope of the law (18)",
         slope,
         1 - beta * (1 - k * x_max / u_max),
+        scope=LAW_OFF_REFERENCE,
         grounds=(Ground("(18)", derivative=(u_i, slope)),),
         positive_if=beta * (1 - k * x_max / u_max) < 1,
         note="Holds for every beta <= 1. The law `target` always rises.",

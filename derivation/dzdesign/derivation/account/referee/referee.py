@@ -23,8 +23,12 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
     places = [one for one in situations() if _admits(statement, one) and _conditions_hold(verdict, statements, one)]
     if not places:
         return f"no valve is ever in its scope ({statement.scope or 'everywhere'})"
+    for name in statement.condition.for_all if statement.condition is not None else ():
+        if len({place.numbers.get(name) for place in places}) == 1:
+            return f"it is to hold for every {name}, and its scope ({statement.scope}) leaves one value"
     free, silent = _left_free(statement.scope), set(statement.grounds)
     tried, is_refuted, is_met, is_general = False, False, False, False
+    unmet: dict[tuple[float, ...], str] = {}
     for place in places:
         objection = _ground_objection(statement, statements, place, silent)
         if objection:
@@ -39,6 +43,9 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
         if wrong and verdict.holds and meets:
             return f"{wrong}: {place.words}"
         is_refuted = is_refuted or bool(wrong)
+        if not meets:
+            alike = _alike(statement, place)
+            unmet[alike] = "" if wrong else unmet.get(alike, place.words)
     if not tried:
         return f"no situation of its scope ({statement.scope or 'everywhere'}) has numbers for its symbols"
     if silent:
@@ -48,6 +55,9 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
     if not is_general:
         names = " and ".join(sorted(map(str, free)))
         return f"its scope ({statement.scope or 'everywhere'}) leaves only special values of {names}, and says none"
+    true_without = next(filter(None, unmet.values()), "")
+    if true_without:
+        return f"it is true without its condition: {true_without}"
     if not is_refuted and (statement.condition is not None or not verdict.holds):
         return "it is true of every valve, also where it should not follow"
     return ""
@@ -83,6 +93,16 @@ def _meets(statement: Statement, place: Situation) -> bool:
     if condition is None:
         return True
     return any(all(holds(equation, place) for equation in alternative) for alternative in condition.any_of)
+
+
+def _alike(statement: Statement, place: Situation) -> tuple[float, ...]:
+    """Return the numbers that a condition is about: places are alike where only what it is to hold for differs."""
+    condition = statement.condition
+    if condition is None:
+        return ()
+    asked = {name for alternative in condition.any_of for one in alternative for name in one.free_symbols}
+    names = (condition.discrepancy.free_symbols | asked) - set(condition.for_all)
+    return tuple(place.numbers[name] for name in sorted(names, key=str) if name in place.numbers)
 
 
 def _ground_objection(
