@@ -145,7 +145,6 @@ excess = _positive("excess", "V", "by how much a threshold is exceeded")
 guard = _positive("guard", "V", "by how much a threshold is not reached")
 below = _nonnegative("below", "Pa", "dP0 - dP1, zero or more")
 above = _positive("above", "Pa", "dP1 - dP0, more than zero")
-DISTANCES = (headroom, excess, guard, below, above, y, rest)
 
 # What varies: the plant's state and its transforms, ...
 dv_dt = _varying("dv_dt", "m/s**2", "rate of the armature's speed", latex=r"\frac{\mathrm{d}v}{\mathrm{d}t}")

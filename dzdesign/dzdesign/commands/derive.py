@@ -5,11 +5,9 @@ from pathlib import Path
 from typing import Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import read_bytes
 from dzdesign.core.options import AnyPath, Option, Texts, texts_of
-from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import stage_progress
 
 EXAMPLES = ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html")
@@ -25,8 +23,6 @@ class Arguments:
     """Number of an equation to print with its premises, such as 18 or T3b. Repeatable."""
     paper: Annotated[AnyPath | None, Option("FILE")] = None
     """The paper as plain text, to look up each of its numbers (default: digests of the passages are compared)."""
-    mutate: Annotated[bool, Option()] = False
-    """Falsify every statement and every published number instead, and count the faults that are detected."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default: standard output)."""
 
@@ -40,10 +36,6 @@ def run(arguments: Arguments, json: bool) -> int:
     check_format(arguments.format)
     if arguments.output:
         check_file_may_be_written(Path(arguments.output))
-    if arguments.mutate:
-        if arguments.equation:
-            raise InputError("--mutate counts over all equations; leave out --equation")
-        return _run_mutations(arguments, json)
     chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
     with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
@@ -66,20 +58,3 @@ def _text_of(paper: AnyPath | None) -> str | None:
         raise InputError(
             f"{paper}: the paper is expected as plain text in UTF-8 ({error}); export it as text"
         ) from error
-
-
-def _run_mutations(arguments: Arguments, json: bool) -> int:
-    """Count the wrong statements and numbers that the account catches; 1 if one of them is not caught."""
-    from dzdesign.derivation.account.account import verify_statements
-    from dzdesign.derivation.account.mutation.scoring import score_mutations
-    from dzdesign.terminal.tables import print_mutations
-
-    with stage_progress("making every statement wrong in every small way"):
-        found = score_mutations(verify_statements())
-    if arguments.output:
-        write_file(Path(arguments.output), to_json_bytes(found))
-    elif json:
-        print_json(found)
-    else:
-        print_mutations(found)
-    return 0 if found.caught == found.mutants else 1

@@ -6,7 +6,6 @@ import pytest
 import sympy
 
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account import proof
 from dzdesign.derivation.account.proof import judge, overrule
 from dzdesign.derivation.account.referee.drawn import drawn_plants, drawn_valves
 from dzdesign.derivation.account.referee.referee import hear
@@ -53,10 +52,10 @@ STEPS = ("jump", at("L2", (s.u_O, s.u_above), (s.dP1, s.dP0 + s.above)), at("(14
 FALSE = {
     "K_1 is K_0": (
         theorem(s.K_1, s.K_0, at("(2)", (s.K_e, s.K_1)), at("(2)", (s.K_e, s.K_0)), eliminate=(s.Q_max,)),
-        "(2) is taken at dP1, but not its Q_max",
+        "does not hold in its scope",
     ),
-    "K_1 is K_0, all of both grounds renamed": (SAME_GAIN, "(2) is taken"),
-    "dP1 is dP0": (SAME_DROP, "but not its Q_max"),
+    "K_1 is K_0, all of both grounds renamed": (SAME_GAIN, "does not hold in its scope"),
+    "dP1 is dP0": (SAME_DROP, "does not hold in its scope"),
     "beta is 1, where dP1 is dP0": (
         theorem(s.beta, ONE, at("beta(dP)", (s.dP1, s.dP0)), scope=scope(sympy.Eq(s.dP0, s.dP1))),
         "no valve is ever in its scope",
@@ -64,17 +63,17 @@ FALSE = {
     "one threshold": (
         theorem(s.u_min1, s.u_min0, at("(4)", (s.u_min, s.u_min1)), at("(4)", (s.u_min, s.u_min0)),
                 eliminate=(s.f(s.dP),)),
-        "but not its dP",
+        "does not hold in its scope",
     ),
     "one largest flow": (
         theorem(s.Q_max1, s.Q_max0, at("Q_max", (s.Q_max, s.Q_max1)), at("Q_max", (s.Q_max, s.Q_max0)),
                 eliminate=(s.dP,)),
-        "but not its dP",
+        "does not hold in its scope",
     ),
     "one largest flow, by a premise of another name": (
         theorem(s.Q_max, s.Q_max0, "(2)", at("(2)", (s.K_e, s.K_0), (s.Q_max, s.Q_max0)), "K_e",
                 at("K_e", (s.K_e, s.K_0)), eliminate=(s.K_e, s.K_0, s.Q_w), provided=()),
-        "K_e is taken at dP0, but not its Q_w",
+        "Q_max is 1.1482 and not",
     ),
     "the paper's law is the law `target`": (
         theorem(s.beta, ONE, "(18)", "L3", eliminate=(s.u_O,),
@@ -93,7 +92,7 @@ FALSE = {
     ),
     "the offset at every command": (
         theorem(s.u_O, s.beta * s.u_min0, at("(18)", (s.u_i, ZERO)), scope=LAW_OFF_REFERENCE),
-        "(18) is taken at u_i = 0, which the scope does not say",
+        "does not hold in its scope",
     ),
     "full drive at every command": (
         theorem(s.u_O, s.u_max + s.beta * (s.k * s.x_max + s.u_min0 - s.u_max), at("(18)", (s.u_i, s.u_max)),
@@ -108,17 +107,17 @@ FALSE = {
     "nothing is left below the reference": (
         theorem(s.u_dz, ZERO, "T4c", at("(4)", (s.dP, s.dP0)), at("(4)", (s.u_min, s.u_min0), (s.dP, s.dP0)),
                 eliminate=(s.u_min, s.u_min0)),
-        "(4) is taken at dP0, but not its u_min",
+        "does not hold in its scope",
     ),
     "one slope": (
         theorem(s.s_flow1, s.s_flow0, at("S", (s.s_flow, s.s_flow1)), at("S", (s.s_flow, s.s_flow0)),
                 eliminate=(s.C_d,)),
-        "but not its dP",
+        "does not hold in its scope",
     ),
     "one wanted flow, by the opening": (
         theorem(s.Q_O_prime, s.Q_O, at("(10)", (s.Q_O, s.Q_O_prime)), "(10)", eliminate=(s.x,),
                 scope=LAW_AT_REFERENCE),
-        "but not its dP0",
+        "does not hold in its scope",
     ),
     "one wanted flow, by T1d and T1a": (
         theorem(s.Q_O_prime, s.Q_O, "T1d", "T1a", eliminate=(s.Q,)),
@@ -127,12 +126,12 @@ FALSE = {
     "every pressure drop is dP0": (
         theorem(s.dP, s.dP0, "(3)", "(2)", at("(2)", (s.K_e, s.K_0)), "(8)", "gamma_0",
                 eliminate=(s.K_e, s.Q_max, s.K_0, s.gamma_0)),
-        "but not its Q_max",
+        "does not hold in its scope",
     ),
     "the meter starts at one command": (
         theorem(s.u_seen1, s.u_seen0, at("T9a", (s.u_seen, s.u_seen1)), at("T9a", (s.u_seen, s.u_seen0)),
                 eliminate=(s.u_min,)),
-        "but not its dP",
+        "does not hold in its scope",
     ),
     "volts at the pin are volts of command": (
         theorem(s.n_V, s.n_adc / s.u_max, "code of u_0", "scale of u_0", eliminate=(s.n_0,),
@@ -252,23 +251,21 @@ TRUE = {
 
 
 @pytest.mark.parametrize("name", FALSE)
-def test_a_false_theorem_does_not_follow(name, verdicts, monkeypatch):
+def test_a_false_theorem_does_not_follow(name, verdicts):
     claim, named = FALSE[name]
     statements = {**BY_NUMBER, "false": claim}
     judged = judge(claim, statements, verdicts)
-    verdict = overrule(judged, hear(judged, statements)) if judged.as_expected else judged
+    # By algebra alone it follows: that is what makes it a trap.
+    assert judged.as_expected
+    verdict = overrule(judged, hear(judged, statements))
     assert not verdict.holds
     assert not verdict.as_expected
     assert named in verdict.words
-    # By algebra alone it follows: that is what makes it a trap.
-    monkeypatch.setattr(proof, "find_renaming_fault", lambda *_: "")
-    assert judge(claim, statements, verdicts).as_expected
 
 
 @pytest.mark.parametrize("name", TRUE)
-def test_a_true_theorem_follows(name, verdicts, monkeypatch):
+def test_a_true_theorem_follows(name, verdicts):
     statements = {**BY_NUMBER, "false": TRUE[name]}
-    monkeypatch.setattr(proof, "find_renaming_fault", lambda *_: "")
     judged = judge(TRUE[name], statements, verdicts)
     assert judged.as_expected, judged.words
     assert hear(judged, statements) == ""
@@ -289,7 +286,7 @@ def test_the_three_false_theorems_fall_one_after_another(verdicts):
         verdict = overrule(verdict, hear(verdict, book)) if verdict.as_expected else verdict
         book[one.number], judged[one.number] = one, verdict
         assert not verdict.holds and not verdict.as_expected
-    assert "(2) is taken at dP1, but not its Q_max" in judged["K"].words
+    assert "its ground (2)" in judged["K"].words
     # The numbers speak for themselves: not only because the one before fell.
     for one in (judged["D"], judged["false"]):
         believed = replace(one, outcome=Outcome.FOLLOWS, objection="")

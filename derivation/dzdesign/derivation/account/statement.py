@@ -110,7 +110,7 @@ def pressure_index(at: Replacements) -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One of the cases by which a piecewise statement is proved; together they exhaust what can occur."""
+    """One of the cases by which a piecewise statement is proved; the referee tries what they may leave out."""
 
     #: Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
     at: Replacements
@@ -207,7 +207,7 @@ class Statement:
     condition: Condition | None = None
     #: The claim that the left-hand side is positive exactly if this holds.
     positive_if: sympy.core.relational.Relational | None = None
-    #: Where it is meant to hold. Its cases must cover all of that, and the referee (`referee/`) tries it only there.
+    #: Where it is meant to hold: the referee (`referee/`) tries it there, and only there.
     scope: Scope = EVERYWHERE
     #: What must differ for the derivation, which divides by the difference.
     provided: tuple[sympy.Ne, ...] = ()
