@@ -18,11 +18,11 @@ class Arguments:
     """Arguments of `derive`."""
 
     format: Annotated[str, Option("F", choices="dzdesign.derivation.presentation.report:FORMATS")] = "text"
-    """Output format: text, json, latex or html."""
+    """Output format: text, json or html."""
     equation: Annotated[Texts, Option("N")] = ()
     """Number of an equation to print with its premises, such as 18 or T3b. Repeatable."""
     paper: Annotated[AnyPath | None, Option("FILE")] = None
-    """The paper as plain text, to look up each of its numbers (default: digests of the passages are compared)."""
+    """The paper as plain text, to look up each of its numbers in its section."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default: standard output)."""
 
@@ -30,7 +30,7 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Re-derive the paper's equations; 1 if one of those printed is not found as a correct account finds it."""
     from dzdesign.derivation.account.account import STATEMENTS, verify_statements
-    from dzdesign.derivation.account.passages.transcription import find_transcription_faults, find_value_faults
+    from dzdesign.derivation.account.published import find_number_faults
     from dzdesign.derivation.presentation.report import check_format, closure, render
 
     check_format(arguments.format)
@@ -39,7 +39,7 @@ def run(arguments: Arguments, json: bool) -> int:
     chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
     with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
-        misprints = find_transcription_faults(paper=_text_of(arguments.paper)) + find_value_faults(STATEMENTS)
+        misprints = find_number_faults(STATEMENTS, _text_of(arguments.paper))
     text = render(verdicts, "json" if json else arguments.format, chosen, misprints)
     if arguments.output:
         write_file(Path(arguments.output), text)

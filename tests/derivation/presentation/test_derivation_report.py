@@ -219,13 +219,6 @@ def test_text_has_every_statement_with_its_verdict(verdicts, rendered):
         assert f"[{mark_of(verdict)}" in head.replace("\n", " "), verdict.number
 
 
-def test_latex_has_every_statement_with_its_verdict(verdicts, rendered):
-    for verdict in verdicts:
-        target = rf"\hypertarget{{{anchor(verdict.number)}}}"
-        assert rendered["latex"].count(target) == 1
-        assert mark_of(verdict) in rendered["latex"].split(target)[1].split(r"\subsection")[0]
-
-
 def test_html_has_every_statement_with_its_verdict(verdicts, rendered):
     articles = dict(re.findall(r'<article id="([^"]+)"(.*?)</article>', rendered["html"], re.DOTALL))
     assert list(articles) == [anchor(verdict.number) for verdict in verdicts]
@@ -247,8 +240,6 @@ def test_the_table_has_all_32_equations(rendered):
     assert len(PAPER_NUMBERS) == 32
     text = rendered["text"].split("The paper's equations\n")[1].split("\n\n")[0]
     assert re.findall(r"^\(\d+\)", text, re.MULTILINE) == list(PAPER_NUMBERS)
-    latex = rendered["latex"].split(r"\endhead")[1].split(r"\end{longtable}")[0]
-    assert re.findall(r"^\\hyperlink{eq-\d+}{(\(\d+\))}", latex, re.MULTILINE) == list(PAPER_NUMBERS)
     html = rendered["html"].split('<table class="equations">')[1].split("</table>")[0]
     assert re.findall(r'<th scope="row"><a href="#eq-\d+">(\(\d+\))</a>', html) == list(PAPER_NUMBERS)
     numbers = [row["number"] for row in json.loads(rendered["json"])["statements"]]
@@ -371,36 +362,12 @@ def test_a_verdict_is_a_sign_and_a_word_not_only_a_colour(rendered):
     assert all(word.startswith(words[sign]) for sign, word in marks)
 
 
-@pytest.mark.parametrize("format", ["html", "latex"])
-def test_text_is_escaped(verdicts, format):
-    hostile = "<b>50 % & more_</b> </p><script> \\input{y} $y$ #1 ~^"
+def test_text_is_escaped(verdicts):
+    hostile = "<b>50 % & more_</b> </p><script> $y$ #1 ~^"
     first = replace(verdicts[0], statement=replace(verdicts[0].statement, title=hostile, note=hostile, number="<i>"))
-    page = report.render([first], format, only=["<i>"])
-    if format == "html":
-        assert "<script>" not in page and "<b>50" not in page
-        assert page.count("&lt;b&gt;50 % &amp; more_&lt;/b&gt;") >= 2
-    else:
-        assert r"50 \% \& more\_" in page and r"\input" not in page and r"\textbackslash{}input\{y\}" in page
-
-
-# --- latex --------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
-def test_latex_compiles_and_stays_on_the_page(rendered, tmp_path):
-    (tmp_path / "derivation.tex").write_text(rendered["latex"], encoding="utf-8")
-    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "derivation.tex"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, errors="replace")
-    assert done.returncode == 0, done.stdout[-2000:]
-    overfull = [float(points) for points in re.findall(r"Overfull \\hbox \(([\d.]+)pt", done.stdout)]
-    assert [points for points in overfull if points > 5] == []
-
-
-def test_latex_environments_and_braces_balance(rendered):
-    text = rendered["latex"].replace(r"\{", "").replace(r"\}", "")
-    assert text.isascii()
-    assert text.count(r"\begin{") == text.count(r"\end{")
-    assert text.count("{") == text.count("}")
+    page = report.render([first], "html", only=["<i>"])
+    assert "<script>" not in page and "<b>50" not in page
+    assert page.count("&lt;b&gt;50 % &amp; more_&lt;/b&gt;") >= 2
 
 
 # --- one equation -------------------------------------------------------------------------------------------
@@ -502,7 +469,6 @@ def test_make_docs_builds_the_page_with_the_products_own_command(derive, rendere
     built = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
     assert built == {
         "index.html": rendered["html"],
-        "derivation.tex": rendered["latex"],
         "derivation.json": rendered["json"],
     }
 
@@ -563,7 +529,6 @@ def test_every_symbol_is_explained(rendered):
 
 def test_where_a_statement_is_proved_is_said_in_every_format(rendered):
     assert "Proved for u_1 != u_2." in entry_of(rendered["text"], "T8d")
-    assert r"u_{1} \neq u_{2}" in rendered["latex"]
     row = next(row for row in json.loads(rendered["json"])["statements"] if row["number"] == "T8d")
     assert (row["provided"], row["limited_by"]) == (["u_1 != u_2"], ["straight part"])
     assert rendered["html"].count('class="scope"') > 20

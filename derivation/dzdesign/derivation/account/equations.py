@@ -47,7 +47,13 @@ APPROACH = (
     ),
     Kind.DEFINITION("K_e", "output flow gain: flow per command", K_e, Q_w / u_i, note="The words below Eq. (2)."),
     Kind.PAPER(
-        "(2)", "flow gain of the target line", K_e, Q_max / u_max, grounds=("K_e", "Fig. 3, line"), eliminate=(Q_w,)
+        "(2)",
+        "flow gain of the target line",
+        K_e,
+        Q_max / u_max,
+        rearranges=True,
+        grounds=("K_e", "Fig. 3, line"),
+        eliminate=(Q_w,),
     ),
     Kind.PAPER(
         "Q_max",
@@ -124,6 +130,7 @@ AT_REFERENCE = (
         "wanted flow at the reference",
         Q_O,
         K_0 * u_i,
+        rearranges=True,
         grounds=(
             Ground("Fig. 3, line", ((Q_w, Q_O), (Q_max, Q_max0))),
             Ground("(2)", ((K_e, K_0), (Q_max, Q_max0))),
@@ -181,6 +188,7 @@ AT_REFERENCE = (
         u_0,
         u_i_prime + u_min0 - u_i,
         scope=LAW_AT_REFERENCE,
+        rearranges=True,
         grounds=("Fig. 3, command", "u_O"),
         eliminate=(u_O,),
     ),
@@ -229,6 +237,7 @@ OFF_REFERENCE = (
         "wanted flow off the reference",
         Q_O_prime,
         K_1 * u_i,
+        rearranges=True,
         grounds=(
             Ground("Fig. 3, line", ((Q_w, Q_O_prime), (Q_max, Q_max1))),
             Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),

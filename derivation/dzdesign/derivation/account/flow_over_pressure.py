@@ -34,6 +34,7 @@ FLOW_OVER_PRESSURE = (
         n,
         sympy.log(Q_max1 / Q_max0) / sympy.log(dP1 / dP0),
         provided=(sympy.Ne(dP0, dP1),),
+        rearranges=True,
         grounds=("exponent",),
         values=tuple(
             Value(valve.name, valve.at(), "1", remark=DROP_ASSUMED if valve is SECOND else "") for valve in VALVES

@@ -93,6 +93,7 @@ IMPLEMENTATION = (
         "code of the command, corrected",
         n_i,
         n_adc * u_i / u_max,
+        rearranges=True,
         grounds=("converter", "attenuator"),
         eliminate=(V_pin,),
     ),
@@ -243,7 +244,14 @@ CODES = (
         "printed. No conversion coefficient saves the printed set: its two terms are in different units.",
     ),
     Kind.CHOICE("PWM", "compare value: full drive is n_full counts", n_pwm, scaling.COMPARE_VALUE),
-    Kind.LAW("L4", "the scaling of this tool is the corrected Eq. (29)", n_i, scaling.COMMAND_CODE, grounds=("(29c)",)),
+    Kind.LAW(
+        "L4",
+        "the scaling of this tool is the corrected Eq. (29)",
+        n_i,
+        scaling.COMMAND_CODE,
+        rearranges=True,
+        grounds=("(29c)",),
+    ),
     Kind.THEOREM(
         "T5b",
         "the law in counts, from the command's code to the compare value",

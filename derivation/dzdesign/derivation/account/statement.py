@@ -213,6 +213,8 @@ class Statement:
     provided: tuple[sympy.Ne, ...] = ()
     #: What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.
     expected: Outcome = None  # type: ignore[assignment]  # what is usual of its kind, by __post_init__
+    #: Whether it only rearranges a definition or one premise: then it follows, and says nothing new.
+    rearranges: bool = False
     #: Number of the statement that says what this one should read.
     corrected_by: str = ""
     #: Statements that qualify this one.

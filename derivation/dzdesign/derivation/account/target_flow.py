@@ -113,6 +113,7 @@ TARGET = (
         drive_left,
         u_max - k * x_max - beta * u_min0,
         scope=TARGET_OFF_REFERENCE & AT_FULL_COMMAND,
+        rearranges=True,
         grounds=("drive left", Ground("L3", ((u_i, u_max),))),
         eliminate=(u_O,),
         values=tuple(Value(f"at 5 MPa, {valve.name}", valve.at(), "V") for valve in (FIRST, SECOND)),

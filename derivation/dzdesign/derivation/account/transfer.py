@@ -86,7 +86,7 @@ SIMULATION_MODEL = (
         expected=Outcome.FOLLOWS_IF,
         note="Printed without its middle, U_e(s).",
     ),
-    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, grounds=(laplace("(22)"),)),
+    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, rearranges=True, grounds=(laplace("(22)"),)),
     Kind.PAPER(
         "(27)",
         "motion, transformed",

@@ -19,7 +19,15 @@ LAW = Law(
     "x_max it exceeds the target by gamma_1 (1 - beta) (1 - k x_max/u_max) u_i / k (T1b).",
     stated_as="(18)",
     statements=(
-        Kind.LAW("L1", "the law `paper` is Eq. (18)", u_O, _OUTPUT, scope=LAW_OFF_REFERENCE, grounds=("(18)",)),
+        Kind.LAW(
+            "L1",
+            "the law `paper` is Eq. (18)",
+            u_O,
+            _OUTPUT,
+            scope=LAW_OFF_REFERENCE,
+            rearranges=True,
+            grounds=("(18)",),
+        ),
         Kind.LAW(
             "L2",
             "the selector gives the law `paper`, at beta = 1 up to dP0: Eq. (14)",

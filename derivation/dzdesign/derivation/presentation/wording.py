@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 import sympy
 
 from dzdesign.derivation.account.proof import CaseProof, Verdict
-from dzdesign.derivation.account.rearrangement import is_rearrangement
 from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Replacements, Statement, Value
 from dzdesign.derivation.account.steps import Relation, Step
 from dzdesign.derivation.presentation.content import Derivation, Entry, Figure, Line, Premise
@@ -40,7 +39,7 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         holds=verdict.holds,
         verdict=verdict.words,
         judgement=Words.join(_sentences(verdict, book), " "),
-        rearranges=is_rearrangement(verdict, book),
+        rearranges=statement.rearranges,
         any_of=tuple(tuple(map(Formula, alternative)) for alternative in condition.any_of) if condition else (),
         ruled_out_by=tuple(Formula(*pair) for pair in condition.ruled_out_by) if condition else (),
         necessary=verdict.necessary,
