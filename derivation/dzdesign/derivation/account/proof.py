@@ -6,7 +6,6 @@ of its members exactly. Where they do not, the difference is factored: it says o
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -16,14 +15,13 @@ from sympy.core.relational import Relational
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.conditions import Finding, judge_condition
 from dzdesign.derivation.account.identity import agree
-from dzdesign.derivation.account.solving import solve_relations
+from dzdesign.derivation.account.solving import Relation, Step, solve_relations
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
-from dzdesign.derivation.account.steps import Relation, Step, derive_in_steps
 from dzdesign.derivation.account.symbol_units import find_unit_error
 from dzdesign.derivation.symbols import Name
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CaseProof:
     """The derivation of one case of a statement; most statements have a single one, without words."""
 
@@ -37,15 +35,12 @@ class CaseProof:
     relations: tuple[Relation, ...]
     #: The statement's symbol and the eliminated ones, solved for.
     solution: Mapping[Name, sympy.Expr]
+    #: How they were solved for, one ground after another.
+    steps: tuple[Step, ...]
     #: The form in which a derivation states the result: as published, or as derived where the two differ.
     reached: sympy.Expr
     #: The last member's branch of this case, in the symbols of the statement.
     published: sympy.Expr
-
-    @cached_property
-    def steps(self) -> tuple[Step, ...]:
-        """How the grounds lead to the result, one after another."""
-        return derive_in_steps(self.relations, self.statement, self.solution, self.reached)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -256,6 +251,7 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
                 discrepancies=differences,
                 relations=relations,
                 solution=solution,
+                steps=found.steps,
                 reached=reached,
                 published=branches[-1],
             )

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 import sympy
 
 from dzdesign.derivation.account.proof import CaseProof, Verdict
+from dzdesign.derivation.account.solving import Step
 from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Replacements, Statement, Value
-from dzdesign.derivation.account.steps import Relation, Step
 from dzdesign.derivation.presentation.content import Derivation, Entry, Figure, Line, Premise
 from dzdesign.derivation.presentation.formulas import to_latex, to_text
 from dzdesign.derivation.presentation.prose import Formula, Part, Reference, Words, parse_prose
@@ -214,13 +214,11 @@ def _derivation(proof: CaseProof, book: Mapping[str, Verdict]) -> Derivation:
     if cases:
         made = Words.join(Formula(*pair) for pair in proof.case.at)
         where = Words("Case: ", where, ", that is ", made) if where else Words("With ", made)
-    steps = tuple(_visible(proof))
-    lines = [Line(words=_step(one, before, proof, book), formula=Formula(symbol, one.result)) for before, one in steps]
-    if lines and cases and not any(proof.discrepancies) and to_text(proof.published) != to_text(steps[-1][1].result):
+    lines = [Line(words=_step(step, proof, book), formula=Formula(step.name, step.gives)) for step in proof.steps]
+    if to_text(proof.steps[-1].gives) != to_text(proof.reached) or len(proof.steps) > 1:
+        lines.append(Line(words=Words("Together:"), formula=Formula(symbol, proof.reached)))
+    if cases and not any(proof.discrepancies) and to_text(proof.published) != to_text(proof.reached):
         lines.append(Line(words=Words("In the form stated:"), formula=Formula(symbol, proof.published)))
-    if not lines:
-        at_once = Words("The premises, solved together, give:")
-        lines = [Line(words=at_once, formula=Formula(symbol, proof.derived))]
     return Derivation(
         where=where,
         derived=Formula(proof.derived),
@@ -229,36 +227,8 @@ def _derivation(proof: CaseProof, book: Mapping[str, Verdict]) -> Derivation:
     )
 
 
-def _visible(proof: CaseProof) -> Iterator[tuple[Step | None, Step]]:
-    """Yield each step with the one before, but for rearrangements that look as before."""
-    before: Step | None = None
-    for step in proof.steps:
-        if step.used or before is None or to_text(step.result) != to_text(before.result):
-            yield before, step
-        before = step
-
-
-def _step(step: Step, before: Step | None, proof: CaseProof, book: Mapping[str, Verdict]) -> Words:
-    symbol = proof.statement.symbol
-    if not step.used:
-        if before is not None and before.result.has(symbol):
-            return Words("Solve for ", Formula(symbol), ", which stands on both sides:")
-        return Words("Rearranged:")
-    relations = [next(one for one in proof.relations if one.ground == ground) for ground in step.used]
-    used = Words(_ground(step.used[0], book), *_solved(relations[0], step), ":")
-    if before is None:
-        return Words("Start from ", used)
-    if step.name != symbol:
-        return Words("Put in ", Formula(step.name, step.gives), " from ", used)
-    *others, last = [
-        Words(Formula(one.left, one.right), " from ", _ground(one.ground, book))
-        for one in relations
-        if one.left != one.right
-    ]
-    return Words("With ", Words.join(others), " and " if others else "", last, ", this is:")
-
-
-def _solved(relation: Relation, step: Step) -> tuple[Part, ...]:
-    if relation.left == step.name and relation.right == step.gives:
-        return ()
-    return ", solved for ", Formula(step.name)
+def _step(step: Step, proof: CaseProof, book: Mapping[str, Verdict]) -> Words:
+    """Say from which ground a step comes, and for what it was solved if it does not stand there."""
+    as_stated = any(one.ground == step.ground and one.left == step.name for one in proof.relations)
+    solved: tuple[Part, ...] = () if as_stated else (", solved for ", Formula(step.name))
+    return Words("From ", _ground(step.ground, book), *solved, ":")
