@@ -45,13 +45,14 @@ def formula_mutants(
     statement: Statement, neighbours: Mapping[str, list[Name]]
 ) -> Iterator[tuple[Statement | None, str]]:
     """Yield mutated statements with their text, or None for a change that leaves the meaning."""
+    said = _said(statement)
     for index, member in enumerate(statement.members):
         # A statement used as a ground gives its last member only; of a given one the others say nothing.
         for wrong in _mutated(member, neighbours):
             text = f"{statement.symbol} = {sympy.sstr(wrong)}"
             if wrong.has(statement.symbol):
                 continue
-            if _equivalent(member, wrong):
+            if _equivalent(member.xreplace(said), wrong.xreplace(said)):
                 yield None, text
                 continue
             yield replace(statement, members=_with(statement.members, index, wrong)), text
@@ -140,6 +141,12 @@ def _changed_here(part: sympy.Basic, neighbours: Mapping[str, list[Name]]) -> It
         yield {">": sympy.Ge, "<": sympy.Le, ">=": sympy.Gt, "<=": sympy.Lt}[part.rel_op](part.lhs, part.rhs)
 
 
+def _said(statement: Statement) -> dict[Name, Name]:
+    """Return which symbols are one where a statement is meant to hold."""
+    equations = (one for one in statement.scope.comparisons if isinstance(one, sympy.Eq))
+    return {one.lhs: one.rhs for one in equations if one.lhs.is_Symbol and one.rhs.is_Symbol}
+
+
 def _equivalent(original: sympy.Expr, mutant: sympy.Expr) -> bool:
     if not original.has(sympy.Piecewise):
         return not mutant.has(sympy.nan, sympy.zoo) and agree(original, mutant)
@@ -195,8 +202,7 @@ def _other_grounds(ground: Ground) -> Iterator[Ground]:
 def _says_the_same(ground: Ground, other: Ground, user: Statement, statements: Mapping[str, Statement]) -> bool:
     """Whether two grounds are one where their user is meant to hold: a constant threshold is one at every drop."""
     one, two = (relation_of(statements[each.number], each) for each in (ground, other))
-    limits = [limit for limit in user.scope.comparisons if isinstance(limit, sympy.Eq) and limit.rhs.is_Symbol]
-    said = {limit.lhs: limit.rhs for limit in limits if limit.lhs.is_Symbol}
+    said = _said(user)
     sides = [(one.left.xreplace(said), two.left.xreplace(said)), (one.right.xreplace(said), two.right.xreplace(said))]
     return all(left == right or agree(left, right) for left, right in sides)
 

@@ -33,9 +33,9 @@ TAKEN = {
     ),
     Kind.DEFINITION: (
         "K_e", "gamma_0", "gamma_1", "u_O", "1365", "drive left", "jump", "duty", "transfer function", "overlap",
-        "exponent", "S", "travel", "fall",
+        "exponent", "S", "travel", "fall", "share",
     ),
-    Kind.CHOICE: ("attenuator", "scale of u_0", "scale of u_no", "PWM", "L3"),
+    Kind.CHOICE: ("attenuator", "scale of u_0", "scale of u_no", "PWM", "L3", "transition", "beyond"),
 }  # fmt: skip
 
 

@@ -257,7 +257,9 @@ def test_a_wrong_equation_comes_with_its_difference_and_what_it_should_read(rend
     entry = entry_of(rendered["text"], "(30)")
     assert "It would follow only if n_V = 1; the published numbers give n_V = 1365." in entry
     assert "Derived minus published:\n        (n_V - 1)*u_min0" in entry
-    assert "It should read, by (30c):\n        n_0 = (k*x_max/u_max - 1)*n_i + n_adc*u_min0/u_max" in entry
+    assert "It should read, by (30b):\n        n_0 = n_V*((k*x_max/u_max - 1)*u_i + u_min0)" in entry
+    box = entry_of(rendered["text"], "(6)")
+    assert "For a stop at every pressure drop it should read, by (6c):" in box
     assert "Its units do not agree:" in entry
     assert "5.39 counts" in entry
 

@@ -14,7 +14,7 @@ from dzdesign.derivation.account.referee.referee import hear
 from dzdesign.derivation.account.statement import Statement
 from dzdesign.derivation.account.target_flow import TARGET, TIES
 from dzdesign.derivation.account.transfer import SIMULATION_MODEL, TRANSFER_FUNCTION
-from dzdesign.derivation.account.zero_command import SHAPE, ZERO_COMMAND
+from dzdesign.derivation.account.zero_command import SHAPE, TRANSITION, ZERO_COMMAND
 
 SECTIONS = {
     "1 Proposed compensation approach": APPROACH,
@@ -32,6 +32,7 @@ SECTIONS = {
     "Theorem 7: flow over pressure drop": FLOW_OVER_PRESSURE,
     "Theorem 8: what flow can tell": IDENTIFIABILITY,
     "Theorem 9: the meter's floor": METER_FLOOR,
+    "Theorem 10: zero band and transition": TRANSITION,
 }
 
 STATEMENTS = tuple(

@@ -96,6 +96,7 @@ APPROACH = (
         scope=LAW_OFF_REFERENCE,
         see=("T1c", "(6c)", "T2d"),
         corrected_by="(6c)",
+        corrected_for="a stop at every pressure drop",
         note="The paper's choice. It scales the whole compensation signal. Where a stop fixes x_max the target (16) "
         "asks for less: (6c). Where full command is the limit it is exact: T2d.",
     ),

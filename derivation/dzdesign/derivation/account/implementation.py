@@ -77,6 +77,7 @@ IMPLEMENTATION = (
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="(29c)",
+        see=("T5d",),
         values=(
             Value(
                 "code of 10 V by (29)",
@@ -86,7 +87,8 @@ IMPLEMENTATION = (
             ),
         ),
         note="Printed as hex(4095 u_i / 3), called u_i' like the command in Eq. (11); hex() only changes the notation. "
-        "Right if u_i were the voltage at the pin; before the 0-10 V command an attenuator has to stand (our choice).",
+        "Right if u_i is the voltage at the pin: as printed it goes with one bracket in (30) and (31), T5d. For a "
+        "0-10 V command an attenuator has to stand before the pin: one reading more, our choice.",
     ),
     Kind.CORRECTED(
         "(29c)",
@@ -126,7 +128,8 @@ IMPLEMENTATION = (
             discrepancy=(n_V - 1) * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="(30c)",
+        corrected_by="(30b)",
+        see=("(30c)", "T5d"),
         values=(
             Value(
                 "u_min0 as it stands in (30), first valve",
@@ -143,8 +146,9 @@ IMPLEMENTATION = (
                 remark="over nearly the whole range hex() would be given a negative number",
             ),
         ),
-        note="Its first term is scaled by 1365 counts per volt, u_min0 is not scaled at all. Most likely a bracket is "
-        "missing; (30c) has it, with n_adc/u_max counts per volt of the command for 1365 per volt at the pin.",
+        note="Its first term is scaled by 1365 counts per volt, u_min0 is not scaled at all. The smallest erratum is "
+        "one bracket, (30b): with K_c = 3/4095 V a count it closes (29) to (32) as they stand, T5d. (30c) has the "
+        "counts of the command, n_adc/u_max per volt, behind an attenuator.",
     ),
     Kind.PAPER(
         "(31)",
@@ -160,8 +164,29 @@ IMPLEMENTATION = (
             discrepancy=(n_V - 1) * beta * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="(31c)",
+        corrected_by="(31b)",
+        see=("(31c)", "T5d"),
         note="As (30).",
+    ),
+    Kind.CORRECTED(
+        "(30b)",
+        "code of the compensation signal at the reference, with the bracket",
+        n_0,
+        n_V * (_REST * u_i + u_min0),
+        scope=scope(CODES_AT_PIN),
+        grounds=("code of u_0", "(13)"),
+        eliminate=(u_0,),
+        see=("T5d", "(30c)"),
+    ),
+    Kind.CORRECTED(
+        "(31b)",
+        "code of the compensation signal off the reference, with the bracket",
+        n_no,
+        n_V * beta * (_REST * u_i + u_min0),
+        scope=scope(CODES_AT_PIN) & LAW_OFF_REFERENCE,
+        grounds=("code of u_no", "(17)"),
+        eliminate=(u_no,),
+        see=("T5d", "(31c)"),
     ),
     Kind.CHOICE(
         "scale of u_0",
@@ -241,7 +266,26 @@ CODES = (
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         note="The formula is (32) with n_i = n_adc/V_adc u_i, as (29) reads with V_adc for 3 V, and n_0 as (30) is "
-        "printed. No conversion coefficient saves the printed set: its two terms are in different units.",
+        "printed. No conversion coefficient saves the printed set, its two terms are in different units; one bracket "
+        "does: T5d.",
+    ),
+    Kind.THEOREM(
+        "T5d",
+        "with one bracket in (31), Eqs. (29) to (32) as printed give the law (18), at beta = 1 (14)",
+        u_O,
+        K_c * (n_adc * u_i / V_adc + n_V * beta * (_REST * u_i + u_min0)),
+        scope=LAW_OFF_REFERENCE & scope(CODES_AT_PIN),
+        grounds=("(18)", "1365"),
+        eliminate=(n_V,),
+        condition=Condition(
+            any_of=((sympy.Eq(K_c, V_adc / n_adc),),),
+            for_all=(u_i,),
+            discrepancy=(1 - K_c * n_adc / V_adc) * law("paper").output,
+        ),
+        expected=Outcome.FOLLOWS_IF,
+        see=("(30b)", "(31b)"),
+        note="The smallest erratum of (29) to (32): a bracket, and K_c = 3/4095 V a count. The attenuator of (29c) is "
+        "one reading more: then the counts are those of a 0-10 V command, and K_c is 10/4095 V.",
     ),
     Kind.CHOICE("PWM", "compare value: full drive is n_full counts", n_pwm, scaling.COMPARE_VALUE),
     Kind.LAW(

@@ -217,6 +217,8 @@ class Statement:
     rearranges: bool = False
     #: Number of the statement that says what this one should read.
     corrected_by: str = ""
+    #: For what it should read so, in words; for everything unless given.
+    corrected_for: str = ""
     #: Statements that qualify this one.
     see: tuple[str, ...] = ()
     #: Its numbers beside the paper's.

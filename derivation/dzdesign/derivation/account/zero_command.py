@@ -1,4 +1,4 @@
-"""Theorems 3 and 4: what the law does at zero command, whether it rises, and what is left below the reference."""
+"""Theorems 3, 4 and 10: the law at zero command, whether it rises, what it leaves below the reference; transition."""
 
 import sympy
 
@@ -10,11 +10,13 @@ from dzdesign.derivation.account.scope import (
     FREE_OPENING,
     LAW_OFF_REFERENCE,
     UP_TO_REFERENCE,
+    WITH_TRANSITION,
     scope,
 )
 from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *
+from dzdesign.derivation.transition import LAW_COMMAND, LOWERED_BY, SHARE
 
 _PAPER_LAW = law("paper")
 _OFFSET = _PAPER_LAW.offset
@@ -182,5 +184,103 @@ SHAPE = (
             Case(((u_i, y), (u_min, y + guard)), "0 <= u_i < u_min"),
             Case(((u_i, -y), (u_min, y + guard)), "-u_min < u_i <= 0"),
         ),
+    ),
+)
+
+_OPENING_LAW = _PAPER_LAW.output.subs(beta, beta_o)
+_RISE = _OPENING_LAW.subs(u_i, u_t) - _OFFSET
+_DRIVEN = scope(WITH_TRANSITION, sympy.Eq(dP, dP1))
+_BAND = _DRIVEN & scope(u_i <= u_z)
+_TRANSITION = _DRIVEN & scope(u_z <= u_i, u_i <= u_t)
+
+#: Theorem 10: the law that the firmware runs by default.
+TRANSITION = (
+    Kind.DEFINITION(
+        "share",
+        "share of the transition that the command has passed",
+        share,
+        sympy.Piecewise((0, u_i <= u_z), (SHARE, u_i <= u_t), (1, u_t < u_i)),
+        scope=_DRIVEN,
+    ),
+    Kind.CHOICE(
+        "transition",
+        "the law `paper` with zero band and transition, up to the end of the transition",
+        u_O,
+        _OPENING_LAW.subs(u_i, LAW_COMMAND) - LOWERED_BY,
+        scope=_DRIVEN & scope(u_i <= u_t),
+        note="The law of the opening threshold, lowered to the certified offset beta u_min0 of the closing one.",
+    ),
+    Kind.CHOICE(
+        "beyond",
+        "the law `paper` of the opening threshold, beyond the transition",
+        u_O,
+        _OPENING_LAW,
+        scope=_DRIVEN & scope(u_t <= u_i),
+    ),
+    Kind.THEOREM(
+        "T10a",
+        "within the zero band the output is the certified offset, and never above it",
+        u_O,
+        _OFFSET,
+        scope=_BAND,
+        grounds=("transition", "share"),
+        eliminate=(share,),
+        cases=(Case(((u_z, u_i + y),), "within the zero band"),),
+    ),
+    Kind.THEOREM(
+        "T10b",
+        "the transition runs straight from the certified offset to the law of the opening threshold",
+        u_O,
+        _OFFSET + _RISE * (u_i - u_z) / (u_t - u_z),
+        scope=_TRANSITION,
+        grounds=("transition", "share"),
+        eliminate=(share,),
+        cases=(Case(((u_i, u_z + excess), (u_t, u_z + excess + headroom)), "within the transition"),),
+        note="At u_z it is the output of the zero band (T10a), at u_t that of the law beyond (T10c): continuous.",
+    ),
+    Kind.THEOREM(
+        "T10c",
+        "at the end of the transition the output is that of the law beyond it",
+        u_O,
+        _OPENING_LAW,
+        scope=_DRIVEN & scope(sympy.Eq(u_i, u_t)),
+        grounds=("transition", "share"),
+        eliminate=(share,),
+        cases=(Case(((u_i, u_z + width), (u_t, u_z + width)), "at the end"),),
+    ),
+    Kind.THEOREM(
+        "T10d",
+        "slope within the transition",
+        slope,
+        _RISE / (u_t - u_z),
+        scope=_DRIVEN & scope(u_z <= u_i, u_i < u_t),
+        grounds=(Ground("T10b", derivative=(u_i, slope)),),
+        cases=(Case(((u_t, u_z + width),), ""),),
+        positive_if=_OPENING_LAW.subs(u_i, u_t) > _OFFSET,
+        note="It rises if the law of the opening threshold stands above the certified offset at u_t: always where it "
+        "rises itself (T10e), for beta <= beta_o.",
+    ),
+    Kind.THEOREM(
+        "T10e",
+        "slope beyond the transition",
+        slope,
+        1 - beta_o * (1 - k * x_max / u_max),
+        scope=_DRIVEN & scope(u_t <= u_i),
+        grounds=(Ground("beyond", derivative=(u_i, slope)),),
+        positive_if=beta_o * (1 - k * x_max / u_max) < 1,
+    ),
+    Kind.THEOREM(
+        "T10f",
+        "no flow within the zero band, with a certified offset that is not above the threshold",
+        Q,
+        sympy.S.Zero,
+        scope=_BAND & scope(beta * u_min0 <= u_min1, beta * u_min0 <= u_max),
+        grounds=("T3a",),
+        cases=(
+            Case(((u_min1, _OFFSET + guard),), "beta u_min0 below the threshold"),
+            Case(((u_min1, _OFFSET),), "beta u_min0 at the threshold"),
+        ),
+        see=("T10a",),
+        note="The drive is that of zero command (T10a), and so is the flow.",
     ),
 )

@@ -88,7 +88,7 @@ _BESIDE_SIGNS = r"(?<=[(+−] )[ast]\b|(?<=[(−])[ast]\b|\b[ast](?=\)| [=+] )|(
 _SIGNS = ((" - ", " − "), ("<=", "≤"), (">=", "≥"), (" -> ", " → "))
 _MINUS = re.compile(r"(?<![\w)-])-(?=[\w(])")
 _RANGE = re.compile(r"(?<=[\d)])-(?=[\d(])")
-_REFERENCE = r"\(\d+[a-z]?\)|\b[TL]\d[a-z]?\b"
+_REFERENCE = r"\(\d+[a-z]?\)|\b[TL]\d+[a-z]?\b"
 
 
 @cache

@@ -28,8 +28,8 @@ _FORMATS: dict[str, Callable[[DerivationReport], str]] = {
 FORMATS = tuple(_FORMATS)
 #: Of (6), which is given and yet corrected.
 _CHOICE = (
-    "the paper's choice. Where a stop fixes x_max, it does not meet the target (16); where full command is the limit, "
-    "it meets it exactly, and the correction loses flow: T2d, T2e."
+    "the paper's choice. For a stop at every pressure drop it does not meet the target (16); where full command is the "
+    "limit, it meets it exactly, and the correction loses flow: T2d, T2e."
 )
 _COUNTED = {
     Outcome.GIVEN: "taken as given",

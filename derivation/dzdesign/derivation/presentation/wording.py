@@ -12,7 +12,7 @@ from dzdesign.derivation.presentation.content import Derivation, Entry, Figure, 
 from dzdesign.derivation.presentation.formulas import to_latex, to_text
 from dzdesign.derivation.presentation.prose import Formula, Part, Reference, Words, parse_prose
 
-_NUMBERED = re.compile(r"\(\d+[a-z]?\)|[TL]\d[a-z]?")
+_NUMBERED = re.compile(r"\(\d+[a-z]?\)|[TL]\d+[a-z]?")
 _FORMS = ("first", "second", "third", "fourth")
 #: What is known of the sign of a symbol, as SymPy calls it and as the report does; the first that holds.
 _SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of either sign"}
@@ -163,7 +163,8 @@ def _correction(statement: Statement, corrected: Statement, book: Mapping[str, V
     if corrected.published == statement.published:  # the same claim, of something else
         return Line(words=Words("What holds is ", refer(corrected), ": ", parse_prose(corrected.title, book), "."))
     formula = Formula(corrected.symbol, corrected.members[-1])
-    return Line(words=Words("It should read, by ", refer(corrected), ":"), formula=formula)
+    start = f"For {statement.corrected_for} it" if statement.corrected_for else "It"
+    return Line(words=Words(start, " should read, by ", refer(corrected), ":"), formula=formula)
 
 
 def _signs(verdict: Verdict, book: Mapping[str, Verdict]) -> dict[str, tuple[Formula, ...]]:

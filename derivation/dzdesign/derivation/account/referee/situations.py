@@ -22,6 +22,7 @@ from dzdesign.derivation.account.scope import (
     FREE_BETA,
     FREE_OPENING,
     PLANT,
+    WITH_TRANSITION,
     Setting,
     under_law,
 )
@@ -84,9 +85,32 @@ def _of_valve(valve: PlainValve) -> Iterator[Situation]:
         for u_i in compensated:
             for name in LAW_NAMES:
                 yield _situation(valve, dP, u_i, under_law(name), beta, partial(_drive, valve, name))
+        if dP == valve.dP1:
+            yield from _with_transition(valve)
+        for u_i in compensated:
             if dP == valve.dP1:
                 for free in (0.5, 1.0, 1.25):
                     yield _situation(valve, dP, u_i, FREE_BETA, free, partial(_freely_scaled_drive, valve, free))
+
+
+def _with_transition(valve: PlainValve) -> Iterator[Situation]:
+    """Zero band and transition: straight from an offset below the threshold, the closing one, to the opening law."""
+    dP, opening = valve.dP1, valve.threshold(valve.dP1) / valve.u_min0
+    band, end = valve.u_max * (0.03 + 0.001 * valve.k), valve.u_max * (0.3 + 0.01 * valve.k)
+
+    for closing in (0.875 * opening, opening):
+
+        def drives(at: float, u_i: float, offset: float = closing * valve.u_min0) -> float:
+            if u_i <= band:
+                return offset
+            top = _scaled_drive(valve, opening, max(u_i, end))
+            return top if u_i >= end else offset + (top - offset) * (u_i - band) / (end - band)
+
+        for u_i in (0.0, 0.4 * band, band, 0.7 * band + 0.3 * end, end, 0.7 * valve.u_max, valve.u_max):
+            place = _situation(valve, dP, u_i, WITH_TRANSITION, closing, drives)
+            passed = min(max((u_i - band) / (end - band), 0.0), 1.0)
+            own = {s.beta_o: opening, s.u_z: band, s.u_t: end, s.width: end - band, s.share: passed}
+            yield replace(place, numbers={**place.numbers, **own})
 
 
 def _straight(dP: float, u_i: float) -> float:
@@ -247,7 +271,9 @@ def _of_command(
             s.n_pwm: valve.n_full * u_O / valve.u_max,
         },
         **{s.V_pin: pin, s.n_i: valve.n_adc * pin / valve.V_adc},
-        s.K_c: valve.u_max / valve.n_adc * (1.25 if u_i == 0.5 else valve.K_c_share),
+        s.K_c: (valve.V_adc if codes == CODES_AT_PIN else valve.u_max)
+        / valve.n_adc
+        * (1.25 if u_i == 0.5 or (codes == CODES_AT_PIN and not valve.has_stop) else valve.K_c_share),
     }
     if u_i < 0:
         return numbers
