@@ -1,8 +1,6 @@
 """Every symbol of the account, declared once: its sign, its unit, its meaning and, where the name does not spell it,
 its look.
 
-The order is the one in which a product is written: scales and gains, lengths, commands, and last what varies with time.
-
 The paper uses three names for two things each. They are kept apart here: ``u_0`` (compensation signal) and
 ``u_O`` (output of the compensator), which Eqs. (14) and (18) print alike; ``K_e`` (flow gain, Eq. 2) and
 ``K_a`` (gain of the proportional amplifier, which Eq. (19) calls K_e); ``u_i'`` (command beyond the threshold,
@@ -29,8 +27,6 @@ class Quantity:
     meaning: str
     #: How it looks, where its name does not spell it.
     latex: str = ""
-    #: Whether it varies with time, or is what a formula is a function of.
-    varies: bool = False
 
 
 QUANTITIES: dict[Name, Quantity] = {}
@@ -41,14 +37,13 @@ def _declare(name: Name, unit: str, meaning: str, **more: Any) -> Any:
     return name
 
 
-def _symbol(name: str, unit: str, meaning: str, *, latex: str = "", varies: bool = False, **sign: bool) -> sympy.Symbol:
-    return _declare(sympy.Symbol(name, **sign), unit, meaning, latex=latex, varies=varies)
+def _symbol(name: str, unit: str, meaning: str, *, latex: str = "", **sign: bool) -> sympy.Symbol:
+    return _declare(sympy.Symbol(name, **sign), unit, meaning, latex=latex)
 
 
 _positive = partial(_symbol, positive=True)
 _nonnegative = partial(_symbol, nonnegative=True)
 _real = partial(_symbol, real=True)
-_varying = partial(_real, varies=True)
 _FLOW = "m**3/s"
 
 # Codes in the compensator, Eqs. (29)-(32), and ratios
@@ -152,21 +147,21 @@ width = _positive("width", "V", "u_t - u_z, more than zero")
 above = _positive("above", "Pa", "dP1 - dP0, more than zero")
 
 # What varies: the plant's state and its transforms, ...
-dv_dt = _varying("dv_dt", "m/s**2", "rate of the armature's speed", latex=r"\frac{\mathrm{d}v}{\mathrm{d}t}")
-dx_e_dt = _varying("dx_e_dt", "m/s", "rate of the armature's travel", latex=r"\frac{\mathrm{d}x_{e}}{\mathrm{d}t}")
-v = _varying("v", "m/s", "speed of the armature")
-x_e = _varying("x_e", "m", "travel of the armature")
-f_e = _varying("f_e", "N", "force of the solenoid")
-f_eL = _varying("f_eL", "N", "force of the load")
-di_dt = _varying("di_dt", "A/s", "rate of the coil's current", latex=r"\frac{\mathrm{d}i}{\mathrm{d}t}")
-i = _varying("i", "A", "current of the coil")
-u_e = _varying("u_e", "V", "output of the amplifier")
-u_if = _varying("u_if", "V", "feedback of the current")
+dv_dt = _real("dv_dt", "m/s**2", "rate of the armature's speed", latex=r"\frac{\mathrm{d}v}{\mathrm{d}t}")
+dx_e_dt = _real("dx_e_dt", "m/s", "rate of the armature's travel", latex=r"\frac{\mathrm{d}x_{e}}{\mathrm{d}t}")
+v = _real("v", "m/s", "speed of the armature")
+x_e = _real("x_e", "m", "travel of the armature")
+f_e = _real("f_e", "N", "force of the solenoid")
+f_eL = _real("f_eL", "N", "force of the load")
+di_dt = _real("di_dt", "A/s", "rate of the coil's current", latex=r"\frac{\mathrm{d}i}{\mathrm{d}t}")
+i = _real("i", "A", "current of the coil")
+u_e = _real("u_e", "V", "output of the amplifier")
+u_if = _real("u_if", "V", "feedback of the current")
 
 
 def _transform(name: str, unit: str, meaning: str) -> Any:
     # A transform is an integral over time.
-    return _declare(sympy.Function(name)(s), unit, meaning, varies=True)
+    return _declare(sympy.Function(name)(s), unit, meaning)
 
 
 X_e = _transform("X_e", "m*s", "transform of x_e")
@@ -180,26 +175,26 @@ Q_s = _transform("Q", "m**3", "transform of Q")
 G = _transform("G", f"{_FLOW}/V", "transfer function from command to flow")
 
 # ... what an identification differentiates, ...
-dQ_dC_d = _varying("dQ_dC_d", _FLOW, "sensitivity of the flow to C_d", latex=r"\frac{\partial Q}{\partial C_{d}}")
-dQ_dk = _varying("dQ_dk", f"{_FLOW}*m/V", "sensitivity of the flow to k", latex=r"\frac{\partial Q}{\partial k}")
-dQ_dx_max = _varying(
+dQ_dC_d = _real("dQ_dC_d", _FLOW, "sensitivity of the flow to C_d", latex=r"\frac{\partial Q}{\partial C_{d}}")
+dQ_dk = _real("dQ_dk", f"{_FLOW}*m/V", "sensitivity of the flow to k", latex=r"\frac{\partial Q}{\partial k}")
+dQ_dx_max = _real(
     "dQ_dx_max", "m**2/s", "sensitivity of the flow to x_max", latex=r"\frac{\partial Q}{\partial x_{\text{max}}}"
 )
 
 # ... and commands, last in a product
-u_O = _varying("u_O", "V", "output of the compensator")
-u_above = _varying("u_above", "V", "output just above dP0")
-u_below = _varying("u_below", "V", "output at dP0")
-u_0 = _varying("u_0", "V", "compensation signal at the reference")
-u_no = _varying("u_no", "V", "compensation signal off the reference")
-u_i_prime = _nonnegative("u_i'", "V", "command beyond the threshold (Fig. 3, Eq. 11)", varies=True)
-u_1 = _varying("u_1", "V", "command of the first sample")
-u_2 = _varying("u_2", "V", "command of the second sample")
-u_i = _varying("u_i", "V", "command, the compensator's input; in (1) the valve's input")
-n_pwm = _varying("n_O", "code", "code of the output")
-n_i = _varying("n_i", "code", "code of the command (Eq. 29)")
-n_0 = _varying("n_0", "code", "code of the compensation signal at the reference")
-n_no = _varying("n_no", "code", "code of the compensation signal off the reference")
+u_O = _real("u_O", "V", "output of the compensator")
+u_above = _real("u_above", "V", "output just above dP0")
+u_below = _real("u_below", "V", "output at dP0")
+u_0 = _real("u_0", "V", "compensation signal at the reference")
+u_no = _real("u_no", "V", "compensation signal off the reference")
+u_i_prime = _nonnegative("u_i'", "V", "command beyond the threshold (Fig. 3, Eq. 11)")
+u_1 = _real("u_1", "V", "command of the first sample")
+u_2 = _real("u_2", "V", "command of the second sample")
+u_i = _real("u_i", "V", "command, the compensator's input; in (1) the valve's input")
+n_pwm = _real("n_O", "code", "code of the output")
+n_i = _real("n_i", "code", "code of the command (Eq. 29)")
+n_0 = _real("n_0", "code", "code of the compensation signal at the reference")
+n_no = _real("n_no", "code", "code of the compensation signal off the reference")
 
 #: What depends on the pressure drop: its name at the present one, at dP0 and at dP1.
 AT_PRESSURE_DROPS: dict[Name, tuple[Name, Name]] = {
