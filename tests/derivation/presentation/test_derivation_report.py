@@ -474,16 +474,13 @@ def test_what_make_docs_builds_is_ignored_by_git_and_removed_by_clean():
 # --- prose --------------------------------------------------------------------------------------------------
 
 
-def test_prose_finds_symbols_and_references_and_leaves_words_alone():
-    words = prose.parse_prose(
-        "a step of u_i' - k x_max at S d by Eqs. (18)-(20), L1, 8-8.5 V; `target`", ["(18)", "L1"]
-    )
+def test_prose_has_symbols_between_dollars_and_references():
+    words = prose.parse_prose("a step of $u_i' - k x_max$ by Eqs. (18)-(20), L1, 8-8.5 V; `target`", ["(18)", "L1"])
     named = [(type(word).__name__, str(word)) for word in words.parts if not isinstance(word, str)]
     assert named == [
         ("Formula", "u_i'"),
         ("Formula", "k"),
         ("Formula", "x_max"),
-        ("Formula", "S"),
         ("Reference", "(18)"),
         ("Reference", "L1"),
         ("Code", "`target`"),
@@ -494,7 +491,15 @@ def test_prose_finds_symbols_and_references_and_leaves_words_alone():
 def test_prose_survives_the_way_to_plain_text():
     for statement in STATEMENTS:
         for sentence in (statement.title, statement.note, *(setting.words for setting in statement.scope.settings)):
-            assert str(prose.parse_prose(sentence, BY_NUMBER)) == sentence
+            assert str(prose.parse_prose(sentence, BY_NUMBER)) == sentence.replace("$", "")
+
+
+def test_every_symbol_in_prose_is_declared():
+    known = {str(name).removesuffix("(s)") for name in symbols.QUANTITIES} | {"f", "gamma", "u_min"}
+    sentences = [sentence for one in STATEMENTS for sentence in (one.title, one.note)]
+    for sentence in [*sentences, *(one.meaning for one in symbols.QUANTITIES.values())]:
+        found = [str(part) for part in prose.parse_prose(sentence).parts if isinstance(part, prose.Formula)]
+        assert {*found} <= known, sentence
 
 
 @pytest.mark.parametrize("module", [prose, report, writer, formulas], ids=lambda one: one.__name__)

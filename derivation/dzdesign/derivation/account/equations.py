@@ -34,12 +34,12 @@ APPROACH = (
         ),
         scope=scope(BARE),
         see=("T6d",),
-        note="x is the opening of the edge, not the travel of the spool: x = 0 at the threshold. u_i is the valve's "
-        "input; behind a compensator that is its output u_O.",
+        note="$x$ is the opening of the edge, not the travel of the spool: $x = 0$ at the threshold. $u_i$ is the "
+        "valve's input; behind a compensator that is its output $u_O$.",
     ),
     Kind.ASSUMPTION(
         "Fig. 3, line",
-        "target line through (0, 0) and (u_max, Q_max)",
+        "target line through (0, 0) and ($u_max$, $Q_max$)",
         Q_w,
         Q_max / u_max * u_i,
         see=("T7d",),
@@ -77,7 +77,7 @@ APPROACH = (
         grounds=("(2)", "Q_max"),
         eliminate=(Q_max,),
         see=("T7b",),
-        note="With C_d constant (Assumption 2).",
+        note="With $C_d$ constant (Assumption 2).",
     ),
     Kind.PREMISE(
         "(4)",
@@ -85,9 +85,9 @@ APPROACH = (
         u_min,
         f(dP),
         see=("T9b", "T9c"),
-        note="f is fitted to the ramp tests by least squares. The temperature does not enter (Assumption 1).",
+        note="$f$ is fitted to the ramp tests by least squares. The temperature does not enter (Assumption 1).",
     ),
-    Kind.PREMISE("(5)", "correction coefficient at dP1", beta, u_min1 / u_min0, see=("T3b", "T9c")),
+    Kind.PREMISE("(5)", "correction coefficient at $dP1$", beta, u_min1 / u_min0, see=("T3b", "T9c")),
     Kind.PREMISE(
         "(6)",
         "compensation above the reference",
@@ -97,8 +97,8 @@ APPROACH = (
         see=("T1c", "(6c)", "T2d"),
         corrected_by="(6c)",
         corrected_for="a stop at every pressure drop",
-        note="The paper's choice. It scales the whole compensation signal. Where a stop fixes x_max the target (16) "
-        "asks for less: (6c). Where full command is the limit it is exact: T2d.",
+        note="The paper's choice. It scales the whole compensation signal. Where a stop fixes $x_max$ the target "
+        "(16) asks for less: (6c). Where full command is the limit it is exact: T2d.",
     ),
     Kind.PREMISE(
         "(7)",
@@ -114,7 +114,7 @@ APPROACH = (
 #: Section 1.1.
 AT_REFERENCE = (
     Kind.DEFINITION(
-        "gamma_0", "flow per opening at dP0 (text below Eq. 8)", gamma_0, C_d * W * sympy.sqrt(2 * dP0 / rho)
+        "gamma_0", "flow per opening at $dP0$ (text below Eq. 8)", gamma_0, C_d * W * sympy.sqrt(2 * dP0 / rho)
     ),
     Kind.PAPER(
         "(8)",
@@ -124,7 +124,7 @@ AT_REFERENCE = (
         gamma_0 * x_max / u_max,
         grounds=(Ground("(3)", ((K_e, K_0), (dP, dP0))), "gamma_0"),
         eliminate=(gamma_0,),
-        note="x_max does not depend on dP (Assumption 3).",
+        note="$x_max$ does not depend on $dP$ (Assumption 3).",
     ),
     Kind.PAPER(
         "(9)",
@@ -173,7 +173,7 @@ AT_REFERENCE = (
         u_O,
         u_0 + u_i,
         scope=UP_TO_REFERENCE,
-        note="Eqs. (14) and (18) print u_0 on both sides; the left one is the output u_O.",
+        note="Eqs. (14) and (18) print $u_0$ on both sides; the left one is the output $u_O$.",
     ),
     Kind.ASSUMPTION(
         "Fig. 3, command",
@@ -181,7 +181,7 @@ AT_REFERENCE = (
         u_O,
         u_i_prime + u_min0,
         scope=scope(sympy.Eq(dP, dP0), u_min0 <= u_O),
-        note="Read off the figure: u_i' is the part of the command that opens the edge.",
+        note="Read off the figure: $u_i'$ is the part of the command that opens the edge.",
     ),
     Kind.PAPER(
         "(12)",
@@ -212,14 +212,14 @@ AT_REFERENCE = (
         grounds=("u_O", "(13)"),
         eliminate=(u_0,),
         see=("T1a", "T2b"),
-        note="Printed with u_0 on the left, which is the output u_O.",
+        note="Printed with $u_0$ on the left, which is the output $u_O$.",
     ),
 )
 
 #: Section 1.2.
 OFF_REFERENCE = (
     Kind.DEFINITION(
-        "gamma_1", "flow per opening at dP1 (text below Eq. 15)", gamma_1, C_d * W * sympy.sqrt(2 * dP1 / rho)
+        "gamma_1", "flow per opening at $dP1$ (text below Eq. 15)", gamma_1, C_d * W * sympy.sqrt(2 * dP1 / rho)
     ),
     Kind.PAPER(
         "(15)",
@@ -231,7 +231,7 @@ OFF_REFERENCE = (
         grounds=(Ground("(3)", ((K_e, K_1), (dP, dP1))), "gamma_1"),
         eliminate=(gamma_1,),
         see=("T7a", "T7c"),
-        note="The published largest flows grow far more slowly with dP: T7a.",
+        note="The published largest flows grow far more slowly with $dP$: T7a.",
     ),
     Kind.PAPER(
         "(16)",
@@ -245,8 +245,8 @@ OFF_REFERENCE = (
         ),
         eliminate=(Q_max1,),
         see=("T1c", "T1d"),
-        note="As a target. Fig. 3 draws the line at the reference; (16) takes it to hold at dP1 too. As a claim about "
-        "the valve under Eq. (18) it does not follow: T1c.",
+        note="As a target. Fig. 3 draws the line at the reference; (16) takes it to hold at $dP1$ too. As a claim "
+        "about the valve under Eq. (18) it does not follow: T1c.",
     ),
     Kind.PAPER(
         "(17)",
@@ -268,6 +268,6 @@ OFF_REFERENCE = (
         grounds=(Ground("u_O", ((u_0, u_no),)), "(17)"),
         eliminate=(u_no,),
         see=("T1b", "T1c", "T3a", "T4a"),
-        note="Printed with u_0 on the left, which is the output u_O.",
+        note="Printed with $u_0$ on the left, which is the output $u_O$.",
     ),
 )

@@ -51,13 +51,13 @@ FLOW_OVER_PRESSURE = (
         grounds=("(15)", "gamma_1", "(8)", "gamma_0"),
         eliminate=(gamma_1, K_0, gamma_0),
         values=(
-            Value("K_1/K_0 by Eq. (15)", of=sympy.sqrt(dP1 / dP0), at=FIRST.at(), unit="1"),
+            Value("$K_1/K_0$ by Eq. (15)", of=sympy.sqrt(dP1 / dP0), at=FIRST.at(), unit="1"),
             *(
-                Value(f"K_1/K_0 by the largest flows, {valve.name}", of=Q_max1 / Q_max0, at=valve.at(), unit="1")
+                Value(f"$K_1/K_0$ by the largest flows, {valve.name}", of=Q_max1 / Q_max0, at=valve.at(), unit="1")
                 for valve in VALVES
             ),
             Value(
-                "K_1/K_0 by Eq. (15) and the simulated openings",
+                "$K_1/K_0$ by Eq. (15) and the simulated openings",
                 # Section 2.2: 1.8 mm with 54 % dead at 1 MPa; 0.1 mm less with 1 % more dead at 5 MPa.
                 of=sympy.sqrt(dP1 / dP0) * _OPENING_RATIO,
                 at=FIRST.at(),
@@ -87,15 +87,15 @@ FLOW_OVER_PRESSURE = (
                 of=Q_max0 * sympy.sqrt(dP1 / dP0) / Q_max1,
                 at=FIRST.at(),
                 unit="1",
-                remark="The line (16) with K_1 by Eq. (15) asks at 5 MPa for more flow than the valve has.",
+                remark="The line (16) with $K_1$ by Eq. (15) asks at 5 MPa for more flow than the valve has.",
             ),
         ),
-        note="The law does not need it: gamma cancels in Eqs. (13) and (18), only k, x_max and the thresholds remain. "
-        "The identification leaves the slope of each pressure drop free.",
+        note="The law does not need it: $gamma$ cancels in Eqs. (13) and (18), only $k$, $x_max$ and the thresholds "
+        "remain. The identification leaves the slope of each pressure drop free.",
     ),
     Kind.THEOREM(
         "T7d",
-        "the abstract's target line, through (dP0, Q_max), has the flow gain (2)",
+        "the abstract's target line, through ($dP0$, $Q_max$), has the flow gain (2)",
         K_e,
         Q_max / dP0,
         grounds=("(2)",),
@@ -107,6 +107,6 @@ FLOW_OVER_PRESSURE = (
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="(2)",
-        note="The text below Eq. (1) ends the line at (u_max, Q_max), as Fig. 3 needs it.",
+        note="The text below Eq. (1) ends the line at ($u_max$, $Q_max$), as Fig. 3 needs it.",
     ),
 )

@@ -54,7 +54,7 @@ FULL_COMMAND = (
     ),
     Kind.THEOREM(
         "largest flow",
-        "largest flow at dP1 without compensator",
+        "largest flow at $dP1$ without compensator",
         Q_max1,
         gamma_1 * (u_max - u_min1) / k,
         scope=scope(BARE, FREE_OPENING, sympy.Eq(dP, dP1), u_min1 <= u_max) & AT_FULL_COMMAND,
@@ -69,13 +69,13 @@ FULL_COMMAND = (
     ),
     Kind.ASSUMPTION(
         "full command",
-        "x_max is the opening that full command gives at dP0",
+        "$x_max$ is the opening that full command gives at $dP0$",
         x_max,
         (u_max - u_min0) / k,
         scope=_FULL_COMMAND_IS_THE_LIMIT,
         see=("T2b",),
         note="The condition under which 1.048 and 1.018 (T1b) are computed. Without a stop, full command then opens "
-        "the valve further at dP1, where its threshold is lower.",
+        "the valve further at $dP1$, where its threshold is lower.",
     ),
     Kind.THEOREM(
         "T2c",
@@ -85,7 +85,7 @@ FULL_COMMAND = (
         scope=_FULL_COMMAND_IS_THE_LIMIT,
         grounds=("largest flow", "(5)"),
         eliminate=(u_min1,),
-        note="More than gamma_1 x_max, the flow of Assumption 3, wherever beta < 1.",
+        note="More than $gamma_1 x_max$, the flow of Assumption 3, wherever $beta < 1$.",
     ),
     Kind.THEOREM(
         "T2d",
@@ -102,7 +102,7 @@ FULL_COMMAND = (
         eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
         see=("T1c", "T2e"),
         note="The other reading of (6): Eq. (18) is the right law of Fig. 3 as long as full command is the limit. "
-        "With a stop that fixes x_max it overshoots: T1b, T1c.",
+        "With a stop that fixes $x_max$ it overshoots: T1b, T1c.",
     ),
     Kind.THEOREM(
         "T2e",
@@ -126,7 +126,7 @@ FULL_COMMAND = (
             )
             for valve in (FIRST, SIMULATION, SECOND)
         ),
-        note="At every command, full command included. The correction (6c) is right only where a stop fixes x_max "
+        note="At every command, full command included. The correction (6c) is right only where a stop fixes $x_max$ "
         "(T1d).",
     ),
 )

@@ -55,7 +55,7 @@ METER_FLOOR = (
         positive_if=sympy.sqrt(dP1) > sympy.sqrt(dP0),
         values=tuple(
             Value(
-                f"in per cent of u_max, {valve.name}",
+                f"in per cent of $u_max$, {valve.name}",
                 of=Q_floor * (u_max - u_min0) / Q_max0 * (1 - sympy.sqrt(dP0 / dP1)) / u_max,
                 at=valve.at(),
                 unit="%",
@@ -84,7 +84,7 @@ METER_FLOOR = (
         eliminate=(u_seen0, u_seen1, u_min1),
         values=tuple(
             Value(
-                f"in per cent of u_max, {valve.name}",
+                f"in per cent of $u_max$, {valve.name}",
                 of=Q_floor * ((u_max - u_min0) / Q_max0 - (u_max - u_min1) / Q_max1) / u_max,
                 at=valve.at(),
                 unit="%",
@@ -95,7 +95,7 @@ METER_FLOOR = (
     ),
     Kind.THEOREM(
         "slope at dP1",
-        "flow per command at dP1 from the two ends of the straight part",
+        "flow per command at $dP1$ from the two ends of the straight part",
         s_flow1,
         (Q_max1 - Q_floor) / (u_max - u_seen1),
         scope=scope(FREE_OPENING),
@@ -111,7 +111,7 @@ METER_FLOOR = (
     ),
     Kind.THEOREM(
         "T9d",
-        "flow at zero command without beta, if the thresholds are the first flow seen",
+        "flow at zero command without $beta$, if the thresholds are the first flow seen",
         Q,
         Q_floor + (Q_max1 - Q_floor) * (u_seen0 - u_seen1) / (u_max - u_seen1),
         scope=scope(BARE, FREE_OPENING, sympy.Eq(u_i, u_seen0), sympy.Eq(dP, dP1), u_min1 <= u_seen0),

@@ -17,16 +17,19 @@ class Setting(NamedTuple):
     #: As a report says it, behind "proved for".
     words: str
 
+    def __str__(self) -> str:
+        return self.words.replace("$", "")
+
 
 BARE = Setting("drive", "the valve without compensator")
-FREE_BETA = Setting("drive", "the paper's law with any beta")
+FREE_BETA = Setting("drive", "the paper's law with any $beta$")
 #: The simulation model, Eqs. (19)-(24), which has no overlap.
 PLANT = Setting("drive", "the simulation model")
 #: What the firmware runs unless it is told otherwise (`transition.py`).
 WITH_TRANSITION = Setting("drive", "the law `paper` with zero band and transition")
-FIXED_OPENING = Setting("spool", "a stop that fixes x_max at every pressure drop (Assumption 3)")
+FIXED_OPENING = Setting("spool", "a stop that fixes $x_max$ at every pressure drop (Assumption 3)")
 FREE_OPENING = Setting("spool", "a spool that does not meet its stop")
-CODES_AT_PIN = Setting("codes", "codes at n_V counts per volt")
+CODES_AT_PIN = Setting("codes", "codes at $n_V$ counts per volt")
 CODES_OF_COMMAND = Setting("codes", "codes in the counts of the command")
 
 
@@ -46,7 +49,7 @@ class Scope:
         return bool(self.settings) or self.where != sympy.true
 
     def __str__(self) -> str:
-        return "; ".join([*(setting.words for setting in self.settings), *map(sympy.sstr, self.comparisons)])
+        return "; ".join([*(str(setting) for setting in self.settings), *map(sympy.sstr, self.comparisons)])
 
     @property
     def comparisons(self) -> tuple[Boolean, ...]:

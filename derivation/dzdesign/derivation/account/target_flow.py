@@ -17,7 +17,7 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.symbols import *
 
-_DRIVE_LEFT_OVER = "with k x_max = u_max - u_min0, the command left above the threshold"
+_DRIVE_LEFT_OVER = "with $k x_max = u_max - u_min0$, the command left above the threshold"
 
 #: What the laws are in the paper's terms.
 TIES = tuple(statement for name in LAW_NAMES for statement in law(name).statements)
@@ -75,7 +75,7 @@ TARGET = (
             )
             for valve in VALVES
         ),
-        note=f"Above the target wherever beta < 1 and k x_max < u_max. The numbers: {_DRIVE_LEFT_OVER}.",
+        note=f"Above the target wherever $beta < 1$ and $k x_max < u_max$. The numbers: {_DRIVE_LEFT_OVER}.",
     ),
     Kind.THEOREM(
         "T1c",
@@ -94,8 +94,8 @@ TARGET = (
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="T1d",
         see=("T2d",),
-        note="Where a stop fixes x_max. Where full command is the limit it follows, for then the target ends at the "
-        "largest flow that full command gives: T2d.",
+        note="Where a stop fixes $x_max$. Where full command is the limit it follows, for then the target ends at "
+        "the largest flow that full command gives: T2d.",
     ),
     Kind.THEOREM(
         "T1d",
@@ -117,12 +117,13 @@ TARGET = (
         grounds=("drive left", Ground("L3", ((u_i, u_max),))),
         eliminate=(u_O,),
         values=tuple(Value(f"at 5 MPa, {valve.name}", valve.at(), "V") for valve in (FIRST, SECOND)),
-        note="(1 - beta) u_min0 where k x_max = u_max - u_min0: the target asks for x_max and not for more, though at "
-        "a lower threshold the same command could open further. In flow it is what T1b gives above the target.",
+        note="(1 - $beta$) $u_min0$ where $k x_max = u_max - u_min0$: the target asks for $x_max$ and not for more, "
+        "though at a lower threshold the same command could open further. In flow it is what T1b gives above the "
+        "target.",
     ),
     Kind.CORRECTED(
         "(6c)",
-        "compensation signal that meets the target (16) where a stop fixes x_max, what (6) should read",
+        "compensation signal that meets the target (16) where a stop fixes $x_max$, what (6) should read",
         u_no,
         u_0 - (1 - beta) * u_min0,
         scope=_TARGET_LAW,

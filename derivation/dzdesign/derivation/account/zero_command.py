@@ -21,9 +21,9 @@ from dzdesign.derivation.transition import LAW_COMMAND, LOWERED_BY, SHARE
 _PAPER_LAW = law("paper")
 _OFFSET = _PAPER_LAW.offset
 _THREE_CASES = (
-    Case(((u_min1, _OFFSET + guard),), "beta u_min0 below the threshold"),
-    Case(((u_min1, _OFFSET),), "beta u_min0 at the threshold"),
-    Case(((u_min1, _OFFSET - excess),), "beta u_min0 above the threshold"),
+    Case(((u_min1, _OFFSET + guard),), "$beta u_min0$ below the threshold"),
+    Case(((u_min1, _OFFSET),), "$beta u_min0$ at the threshold"),
+    Case(((u_min1, _OFFSET - excess),), "$beta u_min0$ above the threshold"),
 )
 
 #: Theorem 3: zero command.
@@ -45,11 +45,11 @@ ZERO_COMMAND = (
         eliminate=(x, gamma_1),
         cases=_THREE_CASES,
         positive_if=u_min1 < _OFFSET,
-        note="So zero command passes no flow exactly if beta u_min0 <= u_min(dP). Both laws have this offset.",
+        note="So zero command passes no flow exactly if $beta u_min0 <= u_min$($dP$). Both laws have this offset.",
     ),
     Kind.THEOREM(
         "T3b",
-        "flow at zero command without beta, for a threshold lower than at the reference",
+        "flow at zero command without $beta$, for a threshold lower than at the reference",
         Q,
         gamma_1 * (u_min0 - u_min1) / k,
         Q_max1 * (u_min0 - u_min1) / (u_max - u_min1),
@@ -92,7 +92,7 @@ ZERO_COMMAND = (
     ),
     Kind.THEOREM(
         "T3c",
-        "with beta by Eq. (5), zero command stands at the threshold of the present pressure drop",
+        "with $beta$ by Eq. (5), zero command stands at the threshold of the present pressure drop",
         u_O,
         f(dP1),
         scope=LAW_OFF_REFERENCE & AT_ZERO_COMMAND,
@@ -116,12 +116,12 @@ SHAPE = (
         scope=LAW_OFF_REFERENCE,
         grounds=(Ground("(18)", derivative=(u_i, slope)),),
         positive_if=beta * (1 - k * x_max / u_max) < 1,
-        note="Holds for every beta <= 1. The law `target` always rises.",
+        note="Holds for every $beta <= 1$. The law `target` always rises.",
     ),
-    Kind.DEFINITION("jump", "step of the output where dP passes dP0", jump, u_above - u_below),
+    Kind.DEFINITION("jump", "step of the output where $dP$ passes $dP0$", jump, u_above - u_below),
     Kind.THEOREM(
         "T4b",
-        "the selector (7) is continuous at dP0",
+        "the selector (7) is continuous at $dP0$",
         jump,
         sympy.S.Zero,
         scope=scope(FREE_BETA, sympy.Eq(dP, dP1), dP0 < dP1),
@@ -135,10 +135,11 @@ SHAPE = (
             any_of=((sympy.Eq(beta, 1),),),
             for_all=(u_i,),
             discrepancy=(beta - 1) * (u_min0 - (1 - k * x_max / u_max) * u_i),
-            words="(at dP0)",
+            words="(at $dP0$)",
         ),
         expected=Outcome.FOLLOWS_IF,
-        note="beta is its limit from above. A beta fitted freely to tests need not be 1 there; ours is by constraint.",
+        note="$beta$ is its limit from above. A $beta$ fitted freely to tests need not be 1 there; ours is by "
+        "constraint.",
     ),
     Kind.THEOREM(
         "T4c",
@@ -149,13 +150,13 @@ SHAPE = (
         grounds=(Ground("(14)", ((u_O, u_min), (u_i, u_dz))),),
         values=(
             Value(
-                "for a threshold 1 % of u_max above u_min0, first valve",
+                "for a threshold 1 % of $u_max$ above $u_min0$, first valve",
                 of=(u_min - u_min0) / (k * x_max),
                 at=(*FIRST.at(), (u_min, sympy.Rational("5.49"))),
                 unit="%",
             ),
         ),
-        note="The threshold is higher at a lower pressure drop, and the paper holds u_0 there.",
+        note="The threshold is higher at a lower pressure drop, and the paper holds $u_0$ there.",
     ),
     Kind.THEOREM(
         "T4d",
@@ -181,8 +182,8 @@ SHAPE = (
         scope=scope(BARE, -u_min < u_i, u_i < u_min),
         grounds=("(1)",),
         cases=(
-            Case(((u_i, y), (u_min, y + guard)), "0 <= u_i < u_min"),
-            Case(((u_i, -y), (u_min, y + guard)), "-u_min < u_i <= 0"),
+            Case(((u_i, y), (u_min, y + guard)), "0 <= $u_i < u_min$"),
+            Case(((u_i, -y), (u_min, y + guard)), "-$u_min < u_i <= 0$"),
         ),
     ),
 )
@@ -208,7 +209,7 @@ TRANSITION = (
         u_O,
         _OPENING_LAW.subs(u_i, LAW_COMMAND) - LOWERED_BY,
         scope=_DRIVEN & scope(u_i <= u_t),
-        note="The law of the opening threshold, lowered to the certified offset beta u_min0 of the closing one.",
+        note="The law of the opening threshold, lowered to the certified offset $beta u_min0$ of the closing one.",
     ),
     Kind.CHOICE(
         "beyond",
@@ -236,7 +237,7 @@ TRANSITION = (
         grounds=("transition", "share"),
         eliminate=(share,),
         cases=(Case(((u_i, u_z + excess), (u_t, u_z + excess + headroom)), "within the transition"),),
-        note="At u_z it is the output of the zero band (T10a), at u_t that of the law beyond (T10c): continuous.",
+        note="At $u_z$ it is the output of the zero band (T10a), at $u_t$ that of the law beyond (T10c): continuous.",
     ),
     Kind.THEOREM(
         "T10c",
@@ -257,8 +258,8 @@ TRANSITION = (
         grounds=(Ground("T10b", derivative=(u_i, slope)),),
         cases=(Case(((u_t, u_z + width),), ""),),
         positive_if=_OPENING_LAW.subs(u_i, u_t) > _OFFSET,
-        note="It rises if the law of the opening threshold stands above the certified offset at u_t: always where it "
-        "rises itself (T10e), for beta <= beta_o.",
+        note="It rises if the law of the opening threshold stands above the certified offset at $u_t$: always where "
+        "it rises itself (T10e), for $beta <= beta_o$.",
     ),
     Kind.THEOREM(
         "T10e",
@@ -277,8 +278,8 @@ TRANSITION = (
         scope=_BAND & scope(beta * u_min0 <= u_min1, beta * u_min0 <= u_max),
         grounds=("T3a",),
         cases=(
-            Case(((u_min1, _OFFSET + guard),), "beta u_min0 below the threshold"),
-            Case(((u_min1, _OFFSET),), "beta u_min0 at the threshold"),
+            Case(((u_min1, _OFFSET + guard),), "$beta u_min0$ below the threshold"),
+            Case(((u_min1, _OFFSET),), "$beta u_min0$ at the threshold"),
         ),
         see=("T10a",),
         note="The drive is that of zero command (T10a), and so is the flow.",
