@@ -7,7 +7,7 @@ import sympy
 
 from dzdesign.derivation import symbols as s
 from dzdesign.derivation.account.proof import judge, overrule
-from dzdesign.derivation.account.referee.drawn import drawn_plants, drawn_valves
+from dzdesign.derivation.account.referee.machines import drawn_plants, drawn_valves
 from dzdesign.derivation.account.referee.referee import hear
 from dzdesign.derivation.account.scope import (
     AT_ZERO_COMMAND,

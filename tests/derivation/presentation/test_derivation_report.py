@@ -21,9 +21,9 @@ from dzdesign.derivation.account.account import STATEMENTS, verify_statements
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.statement import Outcome
-from dzdesign.derivation.presentation import formulas, prose, report, writer
+from dzdesign.derivation.presentation import formulas, prose, report, writers
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text
-from dzdesign.derivation.presentation.writer import anchor
+from dzdesign.derivation.presentation.writers import anchor
 from tests.support.paths import ROOT
 
 BY_NUMBER = {statement.number: statement for statement in STATEMENTS}
@@ -502,7 +502,7 @@ def test_every_symbol_in_prose_is_declared():
         assert {*found} <= known, sentence
 
 
-@pytest.mark.parametrize("module", [prose, report, writer, formulas], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("module", [prose, report, writers, formulas], ids=lambda one: one.__name__)
 def test_examples_in_the_docstrings_run(module):
     outcome = doctest.testmod(module)
     assert outcome.attempted > 0

@@ -79,7 +79,6 @@ class Entry:
     ]
     section: Annotated[str, Meta(description="Section of the account in which the statement appears.")]
     statement: Annotated[Formula, Meta(description="Chain of equal formulas, in a form that SymPy can read.")]
-    latex: Annotated[str, Meta(description="The statement in LaTeX.")]
     premises: Annotated[tuple[Premise, ...], Meta(description="Premises on which the statement rests.")]
     outcome: Annotated[Outcome, Meta(description="Outcome of the derivation.")]
     expected: Annotated[Outcome, Meta(description="Outcome of a correct account.")]
@@ -147,7 +146,6 @@ class Term:
     symbol: Annotated[Formula, Meta(description="The symbol; for a function, with its argument.")]
     meaning: Annotated[Words, Meta(description="Short description of the symbol.")]
     unit: Annotated[str, Meta(description="Unit of the symbol.")]
-    latex: Annotated[str, Meta(description="The symbol in LaTeX.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,12 +12,10 @@ from dzdesign.derivation.account.published import transcribed
 from dzdesign.derivation.account.statement import Outcome, Statement
 from dzdesign.derivation.account.symbol_units import print_unit
 from dzdesign.derivation.presentation.content import DerivationReport, Entry, Term
-from dzdesign.derivation.presentation.formulas import to_latex, to_python
-from dzdesign.derivation.presentation.html import HtmlWriter
+from dzdesign.derivation.presentation.formulas import to_python
 from dzdesign.derivation.presentation.prose import Formula, Words, parse_prose
-from dzdesign.derivation.presentation.text import TextWriter
 from dzdesign.derivation.presentation.wording import describe, refer
-from dzdesign.derivation.presentation.writer import write
+from dzdesign.derivation.presentation.writers import HtmlWriter, TextWriter, write
 from dzdesign.derivation.symbols import QUANTITIES
 
 _FORMATS: dict[str, Callable[[DerivationReport], str]] = {
@@ -129,7 +127,6 @@ def _symbols(statements: Sequence[Statement]) -> tuple[Term, ...]:
             symbol=Formula(name),
             meaning=parse_prose(QUANTITIES[name].meaning),
             unit=print_unit(name),
-            latex=to_latex(name),
         )
         for name in names
     )

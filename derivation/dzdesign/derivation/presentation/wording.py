@@ -9,7 +9,7 @@ from dzdesign.derivation.account.proof import CaseProof, Verdict
 from dzdesign.derivation.account.solving import Step
 from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Replacements, Statement, Value
 from dzdesign.derivation.presentation.content import Derivation, Entry, Figure, Line, Premise
-from dzdesign.derivation.presentation.formulas import to_latex, to_text
+from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.derivation.presentation.prose import Formula, Part, Reference, Words, parse_prose
 
 _NUMBERED = re.compile(r"\(\d+[a-z]?\)|[TL]\d+[a-z]?")
@@ -31,7 +31,6 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         kind=statement.kind,
         section=statement.section,
         statement=Formula(*sides),
-        latex=" = ".join(map(to_latex, sides)),
         premises=tuple(_premise(ground, book) for ground in statement.grounds),
         outcome=verdict.outcome,
         expected=statement.expected,

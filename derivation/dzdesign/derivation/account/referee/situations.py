@@ -11,9 +11,16 @@ from typing import Any
 import sympy
 
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account.referee.drawn import drawn_commands, drawn_drops, drawn_plants, drawn_valves
-from dzdesign.derivation.account.referee.plain_plant import PLANTS, PlainPlant
-from dzdesign.derivation.account.referee.valve import VALVES, PlainValve
+from dzdesign.derivation.account.referee.machines import (
+    PLANTS,
+    VALVES,
+    PlainPlant,
+    PlainValve,
+    drawn_commands,
+    drawn_drops,
+    drawn_plants,
+    drawn_valves,
+)
 from dzdesign.derivation.account.scope import (
     BARE,
     CODES_AT_PIN,
