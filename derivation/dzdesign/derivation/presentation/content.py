@@ -1,6 +1,5 @@
 """What a report on the account holds: built once, written by each format, and as JSON the artefact derivation.json."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
@@ -114,7 +113,6 @@ class Entry:
     corrected_by: Annotated[tuple[Reference, ...], Meta(description="Statement that gives the correction.")]
     see: Annotated[tuple[Reference, ...], Meta(description="Statements that qualify this one.")]
     figures: Annotated[tuple[Figure, ...], Meta(description="Numbers of dzdesign beside those of the paper.")]
-    signs: Annotated[Mapping[str, tuple[Formula, ...]], Meta(description="Assumed signs of the symbols.")]
     note: Annotated[Words, Meta(description="Remark for the reader.")]
 
     @property
@@ -131,12 +129,6 @@ class Entry:
         given = "our choice" if self.kind is Kind.CHOICE else self.kind.value
         return f"given: {given}" if self.outcome is Outcome.GIVEN else self.outcome.value
 
-    @property
-    def sign_words(self) -> Words:
-        """What is assumed of the signs, in words."""
-        by_sign = (Words(f"{sign}: ", Words.join(names)) for sign, names in self.signs.items())
-        return Words(Words.join(by_sign, "; "), ".")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Term:
@@ -146,6 +138,7 @@ class Term:
     symbol: Annotated[Formula, Meta(description="The symbol; for a function, with its argument.")]
     meaning: Annotated[Words, Meta(description="Short description of the symbol.")]
     unit: Annotated[str, Meta(description="Unit of the symbol.")]
+    sign: Annotated[str, Meta(description="Assumed sign of the symbol.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

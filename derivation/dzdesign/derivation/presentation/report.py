@@ -29,6 +29,8 @@ _CHOICE = (
     "the paper's choice. For a stop at every pressure drop it does not meet the target (16); where full command is the "
     "limit, it meets it exactly, and the correction loses flow: T2d, T2e."
 )
+#: What is known of the sign of a symbol, as SymPy calls it and as the report does; the first that holds.
+_SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of either sign"}
 _COUNTED = {
     Outcome.GIVEN: "taken as given",
     Outcome.FOLLOWS: "follow",
@@ -127,6 +129,7 @@ def _symbols(statements: Sequence[Statement]) -> tuple[Term, ...]:
             symbol=Formula(name),
             meaning=parse_prose(QUANTITIES[name].meaning),
             unit=print_unit(name),
+            sign=next((words for sign, words in _SIGNS.items() if getattr(name, f"is_{sign}")), ""),
         )
         for name in names
     )

@@ -7,15 +7,13 @@ import sympy
 
 from dzdesign.derivation.account.proof import CaseProof, Verdict
 from dzdesign.derivation.account.solving import Step
-from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Replacements, Statement, Value
+from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Statement, Value
 from dzdesign.derivation.presentation.content import Derivation, Entry, Figure, Line, Premise
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.derivation.presentation.prose import Formula, Part, Reference, Words, parse_prose
 
 _NUMBERED = re.compile(r"\(\d+[a-z]?\)|[TL]\d+[a-z]?")
 _FORMS = ("first", "second", "third", "fourth")
-#: What is known of the sign of a symbol, as SymPy calls it and as the report does; the first that holds.
-_SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of either sign"}
 
 
 def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
@@ -54,7 +52,6 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         corrected_by=(Reference(statement.corrected_by),) if statement.corrected_by else (),
         see=tuple(refer(book[number].statement) for number in see),
         figures=tuple(_figure(value, statement, book) for value in statement.values),
-        signs=_signs(verdict, book),
         note=parse_prose(statement.note, book),
     )
 
@@ -87,13 +84,6 @@ def _formula(comparison: sympy.Basic) -> Formula:
 def _premise(ground: Ground, book: Mapping[str, Verdict]) -> Premise:
     """Refer to a ground, with what replaces its symbols."""
     return Premise(number=ground.number, at=tuple(Formula(*pair) for pair in ground.at), words=_ground(ground, book))
-
-
-def _used(ground: Ground, book: Mapping[str, Verdict]) -> Replacements:
-    """Return the replacements that change something in the ground."""
-    statement = book[ground.number].statement
-    sides = statement.symbol, statement.members[ground.member]
-    return tuple((name, value) for name, value in ground.at if name != value and any(side.has(name) for side in sides))
 
 
 def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]:
@@ -164,18 +154,6 @@ def _correction(statement: Statement, corrected: Statement, book: Mapping[str, V
     formula = Formula(corrected.symbol, corrected.members[-1])
     start = f"For {statement.corrected_for} it" if statement.corrected_for else "It"
     return Line(words=Words(start, " should read, by ", refer(corrected), ":"), formula=formula)
-
-
-def _signs(verdict: Verdict, book: Mapping[str, Verdict]) -> dict[str, tuple[Formula, ...]]:
-    sides = [verdict.statement.symbol, *verdict.statement.members]
-    sides += [side for proof in verdict.proofs for one in proof.relations for side in (one.left, one.right)]
-    replaced = [pair for ground in verdict.statement.grounds for pair in _used(ground, book)]
-    sides += [value for _, value in (*replaced, *(pair for case in verdict.statement.cases for pair in case.at))]
-    names = sorted(set().union(*(side.free_symbols for side in sides)), key=lambda name: (name.name.lower(), name.name))
-    found: dict[str, list[Formula]] = {words: [] for words in _SIGNS.values()}
-    for name in names:
-        found[next(words for sign, words in _SIGNS.items() if getattr(name, f"is_{sign}"))].append(Formula(name))
-    return {sign: tuple(formulas) for sign, formulas in found.items() if formulas}
 
 
 def _figure(value: Value, statement: Statement, book: Mapping[str, Verdict]) -> Figure:
