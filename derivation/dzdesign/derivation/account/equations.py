@@ -61,12 +61,7 @@ APPROACH = (
         Q_max,
         ORIFICE * x_max,
         scope=scope(FIXED_OPENING),
-        grounds=(
-            Ground(
-                "(1)",
-                ((Q, Q_max), (x, x_max), (u_max, u_min + headroom), (u_i, u_min + headroom)),
-            ),
-        ),
+        grounds=(Ground("(1)", ((Q, Q_max), (x, x_max), (u_max, u_min + headroom), (u_i, u_min + headroom))),),
     ),
     Kind.PAPER(
         "(3)",
@@ -132,10 +127,7 @@ AT_REFERENCE = (
         Q_O,
         K_0 * u_i,
         rearranges=True,
-        grounds=(
-            Ground("Fig. 3, line", ((Q_w, Q_O), (Q_max, Q_max0))),
-            Ground("(2)", ((K_e, K_0), (Q_max, Q_max0))),
-        ),
+        grounds=(Ground("Fig. 3, line", ((Q_w, Q_O), (Q_max, Q_max0))), Ground("(2)", ((K_e, K_0), (Q_max, Q_max0)))),
         eliminate=(Q_max0,),
         see=("T1a",),
     ),

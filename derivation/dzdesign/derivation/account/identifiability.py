@@ -32,13 +32,7 @@ IDENTIFIABILITY = (
         Q_scaled,
         Q,
         scope=FULL_STROKE,
-        grounds=(
-            "valve",
-            Ground(
-                "valve",
-                ((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale)),
-            ),
-        ),
+        grounds=("valve", Ground("valve", ((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale)))),
         eliminate=(Q,),
         cases=_REGIMES,
         note="At every command and pressure drop, so no set of flow measurements tells these valves apart; nor "
@@ -80,11 +74,7 @@ IDENTIFIABILITY = (
         Q,
         s_flow * (u_O - u_min),
         scope=BEYOND_THRESHOLD,
-        grounds=(
-            Ground("(1)", ((u_i, u_min + y), (u_max, u_min + y + headroom))),
-            "opening",
-            "S",
-        ),
+        grounds=(Ground("(1)", ((u_i, u_min + y), (u_max, u_min + y + headroom))), "opening", "S"),
         eliminate=(x, s_flow),
         cases=(Case(((u_O, u_min + y),), "beyond the threshold, before the stop"),),
     ),
@@ -94,10 +84,7 @@ IDENTIFIABILITY = (
         s_flow,
         (Q_2 - Q_1) / (u_2 - u_1),
         provided=(sympy.Ne(u_1, u_2),),
-        grounds=(
-            Ground("straight part", ((Q, Q_2), (u_O, u_2))),
-            Ground("straight part", ((Q, Q_1), (u_O, u_1))),
-        ),
+        grounds=(Ground("straight part", ((Q, Q_2), (u_O, u_2))), Ground("straight part", ((Q, Q_1), (u_O, u_1)))),
         eliminate=(u_min,),
         note="With T8e and T8f: these three are determined, and by T8b nothing else is.",
     ),

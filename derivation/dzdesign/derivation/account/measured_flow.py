@@ -179,10 +179,7 @@ METER_FLOOR = (
         grounds=(
             "fall",
             Ground("straight part", ((Q, Q_floor), (u_O, u_seen0), (s_flow, s_flow0), (u_min, u_min0))),
-            Ground(
-                "straight part",
-                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-            ),
+            Ground("straight part", ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1))),
             "constant threshold",
         ),
         eliminate=(u_seen0, u_seen1, u_min1),
@@ -206,10 +203,7 @@ METER_FLOOR = (
         provided=(sympy.Ne(u_max, u_seen1),),
         grounds=(
             Ground("straight part", ((Q, Q_max1), (u_O, u_max), (s_flow, s_flow1), (u_min, u_min1))),
-            Ground(
-                "straight part",
-                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-            ),
+            Ground("straight part", ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1))),
         ),
         eliminate=(u_min1,),
     ),
@@ -220,14 +214,8 @@ METER_FLOOR = (
         Q_floor + (Q_max1 - Q_floor) * (u_seen0 - u_seen1) / (u_max - u_seen1),
         scope=scope(BARE, FREE_OPENING, sympy.Eq(u_i, u_seen0), sympy.Eq(dP, dP1), u_min1 <= u_seen0),
         grounds=(
-            Ground(
-                "straight part",
-                ((u_O, u_seen0), (s_flow, s_flow1), (u_min, u_min1)),
-            ),
-            Ground(
-                "straight part",
-                ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1)),
-            ),
+            Ground("straight part", ((u_O, u_seen0), (s_flow, s_flow1), (u_min, u_min1))),
+            Ground("straight part", ((Q, Q_floor), (u_O, u_seen1), (s_flow, s_flow1), (u_min, u_min1))),
             "slope at dP1",
         ),
         eliminate=(u_min1, s_flow1),

@@ -251,10 +251,7 @@ FULL_COMMAND = (
         see=("T1d", "T1e"),
         values=tuple(
             Value(
-                f"flow lost, {valve.name}",
-                of=1 - (u_max - u_min0) / (u_max - beta * u_min0),
-                at=valve.at(),
-                unit="%",
+                f"flow lost, {valve.name}", of=1 - (u_max - u_min0) / (u_max - beta * u_min0), at=valve.at(), unit="%"
             )
             for valve in (FIRST, SIMULATION, SECOND)
         ),

@@ -109,12 +109,7 @@ SIMULATION_MODEL = (
         "flow, transformed",
         Q_s,
         C_d * W * X_e * sympy.sqrt(2 * dP / rho),
-        grounds=(
-            Ground(
-                "(24)",
-                ((Q, Q_s), (x_e, X_e.func(s + a))),
-            ),
-        ),
+        grounds=(Ground("(24)", ((Q, Q_s), (x_e, X_e.func(s + a)))),),
         condition=Condition(
             any_of=((sympy.Eq(a, 0),),),
             # The transform of a unit step.
@@ -154,13 +149,7 @@ TRANSFER_FUNCTION = (
         G,
         ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
         scope=scope(sympy.Eq(F_eL, 0)),
-        grounds=(
-            "transfer function",
-            "(28)",
-            Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),)),
-            "(26)",
-            "T6a",
-        ),
+        grounds=("transfer function", "(28)", Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),)), "(26)", "T6a"),
         eliminate=(Q_s, X_e, F_e, I_s),
         expected=Outcome.FOLLOWS_IF,
         note="Third order. All coefficients of both factors are positive, so it is stable for every set of parameters.",
@@ -183,16 +172,11 @@ TRANSFER_FUNCTION = (
         Q,
         ORIFICE * x_e,
         scope=scope(BARE, u_min <= u_i),
-        grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
-            "overlap",
-        ),
+        grounds=(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap"),
         eliminate=(x,),
         # Section 2.2: the simulated spool's dead zone is 54 % of its 1.8 mm.
         condition=Condition(
-            any_of=((sympy.Eq(x_ov, 0),),),
-            ruled_out_by=((x_ov, _OVERLAP_MM / 1000),),
-            discrepancy=-ORIFICE * x_ov,
+            any_of=((sympy.Eq(x_ov, 0),),), ruled_out_by=((x_ov, _OVERLAP_MM / 1000),), discrepancy=-ORIFICE * x_ov
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="T6e",
@@ -205,10 +189,7 @@ TRANSFER_FUNCTION = (
         Q,
         ORIFICE * (x_e - x_ov),
         scope=scope(BARE, u_min <= u_i),
-        grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
-            "overlap",
-        ),
+        grounds=(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap"),
         eliminate=(x,),
     ),
 )

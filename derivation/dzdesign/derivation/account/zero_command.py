@@ -35,10 +35,7 @@ ZERO_COMMAND = (
         sympy.Piecewise((0, u_min1 > _OFFSET), (gamma_1 * (_OFFSET - u_min1) / k, u_min1 <= _OFFSET)),
         scope=scope(FREE_BETA, sympy.Eq(dP, dP1), beta * u_min0 <= u_max) & AT_ZERO_COMMAND,
         grounds=(
-            Ground(
-                "(1)",
-                ((dP, dP1), (u_i, _OFFSET), (u_min, u_min1), (u_max, _OFFSET + headroom)),
-            ),
+            Ground("(1)", ((dP, dP1), (u_i, _OFFSET), (u_min, u_min1), (u_max, _OFFSET + headroom))),
             Ground("opening", ((u_O, _OFFSET), (u_min, u_min1))),
             "gamma_1",
         ),
@@ -83,11 +80,7 @@ ZERO_COMMAND = (
         "correction coefficient from the fitted thresholds",
         beta,
         f(dP1) / f(dP0),
-        grounds=(
-            "(5)",
-            Ground("(4)", ((u_min, u_min0), (dP, dP0))),
-            Ground("(4)", ((u_min, u_min1), (dP, dP1))),
-        ),
+        grounds=("(5)", Ground("(4)", ((u_min, u_min0), (dP, dP0))), Ground("(4)", ((u_min, u_min1), (dP, dP1)))),
         eliminate=(u_min0, u_min1),
     ),
     Kind.THEOREM(
@@ -96,11 +89,7 @@ ZERO_COMMAND = (
         u_O,
         f(dP1),
         scope=LAW_OFF_REFERENCE & AT_ZERO_COMMAND,
-        grounds=(
-            Ground("(18)", ((u_i, sympy.S.Zero),)),
-            "beta(dP)",
-            Ground("(4)", ((u_min, u_min0), (dP, dP0))),
-        ),
+        grounds=(Ground("(18)", ((u_i, sympy.S.Zero),)), "beta(dP)", Ground("(4)", ((u_min, u_min0), (dP, dP0)))),
         eliminate=(beta, u_min0),
         note="Nothing is left for an error of the threshold: a design needs a guard.",
     ),
@@ -125,11 +114,7 @@ SHAPE = (
         jump,
         sympy.S.Zero,
         scope=scope(FREE_BETA, sympy.Eq(dP, dP1), dP0 < dP1),
-        grounds=(
-            "jump",
-            Ground("L2", ((u_O, u_above), (dP1, dP0 + above))),
-            Ground("(14)", ((u_O, u_below),)),
-        ),
+        grounds=("jump", Ground("L2", ((u_O, u_above), (dP1, dP0 + above))), Ground("(14)", ((u_O, u_below),))),
         eliminate=(u_above, u_below),
         condition=Condition(
             any_of=((sympy.Eq(beta, 1),),),
@@ -166,10 +151,7 @@ SHAPE = (
         scope=scope(BARE, u_min <= u_i),
         grounds=(
             Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
-            Ground(
-                "(1)",
-                ((Q, Q_neg), (u_i, -u_min - u_i_prime), (u_max, u_min + u_i_prime + headroom)),
-            ),
+            Ground("(1)", ((Q, Q_neg), (u_i, -u_min - u_i_prime), (u_max, u_min + u_i_prime + headroom))),
         ),
         eliminate=(Q,),
         note="So the law for negative commands is the mirror image, with its own parameters.",
