@@ -16,7 +16,7 @@ from scoreboard import Row, print_rows, run_parts, say  # noqa: E402
 #: Of all ways together and of formulas: fewer would mean that a way is no longer tried.
 LEAST = {"formulas": 3000, "scopes": 80, "grounds": 400}
 #: Whose formulas can be changed without a change of meaning: in comparisons, or in symbols that are one in its scope.
-COMPARED = {"(1)", "(7)", "opening", "T3a", "valve", "T8c", "share", "T10c"}
+COMPARED = {"(1)", "(7)", "opening", "T3a", "valve", "T8c", "share", "(10)", "T1e", "T2a", "largest flow", "T10c"}
 
 
 def print_mutants(*, quick: bool, seed: int) -> list[Row]:
