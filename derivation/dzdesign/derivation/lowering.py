@@ -75,7 +75,8 @@ def _has_fraction(expression: sympy.Expr) -> bool:
 
 
 def _as_fraction(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
-    return sympy.fraction(sympy.together(expression))
+    above, below = sympy.fraction(sympy.together(expression))
+    return above, below
 
 
 def _complaints(node: sympy.Basic, arguments: set[sympy.Symbol], functions: Mapping[str, Any]) -> Iterator[str]:

@@ -54,7 +54,7 @@ def _scaling(expression: sympy.Expr) -> float:
     compute = sympy.lambdify([stand_ins.get(name, name) for name in names], expression.xreplace(stand_ins), "math")
     values = [1 + math.sqrt(2 + position) for position in range(len(names))]
     scaled = [value * _factor(name) for name, value in zip(names, values, strict=True)]
-    return compute(*scaled) / compute(*values)
+    return float(compute(*scaled) / compute(*values))
 
 
 @cache
@@ -63,7 +63,7 @@ def _factor(name: Name) -> float:
     if _as_declared(name) not in QUANTITIES:
         raise KeyError(str(name))
     dimensions = _registry().Unit(QUANTITIES[_as_declared(name)].unit).dimensionality
-    return math.prod(_BASES[base] ** power for base, power in dimensions.items())
+    return float(math.prod(_BASES[base] ** power for base, power in dimensions.items()))
 
 
 def _as_declared(name: Name) -> Name:
