@@ -86,13 +86,12 @@ $(VENV)/.fuzz: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e '.[fuzz]'
 	touch $@
 
-# The pages, in $(SITE), a warning an error; a part of them is the account of the paper as a page, for LaTeX and for
+# The pages, in $(SITE), a warning an error; a part of them is the account of the paper as a page and for
 # machines. Built, never committed.
 docs: $(STAMP)
 	mkdir -p $(DOCS)
 	@echo "docs: the account of the paper's equations; then figures and pages: two minutes in all"
 	$(BIN)/dzdesign derive --format html -o $(DOCS)/index.html
-	$(BIN)/dzdesign derive --format latex -o $(DOCS)/derivation.tex
 	$(BIN)/dzdesign derive --format json -o $(DOCS)/derivation.json
 	OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -q -E -W --keep-going -b html docs $(SITE)
 	@echo "docs: $(SITE)/index.html"

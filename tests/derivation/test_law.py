@@ -97,11 +97,11 @@ def test_a_law_of_its_own_is_a_choice_of_the_account():
     assert stated.statements[0].kind.is_given and stated.statements[0].members == (stated.output,)
 
 
-def test_a_law_with_a_fraction_is_not_lowered_to_floats(wording):
-    halved = Law(name="halved", equation="", output=s.k * s.x_max / s.u_max * s.u_i / 2 + s.beta * s.u_min0, note="")
-    with pytest.raises(ValueError) as caught:
-        halved.evaluate_gain(1, 1)
-    wording("a law: a fraction", str(caught.value))
+def test_a_law_with_a_fraction_stays_exact():
+    halved = Law(name="halved", equation="", output=GAIN * s.u_i / 2 + OFFSET, note="")
+    assert halved.evaluate_gain(1, Fraction(1, 3)) == Fraction(1, 6)
+    assert halved.evaluate_gain(1.0, 0.5) == 0.25
+    assert Law(name="half", equation="", output=s.u_i / 2 + OFFSET, note="").evaluate_gain(1, 1) == Fraction(1, 2)
 
 
 # --- the plant ----------------------------------------------------------------------------------------------

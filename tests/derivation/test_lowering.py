@@ -101,7 +101,6 @@ def test_the_flow(sqrt, draw):
 @pytest.mark.parametrize(
     "expression",
     [
-        s.u_i / 2,
         s.u_i * sympy.Float(0.1),
         s.u_i + s.u_max,
         sympy.sqrt(s.u_i**2 + 1),
@@ -118,5 +117,8 @@ def test_what_would_lose_digits_is_not_lowered(expression, wording):
 
 
 def test_ints_are_not_divided_to_floats():
+    assert lower(s.u_i / 2 + s.u_max / 3, (s.u_i, s.u_max))(1, 1) == Fraction(5, 6)
+    assert lower(s.u_i / (s.u_max / 2 + 1), (s.u_i, s.u_max))(1, 1) == Fraction(2, 3)
+    np.testing.assert_allclose(lower(s.u_i / 2, (s.u_i,))(np.array([1.0, 3.0])), [0.5, 1.5])
     assert lower(s.u_i / s.u_max, (s.u_i, s.u_max))(1, 3) == Fraction(1, 3)
     assert lower(sympy.sqrt(s.u_max), (s.u_max,), {"sqrt": np.sqrt})(4.0) == 2.0

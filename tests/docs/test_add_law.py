@@ -63,7 +63,7 @@ def test_the_command_line_knows_the_law(run):
 def test_the_account_proves_it(run):
     account = run("derive", "--equation", "scaled")
     assert "the law `scaled`" in account
-    assert "u_O = beta*((k*x_max/u_max)*u_i + u_min0)" in account
+    assert "u_O = beta*(u_min0 + k*x_max*u_i/u_max)" in account
 
 
 def test_the_firmware_says_which_law_it_is(firmware):

@@ -90,7 +90,7 @@ def test_nothing_is_loaded_from_elsewhere(site, pages):
 
 def test_every_link_leads_somewhere(site, pages):
     broken, tried = [], 0
-    account = {"index.html", "derivation.tex", "derivation.json"}
+    account = {"index.html", "derivation.json"}
     for path, page in pages.items():
         for link in page.links:
             tried += 1
@@ -109,7 +109,7 @@ def test_make_docs_builds_the_account_that_the_pages_link_to():
     recipe = (ROOT / "Makefile").read_text().partition("\ndocs:")[2].partition("\n\n")[0]
     text = (DOCS / "derivation.md").read_text()
     linked = re.findall(r'href="derivation/([^"]+)"', text)
-    assert len(linked) == 3 and [name for name in linked if f"$(DOCS)/{name}" not in recipe] == []
+    assert len(linked) == 2 and [name for name in linked if f"$(DOCS)/{name}" not in recipe] == []
     assert "sphinx-build -q -E -W" in recipe
     ignored = (ROOT / ".gitignore").read_text().splitlines()
     assert {"/docs/_build/", "/docs/_made/", "/docs/derivation/"} <= set(ignored)

@@ -6,6 +6,8 @@ from typing import Any
 
 import sympy
 
+_ONE = sympy.S.One
+
 
 def lower(
     expression: sympy.Expr | Sequence[sympy.Expr],
@@ -17,7 +19,7 @@ def lower(
     Parameters
     ----------
     expression : sympy.Expr, or a sequence of them
-        Sums, products and whole powers of `arguments` and integers, and `functions` of such.
+        Sums, products and whole powers of `arguments` and rational numbers, and `functions` of such, integers inside.
     arguments : sequence of sympy.Symbol
         What the function takes, in this order.
     functions : mapping, optional
@@ -32,7 +34,7 @@ def lower(
     Raises
     ------
     ValueError
-        If `expression` holds a number that is not an integer, a symbol that is not an argument, or a root, power or
+        If `expression` holds a number that is not rational, a symbol that is not an argument, or a root, power or
         function without an implementation.
 
     Examples
@@ -44,20 +46,37 @@ def lower(
     functions = dict(functions or {})
     one = isinstance(expression, sympy.Expr)
     expressions = (expression,) if one else tuple(expression)
-    for each in expressions:
-        for complaint in _complaints(each, set(arguments), functions):
+    # Above and below a fraction bar: a coefficient 1/2 as it stands would be printed as a division of ints to a float.
+    sides = [side for each in expressions for side in (_as_fraction(each) if _has_fraction(each) else (each, _ONE))]
+    for each, side in zip((one for one in expressions for _ in range(2)), sides, strict=True):
+        for complaint in _complaints(side, set(arguments), functions):
             raise ValueError(f"{each} can't be lowered: {complaint}")
     # No numeric module: whatever is not in `functions` would be a NameError, never silently a float.
-    compute = sympy.lambdify(tuple(arguments), expressions, modules=[functions])
+    compute = sympy.lambdify(tuple(arguments), sides, modules=[functions])
 
     def lowered(*values: Any) -> Any:
         # Python divides two ints to a float.
         if all(isinstance(value, int | Fraction) for value in values):
             values = tuple(map(Fraction, values))
-        results = compute(*values)
+        found = compute(*values)
+        results = tuple(
+            above if side == 1 else (Fraction(above) if isinstance(above, int) else above) / below
+            for above, below, side in zip(found[::2], found[1::2], sides[1::2], strict=True)
+        )
         return results[0] if one else results
 
     return lowered
+
+
+def _has_fraction(expression: sympy.Expr) -> bool:
+    if isinstance(expression, sympy.Rational):
+        return not expression.is_Integer
+    return any(map(_has_fraction, expression.args[:1] if isinstance(expression, sympy.Pow) else expression.args))
+
+
+def _as_fraction(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+    above, below = sympy.fraction(sympy.together(expression))
+    return above, below
 
 
 def _complaints(node: sympy.Basic, arguments: set[sympy.Symbol], functions: Mapping[str, Any]) -> Iterator[str]:

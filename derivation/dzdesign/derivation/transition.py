@@ -18,11 +18,8 @@ import sympy
 
 from dzdesign.derivation.lowering import lower
 from dzdesign.derivation.scaling import COMPARE_VALUE, mu
-from dzdesign.derivation.symbols import beta, n_full, u_i, u_max, u_min0, u_O
+from dzdesign.derivation.symbols import beta, beta_o, n_full, share, u_i, u_max, u_min0, u_O, u_t, u_z
 
-beta_o = sympy.Symbol("beta_o", positive=True)  # beta of the opening threshold
-share = sympy.Symbol("share", nonnegative=True)  # of the transition that the command has passed, 0 to 1
-u_z, u_t = sympy.symbols("u_z u_t", positive=True)  # ends of the zero band and of the transition
 #: What the transition takes from the opening law, V.
 LOWERED_BY = (beta_o - beta) * u_min0 * (1 - share)
 #: Share of the transition that a command within it has passed.

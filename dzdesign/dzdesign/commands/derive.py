@@ -5,11 +5,9 @@ from pathlib import Path
 from typing import Annotated
 
 from dzdesign.core.artefact_files import check_file_may_be_written, write_file
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import read_bytes
 from dzdesign.core.options import AnyPath, Option, Texts, texts_of
-from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import stage_progress
 
 EXAMPLES = ("dzdesign derive --equation 18", "dzdesign derive --format html -o derivation.html")
@@ -20,13 +18,11 @@ class Arguments:
     """Arguments of `derive`."""
 
     format: Annotated[str, Option("F", choices="dzdesign.derivation.presentation.report:FORMATS")] = "text"
-    """Output format: text, json, latex or html."""
+    """Output format: text, json or html."""
     equation: Annotated[Texts, Option("N")] = ()
     """Number of an equation to print with its premises, such as 18 or T3b. Repeatable."""
     paper: Annotated[AnyPath | None, Option("FILE")] = None
-    """The paper as plain text, to look up each of its numbers (default: digests of the passages are compared)."""
-    mutate: Annotated[bool, Option()] = False
-    """Falsify every statement and every published number instead, and count the faults that are detected."""
+    """The paper as plain text, to look up each of its numbers in its section."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default: standard output)."""
 
@@ -34,20 +30,16 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Re-derive the paper's equations; 1 if one of those printed is not found as a correct account finds it."""
     from dzdesign.derivation.account.account import STATEMENTS, verify_statements
-    from dzdesign.derivation.account.passages.transcription import find_transcription_faults, find_value_faults
+    from dzdesign.derivation.account.published import find_number_faults
     from dzdesign.derivation.presentation.report import check_format, closure, render
 
     check_format(arguments.format)
     if arguments.output:
         check_file_may_be_written(Path(arguments.output))
-    if arguments.mutate:
-        if arguments.equation:
-            raise InputError("--mutate counts over all equations; leave out --equation")
-        return _run_mutations(arguments, json)
     chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
     with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
-        misprints = find_transcription_faults(paper=_text_of(arguments.paper)) + find_value_faults(STATEMENTS)
+        misprints = find_number_faults(STATEMENTS, _text_of(arguments.paper))
     text = render(verdicts, "json" if json else arguments.format, chosen, misprints)
     if arguments.output:
         write_file(Path(arguments.output), text)
@@ -66,20 +58,3 @@ def _text_of(paper: AnyPath | None) -> str | None:
         raise InputError(
             f"{paper}: the paper is expected as plain text in UTF-8 ({error}); export it as text"
         ) from error
-
-
-def _run_mutations(arguments: Arguments, json: bool) -> int:
-    """Count the wrong statements and numbers that the account catches; 1 if one of them is not caught."""
-    from dzdesign.derivation.account.account import verify_statements
-    from dzdesign.derivation.account.mutation.scoring import score_mutations
-    from dzdesign.terminal.tables import print_mutations
-
-    with stage_progress("making every statement wrong in every small way"):
-        found = score_mutations(verify_statements())
-    if arguments.output:
-        write_file(Path(arguments.output), to_json_bytes(found))
-    elif json:
-        print_json(found)
-    else:
-        print_mutations(found)
-    return 0 if found.caught == found.mutants else 1

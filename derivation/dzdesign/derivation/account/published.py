@@ -1,17 +1,18 @@
 """The numbers that the paper prints, once: exact, as printed, with where they stand.
 
-Nothing else stands here: `transcribed` finds every number of a constant of this module by itself, and one whose passage
-has no digest (`passages/`) makes `dzdesign derive` fail.
+Nothing else stands here: `transcribed` finds every number of a constant of this module by itself, and one that is in no
+section of `SECTION_OF` makes `dzdesign derive` fail.
 """
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from decimal import Decimal
 from typing import Any
 
 import sympy
 
-from dzdesign.derivation.account.statement import Replacements
+from dzdesign.derivation.account.statement import Replacements, Statement
 from dzdesign.derivation.symbols import Q_floor, Q_max0, Q_max1, beta, dP0, dP1, k, u_max, u_min0, u_min1, x_max
 
 U_MAX_V = 10
@@ -143,34 +144,69 @@ SECOND = PublishedValve(
 VALVES = (SIMULATION, FIRST, SECOND)
 
 
-#: What is printed once more, by where.
-ALSO_PRINTED = {"COUNTS_PER_PIN_VOLT, Eq. (31)": COUNTS_PER_PIN_VOLT}
+#: Each number, and the section of the paper that prints it.
+SECTION_OF = {
+    number: section
+    for section, numbers in {
+        "2.2": "53.5 51.7 15 25.2 0.95 1.8 0.1 54",
+        "3": "2 20 55 3 4095 1365 2.5 3.16",
+        "4.1": "1 5 10 27 100 150 0.5 0.6",
+        "4.2": "8 8.5 53.9 15.1 24.6 15.2 25.8 43.2 42.2 27.9 28.3 35.7 36.3",
+        "4.3": "1.5 3.5 1.6",
+    }.items()
+    for number in numbers.split()
+}
 
 
-def transcribed() -> dict[str, str]:
-    """Return every number of every constant of this module, as printed: by its name, and that of its field or place."""
-    constants = ((name, value) for name, value in globals().items() if name.isupper())
-    return {name: text for constant, value in constants for name, text in _numbers_of(constant, value)}
+def transcribed() -> set[str]:
+    """Return every number of every constant of this module, as printed."""
+    constants = [value for name, value in globals().items() if name.isupper() and name != "SECTION_OF"]
+    return {number for value in constants for number in _numbers_of(value)}
 
 
-def _numbers_of(name: str, value: Any) -> Iterator[tuple[str, str]]:
-    """Yield the numbers in a value, each with its name; words have none."""
+def _numbers_of(value: Any) -> Iterator[str]:
+    """Yield the numbers in a value as printed; words have none."""
     if isinstance(value, PublishedValve):
         for field in fields(value)[2:]:  # what it is called and where it stands are no numbers
-            yield from _numbers_of(f"{value.name}, {field.name}", getattr(value, field.name))
-    elif isinstance(value, Mapping):
-        for place, each in value.items():
-            yield from _numbers_of(place, each)
+            yield from _numbers_of(getattr(value, field.name))
     elif isinstance(value, tuple):
-        for index, each in enumerate(value):
-            yield from _numbers_of(f"{name}, {index + 1}", each)
+        for each in value:
+            yield from _numbers_of(each)
     elif not isinstance(value, str):
-        yield name, _as_printed(value)
+        exact = sympy.Rational(value)
+        yield f"{Decimal(exact.p) / Decimal(exact.q):f}"
     elif any(letter.isdigit() for letter in value):
-        yield name, value
+        yield value
 
 
-def _as_printed(value: int | sympy.Rational) -> str:
-    """Return a number's decimals, all of them."""
-    exact = sympy.Rational(value)
-    return f"{Decimal(exact.p) / Decimal(exact.q):f}"
+def find_number_faults(statements: Sequence[Statement], paper: str | None = None) -> list[str]:
+    """Say which numbers are not the paper's, and which beside a statement differ from ours without a remark.
+
+    Without the text of the paper they are those in no section of `SECTION_OF`, with it those that its section has not.
+    """
+    printed, faults = transcribed(), []
+    faults += [f"{number} is transcribed, and no section is stated for it" for number in printed - SECTION_OF.keys()]
+    faults += [f"a section is stated for {number}, which is not transcribed" for number in SECTION_OF.keys() - printed]
+    if paper is not None:
+        sections = _sections(paper)
+        faults += [
+            f"{number} does not stand in section {section} of the text given"
+            for number, section in SECTION_OF.items()
+            if number not in sections.get(section, ())
+        ]
+    for statement, value in ((one, each) for one in statements for each in one.values if each.published):
+        where = f"{statement.number}, {value.label}: {value.published}"
+        if value.published not in printed:
+            faults.append(f"{where} is called printed, and the paper has no such number")
+        elif not value.agrees(statement) and not value.remark:
+            ours = sympy.N(value.exact(statement), 4)
+            faults.append(f"{where} is printed, the statement gives {ours}, and no remark says why")
+    return sorted(faults)
+
+
+def _sections(paper: str) -> dict[str, set[str]]:
+    """Return the numbers in each section of the paper's text, by the section's own number at the start of a line."""
+    parts = re.split(r"(?m)^(?:\d [^\d\n]+ )?(\d(?:\.\d)?) (?=[A-Z][a-z])", paper)
+    return {
+        number: set(re.findall(r"\d+(?:\.\d+)?", text)) for number, text in zip(parts[1::2], parts[2::2], strict=True)
+    }

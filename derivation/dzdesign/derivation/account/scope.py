@@ -17,14 +17,19 @@ class Setting(NamedTuple):
     #: As a report says it, behind "proved for".
     words: str
 
+    def __str__(self) -> str:
+        return self.words.replace("$", "")
+
 
 BARE = Setting("drive", "the valve without compensator")
-FREE_BETA = Setting("drive", "the paper's law with any beta")
+FREE_BETA = Setting("drive", "the paper's law with any $beta$")
 #: The simulation model, Eqs. (19)-(24), which has no overlap.
 PLANT = Setting("drive", "the simulation model")
-FIXED_OPENING = Setting("spool", "a stop that fixes x_max at every pressure drop (Assumption 3)")
+#: What the firmware runs unless it is told otherwise (`transition.py`).
+WITH_TRANSITION = Setting("drive", "the law `paper` with zero band and transition")
+FIXED_OPENING = Setting("spool", "a stop that fixes $x_max$ at every pressure drop (Assumption 3)")
 FREE_OPENING = Setting("spool", "a spool that does not meet its stop")
-CODES_AT_PIN = Setting("codes", "codes at n_V counts per volt")
+CODES_AT_PIN = Setting("codes", "codes at $n_V$ counts per volt")
 CODES_OF_COMMAND = Setting("codes", "codes in the counts of the command")
 
 
@@ -44,7 +49,7 @@ class Scope:
         return bool(self.settings) or self.where != sympy.true
 
     def __str__(self) -> str:
-        return "; ".join([*(setting.words for setting in self.settings), *map(sympy.sstr, self.comparisons)])
+        return "; ".join([*(str(setting) for setting in self.settings), *map(sympy.sstr, self.comparisons)])
 
     @property
     def comparisons(self) -> tuple[Boolean, ...]:
@@ -64,8 +69,8 @@ class Scope:
         return inside and named and set(other.comparisons) <= set(self.comparisons)
 
     def admits(self, settings: frozenset[Setting]) -> bool:
-        """Whether what is set up is one of the settings named, of each aspect; any beta is meant only if named."""
-        if FREE_BETA in settings and FREE_BETA not in self.settings:
+        """Whether what is set up is one of the settings named, of each aspect; one with a beta of its own if named."""
+        if settings & {FREE_BETA, WITH_TRANSITION} - set(self.settings):
             return False
         named: dict[str, set[Setting]] = {}
         for setting in self.settings:

@@ -11,7 +11,7 @@ from functools import lru_cache
 import sympy
 
 from dzdesign.derivation.account.identity import agree
-from dzdesign.derivation.account.steps import Relation
+from dzdesign.derivation.account.statement import Ground
 from dzdesign.derivation.symbols import Name
 
 _CONTRADICTION = "the premises contradict each other"
@@ -22,12 +22,31 @@ Sides = tuple[sympy.Expr, sympy.Expr]
 _Nonzero = Sequence[tuple[sympy.Expr, sympy.Ne | None]]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relation:
+    """A ground at the values at which it is used: ``left = right``."""
+
+    ground: Ground
+    left: sympy.Expr
+    right: sympy.Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A ground, the unknown that it was solved for, and the value, in what earlier steps left unknown."""
+
+    ground: Ground
+    name: Name
+    gives: sympy.Expr
+
+
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """The unknowns in the symbols that remain, and which of the provisions were needed to divide."""
+    """The unknowns in the symbols that remain, how they were found, and which provisions were needed to divide."""
 
     values: Mapping[Name, sympy.Expr]
     needed: frozenset[sympy.Ne]
+    steps: tuple[Step, ...]
 
 
 @lru_cache(maxsize=4096)
@@ -45,9 +64,10 @@ def solve_relations(
     needed: set[sympy.Ne] = set()
     nonzero = [(provision.lhs - provision.rhs, provision) for provision in provided]
     sides = [(relation.left, relation.right) for relation in relations]
+    grounds, steps = [relation.ground for relation in relations], []
     while sides:
         index, name = _choose(sides, [name for name in unknowns if name not in solved], nonzero)
-        left, right = sides.pop(index)
+        (left, right), ground = sides.pop(index), grounds.pop(index)
         if name is None:  # no unknown is left in it: it must be true by itself
             if not agree(left, right):
                 return _CONTRADICTION
@@ -61,10 +81,11 @@ def solve_relations(
         if name.is_nonzero:  # then what it equals is not zero either
             nonzero.append((sympy.numer(sympy.factor(value)), None))
         solved[name] = value
+        steps.append(Step(ground, name, value))
         needed |= used
         sides = [tuple(side.xreplace({name: value}) for side in pair) for pair in sides]
     values = _put_back(solved, unknowns)
-    return values if isinstance(values, str) else Solution(values, frozenset(needed))
+    return values if isinstance(values, str) else Solution(values, frozenset(needed), tuple(steps))
 
 
 def _choose(sides: Sequence[Sides], names: Sequence[Name], nonzero: _Nonzero) -> tuple[int, Name | None]:

@@ -110,7 +110,7 @@ def pressure_index(at: Replacements) -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One of the cases by which a piecewise statement is proved; together they exhaust what can occur."""
+    """One of the cases by which a piecewise statement is proved; the referee tries what they may leave out."""
 
     #: Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
     at: Replacements
@@ -207,14 +207,18 @@ class Statement:
     condition: Condition | None = None
     #: The claim that the left-hand side is positive exactly if this holds.
     positive_if: sympy.core.relational.Relational | None = None
-    #: Where it is meant to hold. Its cases must cover all of that, and the referee (`referee/`) tries it only there.
+    #: Where it is meant to hold: the referee (`referee/`) tries it there, and only there.
     scope: Scope = EVERYWHERE
     #: What must differ for the derivation, which divides by the difference.
     provided: tuple[sympy.Ne, ...] = ()
     #: What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.
     expected: Outcome = None  # type: ignore[assignment]  # what is usual of its kind, by __post_init__
+    #: Whether it only rearranges a definition or one premise: then it follows, and says nothing new.
+    rearranges: bool = False
     #: Number of the statement that says what this one should read.
     corrected_by: str = ""
+    #: For what it should read so, in words; for everything unless given.
+    corrected_for: str = ""
     #: Statements that qualify this one.
     see: tuple[str, ...] = ()
     #: Its numbers beside the paper's.

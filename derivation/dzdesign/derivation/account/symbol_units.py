@@ -1,19 +1,19 @@
-"""Whether a statement adds and equates only what has one unit.
-
-A check that knows nothing of the derivations: each side is evaluated with pint quantities.
-"""
+"""Whether a statement is one equation in every system of units: a check that knows nothing of the derivations."""
 
 import math
 from functools import cache
-from typing import Any
 
 import pint
 import sympy
 from sympy.core.function import AppliedUndef
+from sympy.core.relational import Relational
 
 from dzdesign.derivation import symbols
 from dzdesign.derivation.account.statement import Statement
 from dzdesign.derivation.symbols import QUANTITIES, Name
+
+#: In a system of units of its own, each base unit is another number of ours.
+_BASES = {"[length]": 2.0, "[mass]": 3.0, "[time]": 5.0, "[current]": 7.0, "[code]": 11.0}
 
 
 def print_unit(name: Name) -> str:
@@ -24,79 +24,46 @@ def print_unit(name: Name) -> str:
     >>> print_unit(symbols.Q), print_unit(symbols.beta)
     ('m^3/s', '1')
     """
-    unit = _plain(_registry().Unit(QUANTITIES[_as_declared(name)].unit)).replace("code", "counts").replace("Ω", "ohm")
-    return "1" if unit == "a number" else unit
+    unit = f"{_registry().Unit(QUANTITIES[_as_declared(name)].unit):~C}".replace("**", "^")
+    return unit.replace("code", "counts").replace("Ω", "ohm") or "1"
 
 
 def find_unit_error(statement: Statement) -> str:
-    """Say what is wrong with the units of a statement; nothing if all sides have one and no sum mixes them."""
-    left = _quantity_of(statement.symbol)
-    if left is None:
-        return f"the unit of {statement.symbol} is not known"
-    for member in statement.members:
-        try:
-            branches = _branches(member)
-        except pint.DimensionalityError as error:
-            return f"a comparison of {_plain(error.units1)} with {_plain(error.units2)}"
-        for branch in branches:
-            wrong = _error(left, branch)
-            if wrong:
-                return wrong
-    return ""
-
-
-def _branches(member: sympy.Expr) -> list[sympy.Expr]:
-    if not isinstance(member, sympy.Piecewise):
-        return [member]
-    # A comparison needs one unit just as a sum does.
-    compared = [relation.lhs - relation.rhs for relation in member.atoms(sympy.core.relational.Relational)]
-    for margin in compared:
-        if not margin.is_number:
-            _evaluate(margin)
-    return [value for value, _ in member.args]
-
-
-def _error(left: Any, side: sympy.Expr) -> str:
-    if side.is_number:
-        # Zero is of every unit.
-        return "" if side == 0 or left.dimensionless else f"a bare number where {_plain(left.units)} is meant"
+    """Say what is wrong with the units of a statement: nothing if each side scales as its symbol does."""
     try:
-        right = _evaluate(side)
-    except pint.DimensionalityError as error:
-        return f"a sum of {_plain(error.units1)} and {_plain(error.units2)}"
+        wanted = _factor(statement.symbol)
+        for member in statement.members:
+            for relation in member.atoms(Relational):
+                margin = relation.lhs - relation.rhs
+                sides = [side for side in relation.args if not side.is_number]
+                if any(not math.isclose(_scaling(side), _scaling(margin)) for side in sides):
+                    return f"{sympy.sstr(relation)} compares two units"
+            for branch in [value for value, _ in member.args] if isinstance(member, sympy.Piecewise) else [member]:
+                if branch != 0 and not math.isclose(_scaling(branch), wanted):  # zero is of every unit
+                    return f"the right-hand side is not in {print_unit(statement.symbol)}"
     except KeyError as error:
         return f"the unit of {error.args[0]} is not known"
-    if not left.is_compatible_with(right):
-        return f"{_plain(left.units)} on the left, {_plain(getattr(right, 'units', 'a number'))} on the right"
     return ""
 
 
-def _plain(units: Any) -> str:
-    if isinstance(units, str):
-        return units
-    text = f"{_registry().Unit(units):~C}".replace("**", "^")
-    return {"": "a number", "code": "counts"}.get(text, text)
+def _scaling(expression: sympy.Expr) -> float:
+    """Return an expression in the other system of units over itself, at values without a pattern."""
+    names = sorted(expression.free_symbols | expression.atoms(AppliedUndef), key=str)
+    stand_ins = {name: sympy.Dummy() for name in names if isinstance(name, AppliedUndef)}
+    names = [name for name in names if name in stand_ins or expression.xreplace(stand_ins).has(name)]
+    compute = sympy.lambdify([stand_ins.get(name, name) for name in names], expression.xreplace(stand_ins), "math")
+    values = [1 + math.sqrt(2 + position) for position in range(len(names))]
+    scaled = [value * _factor(name) for name, value in zip(names, values, strict=True)]
+    return float(compute(*scaled) / compute(*values))
 
 
-def _evaluate(expression: sympy.Expr) -> Any:
-    stand_ins = {function: sympy.Dummy() for function in expression.atoms(AppliedUndef)}
-    plain = expression.xreplace(stand_ins)
-    names = {stand_in: function for function, stand_in in stand_ins.items()}
-    arguments = sorted(plain.free_symbols, key=str)
-    quantities = []
-    for position, name in enumerate(arguments):
-        quantity = _quantity_of(names.get(name, name), position)
-        if quantity is None:
-            raise KeyError(str(name))
-        quantities.append(quantity)
-    functions = {"sqrt": lambda value: value**0.5, "log": lambda value: math.log(value.to("").magnitude)}
-    return sympy.lambdify(arguments, plain, modules=[functions])(*quantities)
-
-
-def _quantity_of(name: Name, position: int = 0) -> Any:
-    known = QUANTITIES.get(_as_declared(name))
-    # Values without a pattern, so that no sum is zero by chance.
-    return None if known is None else _registry().Quantity(1 + math.sqrt(2 + position), known.unit)
+@cache
+def _factor(name: Name) -> float:
+    """Return how many of the other system's units one of ours is."""
+    if _as_declared(name) not in QUANTITIES:
+        raise KeyError(str(name))
+    dimensions = _registry().Unit(QUANTITIES[_as_declared(name)].unit).dimensionality
+    return float(math.prod(_BASES[base] ** power for base, power in dimensions.items()))
 
 
 def _as_declared(name: Name) -> Name:

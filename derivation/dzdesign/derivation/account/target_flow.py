@@ -1,23 +1,26 @@
-"""What ties the laws to the paper's equations, and theorem 1: which flow they give."""
+"""The laws' ties to the paper's equations, and theorems 1 and 2: which flow they give, and what full command does."""
 
 import sympy
 
-from dzdesign.derivation.account.published import FIRST, SECOND, VALVES
+from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION, VALVES
 from dzdesign.derivation.account.scope import (
     AT_FULL_COMMAND,
+    BARE,
     BEFORE_STOP,
+    EDGE,
     FIXED_OPENING,
+    FREE_OPENING,
     LAW_AT_REFERENCE,
     LAW_OFF_REFERENCE,
     TARGET_OFF_REFERENCE,
     scope,
 )
-from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Value
+from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.symbols import *
 
-_DRIVE_LEFT_OVER = "with k x_max = u_max - u_min0, the command left above the threshold"
+_DRIVE_LEFT_OVER = "with $k x_max = u_max - u_min0$, the command left above the threshold"
 
 #: What the laws are in the paper's terms.
 TIES = tuple(statement for name in LAW_NAMES for statement in law(name).statements)
@@ -75,7 +78,7 @@ TARGET = (
             )
             for valve in VALVES
         ),
-        note=f"Above the target wherever beta < 1 and k x_max < u_max. The numbers: {_DRIVE_LEFT_OVER}.",
+        note=f"Above the target wherever $beta < 1$ and $k x_max < u_max$. The numbers: {_DRIVE_LEFT_OVER}.",
     ),
     Kind.THEOREM(
         "T1c",
@@ -94,8 +97,8 @@ TARGET = (
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="T1d",
         see=("T2d",),
-        note="Where a stop fixes x_max. Where full command is the limit it follows, for then the target ends at the "
-        "largest flow that full command gives: T2d.",
+        note="Where a stop fixes $x_max$. Where full command is the limit it follows, for then the target ends at "
+        "the largest flow that full command gives: T2d.",
     ),
     Kind.THEOREM(
         "T1d",
@@ -113,15 +116,17 @@ TARGET = (
         drive_left,
         u_max - k * x_max - beta * u_min0,
         scope=TARGET_OFF_REFERENCE & AT_FULL_COMMAND,
+        rearranges=True,
         grounds=("drive left", Ground("L3", ((u_i, u_max),))),
         eliminate=(u_O,),
         values=tuple(Value(f"at 5 MPa, {valve.name}", valve.at(), "V") for valve in (FIRST, SECOND)),
-        note="(1 - beta) u_min0 where k x_max = u_max - u_min0: the target asks for x_max and not for more, though at "
-        "a lower threshold the same command could open further. In flow it is what T1b gives above the target.",
+        note="(1 - $beta$) $u_min0$ where $k x_max = u_max - u_min0$: the target asks for $x_max$ and not for more, "
+        "though at a lower threshold the same command could open further. In flow it is what T1b gives above the "
+        "target.",
     ),
     Kind.CORRECTED(
         "(6c)",
-        "compensation signal that meets the target (16) where a stop fixes x_max, what (6) should read",
+        "compensation signal that meets the target (16) where a stop fixes $x_max$, what (6) should read",
         u_no,
         u_0 - (1 - beta) * u_min0,
         scope=_TARGET_LAW,
@@ -140,5 +145,117 @@ TARGET = (
         see=("T2d", "T2e"),
         note="Only the threshold is corrected, not the gain: this is the law `target`. One of two readings: where full "
         "command is the limit, (6) itself meets the target (T2d) and this one loses flow (T2e).",
+    ),
+)
+
+_FULL_COMMAND_IS_THE_LIMIT = scope(FREE_OPENING)
+
+#: Theorem 2: full command.
+FULL_COMMAND = (
+    Kind.THEOREM(
+        "T2a",
+        "output of the law (18) at full command",
+        u_O,
+        u_max + beta * (k * x_max + u_min0 - u_max),
+        scope=LAW_OFF_REFERENCE & AT_FULL_COMMAND,
+        grounds=(Ground("(18)", ((u_i, u_max),)),),
+    ),
+    Kind.THEOREM(
+        "T2b",
+        "full command gives full drive at every pressure drop",
+        u_O,
+        u_max,
+        scope=LAW_OFF_REFERENCE & AT_FULL_COMMAND,
+        grounds=("T2a",),
+        condition=Condition(
+            any_of=((sympy.Eq(k * x_max, u_max - u_min0),),),
+            for_all=(beta,),
+            discrepancy=beta * (k * x_max + u_min0 - u_max),
+        ),
+        expected=Outcome.FOLLOWS_IF,
+        note="With less travel, as where the spool meets its stop at 8-8.5 V (section 4.2), full command asks for less "
+        "than full drive; with more, for drive that is not there.",
+    ),
+    Kind.ASSUMPTION(
+        "opening",
+        "opening on both sides of the threshold",
+        x,
+        sympy.Piecewise(((u_O - u_min) / k, u_min <= u_O), (0, u_O < u_min)),
+        scope=EDGE,
+        note="Eq. (11) with Fig. 3 beyond the threshold; closed before it, as Eq. (1) says.",
+    ),
+    Kind.THEOREM(
+        "largest flow",
+        "largest flow at $dP1$ without compensator",
+        Q_max1,
+        gamma_1 * (u_max - u_min1) / k,
+        scope=scope(BARE, FREE_OPENING, sympy.Eq(dP, dP1), u_min1 <= u_max) & AT_FULL_COMMAND,
+        grounds=(
+            Ground("(1)", ((Q, Q_max1), (dP, dP1), (u_min, u_min1), (u_i, u_max))),
+            Ground("opening", ((u_O, u_max), (u_min, u_min1))),
+            "gamma_1",
+        ),
+        eliminate=(x, gamma_1),
+        cases=(Case(((u_max, u_min1 + headroom),), ""),),
+        note="As long as the spool has not met its stop.",
+    ),
+    Kind.ASSUMPTION(
+        "full command",
+        "$x_max$ is the opening that full command gives at $dP0$",
+        x_max,
+        (u_max - u_min0) / k,
+        scope=_FULL_COMMAND_IS_THE_LIMIT,
+        see=("T2b",),
+        note="The condition under which 1.048 and 1.018 (T1b) are computed. Without a stop, full command then opens "
+        "the valve further at $dP1$, where its threshold is lower.",
+    ),
+    Kind.THEOREM(
+        "T2c",
+        "largest flow off the reference where full command is the limit",
+        Q_max1,
+        gamma_1 * (u_max - beta * u_min0) / k,
+        scope=_FULL_COMMAND_IS_THE_LIMIT,
+        grounds=("largest flow", "(5)"),
+        eliminate=(u_min1,),
+        note="More than $gamma_1 x_max$, the flow of Assumption 3, wherever $beta < 1$.",
+    ),
+    Kind.THEOREM(
+        "T2d",
+        "where full command is the limit, the law (18) gives the line to the largest flow, and so the target (16)",
+        Q,
+        Q_max1 * u_i / u_max,
+        Q_O_prime,
+        scope=LAW_OFF_REFERENCE & _FULL_COMMAND_IS_THE_LIMIT,
+        grounds=(
+            *flow_under("(18)", u_min1, dP1),
+            *("(5)", "gamma_1", "T2c", "full command", "(16)"),
+            Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
+        ),
+        eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
+        see=("T1c", "T2e"),
+        note="The other reading of (6): Eq. (18) is the right law of Fig. 3 as long as full command is the limit. "
+        "With a stop that fixes $x_max$ it overshoots: T1b, T1c.",
+    ),
+    Kind.THEOREM(
+        "T2e",
+        "where full command is the limit, the law `target` falls short of the target (16)",
+        Q,
+        Q_O_prime * (u_max - u_min0) / (u_max - beta * u_min0),
+        scope=TARGET_OFF_REFERENCE & _FULL_COMMAND_IS_THE_LIMIT,
+        grounds=(
+            *flow_under("L3", u_min1, dP1),
+            *("(5)", "gamma_1", "T2c", "full command", "(16)"),
+            Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
+        ),
+        eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
+        see=("T1d", "T1e"),
+        values=tuple(
+            Value(
+                f"flow lost, {valve.name}", of=1 - (u_max - u_min0) / (u_max - beta * u_min0), at=valve.at(), unit="%"
+            )
+            for valve in (FIRST, SIMULATION, SECOND)
+        ),
+        note="At every command, full command included. The correction (6c) is right only where a stop fixes $x_max$ "
+        "(T1d).",
     ),
 )

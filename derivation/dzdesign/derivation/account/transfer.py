@@ -10,11 +10,11 @@ from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
 from dzdesign.derivation.symbols import *
 
 _TITLES = {
-    "(19)": ("proportional amplifier", "Its gain is printed K_e, the name of the flow gain in Eq. (2); here K_a."),
+    "(19)": ("proportional amplifier", "Its gain is printed $K_e$, the name of the flow gain in Eq. (2); here $K_a$."),
     "(20)": ("coil", ""),
     "(21)": ("current feedback", ""),
     "(22)": ("solenoid force", "Linear in the current, and the same at every position: a good proportional solenoid."),
-    "(23)": ("motion of the armature", "No friction and no stop; the load force f_eL is left open."),
+    "(23)": ("motion of the armature", "No friction and no stop; the load force $f_eL$ is left open."),
     "(24)": (
         "flow across the edge",
         "As printed, with the armature's travel for the opening: a valve without overlap.",
@@ -84,9 +84,9 @@ SIMULATION_MODEL = (
             any_of=((sympy.Eq(i_init, 0),),), for_all=(s,), discrepancy=-L_c * i_init, words="(Assumption 4)"
         ),
         expected=Outcome.FOLLOWS_IF,
-        note="Printed without its middle, U_e(s).",
+        note="Printed without its middle, $U_e$($s$).",
     ),
-    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, grounds=(laplace("(22)"),)),
+    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, rearranges=True, grounds=(laplace("(22)"),)),
     Kind.PAPER(
         "(27)",
         "motion, transformed",
@@ -102,30 +102,25 @@ SIMULATION_MODEL = (
             words="(Assumption 4)",
         ),
         expected=Outcome.FOLLOWS_IF,
-        note="Printed without its left end, F_e(s).",
+        note="Printed without its left end, $F_e$($s$).",
     ),
     Kind.PAPER(
         "(28)",
         "flow, transformed",
         Q_s,
         C_d * W * X_e * sympy.sqrt(2 * dP / rho),
-        grounds=(
-            Ground(
-                "(24)",
-                ((Q, Q_s), (x_e, X_e.func(s + a))),
-            ),
-        ),
+        grounds=(Ground("(24)", ((Q, Q_s), (x_e, X_e.func(s + a)))),),
         condition=Condition(
             any_of=((sympy.Eq(a, 0),),),
             # The transform of a unit step.
             witness=((X_e, 1 / s), (X_e.func(s + a), 1 / (s + a))),
             for_all=(s,),
             discrepancy=ORIFICE * (X_e.func(s + a) - X_e),
-            words="(a constant pressure drop, Assumption 4)",
+            words="($a$ constant pressure drop, Assumption 4)",
         ),
         expected=Outcome.FOLLOWS_IF,
-        note="Shown for a pressure drop that falls as exp(-2 a t) during a step: flow and travel are in "
-        "proportion only at a = 0.",
+        note="Shown for a pressure drop that falls as exp(-2 a $t$) during a step: flow and travel are in proportion "
+        "only at $a = 0$.",
     ),
 )
 
@@ -144,8 +139,8 @@ TRANSFER_FUNCTION = (
         grounds=(Ground("(25)", member=0), Ground("(25)", member=1)),
         eliminate=(U_e,),
         expected=Outcome.FOLLOWS_IF,
-        note="Time constant L_c / (R_c + r_p + K_a K_fi): the feedback makes the coil faster by the factor "
-        "1 + K_a K_fi / (R_c + r_p), and makes the current depend less on the coil's temperature by the same factor.",
+        note="Time constant $L_c$ / ($R_c + r_p + K_a K_fi$): the feedback makes the coil faster by the factor 1 + "
+        "$K_a K_fi$ / ($R_c + r_p$), and makes the current depend less on the coil's temperature by the same factor.",
     ),
     Kind.DEFINITION("transfer function", "transfer function from command to flow", G, Q_s / U_i),
     Kind.THEOREM(
@@ -154,13 +149,7 @@ TRANSFER_FUNCTION = (
         G,
         ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
         scope=scope(sympy.Eq(F_eL, 0)),
-        grounds=(
-            "transfer function",
-            "(28)",
-            Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),)),
-            "(26)",
-            "T6a",
-        ),
+        grounds=("transfer function", "(28)", Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),)), "(26)", "T6a"),
         eliminate=(Q_s, X_e, F_e, I_s),
         expected=Outcome.FOLLOWS_IF,
         note="Third order. All coefficients of both factors are positive, so it is stable for every set of parameters.",
@@ -183,21 +172,16 @@ TRANSFER_FUNCTION = (
         Q,
         ORIFICE * x_e,
         scope=scope(BARE, u_min <= u_i),
-        grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
-            "overlap",
-        ),
+        grounds=(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap"),
         eliminate=(x,),
         # Section 2.2: the simulated spool's dead zone is 54 % of its 1.8 mm.
         condition=Condition(
-            any_of=((sympy.Eq(x_ov, 0),),),
-            ruled_out_by=((x_ov, _OVERLAP_MM / 1000),),
-            discrepancy=-ORIFICE * x_ov,
+            any_of=((sympy.Eq(x_ov, 0),),), ruled_out_by=((x_ov, _OVERLAP_MM / 1000),), discrepancy=-ORIFICE * x_ov
         ),
         expected=Outcome.DOES_NOT_FOLLOW,
         corrected_by="T6e",
-        note="If the dead zone is overlap (our reading: 54 % of 1.8 mm, 0.97 mm), Eq. (24) lacks it; a preload within "
-        "f_eL would be another explanation.",
+        note="If the dead zone is overlap (our reading: 54 % of 1.8 mm, 0.97 mm), Eq. (24) lacks it; a preload "
+        "within $f_eL$ would be another explanation.",
     ),
     Kind.CORRECTED(
         "T6e",
@@ -205,10 +189,7 @@ TRANSFER_FUNCTION = (
         Q,
         ORIFICE * (x_e - x_ov),
         scope=scope(BARE, u_min <= u_i),
-        grounds=(
-            Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))),
-            "overlap",
-        ),
+        grounds=(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap"),
         eliminate=(x,),
     ),
 )

@@ -14,21 +14,29 @@ LAW = Law(
     equation="(18)",
     output=_OUTPUT,
     rises_if=beta * (1 - k * x_max / u_max) < 1,
-    note="Eq. (18); Eq. (14) is its case beta = 1, which the selector (7) holds for dP <= dP0. "
-    "Off the reference its flow is the target (16) exactly where full command is the limit (T2d). Where a stop fixes "
-    "x_max it exceeds the target by gamma_1 (1 - beta) (1 - k x_max/u_max) u_i / k (T1b).",
+    note="Eq. (18); Eq. (14) is its case $beta = 1$, which the selector (7) holds for $dP <= dP0$. Off the reference "
+    "its flow is the target (16) exactly where full command is the limit (T2d). Where a stop fixes $x_max$ it "
+    "exceeds the target by $gamma_1$ (1 - $beta$) (1 - $k x_max/u_max$) $u_i / k$ (T1b).",
     stated_as="(18)",
     statements=(
-        Kind.LAW("L1", "the law `paper` is Eq. (18)", u_O, _OUTPUT, scope=LAW_OFF_REFERENCE, grounds=("(18)",)),
+        Kind.LAW(
+            "L1",
+            "the law `paper` is Eq. (18)",
+            u_O,
+            _OUTPUT,
+            scope=LAW_OFF_REFERENCE,
+            rearranges=True,
+            grounds=("(18)",),
+        ),
         Kind.LAW(
             "L2",
-            "the selector gives the law `paper`, at beta = 1 up to dP0: Eq. (14)",
+            "the selector gives the law `paper`, at $beta = 1$ up to $dP0$: Eq. (14)",
             u_O,
             sympy.Piecewise((_OUTPUT, dP1 > dP0), (_OUTPUT.subs(beta, 1), dP1 <= dP0)),
             scope=scope(under_law("paper"), sympy.Eq(dP, dP1)),
             grounds=(Ground("u_O", ((u_0, u_no),)), "(7)", "(13)"),
             eliminate=(u_no, u_0),
-            cases=(Case(((dP1, dP0 - below),), "dP <= dP0"), Case(((dP1, dP0 + above),), "dP > dP0")),
+            cases=(Case(((dP1, dP0 - below),), "$dP <= dP0$"), Case(((dP1, dP0 + above),), "$dP > dP0$")),
         ),
     ),
 )

@@ -7,9 +7,9 @@ from dzdesign.derivation.symbols import beta, k, u_i, u_max, u_min0, u_O, x_max
 
 _OUTPUT = k * x_max / u_max * u_i + beta * u_min0
 _NOTE = (
-    "Gain of Eq. (14), offset of Eq. (18): its flow is the target (16) exactly where a stop fixes x_max and "
-    "beta u_min0 is the threshold (T1d). Where full command is the limit it loses "
-    "(1 - beta) u_min0 / (u_max - beta u_min0) of the flow off the reference (T2e)."
+    "Gain of Eq. (14), offset of Eq. (18): its flow is the target (16) exactly where a stop fixes $x_max$ and $beta "
+    "u_min0$ is the threshold (T1d). Where full command is the limit it loses (1 - $beta$) $u_min0$ / ($u_max - beta "
+    "u_min0$) of the flow off the reference (T2e)."
 )
 
 LAW = Law(

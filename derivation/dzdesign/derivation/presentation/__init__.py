@@ -1,1 +1,1 @@
-"""Presentation: the account enters; text, LaTeX, HTML and JSON leave."""
+"""Presentation: the account enters; text, HTML and JSON leave."""

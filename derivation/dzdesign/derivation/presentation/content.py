@@ -1,6 +1,5 @@
 """What a report on the account holds: built once, written by each format, and as JSON the artefact derivation.json."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
@@ -79,7 +78,6 @@ class Entry:
     ]
     section: Annotated[str, Meta(description="Section of the account in which the statement appears.")]
     statement: Annotated[Formula, Meta(description="Chain of equal formulas, in a form that SymPy can read.")]
-    latex: Annotated[str, Meta(description="The statement in LaTeX.")]
     premises: Annotated[tuple[Premise, ...], Meta(description="Premises on which the statement rests.")]
     outcome: Annotated[Outcome, Meta(description="Outcome of the derivation.")]
     expected: Annotated[Outcome, Meta(description="Outcome of a correct account.")]
@@ -115,7 +113,6 @@ class Entry:
     corrected_by: Annotated[tuple[Reference, ...], Meta(description="Statement that gives the correction.")]
     see: Annotated[tuple[Reference, ...], Meta(description="Statements that qualify this one.")]
     figures: Annotated[tuple[Figure, ...], Meta(description="Numbers of dzdesign beside those of the paper.")]
-    signs: Annotated[Mapping[str, tuple[Formula, ...]], Meta(description="Assumed signs of the symbols.")]
     note: Annotated[Words, Meta(description="Remark for the reader.")]
 
     @property
@@ -132,12 +129,6 @@ class Entry:
         given = "our choice" if self.kind is Kind.CHOICE else self.kind.value
         return f"given: {given}" if self.outcome is Outcome.GIVEN else self.outcome.value
 
-    @property
-    def sign_words(self) -> Words:
-        """What is assumed of the signs, in words."""
-        by_sign = (Words(f"{sign}: ", Words.join(names)) for sign, names in self.signs.items())
-        return Words(Words.join(by_sign, "; "), ".")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Term:
@@ -147,7 +138,7 @@ class Term:
     symbol: Annotated[Formula, Meta(description="The symbol; for a function, with its argument.")]
     meaning: Annotated[Words, Meta(description="Short description of the symbol.")]
     unit: Annotated[str, Meta(description="Unit of the symbol.")]
-    latex: Annotated[str, Meta(description="The symbol in LaTeX.")]
+    sign: Annotated[str, Meta(description="Assumed sign of the symbol.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

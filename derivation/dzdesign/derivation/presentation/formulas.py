@@ -1,4 +1,4 @@
-"""Writes formulas as plain text, LaTeX, MathML and for SymPy, in the order in which the paper writes them."""
+"""Writes formulas as plain text, as LaTeX and by it as MathML, and for SymPy."""
 
 import keyword
 import re
@@ -13,14 +13,49 @@ from sympy.printing.printer import Printer
 from sympy.printing.str import StrPrinter
 
 from dzdesign.derivation import symbols
-from dzdesign.derivation.presentation.arrangement import Root, arrange, with_positive_sign
 from dzdesign.derivation.symbols import QUANTITIES, Name
 
 _LOW_PARENTHESES = re.compile(r"\\left\(((?:(?!\\left|\\frac|\\sqrt|\\right).)*?) ?\\right\)")
 
 
-class _Chains(Printer):  # type: ignore[misc]
-    """Writes a <= u and u < b as a <= u < b."""
+_HALF = sympy.Rational(1, 2)
+_RANK = {name: rank for rank, name in enumerate(QUANTITIES)}
+
+
+class Root(sympy.Function):  # type: ignore[misc]
+    """A square root that SymPy does not split into the roots of its factors."""
+
+
+def _with_roots(formula: sympy.Basic) -> sympy.Basic:
+    """Put the square roots of a product under one root, and -(a - b) c as (b - a) c."""
+    if not formula.args or isinstance(formula, AppliedUndef):
+        return formula
+    if not formula.is_Mul and not (formula.is_Pow and abs(formula.exp) == _HALF):
+        return formula.func(*map(_with_roots, formula.args))
+    factors = sympy.Mul.make_args(formula)
+    sums = [factor for factor in factors if factor.is_Add]
+    if len(sums) == 1 and formula.could_extract_minus_sign():
+        turned = formula.xreplace({sums[0]: -sums[0]})
+        # Which of them SymPy gives may change from run to run.
+        if not turned.could_extract_minus_sign():
+            return -_with_roots(turned)
+    halves = [factor for factor in factors if abs(factor.as_base_exp()[1]) == _HALF]
+    others = [_with_roots(factor) for factor in factors if factor not in halves]
+    roots = [Root(sympy.Mul(*(factor**2 for factor in halves)))] if halves else []
+    return sympy.Mul(*sorted((*others, *roots), key=_place), evaluate=False)
+
+
+def _place(factor: sympy.Expr) -> tuple[bool, bool, int]:
+    """A number first, then symbols in their order, sums and functions last."""
+    base = factor.as_base_exp()[0]
+    return not factor.is_number, bool(base.args), _RANK.get(base, 0)
+
+
+class _Order(Printer):  # type: ignore[misc]
+    """Begins a sum with what is not subtracted, and ends it with a number; writes a <= u and u < b as a <= u < b."""
+
+    def _as_ordered_terms(self, expr: sympy.Add, order: str | None = None) -> list[sympy.Expr]:
+        return sorted(expr.args, key=lambda term: (term.could_extract_minus_sign(), term.is_number))
 
     def _print_And(self, expr: sympy.And) -> str:
         parts = [part if part.lhs == part.lts else part.reversed for part in expr.args]
@@ -34,7 +69,7 @@ class _Ascii(StrPrinter):  # type: ignore[misc]
         return f"{self._print(relation.lhs)} {sign} {self._print(relation.rhs)}"
 
 
-class _Text(_Chains, _Ascii):
+class _Text(_Order, _Ascii):
     """ASCII that a person can read and a computer algebra system too, but for cases, one on a line."""
 
     def _print_Pow(self, expr: sympy.Pow, rational: bool = False) -> str:
@@ -52,7 +87,7 @@ class _Text(_Chains, _Ascii):
         return "otherwise" if when == sympy.true else f"if {self._print(when)}"
 
 
-class _Latex(_Chains, LatexPrinter):  # type: ignore[misc]
+class _Latex(_Order, LatexPrinter):  # type: ignore[misc]
     """LaTeX for math mode, with amsmath."""
 
     def _print_Root(self, root: Root) -> str:
@@ -104,9 +139,9 @@ def to_text(formula: sympy.Basic) -> str:
     --------
     >>> from dzdesign.derivation import symbols as s
     >>> to_text((s.k * s.x_max / s.u_max - 1) * s.u_i + s.u_min0)
-    '(k*x_max/u_max - 1)*u_i + u_min0'
+    'u_min0 + u_i*(k*x_max/u_max - 1)'
     """
-    return str(_Text({"order": "none", "full_prec": False}).doprint(arrange(formula)))
+    return str(_Text({"order": "none", "full_prec": False}).doprint(_with_roots(formula)))
 
 
 @cache
@@ -121,7 +156,7 @@ def to_latex(formula: sympy.Basic) -> str:
     """
     names = {name: known.latex for name, known in QUANTITIES.items() if known.latex}
     settings = {"order": "none", "ln_notation": True, "mul_symbol": r" \, ", "symbol_names": names}
-    latex, low = "", _Latex(settings).doprint(arrange(formula))
+    latex, low = "", _Latex(settings).doprint(_with_roots(formula))
     while latex != low:  # parentheses grow around what is tall only
         latex, low = low, _LOW_PARENTHESES.sub(r"(\1)", low)
     return latex
@@ -130,7 +165,7 @@ def to_latex(formula: sympy.Basic) -> str:
 @cache
 def to_python(formula: sympy.Basic) -> str:
     """Return an expression as SymPy reads it back."""
-    return str(_Python().doprint(with_positive_sign(formula)))
+    return str(_Python().doprint(formula))
 
 
 @cache

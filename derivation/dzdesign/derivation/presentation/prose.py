@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Collection, Iterable, Iterator
-from functools import cache
 
 import sympy
 
@@ -82,54 +81,47 @@ class Words(JsonText):
 
 Part = str | Formula | Reference | Code | Words
 
-#: Letters that are symbols wherever they stand alone, and those that are beside a sign only: elsewhere they are words.
-_LETTERS = ("k", "x", "f", "n", "Q", "S", "W", "beta", "gamma", "kappa", "lambda", "rho")
-_BESIDE_SIGNS = r"(?<=[(+−] )[ast]\b|(?<=[(−])[ast]\b|\b[ast](?=\)| [=+] )|(?<=−\d )[at]\b"
 _SIGNS = ((" - ", " − "), ("<=", "≤"), (">=", "≥"), (" -> ", " → "))
 _MINUS = re.compile(r"(?<![\w)-])-(?=[\w(])")
 _RANGE = re.compile(r"(?<=[\d)])-(?=[\d(])")
-_REFERENCE = r"\(\d+[a-z]?\)|\b[TL]\d[a-z]?\b"
-
-
-@cache
-def _pattern() -> re.Pattern[str]:
-    declared = {name.func.__name__ if name.args else name.name for name in QUANTITIES}
-    names = {name for name in declared if re.fullmatch(r"[A-Za-z]+_\w+'?|dP[01]?", name)} | set(_LETTERS)
-    alternatives = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
-    return re.compile(
-        rf"(?P<code>`[^`]+`)|(?P<reference>{_REFERENCE})"
-        rf"|(?P<name>(?<![\w`])(?:{alternatives})(?![\w'])|{_BESIDE_SIGNS})"
-    )
+_PARTS = re.compile(r"`(?P<code>[^`]+)`|\$(?P<formula>[^$]+)\$|(?P<reference>\(\d+[a-z]?\)|\b[TL]\d+[a-z]?\b)")
+_NAME = re.compile(r"[A-Za-z]\w*'?")
 
 
 def parse_prose(sentence: str, numbers: Collection[str] = ()) -> Words:
-    """Split a sentence into text, symbols and references to statements of `numbers`; its signs become those of print.
+    """Split a sentence into text, symbols between dollars, and references to statements of `numbers`.
+
+    Its signs become those of print.
 
     Examples
     --------
-    >>> [type(part).__name__ for part in parse_prose("u_min0 by (18)", ["(18)"]).parts]
+    >>> [type(part).__name__ for part in parse_prose("$u_min0$ by (18)", ["(18)"]).parts]
     ['Formula', 'str', 'Reference']
     """
-    return Words(*_parts(_with_signs(sentence), numbers))
-
-
-def _parts(sentence: str, numbers: Collection[str]) -> Iterator[Part]:
-    by_name = {str(name): name for name in QUANTITIES}
-    end = 0
-    for found in _pattern().finditer(sentence):
+    parts: list[Part] = []
+    sentence, end = _with_signs(sentence), 0
+    for found in _PARTS.finditer(sentence):
         if found["reference"] and found["reference"] not in numbers:
             continue
-        if found.start() > end:
-            yield sentence[end : found.start()]
+        parts.append(sentence[end : found.start()])
         if found["code"]:
-            yield Code(found["code"].strip("`"))
+            parts.append(Code(found["code"]))
         elif found["reference"]:
-            yield Reference(found["reference"])
+            parts.append(Reference(found["reference"]))
         else:
-            yield Formula(by_name.get(found["name"], sympy.Symbol(found["name"])))
+            parts += _symbols(found["formula"])
         end = found.end()
-    if end < len(sentence):
-        yield sentence[end:]
+    return Words(*parts, sentence[end:])
+
+
+def _symbols(formula: str) -> Iterator[Part]:
+    """Yield what stands between dollars: each name as a symbol, the rest as it is."""
+    by_name, end = {str(name): name for name in QUANTITIES}, 0
+    for found in _NAME.finditer(formula):
+        yield formula[end : found.start()]
+        yield Formula(by_name.get(found[0], sympy.Symbol(found[0])))
+        end = found.end()
+    yield formula[end:]
 
 
 def _with_signs(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Renders the account of the paper for a terminal, for machines, for LaTeX and for a browser."""
+"""Renders the account of the paper for a terminal, for machines and for a browser."""
 
 from collections.abc import Callable, Iterator, Sequence
 
@@ -12,27 +12,25 @@ from dzdesign.derivation.account.published import transcribed
 from dzdesign.derivation.account.statement import Outcome, Statement
 from dzdesign.derivation.account.symbol_units import print_unit
 from dzdesign.derivation.presentation.content import DerivationReport, Entry, Term
-from dzdesign.derivation.presentation.formulas import to_latex, to_python
-from dzdesign.derivation.presentation.html import HtmlWriter
-from dzdesign.derivation.presentation.latex import LatexWriter
+from dzdesign.derivation.presentation.formulas import to_python
 from dzdesign.derivation.presentation.prose import Formula, Words, parse_prose
-from dzdesign.derivation.presentation.text import TextWriter
 from dzdesign.derivation.presentation.wording import describe, refer
-from dzdesign.derivation.presentation.writer import write
+from dzdesign.derivation.presentation.writers import HtmlWriter, TextWriter, write
 from dzdesign.derivation.symbols import QUANTITIES
 
 _FORMATS: dict[str, Callable[[DerivationReport], str]] = {
     "text": lambda report: write(TextWriter, report),
     "json": lambda report: to_json_bytes(report).decode(),
-    "latex": lambda report: write(LatexWriter, report),
     "html": lambda report: write(HtmlWriter, report),
 }
 FORMATS = tuple(_FORMATS)
 #: Of (6), which is given and yet corrected.
 _CHOICE = (
-    "the paper's choice. Where a stop fixes x_max, it does not meet the target (16); where full command is the limit, "
-    "it meets it exactly, and the correction loses flow: T2d, T2e."
+    "the paper's choice. For a stop at every pressure drop it does not meet the target (16); where full command is the "
+    "limit, it meets it exactly, and the correction loses flow: T2d, T2e."
 )
+#: What is known of the sign of a symbol, as SymPy calls it and as the report does; the first that holds.
+_SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of either sign"}
 _COUNTED = {
     Outcome.GIVEN: "taken as given",
     Outcome.FOLLOWS: "follow",
@@ -53,9 +51,8 @@ def render(
 ) -> str:
     """Render an account, or the statements `only`, as one document in one of `FORMATS`, with a newline at its end.
 
-    ``json`` has the schema ``dzdesign.derivation/2``, ``latex`` is a document that compiles by itself, ``html`` one
-    page without scripts that needs no network. The whole account may leave out no equation of the paper. `misprints`
-    are the numbers that are not the paper's, in words.
+    ``json`` has the schema ``dzdesign.derivation/2``, ``html`` is one page without scripts that needs no network. The
+    whole account may leave out no equation of the paper. `misprints` say which numbers are not the paper's.
     """
     check_format(format)
     numbers = [verdict.number for verdict in verdicts]
@@ -132,7 +129,7 @@ def _symbols(statements: Sequence[Statement]) -> tuple[Term, ...]:
             symbol=Formula(name),
             meaning=parse_prose(QUANTITIES[name].meaning),
             unit=print_unit(name),
-            latex=to_latex(name),
+            sign=next((words for sign, words in _SIGNS.items() if getattr(name, f"is_{sign}")), ""),
         )
         for name in names
     )
@@ -141,10 +138,12 @@ def _symbols(statements: Sequence[Statement]) -> tuple[Term, ...]:
 def _of_numbers(partial: bool, misprints: Sequence[str]) -> Iterator[Words]:
     """Say whether the numbers that the paper prints were transcribed rightly."""
     if misprints:
-        yield Words(f"{len(misprints)} of the paper's numbers are not as its passages have them:")
+        yield Words(f"{len(misprints)} of the paper's numbers are not as it prints them:")
         yield from (Words(parse_prose(text), ".") for text in misprints)
     elif not partial:
-        yield Words(f"{len(transcribed())} numbers of the paper agree with the digests of their passages.")
+        yield Words(
+            f"The {len(transcribed())} numbers of the paper stand each with its section; --paper looks them up."
+        )
 
 
 def _summary(entries: Sequence[Entry], verdicts: Sequence[Verdict]) -> tuple[Words, ...]:

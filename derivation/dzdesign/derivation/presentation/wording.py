@@ -6,17 +6,14 @@ from collections.abc import Iterator, Mapping
 import sympy
 
 from dzdesign.derivation.account.proof import CaseProof, Verdict
-from dzdesign.derivation.account.rearrangement import is_rearrangement
-from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Replacements, Statement, Value
-from dzdesign.derivation.account.steps import Relation, Step
+from dzdesign.derivation.account.solving import Step
+from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Statement, Value
 from dzdesign.derivation.presentation.content import Derivation, Entry, Figure, Line, Premise
-from dzdesign.derivation.presentation.formulas import to_latex, to_text
+from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.derivation.presentation.prose import Formula, Part, Reference, Words, parse_prose
 
-_NUMBERED = re.compile(r"\(\d+[a-z]?\)|[TL]\d[a-z]?")
+_NUMBERED = re.compile(r"\(\d+[a-z]?\)|[TL]\d+[a-z]?")
 _FORMS = ("first", "second", "third", "fourth")
-#: What is known of the sign of a symbol, as SymPy calls it and as the report does; the first that holds.
-_SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of either sign"}
 
 
 def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
@@ -32,7 +29,6 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         kind=statement.kind,
         section=statement.section,
         statement=Formula(*sides),
-        latex=" = ".join(map(to_latex, sides)),
         premises=tuple(_premise(ground, book) for ground in statement.grounds),
         outcome=verdict.outcome,
         expected=statement.expected,
@@ -40,7 +36,7 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         holds=verdict.holds,
         verdict=verdict.words,
         judgement=Words.join(_sentences(verdict, book), " "),
-        rearranges=is_rearrangement(verdict, book),
+        rearranges=statement.rearranges,
         any_of=tuple(tuple(map(Formula, alternative)) for alternative in condition.any_of) if condition else (),
         ruled_out_by=tuple(Formula(*pair) for pair in condition.ruled_out_by) if condition else (),
         necessary=verdict.necessary,
@@ -56,7 +52,6 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         corrected_by=(Reference(statement.corrected_by),) if statement.corrected_by else (),
         see=tuple(refer(book[number].statement) for number in see),
         figures=tuple(_figure(value, statement, book) for value in statement.values),
-        signs=_signs(verdict, book),
         note=parse_prose(statement.note, book),
     )
 
@@ -89,13 +84,6 @@ def _formula(comparison: sympy.Basic) -> Formula:
 def _premise(ground: Ground, book: Mapping[str, Verdict]) -> Premise:
     """Refer to a ground, with what replaces its symbols."""
     return Premise(number=ground.number, at=tuple(Formula(*pair) for pair in ground.at), words=_ground(ground, book))
-
-
-def _used(ground: Ground, book: Mapping[str, Verdict]) -> Replacements:
-    """Return the replacements that change something in the ground."""
-    statement = book[ground.number].statement
-    sides = statement.symbol, statement.members[ground.member]
-    return tuple((name, value) for name, value in ground.at if name != value and any(side.has(name) for side in sides))
 
 
 def _sentences(verdict: Verdict, book: Mapping[str, Verdict]) -> Iterator[Words]:
@@ -164,19 +152,8 @@ def _correction(statement: Statement, corrected: Statement, book: Mapping[str, V
     if corrected.published == statement.published:  # the same claim, of something else
         return Line(words=Words("What holds is ", refer(corrected), ": ", parse_prose(corrected.title, book), "."))
     formula = Formula(corrected.symbol, corrected.members[-1])
-    return Line(words=Words("It should read, by ", refer(corrected), ":"), formula=formula)
-
-
-def _signs(verdict: Verdict, book: Mapping[str, Verdict]) -> dict[str, tuple[Formula, ...]]:
-    sides = [verdict.statement.symbol, *verdict.statement.members]
-    sides += [side for proof in verdict.proofs for one in proof.relations for side in (one.left, one.right)]
-    replaced = [pair for ground in verdict.statement.grounds for pair in _used(ground, book)]
-    sides += [value for _, value in (*replaced, *(pair for case in verdict.statement.cases for pair in case.at))]
-    names = sorted(set().union(*(side.free_symbols for side in sides)), key=lambda name: (name.name.lower(), name.name))
-    found: dict[str, list[Formula]] = {words: [] for words in _SIGNS.values()}
-    for name in names:
-        found[next(words for sign, words in _SIGNS.items() if getattr(name, f"is_{sign}"))].append(Formula(name))
-    return {sign: tuple(formulas) for sign, formulas in found.items() if formulas}
+    start = f"For {statement.corrected_for} it" if statement.corrected_for else "It"
+    return Line(words=Words(start, " should read, by ", refer(corrected), ":"), formula=formula)
 
 
 def _figure(value: Value, statement: Statement, book: Mapping[str, Verdict]) -> Figure:
@@ -215,13 +192,11 @@ def _derivation(proof: CaseProof, book: Mapping[str, Verdict]) -> Derivation:
     if cases:
         made = Words.join(Formula(*pair) for pair in proof.case.at)
         where = Words("Case: ", where, ", that is ", made) if where else Words("With ", made)
-    steps = tuple(_visible(proof))
-    lines = [Line(words=_step(one, before, proof, book), formula=Formula(symbol, one.result)) for before, one in steps]
-    if lines and cases and not any(proof.discrepancies) and to_text(proof.published) != to_text(steps[-1][1].result):
+    lines = [Line(words=_step(step, proof, book), formula=Formula(step.name, step.gives)) for step in proof.steps]
+    if to_text(proof.steps[-1].gives) != to_text(proof.reached) or len(proof.steps) > 1:
+        lines.append(Line(words=Words("Together:"), formula=Formula(symbol, proof.reached)))
+    if cases and not any(proof.discrepancies) and to_text(proof.published) != to_text(proof.reached):
         lines.append(Line(words=Words("In the form stated:"), formula=Formula(symbol, proof.published)))
-    if not lines:
-        at_once = Words("The premises, solved together, give:")
-        lines = [Line(words=at_once, formula=Formula(symbol, proof.derived))]
     return Derivation(
         where=where,
         derived=Formula(proof.derived),
@@ -230,36 +205,8 @@ def _derivation(proof: CaseProof, book: Mapping[str, Verdict]) -> Derivation:
     )
 
 
-def _visible(proof: CaseProof) -> Iterator[tuple[Step | None, Step]]:
-    """Yield each step with the one before, but for rearrangements that look as before."""
-    before: Step | None = None
-    for step in proof.steps:
-        if step.used or before is None or to_text(step.result) != to_text(before.result):
-            yield before, step
-        before = step
-
-
-def _step(step: Step, before: Step | None, proof: CaseProof, book: Mapping[str, Verdict]) -> Words:
-    symbol = proof.statement.symbol
-    if not step.used:
-        if before is not None and before.result.has(symbol):
-            return Words("Solve for ", Formula(symbol), ", which stands on both sides:")
-        return Words("Rearranged:")
-    relations = [next(one for one in proof.relations if one.ground == ground) for ground in step.used]
-    used = Words(_ground(step.used[0], book), *_solved(relations[0], step), ":")
-    if before is None:
-        return Words("Start from ", used)
-    if step.name != symbol:
-        return Words("Put in ", Formula(step.name, step.gives), " from ", used)
-    *others, last = [
-        Words(Formula(one.left, one.right), " from ", _ground(one.ground, book))
-        for one in relations
-        if one.left != one.right
-    ]
-    return Words("With ", Words.join(others), " and " if others else "", last, ", this is:")
-
-
-def _solved(relation: Relation, step: Step) -> tuple[Part, ...]:
-    if relation.left == step.name and relation.right == step.gives:
-        return ()
-    return ", solved for ", Formula(step.name)
+def _step(step: Step, proof: CaseProof, book: Mapping[str, Verdict]) -> Words:
+    """Say from which ground a step comes, and for what it was solved if it does not stand there."""
+    as_stated = any(one.ground == step.ground and one.left == step.name for one in proof.relations)
+    solved: tuple[Part, ...] = () if as_stated else (", solved for ", Formula(step.name))
+    return Words("From ", _ground(step.ground, book), *solved, ":")

@@ -9,9 +9,9 @@ from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.account.target_flow import TARGET, TIES
 from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.content import DerivationReport, Entry
-from dzdesign.derivation.presentation.html import HtmlWriter
 from dzdesign.derivation.presentation.prose import Words, parse_prose
 from dzdesign.derivation.presentation.report import closure, compose
+from dzdesign.derivation.presentation.writers import HtmlWriter
 
 #: All that the laws rest on: sections of the account. Of the others some take a second to import.
 STATEMENTS = (*APPROACH, *AT_REFERENCE, *OFF_REFERENCE, *TIES, *TARGET)

@@ -5,12 +5,16 @@ can't join what never holds together. One that follows on a condition must be tr
 else; one that does not follow must be false somewhere.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 import sympy
+from sympy.core.function import AppliedUndef
+from sympy.core.relational import Relational
+from sympy.logic.boolalg import Boolean
 
 from dzdesign.derivation.account.proof import Verdict, relation_of
-from dzdesign.derivation.account.referee.evaluation import NoNumberError, agree, evaluate, holds
 from dzdesign.derivation.account.referee.situations import Situation, situations
 from dzdesign.derivation.account.scope import Scope
 from dzdesign.derivation.account.statement import Ground, Statement
@@ -23,8 +27,12 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
     places = [one for one in situations() if _admits(statement, one) and _conditions_hold(verdict, statements, one)]
     if not places:
         return f"no valve is ever in its scope ({statement.scope or 'everywhere'})"
+    for name in statement.condition.for_all if statement.condition is not None else ():
+        if len({place.numbers.get(name) for place in places}) == 1:
+            return f"it is to hold for every {name}, and its scope ({statement.scope}) leaves one value"
     free, silent = _left_free(statement.scope), set(statement.grounds)
     tried, is_refuted, is_met, is_general = False, False, False, False
+    unmet: dict[tuple[float, ...], str] = {}
     for place in places:
         objection = _ground_objection(statement, statements, place, silent)
         if objection:
@@ -39,6 +47,9 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
         if wrong and verdict.holds and meets:
             return f"{wrong}: {place.words}"
         is_refuted = is_refuted or bool(wrong)
+        if not meets:
+            alike = _alike(statement, place)
+            unmet[alike] = "" if wrong else unmet.get(alike, place.words)
     if not tried:
         return f"no situation of its scope ({statement.scope or 'everywhere'}) has numbers for its symbols"
     if silent:
@@ -48,6 +59,9 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
     if not is_general:
         names = " and ".join(sorted(map(str, free)))
         return f"its scope ({statement.scope or 'everywhere'}) leaves only special values of {names}, and says none"
+    true_without = next(filter(None, unmet.values()), "")
+    if true_without:
+        return f"it is true without its condition: {true_without}"
     if not is_refuted and (statement.condition is not None or not verdict.holds):
         return "it is true of every valve, also where it should not follow"
     return ""
@@ -85,6 +99,16 @@ def _meets(statement: Statement, place: Situation) -> bool:
     return any(all(holds(equation, place) for equation in alternative) for alternative in condition.any_of)
 
 
+def _alike(statement: Statement, place: Situation) -> tuple[float, ...]:
+    """Return the numbers that a condition is about: places are alike where only what it is to hold for differs."""
+    condition = statement.condition
+    if condition is None:
+        return ()
+    asked = {name for alternative in condition.any_of for one in alternative for name in one.free_symbols}
+    names = (condition.discrepancy.free_symbols | asked) - set(condition.for_all)
+    return tuple(place.numbers[name] for name in sorted(names, key=str) if name in place.numbers)
+
+
 def _ground_objection(
     statement: Statement, statements: Mapping[str, Statement], place: Situation, silent: set[Ground]
 ) -> str:
@@ -111,3 +135,76 @@ def _difference(statement: Statement, place: Situation) -> str:
     if statement.positive_if is not None and (left > 1e-9) != holds(statement.positive_if, place):
         return f"{sympy.sstr(statement.symbol)} is {left:.6g}, but {statement.positive_if} says otherwise"
     return ""
+
+
+# --- numbers in expressions and comparisons -----------------------------------------------------------------
+
+#: Equal up to this, of numbers near 1; sensitivities are difference quotients.
+_TOLERANCE = 1e-7
+
+
+class NoNumberError(Exception):
+    """A situation has no number for a symbol, or a formula has none at its numbers."""
+
+
+def agree(left: float, right: float) -> bool:
+    """Return whether two numbers are one, to the rounding of doubles through a formula."""
+    return math.isclose(left, right, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE)
+
+
+def evaluate(expression: sympy.Expr, situation: Situation) -> float:
+    """Return an expression's number in a situation.
+
+    Raises
+    ------
+    NoNumberError
+        If there is none: the situation says nothing of it.
+    """
+    compiled, names = _compiled(expression)
+    try:
+        value = compiled(*(_number(name, situation) for name in names))
+    except (ZeroDivisionError, ValueError, OverflowError) as error:
+        raise NoNumberError(f"{expression}: {error}") from error
+    if value is None or isinstance(value, complex) or not math.isfinite(value):
+        raise NoNumberError(f"{expression} has no value")
+    return float(value)
+
+
+def holds(condition: Boolean, situation: Situation) -> bool:
+    """Whether a comparison, or several joined by and, or, not, holds in a situation."""
+    if condition in (sympy.true, sympy.false):
+        return bool(condition)
+    if isinstance(condition, sympy.And):
+        return all(holds(one, situation) for one in condition.args)
+    if isinstance(condition, sympy.Or):
+        return any(holds(one, situation) for one in condition.args)
+    if isinstance(condition, sympy.Not):
+        return not holds(condition.args[0], situation)
+    if not isinstance(condition, Relational):
+        raise TypeError(f"{condition} is no comparison")
+    left, right = evaluate(condition.lhs, situation), evaluate(condition.rhs, situation)
+    if isinstance(condition, sympy.Eq | sympy.Ne):
+        return agree(left, right) == isinstance(condition, sympy.Eq)
+    if agree(left, right):
+        return condition.rel_op in ("<=", ">=")
+    return (left < right) == (condition.rel_op in ("<", "<="))
+
+
+def _number(name: sympy.Expr, situation: Situation) -> float:
+    if isinstance(name, AppliedUndef):
+        if name.func not in situation.functions:
+            raise NoNumberError(f"{name} has no number")
+        return situation.functions[name.func](evaluate(name.args[0], situation))
+    if name not in situation.numbers:
+        raise NoNumberError(f"{name} has no number")
+    return situation.numbers[name]
+
+
+@lru_cache(maxsize=16384)
+def _compiled(expression: sympy.Expr) -> tuple[Callable[..., float | None], tuple[sympy.Expr, ...]]:
+    stand_ins = {function: sympy.Dummy() for function in expression.atoms(AppliedUndef)}
+    plain = expression.xreplace(stand_ins)
+    functions = {stand_in: function for function, stand_in in stand_ins.items()}
+    arguments = sorted(plain.free_symbols, key=str)
+    names = tuple(functions.get(name, name) for name in arguments)
+    return sympy.lambdify(arguments, plain, modules="math"), names

@@ -11,9 +11,16 @@ from typing import Any
 import sympy
 
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account.referee.drawn import drawn_commands, drawn_drops, drawn_plants, drawn_valves
-from dzdesign.derivation.account.referee.plain_plant import PLANTS, PlainPlant
-from dzdesign.derivation.account.referee.valve import VALVES, PlainValve
+from dzdesign.derivation.account.referee.machines import (
+    PLANTS,
+    VALVES,
+    PlainPlant,
+    PlainValve,
+    drawn_commands,
+    drawn_drops,
+    drawn_plants,
+    drawn_valves,
+)
 from dzdesign.derivation.account.scope import (
     BARE,
     CODES_AT_PIN,
@@ -22,6 +29,7 @@ from dzdesign.derivation.account.scope import (
     FREE_BETA,
     FREE_OPENING,
     PLANT,
+    WITH_TRANSITION,
     Setting,
     under_law,
 )
@@ -29,6 +37,9 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
 
 _STEP = 1e-5  # of a difference quotient
+_JUST_ABOVE = 1 + 1e-12  # times dP0: the limit from above
+#: What a pressure drop and a command make of the command.
+_Drive = Callable[[float, float], float]
 _S = 1.5  # at which transforms are taken of the plants that are not drawn
 
 
@@ -77,13 +88,40 @@ def _of_valve(valve: PlainValve) -> Iterator[Situation]:
     for dP in _drops(valve):
         bare, compensated = _commands(valve, dP)
         for u_i in bare:
-            yield _situation(valve, dP, u_i, BARE, beta, lambda u: u)
+            yield _situation(valve, dP, u_i, BARE, beta, _straight)
         for u_i in compensated:
             for name in LAW_NAMES:
-                yield _situation(valve, dP, u_i, under_law(name), beta, partial(_drive, valve, name, dP))
+                yield _situation(valve, dP, u_i, under_law(name), beta, partial(_drive, valve, name))
+        if dP == valve.dP1:
+            yield from _with_transition(valve)
+        for u_i in compensated:
             if dP == valve.dP1:
                 for free in (0.5, 1.0, 1.25):
-                    yield _situation(valve, dP, u_i, FREE_BETA, free, partial(_scaled_drive, valve, free))
+                    yield _situation(valve, dP, u_i, FREE_BETA, free, partial(_freely_scaled_drive, valve, free))
+
+
+def _with_transition(valve: PlainValve) -> Iterator[Situation]:
+    """Zero band and transition: straight from an offset below the threshold, the closing one, to the opening law."""
+    dP, opening = valve.dP1, valve.threshold(valve.dP1) / valve.u_min0
+    band, end = valve.u_max * (0.03 + 0.001 * valve.k), valve.u_max * (0.3 + 0.01 * valve.k)
+
+    for closing in (0.875 * opening, opening):
+
+        def drives(at: float, u_i: float, offset: float = closing * valve.u_min0) -> float:
+            if u_i <= band:
+                return offset
+            top = _scaled_drive(valve, opening, max(u_i, end))
+            return top if u_i >= end else offset + (top - offset) * (u_i - band) / (end - band)
+
+        for u_i in (0.0, 0.4 * band, band, 0.7 * band + 0.3 * end, end, 0.7 * valve.u_max, valve.u_max):
+            place = _situation(valve, dP, u_i, WITH_TRANSITION, closing, drives)
+            passed = min(max((u_i - band) / (end - band), 0.0), 1.0)
+            own = {s.beta_o: opening, s.u_z: band, s.u_t: end, s.width: end - band, s.share: passed}
+            yield replace(place, numbers={**place.numbers, **own})
+
+
+def _straight(dP: float, u_i: float) -> float:
+    return u_i
 
 
 def _drive(valve: PlainValve, name: str, dP: float, u_i: float) -> float:
@@ -109,24 +147,28 @@ def _scaled_drive(valve: PlainValve, share: float, u_i: float) -> float:
     return u_i + share * (_reference_drive(valve, u_i) - u_i)
 
 
+def _freely_scaled_drive(valve: PlainValve, share: float, dP: float, u_i: float) -> float:
+    """The same, switched on above dP0."""
+    return _scaled_drive(valve, share if dP > valve.dP0 or dP == valve.dP1 else 1.0, u_i)
+
+
 def _paper_drive(valve: PlainValve, dP: float, u_i: float) -> float:
     """The paper's choice: the compensation signal of dP0, times the ratio of thresholds above dP0."""
     return _scaled_drive(valve, valve.threshold(dP) / valve.u_min0 if dP > valve.dP0 else 1.0, u_i)
 
 
-def _situation(
-    valve: PlainValve, dP: float, u_i: float, drive: Setting, beta: float, drives: Callable[[float], float]
-) -> Situation:
+def _situation(valve: PlainValve, dP: float, u_i: float, drive: Setting, beta: float, drives: _Drive) -> Situation:
     spool = FIXED_OPENING if valve.has_stop else FREE_OPENING
     # One of the drawn commands in two, and one of the others.
     at_pin = u_i == 2.0 or (valve in drawn_valves() and not valve.fall)
-    codes, u_O = CODES_AT_PIN if at_pin else CODES_OF_COMMAND, drives(u_i)
+    codes, u_O = CODES_AT_PIN if at_pin else CODES_OF_COMMAND, drives(dP, u_i)
     numbers = {
         **_constants(valve),
         **_at_drop(valve, dP),
         **_of_flow(valve, dP, u_i, u_O),
-        **_of_drive(valve, u_i, u_O, beta, drive, codes),
-        s.u_dz: _left(valve.threshold(dP), drives),
+        **_of_command(valve, u_i, u_O, beta, drive, codes),
+        **_of_drive(valve, dP, u_i, drives),
+        s.u_dz: _left(valve.threshold(dP), partial(drives, dP)),
     }
     return Situation(
         words=f"valve with {valve.name}, {drive.words}, dP = {dP:g}, u_i = {u_i:g}, beta = {beta:g}",
@@ -216,7 +258,15 @@ def _of_flow(valve: PlainValve, dP: float, u_i: float, u_O: float) -> dict[s.Nam
     }  # fmt: skip
 
 
-def _of_drive(
+def _of_drive(valve: PlainValve, dP: float, u_i: float, drives: _Drive) -> dict[s.Name, float]:
+    """What a drive gives beside this command, and on both sides of dP0."""
+    above, below = drives(valve.dP0 * _JUST_ABOVE, u_i), drives(valve.dP0, u_i)
+    step = _STEP if u_i < valve.u_max else -_STEP
+    slope = (drives(dP, u_i + step) - drives(dP, u_i)) / step
+    return {s.slope: slope, s.u_above: above, s.u_below: below, s.jump: above - below}
+
+
+def _of_command(
     valve: PlainValve, u_i: float, u_O: float, beta: float, drive: Setting, codes: Setting
 ) -> dict[s.Name, float]:
     pin = valve.V_adc * u_i / valve.u_max
@@ -228,19 +278,20 @@ def _of_drive(
             s.n_pwm: valve.n_full * u_O / valve.u_max,
         },
         **{s.V_pin: pin, s.n_i: valve.n_adc * pin / valve.V_adc},
-        s.K_c: valve.u_max / valve.n_adc * (1.25 if u_i == 0.5 else valve.K_c_share),
+        s.K_c: (valve.V_adc if codes == CODES_AT_PIN else valve.u_max)
+        / valve.n_adc
+        * (1.25 if u_i == 0.5 or (codes == CODES_AT_PIN and not valve.has_stop) else valve.K_c_share),
     }
     if u_i < 0:
         return numbers
     signal = _reference_drive(valve, u_i) - u_i
-    numbers |= {s.u_0: signal, s.u_above: u_i + beta * signal, s.u_below: u_i + signal, s.jump: (beta - 1) * signal}
-    step = 0.25
-    slope = (_reference_drive(valve, step) - _reference_drive(valve, 0.0)) / step
     per_volt = valve.n_adc / (valve.V_adc if codes == CODES_AT_PIN else valve.u_max)
-    numbers |= {s.slope: 1 + beta * (slope - 1), s.n_0: per_volt * signal}
-    if drive == BARE:
-        return numbers
-    return numbers | {s.u_no: u_O - u_i, s.n_no: per_volt * beta * signal}
+    numbers |= {s.u_0: signal, s.n_0: per_volt * signal}
+    if drive != BARE:
+        numbers[s.u_no] = u_O - u_i
+    if drive in (FREE_BETA, under_law("paper")):  # whether or not the selector takes it
+        numbers[s.n_no] = per_volt * beta * signal
+    return numbers
 
 
 def _of_plant(valve: PlainValve, plant: PlainPlant, at_s: float, dP: float) -> Situation:

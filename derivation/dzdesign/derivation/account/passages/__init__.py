@@ -1,1 +1,0 @@
-"""The numbers that the paper prints, against digests of the passages that they stand in."""
