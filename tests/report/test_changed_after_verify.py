@@ -68,7 +68,6 @@ CHANGES = {
     "a header that hides one": (lambda f: add(f, "f28335/dz_comp.h"), "f28335/dz_comp.h was added"),
     "source in the core": (lambda f: add(f, "core/more.c"), "core/more.c was added"),
     "another build": (lambda f: add(f, "Makefile"), "Makefile was added"),
-    "a build's options": (lambda f: add(f, "CMakePresets.json", "{}"), "CMakePresets.json was added"),
 }
 
 
