@@ -17,7 +17,7 @@ from dzdesign.command_line.options_file import options_from_file
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
@@ -34,7 +34,6 @@ from dzdesign.verify.closed_loop.evidence_curves import read_curves
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.tolerances import read_tolerances
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.firmware.object_code import HEADER, read_object
 from dzdesign.verify.output_evidence import OutputEvidence
 
 GOLDENS = Path(__file__).parents[2] / "tests" / "goldens"
@@ -110,7 +109,6 @@ OPTIONS = [
     for argument in arguments_of_command(name)
     if not argument.is_positional
 ]
-ELF = HEADER.pack(b"\x7fELF\x01\x01".ljust(16, b"\0"), 1, 40, 1, 0, 0, 52, 0, 52, 0, 0, 40, 2, 1)
 TARGETS = {
     "text": Target(
         run=_text, seeds=lambda: [CSV, CSV.replace(b",", b".").replace(b";", b","), gzip.compress(CSV, mtime=0)]
@@ -134,9 +132,6 @@ TARGETS = {
     "lot-table": Target(run=lambda data: read_table(data, TABLE), seeds=lambda: [_lot_seed()]),
     "curves": Target(
         run=_curves, seeds=lambda: [b"dp_code,drive_V\n0,1.5\n1,2.5\n"], refusals=(ValueError,)
-    ),
-    "object-code": Target(
-        run=lambda data: read_object(data), seeds=lambda: [ELF + bytes(80)], refusals=(RequirementError,)
     ),
     "options": Target(
         run=_stored(lambda path: options_from_file(str(path), OPTIONS), "options.toml"),

@@ -3,7 +3,7 @@
 This is here and not in verify, which shares no code with what it checks: this one check asks the generator itself.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,19 +22,14 @@ if TYPE_CHECKING:
     Manifest = FirmwareManifest | OutputManifest
 
 
-def regenerated(folder: Path, include: Sequence[Path] = ()) -> "Check":
-    """Tell whether every file is what `codegen` makes of compensator.json, but for what is the user's.
-
-    Of a project file that is the folder of C2000Ware, of a header or a linker file all but what changes generated C. In
-    `include` lie headers that those of the user include.
+def regenerated(folder: Path) -> "Check":
+    """Tell whether every file is what `codegen` makes of compensator.json, but for those that the user fills in.
 
     It is not checked where another version of dzdesign generated the firmware, or one with other targets: then nothing
-    tells an edited file from a generated one, so the firmware does not hold. Nor is it where the user's headers can't
-    be compiled.
+    tells an edited file from a generated one, so the firmware does not hold.
     """
     from dzdesign.codegen.project import TARGET_NAMES
     from dzdesign.verify.firmware.folder import read_firmware_manifest
-    from dzdesign.verify.firmware.generated_meaning import compare_meaning
     from dzdesign.verify.requirements import REGENERATED
 
     manifest = read_firmware_manifest(folder)
@@ -48,20 +43,11 @@ def regenerated(folder: Path, include: Sequence[Path] = ()) -> "Check":
     compared = {name: digest for name, digest in expected.files.items() if name not in expected.board}
     others = [name for name in sorted(compared) if _digest(folder / name) != compared[name]]
     others += _others_in_manifest(folder, manifest, expected)
-    others += _faults_of_the_users(folder, firmware)
     if others:
         text = f"otherwise than generated now: {', '.join(others)}; make the firmware again with `dzdesign codegen`"
         return REGENERATED.check(holds=False, text=text)
-    meaning = compare_meaning(folder, manifest.target, firmware.files, frozenset(expected.board), include)
-    if meaning.not_compared:
-        return REGENERATED.check(holds=None, text=meaning.not_compared)
-    if meaning.faults:
-        text = f"{'; '.join(meaning.faults)}; headers of yours may not change generated C: correct them"
-        return REGENERATED.check(holds=False, text=text)
     same = f"the manifest and {len(compared)} other files are the same, byte for byte"
     text = f"generated again for {manifest.target}: {same}"
-    if meaning.compared:
-        text += f"; with your headers {', '.join(meaning.compared)} compile to the same code"
     return REGENERATED.check(holds=True, text=text)
 
 
@@ -142,22 +128,6 @@ def _others_in_manifest(folder: Path, manifest: "Manifest", expected: "Manifest"
     if not others and read_bytes(folder / MANIFEST_NAME, "firmware manifest") != to_json_bytes(expected):
         others.append(f"keys or spelling of {MANIFEST_NAME}")
     return others
-
-
-def _faults_of_the_users(folder: Path, firmware: "Firmware") -> list[str]:
-    """Return what stands in files of the user's that is not the user's to change."""
-    from dzdesign.verify.firmware.project_file import WARE_VARIABLE, is_project, project_faults
-    from dzdesign.verify.firmware.unchanged_files import user_files
-    from dzdesign.verify.firmware.user_code import interference
-
-    board = firmware.manifest.board
-    found = [
-        f"{name}, in which {WARE_VARIABLE} alone is yours: {fault}"
-        for name in filter(is_project, board)
-        for fault in project_faults(folder / name, firmware.files[name], folder)
-    ]
-    theirs = [*board, *user_files(folder, firmware.manifest)]
-    return found + list(interference(folder, theirs, firmware.files, frozenset(board)))
 
 
 def not_generated_here(manifest: "Manifest", known: Collection[str]) -> str:

@@ -10,12 +10,8 @@ from dzdesign.command_line.cli import main
 from dzdesign.regeneration import regenerated
 from dzdesign.verify import verification
 from dzdesign.verify.closed_loop.loop import RampSequence
-from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.firmware.unchanged_files import files_unchanged
 from dzdesign.verify.requirements import REGENERATED
-from dzdesign.verify.untried import not_tried
 from tests.support.attacked_firmware import edit, seal
-from tests.support.evidence import read_evidence
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -45,58 +41,6 @@ def test_a_file_edited_together_with_its_hash_is_found(firmware_folder, name, ol
     seal(firmware_folder)
     check = regenerated(firmware_folder)
     assert check.holds is False and check.text.startswith(f"otherwise than generated now: {name}, files of manifest")
-
-
-#: Faults in the C that no run on the host shows: file, what stands there, what stands there instead.
-HIDDEN_FAULTS = {
-    "a count of calls": (
-        "core/dz_comp.c",
-        "uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)\n{\n",
-        "uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)\n{\n    static uint32_t calls;\n"
-        "    if (++calls > UINT32_C(2000000000)) {\n        return 0u;\n    }\n",
-    ),
-    "a variable from elsewhere": (
-        "core/dz_drive.c",
-        "    uint32_t compare = drive->law",
-        "    extern uint32_t elsewhere;\n    uint32_t compare = drive->law + elsewhere",
-    ),
-    "a condition on the compiler": ("core/dz_comp.c", "#include", "#ifdef __TMS320C28XX__\n#endif\n#include"),
-    "a condition behind a comment": ("core/dz_drive.c", "#include", "/* */ #if __INT_MAX__ < 40000\n#endif\n#include"),
-    "a condition in digraphs": ("core/dz_comp.c", "#include", "%:if 1\n%:endif\n#include"),
-    "a size of the compiler's": ("core/dz_drive.h", "#endif", "typedef char dz_size[sizeof(int)];\n#endif"),
-    "a pragma": ("core/dz_comp.c", "#include", "#pragma inline\n#include"),
-    "another header": ("core/dz_comp.c", "#include", "#include <limits.h>\n#include"),
-    "a macro over a function": ("core/dz_drive.h", "#endif", "#define dz_comp(u, a, b) 0u\n#endif"),
-}
-
-
-@pytest.mark.parametrize("fault", HIDDEN_FAULTS)
-def test_what_no_run_on_the_host_shows_is_found_by_the_hashes_or_by_generating_again(firmware_folder, fault):
-    """By the manifest's hash; where that was forged too, by what codegen makes; of another version: not checked."""
-    name, old, new = HIDDEN_FAULTS[fault]
-    edit(firmware_folder, name, old, new)
-    unchanged = files_unchanged(firmware_folder, read_firmware_manifest(firmware_folder))
-    assert unchanged.holds is False and name in unchanged.text
-    seal(firmware_folder)
-    assert files_unchanged(firmware_folder, read_firmware_manifest(firmware_folder)).holds
-    check = regenerated(firmware_folder)
-    assert check.holds is False and name in check.text
-    seal(firmware_folder, lambda manifest: manifest["tool"].update(version="0.0.9"))
-    assert regenerated(firmware_folder).holds is None
-
-
-@pytest.mark.parametrize("name", ["core/another.c", "core/another.h", "f28335/another.c", "f28335/dz_comp.h"])
-def test_a_file_that_codegen_does_not_make_is_found_though_the_manifest_lists_it(firmware_folder, name):
-    (firmware_folder / name).write_text("int another;\n")
-    assert files_unchanged(firmware_folder, read_firmware_manifest(firmware_folder)).holds is False
-
-    def list_it(manifest):
-        manifest["files"][name] = "0" * 64
-        manifest["core"] += [name] * name.startswith("core/")
-
-    seal(firmware_folder, list_it)
-    check = regenerated(firmware_folder)
-    assert check.holds is False and "files of manifest.json" in check.text
 
 
 @pytest.mark.parametrize(
@@ -170,23 +114,6 @@ def test_a_version_of_any_length_and_any_characters_fits_a_message(firmware_fold
     seal(firmware_folder, lambda manifest: manifest["tool"].update(version="9" * 10_000 + "\x1b[2J\n"))
     text = regenerated(firmware_folder).text
     assert len(text) < 300 and text.isprintable()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("origin", UNKNOWN_ORIGINS)
-@pytest.mark.usefixtures("each_core_once")
-def test_an_edit_does_not_hide_behind_an_unknown_origin(firmware_folder, tmp_path, monkeypatch, capsys, origin):
-    monkeypatch.setattr(verification, "verify", partial(verification.verify, sequence=QUICK))
-    always_60000(firmware_folder)
-    seal(firmware_folder, lambda manifest: UNKNOWN_ORIGINS[origin][0](manifest, firmware_folder))
-    assert main(["verify", str(firmware_folder), "-o", str(tmp_path / "evidence"), "--run-changed"]) == 1
-    out = capsys.readouterr().out
-    (line,) = [line for line in out.splitlines() if REGENERATED.title in line and line.startswith("NOT CHECKED  ")]
-    assert UNKNOWN_ORIGINS[origin][1] in line
-    evidence = read_evidence(tmp_path / "evidence")
-    assert evidence.holds is False and not any(line.startswith(REGENERATED.title) for line in not_tried(evidence))
-    html = (tmp_path / "evidence/report.html").read_text(encoding="utf-8")
-    assert 'class="verdict good"' not in html
 
 
 @pytest.mark.slow

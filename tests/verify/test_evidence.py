@@ -8,14 +8,12 @@ import pytest
 
 from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import Tool, to_json_bytes
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.verify import requirements
-from dzdesign.verify.contradictions import contradictions
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.firmware.folder import read_compensator
-from dzdesign.verify.requirements import ALWAYS, AS_STATED, FROM_INPUTS, OPTIONAL, RAMPS, Requirement
+from dzdesign.verify.requirements import ALWAYS, AS_STATED, OPTIONAL, RAMPS, Requirement
 from dzdesign.verify.untried import not_tried, untried_requirements
 from tests.support.evidence import EVIDENCE, read_evidence
 from tests.support.synthetic import needs_compiler
@@ -38,27 +36,11 @@ def test_every_check_of_a_firmware_is_of_a_declared_requirement(reported_demo):
     assert {each.id for each in ALWAYS} <= {check.id for check in found.checks} and found.all_checks == found.checks
 
 
-def test_a_check_that_stands_twice_or_that_nobody_knows_adds_nothing_to_what_was_tried():
-    (first, *rest) = [each for each in EVIDENCE.checks if each.id not in {one.id for one in FROM_INPUTS}]
-    plain = replace(EVIDENCE, checks=(first, *rest))
-    assert contradictions(plain, None) == ()
-    for added in (first, replace(first, id="safe", name="certified")):
-        assert added in contradictions(plain.with_checks(added), None)
-    other = replace(plain, tool=Tool(name="dzdesign", version="0.0.9"))  # it may have had requirements of its own
-    assert contradictions(other.with_checks(replace(first, id="safe", name="certified")), None) == ()
-
-
 @needs_compiler
-def test_findings_that_are_not_required_follow_from_the_scenarios(reported_demo):
-    found, compensator = read_evidence(reported_demo / "evidence"), read_compensator(reported_demo / "firmware")
-    assert contradictions(found, compensator) == ()
-    place = [check.id for check in found.checks].index(requirements.ZERO_FLOW_AFTER_SCENARIOS.id)
-    stated = found.checks[place].not_required
-    assert len(stated) == 2
-    for at, forged in ((place, ()), (place, ("nothing flows", stated[1])), (0, ("nothing flows",))):
-        checks = list(found.checks)
-        checks[at] = replace(checks[at], not_required=forged)
-        assert contradictions(replace(found, checks=tuple(checks)), compensator) == (checks[at],)
+def test_findings_that_are_not_required_stand_beside_the_scenarios_alone(reported_demo):
+    found = read_evidence(reported_demo / "evidence")
+    counts = {check.id: len(check.not_required) for check in found.checks if check.not_required}
+    assert counts == {requirements.ZERO_FLOW_AFTER_SCENARIOS.id: 2}
 
 
 def test_of_a_lot_setting_the_recordings_of_one_valve_leave_the_others_as_stated():

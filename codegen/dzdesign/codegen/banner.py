@@ -83,14 +83,8 @@ def banner_of(compensator: Compensator, digest: str) -> Banner:
 def board_lines(template: str) -> tuple[str, ...]:
     """Return the first lines of a file that its user fills in.
 
-    Nothing in them, such as a hash, grows old where the file is kept through the next generation. In a project file one
-    value is the user's.
+    Nothing in them, such as a hash, grows old where the file is kept through the next generation.
     """
-    if template.endswith(".projectspec.jinja"):
-        return (
-            f"Written by dzdesign {__version__} from template {template}. Yours to edit is C2000WARE_ROOT alone:",
-            "`dzdesign codegen` keeps it, and `dzdesign verify` fails where anything else here is not as generated.",
-        )
     return (
         f"Written by dzdesign {__version__} from template {template}. Yours to edit: `dzdesign codegen` keeps what",
         "you change here, and `dzdesign verify` names this file as yours and does not check it.",

@@ -195,7 +195,7 @@ def _verify_code(
         with stage_progress("comparing every input with each of the calibration blocks"):
             added += blocks_checked(folder, blocks, code)
     more, mutants = _further_checks(arguments, code, verification)
-    verification = verification.with_checks(regenerated(folder, include), *added, *more)
+    verification = verification.with_checks(regenerated(folder), *added, *more)
     if mutants:
         verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
     if arguments.output is not None:

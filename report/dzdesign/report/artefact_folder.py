@@ -10,7 +10,6 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.report.lot.valve_folder import ValveManifest
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.firmware.build_inputs import BUILD_FILES
 from dzdesign.verify.firmware.unchanged_files import added_files
 
 VERIFICATION_NAME = Evidence.FILE_NAME
@@ -126,7 +125,7 @@ def _added_in(place: Path, manifest: bytes | None) -> list[str]:
 
 def is_document(leaf: str) -> bool:
     """Tell whether a file that no manifest lists was read as an artefact or a table, and not as what a build reads."""
-    return "/" not in leaf and leaf.endswith((".json", ".csv")) and leaf.lower() not in BUILD_FILES
+    return "/" not in leaf and leaf.endswith((".json", ".csv"))
 
 
 def is_of(content: bytes, schema: str) -> bool:

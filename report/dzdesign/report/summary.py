@@ -18,7 +18,6 @@ from dzdesign.report.measured_figures import measured_figures, with_span
 from dzdesign.report.page import Figure, Headline, misfit
 from dzdesign.report.sections.cells import counted, whole
 from dzdesign.report.unrequired_flow import unrequired_flow
-from dzdesign.verify.contradictions import contradictions
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.loop_results import PressureResult
 from dzdesign.verify.requirements import Check
@@ -65,10 +64,6 @@ def _verdict(chain: Chain) -> Headline:
                             reasons=reasons)  # fmt: skip
         what = "a design" if chain.compensator else "an identified valve"
         return Headline(kind="open", text=f"NOT VERIFIED: there is no evidence here, only {what}")
-    if others := contradictions(evidence, chain.compensator):
-        reasons = tuple(f"{check.name}: {check.text}" for check in others)
-        text = "THE EVIDENCE CONTRADICTS ITSELF: what it says to hold does not follow from its figures"
-        return Headline(kind="bad", text=text, reasons=reasons)
     judged = _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
     if judged.kind != "good":
         return judged

@@ -8,7 +8,6 @@ import pytest
 
 from dzdesign.core.errors import InputError
 from dzdesign.verify.firmware.folder import check_firmware_inside, read_firmware_manifest
-from dzdesign.verify.firmware.user_code import interference
 from tests.support.attacked_firmware import add
 
 
@@ -69,13 +68,6 @@ def test_a_file_larger_than_any_of_dzdesign_is_refused_before_it_is_read(firmwar
     enlarge(folder / name, 1 << 29)
     with pytest.raises(InputError, match=f"{name}.* is larger than 16 MiB"):
         read_firmware_manifest(folder)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="such a file takes room there")
-def test_a_huge_file_of_the_users_is_refused_before_it_is_read(tmp_path):
-    enlarge(tmp_path / "more.cmd")
-    with pytest.raises(InputError, match=r"more.cmd.* is larger than 16 MiB"):
-        list(interference(tmp_path, ["more.cmd"], {}, frozenset()))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="such a file takes room there")

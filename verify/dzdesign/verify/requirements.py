@@ -157,11 +157,6 @@ CURRENT_FAULTS = Requirement(
 CURRENT_VALVE = Requirement(
     id="current-valve", title="the valve opens at the same command with any coil and supply"
 )
-#: What follows from the figures that stand beside the checks: of every input, and of the closed loop.
-FROM_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK)
-FROM_LOOP = (PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, NATIVE_PLANT)
-#: Names of all of them: of another one nobody knows what it requires.
-KNOWN_IDS = frozenset(each.id for each in tuple(globals().values()) if isinstance(each, Requirement))
 #: What every `verify` checks, in the order of the report.
 ALWAYS = (
     FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK, DRIVE,

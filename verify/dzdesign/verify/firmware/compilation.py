@@ -10,7 +10,6 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.processes.programs import find_program
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
-from dzdesign.verify.firmware.project_file import is_project
 from dzdesign.verify.firmware.unchanged_files import USER_FOLDER, changed_files, user_files
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.host_compiler import (
@@ -49,12 +48,8 @@ def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
 
 
 def changed_board_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
-    """Return the files of the target that the user fills in and that are no longer as generated.
-
-    The project file is none of them: nothing in it goes unchecked.
-    """
-    changed = (name for name in changed_files(folder, manifest) if name in manifest.board)
-    return sorted(name for name in changed if not is_project(name))
+    """Return the files of the target that the user fills in and that are no longer as generated."""
+    return sorted(name for name in changed_files(folder, manifest) if name in manifest.board)
 
 
 def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:

@@ -6,54 +6,43 @@ from dzdesign.core.errors import and_more
 from dzdesign.core.folder_contents import digest_of
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
-from dzdesign.verify.firmware.build_inputs import is_built, is_source, is_taken_for, is_written_by_cmake
-from dzdesign.verify.firmware.project_file import is_project
 from dzdesign.verify.requirements import Check
 
 #: User's files that a sentence names.
 MOST_NAMED = 5
 #: Folder of a firmware for files of the user's own, beside those that were generated.
 USER_FOLDER = "board"
+#: Endings of C, C++, assembly, libraries, linker files, scripts and projects: what a build of the target takes.
+SOURCES = {
+    ".c", ".h", ".cc", ".cpp", ".cxx", ".hh", ".hpp", ".hxx", ".inc", ".inl", ".s", ".asm", ".cla", ".lib", ".a",
+    ".ld", ".lds", ".lcf", ".icf", ".sct", ".cmd", ".def", ".mk", ".cmake", ".ninja", ".bat", ".props", ".targets",
+    ".projectspec", ".ccxml", ".gel", ".syscfg", ".ioc", ".uvprojx", ".ewp", ".vcxproj",
+}  # fmt: skip
+BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", ".project", ".cproject", ".ccsproject"}
 
 
 def files_unchanged(folder: Path, manifest: FirmwareManifest) -> Check:
     """Tell which generated files differ from the manifest: what is checked must be what was generated."""
     differing = changed_files(folder, manifest)
-    filled_in = [name for name in differing if name in manifest.board and not is_project(name)]
-    projects = [name for name in differing if name in manifest.board and is_project(name)]
-    added, user = added_files(folder, manifest), user_files(folder, manifest)
-    built = _cmake_trees(folder, manifest)
-    if fault := _fault(manifest, [name for name in differing if name not in manifest.board], added, user):
+    filled_in = [name for name in differing if name in manifest.board]
+    user = user_files(folder, manifest)
+    if fault := _fault(folder, manifest, [name for name in differing if name not in manifest.board]):
         return requirements.FILES.check(holds=False, text=fault)
-    text = f"{len(manifest.files) - len(filled_in) - len(projects)} files compared"
-    if projects:
-        text += f"; you changed {', '.join(projects)}, whose generated parts are compared with a new generation"
+    text = f"{len(manifest.files) - len(filled_in)} files compared"
     if filled_in:
         text += f"; you changed these files, which are not checked: {', '.join(filled_in)}"
     if user:
         text += f"; your files in {USER_FOLDER}/ are not checked: {and_more(user, MOST_NAMED)}"
-    if objects := _objects(folder, manifest, built):
-        text += f"; object files are not checked, so build them again: {and_more(objects, MOST_NAMED)}"
-    if built:
-        text += f"; CMake's build folders are not checked: {', '.join(sorted(tree.name for tree in built))}"
     return requirements.FILES.check(holds=True, text=text)
 
 
-def _fault(manifest: FirmwareManifest, changed: list[str], added: list[str], user: list[str]) -> str:
+def _fault(folder: Path, manifest: FirmwareManifest, changed: list[str]) -> str:
     """Return the first fault in words, or an empty text."""
-    claimed = [name for name in sorted(manifest.board) if not _may_be_filled_in(name, manifest)]
-    if claimed:
-        return f"the manifest lists {', '.join(claimed)} as board files of the user, but no target has such a file"
     if changed:
         return f"changed or missing: {', '.join(changed)}"
-    if foreign := [name for name in added if _is_core(name)]:
-        place = f"core/ holds only generated files; move your own files to {USER_FOLDER}/"
-        return f"{', '.join(foreign)}: not generated, but {place}"
-    unlisted = [name for name in manifest.files if _is_core(name) and name not in manifest.core]
-    if unlisted or not manifest.core:
-        return f"the manifest does not name {', '.join(unlisted) or 'any file of the core'}"
-    generated = _names(manifest)
-    if shadows := [name for name in added if is_taken_for(PurePosixPath(name).name, generated)]:
+    added, user = added_files(folder, manifest), user_files(folder, manifest)
+    generated = {PurePosixPath(name).name.casefold() for name in manifest.files}
+    if shadows := [name for name in added if PurePosixPath(name).name.casefold() in generated]:
         return (
             f"{', '.join(shadows)}: not generated, but a compiler may take it for the generated file of the same name; "
             "rename it"
@@ -80,48 +69,18 @@ def differing_files(folder: Path, manifest: FirmwareManifest) -> dict[str, str]:
 
 
 def added_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
-    """Return the files that were not generated and that a build may read, but for what CMake writes where it builds."""
-    built, generated = _cmake_trees(folder, manifest), _names(manifest)
-    found = [
-        path
-        for path in sorted(folder.rglob("*"))
-        if (is_source(path) or is_taken_for(path.name, generated))
-        and not (is_written_by_cmake(path) and built.intersection(path.parents))
-    ]
-    names = [path.relative_to(folder).as_posix() for path in found]
-    return [name for name in names if name not in manifest.files]
+    """Return the source and project files that were not generated, but for those in folders that CMake builds in."""
+    ours = {parent for name in manifest.files for parent in (folder / name).parents}
+    built = {path.parent for path in folder.rglob("CMakeCache.txt")} - ours
+    found = [path for path in sorted(folder.rglob("*")) if _is_source(path) and not built.intersection(path.parents)]
+    return [name for name in (path.relative_to(folder).as_posix() for path in found) if name not in manifest.files]
 
 
 def user_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
     """Return the files of the user's own: those in the folder kept for them, in which nothing is generated."""
-    found = [path for path in sorted((folder / USER_FOLDER).rglob("*")) if is_source(path)]
-    names = [path.relative_to(folder).as_posix() for path in found]
-    return [name for name in names if name not in manifest.files]
+    return [name for name in added_files(folder, manifest) if name.startswith(f"{USER_FOLDER}/")]
 
 
-def _names(manifest: FirmwareManifest) -> set[str]:
-    """Return the names of the generated files without their folders, in lower case."""
-    return {PurePosixPath(name).name.casefold() for name in manifest.files}
-
-
-def _objects(folder: Path, manifest: FirmwareManifest, trees: set[Path]) -> list[str]:
-    """Return what a build has left outside of the folders that CMake builds in: make keeps it where it is newer."""
-    found = [path for path in sorted(folder.rglob("*")) if is_built(path) and not trees.intersection(path.parents)]
-    return [name for name in (path.relative_to(folder).as_posix() for path in found) if name not in manifest.files]
-
-
-def _is_core(name: str) -> bool:
-    path = PurePosixPath(name)
-    return path.parent.as_posix() == "core" and path.suffix in (".c", ".h")
-
-
-def _may_be_filled_in(name: str, manifest: FirmwareManifest) -> bool:
-    """Tell whether a file can be its user's: listed, and in a target's folder, not of the core."""
-    folder, slash, _ = name.partition("/")
-    return bool(slash) and folder != "core" and name in manifest.files and name not in manifest.core
-
-
-def _cmake_trees(folder: Path, manifest: FirmwareManifest) -> set[Path]:
-    """Return the folders in which CMake has built, with makefiles and C of its own, and in which nothing is ours."""
-    ours = {parent for name in manifest.files for parent in (folder / name).parents}
-    return {path.parent for path in folder.rglob("CMakeCache.txt")} - ours - {folder}
+def _is_source(path: Path) -> bool:
+    name = path.name.casefold()
+    return path.is_file() and (PurePosixPath(name).suffix in SOURCES or name in BUILD_FILES)
