@@ -237,7 +237,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
             if worst.zero_flow_L_min is None
             else f"; {at_zero.zero_flow_in_words(units)}"
         )
-        + f"; {at_zero.between_in_words(worst.guard)}"
+        + f"; {at_zero.between_in_words(worst.guard).removeprefix('between the tests: ')}"
         + _premise(compensator),
     )
 

@@ -139,7 +139,7 @@ def test_an_overload_at_the_top_of_a_ramp_is_said(tmp_path):
     lines = [line.rpartition(",")[0] + ",OL" if row - 1 in top else line for row, line in enumerate(text)]
     (tmp_path / "ramp.csv").write_text("\n".join(lines))
     codes = {warning.code: warning.text for warning in identify([read_ramp_file(tmp_path / "ramp.csv")]).warnings}
-    assert f"OL in {len(top)} rows of 'Q_Lmin'" in codes["missing-samples"] and "not-full-command" in codes
+    assert f"OL in {len(top)} rows of 'Q_Lmin'" in codes["missing-samples"] and "flow-clipped" in codes
 
 
 @pytest.mark.parametrize(("text", "declared"), [("Sensor off", "sensor off"), ("-500", "-500.0")])

@@ -31,8 +31,8 @@ AT_REST, AT_TOP, SMALL_FLOW = 0.05, 0.9, 0.1
 #: other is that of a shut valve.
 OPEN_AT_REST, SHUT = 0.5, 0.2
 #: A command that goes back to this share of the largest lets the flow fall; what then falls by no more than this share
-#: of its span, and has one of so many times the noise, is a total.
-BACK, NEVER, TOTAL_NOISES = 0.1, 0.02, 20.0
+#: of its span, and has one of so many times the noise, is a total; rows for which the command is back.
+BACK, NEVER, TOTAL_NOISES, ROWS_BACK = 0.1, 0.02, 20.0, 10
 #: So far below the lowest command of a ramp, over u_max, a knee may lie: it is extrapolated, and a warning says so.
 EXTRAPOLATED = 0.1
 
@@ -140,9 +140,13 @@ def refuse_an_open_valve(test: RampTest, u_max: float) -> None:
 
 
 def refuse_a_total(test: RampTest) -> None:
-    """Refuse what rises as long as oil flows and never falls: a volume, pulses, or the position of a cylinder."""
-    after = int(np.argmax(test.u))
-    if test.u[after:].min() > BACK * test.u[after]:
+    """Refuse what rises as long as oil flows and never falls: a volume, pulses, or the position of a cylinder.
+
+    Only a command that rises and goes back, and stays there for some rows, tells it from the flow of a single branch.
+    """
+    top = int(np.argmax(test.u))
+    low = test.u <= BACK * test.u[top]
+    if min(np.count_nonzero(low[:top]), np.count_nonzero(low[top:])) < ROWS_BACK:
         return
     least = max(TOTAL_NOISES * robust_sigma(np.diff(test.q)), 0.01 * L_MIN)
     for q in (test.q, -test.q):
