@@ -160,6 +160,8 @@ CLOCKS = {
         write=one(lambda bench: another_time(bench, 0.0, "cpu_time_s", 0.3)), options=("--columns", "time=time_s")
     ),
     "csv-times-from-another-zero": Form(write=one(lambda bench: another_time(bench, 0.0, "uptime_s", zero=5e3))),
+    "csv-times-and-temperature": Form(write=one(lambda bench: another_time(bench, 0.0, "T_oil_degC", 0.01, zero=40.0))),
+    "csv-times-and-count": Form(write=one(lambda bench: another_time(bench, 0.0, "t", forms.RATE_HZ))),
     "csv-times-rounded": Form(write=one(lambda bench: another_time(bench, 0.0, "elapsed_s", zero=0.002))),
     "csv-column-shorter": Form(write=one(lambda bench: ended_early(bench, 0.995)), refused=("r1_0.csv", "Q_Lmin")),
     "csv-column-much-shorter": Form(write=one(lambda bench: ended_early(bench, 0.8)), refused=("r1_0.csv", "Q_Lmin")),
@@ -277,6 +279,14 @@ FLOWS = {
             }
         ),
         refused=("pA [bara]", "pB [barg]"),
+    ),
+    # Such a bound is too high by what the warning says: its zero error was below zero, and lost its sign.
+    "flow-without-its-sign": Form(
+        write=one(with_column("Q_Lmin", lambda bench: np.abs(bench.q - 0.4))), codes=("zero-hidden",), shift=0.27,
+        near=0.16,
+    ),
+    "zero-with-its-sign": Form(
+        write=one(with_column("Q_Lmin", lambda bench: np.abs(bench.q + 0.4))), never=("zero-hidden",)
     ),
     "command-late": Form(
         write=one(

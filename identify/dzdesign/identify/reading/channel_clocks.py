@@ -29,6 +29,8 @@ from dzdesign.identify.reading.time_stamps import DAY, Start, start_of
 SAME = 1e-3
 #: Two times of one row are one where their usual difference is within this share of a step: the last digit of one.
 ROUNDED = 0.1
+#: A column that may be a time or not is one if it goes as far, within this share.
+ALIKE_SPANS = 0.1
 #: Over a pause of more than so many of its own usual steps a channel has no reading.
 PAUSE = 3.0
 #: Rows at the end in which a column may be blank beside others: the last one was written in part.
@@ -206,6 +208,8 @@ def _refuse_another_time(table: Table, found: Mapping[str, Column], reference: C
         both = np.isfinite(its) & np.isfinite(reference.seconds)
         its, ours = its[both], reference.seconds[both]
         rises = its.size > 1 and np.all(np.diff(its) > 0) and its[0] <= ours[-1] and its[-1] >= ours[0]
+        if not column.unit:  # it may be a temperature, or the number of the row
+            rises = rises and abs(np.ptp(its) - np.ptp(ours)) <= ALIKE_SPANS * np.ptp(ours)
         if rises and abs(float(np.median(its - ours))) > ROUNDED * reference.step:
             raise InputError(
                 f"'{table.path}' has times '{time.label}' and '{label}' that differ, by {its[0] - ours[0]:.6g} s at "
