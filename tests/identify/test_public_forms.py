@@ -156,6 +156,9 @@ CLOCKS = {
         )
         for label in ("time2_s", "sensor_time_s", "elapsed_s", "elapsed time [s]")
     },
+    "mat-times-lone-t": Form(
+        write=one(lambda bench: forms.mat(another_time(bench, 0.24, "t")), "mat"), refused=("r1_0.mat", "Q_Lmin", "'t'")
+    ),
     "csv-times-chosen": Form(
         write=one(lambda bench: another_time(bench, 0.0, "cpu_time_s", 0.3)), options=("--columns", "time=time_s")
     ),

@@ -192,7 +192,7 @@ def _refuse_another_time(table: Table, found: Mapping[str, Column], reference: C
 
     It rises from row to row, and has times in common. One from another zero, such as an uptime, tells nothing.
     """
-    time, claimed = found["time"], {clock_of(table, "", label) for label in table.labels}
+    time, claimed = found["time"], {clock_of(table, "-", label) for label in table.labels}
     claimed |= {each.clock.label for each in found.values() if each.clock} | set(time.label.split(AND))
     alone = [each.label for name, each in found.items() if name not in ("time", "u") and not each.clock]
     for label in table.labels if alone and not table.clocks else ():
