@@ -125,6 +125,13 @@ def twincat(bench: Bench) -> bytes:
     return "\n".join(lines).encode()
 
 
+def another_time(bench: Bench, late_s: float, label: str, rate: float = 1.0, zero: float = 0.0):
+    """Two times in a row, of which the second is the flow's, or another count of the first."""
+    time, q = forms.shifted(bench, late_s)
+    first = {name: values[: time.size] for name, values in plain(bench).items()}
+    return {**first, label: time * rate + zero, "Q_Lmin": q}
+
+
 CLOCKS = {
     "tdms-start-time": Form(write=one(lambda bench: forms.tdms(bench, 0.24), "tdms", repeats=3)),
     "tdms-start-early": Form(write=one(lambda bench: forms.tdms(bench, 1.5), "tdms")),
@@ -142,6 +149,23 @@ CLOCKS = {
     ),
     "csv-times-alike": Form(write=one(lambda bench: own_times(bench, 0.24, TIMES_ALIKE))),
     "csv-times-named": Form(write=one(lambda bench: own_times(bench, 0.24, TIMES_NAMED))),
+    **{
+        f"csv-times-{label}": Form(
+            write=one(lambda bench, label=label: another_time(bench, 0.24, label)),
+            refused=("r1_0.csv", "Q_Lmin", label),
+        )
+        for label in ("time2_s", "sensor_time_s", "elapsed_s", "elapsed time [s]")
+    },
+    "mat-times-lone-t": Form(
+        write=one(lambda bench: forms.mat(another_time(bench, 0.24, "t")), "mat"), refused=("r1_0.mat", "Q_Lmin", "'t'")
+    ),
+    "csv-times-chosen": Form(
+        write=one(lambda bench: another_time(bench, 0.0, "cpu_time_s", 0.3)), options=("--columns", "time=time_s")
+    ),
+    "csv-times-from-another-zero": Form(write=one(lambda bench: another_time(bench, 0.0, "uptime_s", zero=5e3))),
+    "csv-times-and-temperature": Form(write=one(lambda bench: another_time(bench, 0.0, "T_oil_degC", 0.01, zero=40.0))),
+    "csv-times-and-count": Form(write=one(lambda bench: another_time(bench, 0.0, "t", forms.RATE_HZ))),
+    "csv-times-rounded": Form(write=one(lambda bench: another_time(bench, 0.0, "elapsed_s", zero=0.002))),
     "csv-column-shorter": Form(write=one(lambda bench: ended_early(bench, 0.995)), refused=("r1_0.csv", "Q_Lmin")),
     "csv-column-much-shorter": Form(write=one(lambda bench: ended_early(bench, 0.8)), refused=("r1_0.csv", "Q_Lmin")),
     "twincat-scope": Form(
@@ -258,6 +282,14 @@ FLOWS = {
             }
         ),
         refused=("pA [bara]", "pB [barg]"),
+    ),
+    # Such a bound is too high by what the warning says: its zero error was below zero, and lost its sign.
+    "flow-without-its-sign": Form(
+        write=one(with_column("Q_Lmin", lambda bench: np.abs(bench.q - 0.4))), codes=("zero-hidden",), shift=0.27,
+        near=0.16,
+    ),
+    "zero-with-its-sign": Form(
+        write=one(with_column("Q_Lmin", lambda bench: np.abs(bench.q + 0.4))), never=("zero-hidden",)
     ),
     "command-late": Form(
         write=one(

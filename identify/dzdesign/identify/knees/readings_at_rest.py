@@ -35,6 +35,9 @@ EXPLAINED, LEAK_ERRORS = 0.5, 4.0
 HIDES_NOISE, HIDES_ALL = 0.6, 0.95
 LOW_FLOW, MIDDLE_FLOW, FEWEST_AT_FLOW = (0.02, 0.1), (0.3, 0.6), 40
 NOISE_OVER_STEP, NOISE_OVER_FLOW, NOISE_OVER_MIDDLE = 0.5, 2e-4, 0.2
+#: Readings below this share of those at rest, and by so many standard deviations, of which so many follow each other
+#: and differ, are of a flow that was below zero and lost its sign.
+DIP, DIP_SIGMAS, FEWEST_DIPS = 0.6, 3.0, 2
 #: Share of the readings up to twice a meter's floor that may lie below so much of it: with more it hides none.
 BELOW_FLOOR, OF_FLOOR = 0.1, 0.75
 #: Zero error of a meter that may stay hidden: 0.5 % of a range of ten times the largest flow, as data sheets have it.
@@ -261,8 +264,8 @@ def hidden_zero(tests: Sequence[RampTest], floor: float, options: IdentifyOption
     """Return the largest zero error, m³/s, that readings at rest hide because the meter writes none below zero.
 
     At rest they are one number though the meter scatters where oil flows, so an error below zero does not show; it puts
-    every knee too high. 0 where they tell the zero, where it was declared, and where a floor hides them: the level at
-    which flow counts is above that.
+    every knee too high. So does one that lost its sign, whose readings fall before they rise. 0 where they tell the
+    zero, where it was declared, and where a floor hides them: the level at which flow counts is above that.
     """
     if options.meter_zero > 0:
         return 0.0
@@ -275,6 +278,8 @@ def hidden_zero(tests: Sequence[RampTest], floor: float, options: IdentifyOption
 def _hidden_in(test: RampTest, floor: float, largest: float, u_max: float) -> float | None:
     """Return the zero error that a recording hides, m³/s; None where it can't tell."""
     rest = test.q[readings_at_rest(test, u_max)]
+    if rest.size >= FEWEST_AT_REST and _is_a_magnitude(test.q, rest):
+        return 2 * median(rest)
     low = _noise_between(test.q, LOW_FLOW)
     if rest.size < FEWEST_AT_REST or low is None:
         return None
@@ -289,6 +294,18 @@ def _hidden_in(test: RampTest, floor: float, largest: float, u_max: float) -> fl
     if one < HIDES_NOISE or not scatters or has_floor:
         return 0.0
     return HIDDEN_ZERO * largest if one >= HIDES_ALL else min(2 * noise, HIDDEN_ZERO * largest)
+
+
+def _is_a_magnitude(q: np.ndarray, rest: np.ndarray) -> bool:
+    """Tell whether no reading is below zero, and those at rest are above others: a zero error below zero, turned up.
+
+    Where the valve opens such readings fall before they rise, through several values, unlike a drop-out.
+    """
+    zero, noise = median(rest), robust_sigma(rest)
+    dips = (q < min(zero - DIP_SIGMAS * noise, DIP * zero)) & (q > 0)
+    through = np.count_nonzero(dips[1:] & dips[:-1] & (np.diff(q) != 0))
+    no_dip_at_rest = zero > DIP_SIGMAS * noise and float(rest.min()) >= DIP * zero
+    return float(q.min()) >= 0 and no_dip_at_rest and through >= FEWEST_DIPS
 
 
 def _noise_between(q: np.ndarray, shares: tuple[float, float]) -> float | None:

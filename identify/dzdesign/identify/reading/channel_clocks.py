@@ -6,21 +6,31 @@ a flow that is 0.24 s late moves a threshold by 80 mV. Nothing is extrapolated, 
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.clock import never_back, read_times_of_day
-from dzdesign.identify.reading.column_labels import Column, are_alike, clock_of, time_columns
+from dzdesign.identify.reading.column_labels import (
+    Column,
+    are_alike,
+    clock_of,
+    counts_time,
+    time_columns,
+)
 from dzdesign.identify.reading.missing_values import without_placeholders
 from dzdesign.identify.reading.scaling import scaling_of
-from dzdesign.identify.reading.table import Table
+from dzdesign.identify.reading.table import AND, Table
 from dzdesign.identify.reading.time_stamps import DAY, Start, start_of
 
 #: Clocks are one where no sample is off by this share of a step: the jitter of a clock.
 SAME = 1e-3
+#: Two times of one row are one where their usual difference is within this share of a step: the last digit of one.
+ROUNDED = 0.1
+#: A column that may be a time or not is one if it goes as far, within this share.
+ALIKE_SPANS = 0.1
 #: Over a pause of more than so many of its own usual steps a channel has no reading.
 PAUSE = 3.0
 #: Rows at the end in which a column may be blank beside others: the last one was written in part.
@@ -65,8 +75,12 @@ class Clock:
         return 0.0 if counted == (None,) * 4 else None
 
 
-def lay_on_one_clock(table: Table, found: Mapping[str, Column], data: dict[str, np.ndarray], u_max: float) -> None:
+def lay_on_one_clock(
+    table: Table, found: Mapping[str, Column], data: dict[str, np.ndarray], u_max: float, *, time_is_chosen: bool
+) -> None:
     """Lay the channels that have a clock of their own on the command's, in place; NaN where there is no reading.
+
+    With `time_is_chosen` the user has named the column of time, which then goes for all that has none of its own.
 
     Raises
     ------
@@ -78,6 +92,8 @@ def lay_on_one_clock(table: Table, found: Mapping[str, Column], data: dict[str, 
     time = found["time"]
     reference = _clock(table, time, u_max, data["time"])
     _refuse_an_unclear_one(table, found, reference, u_max)
+    if not time_is_chosen:
+        _refuse_another_time(table, found, reference, u_max)
     others = {column.clock.label: _clock(table, column.clock, u_max) for column in found.values() if column.clock}
     differ = False
     for quantity, column in found.items():
@@ -168,6 +184,38 @@ def _refuse_an_unclear_one(table: Table, found: Mapping[str, Column], reference:
                 f"'{table.path}' has times '{time.label}' and '{label}' that differ, by {float(begin[0]):.6g} s at "
                 f"first, and which is that of '{alone[-1]}' can't be told; put each directly before its quantity, "
                 "or name them t_u_s, t_Q_s"
+            )
+
+
+def _refuse_another_time(table: Table, found: Mapping[str, Column], reference: Clock, u_max: float) -> None:
+    """Refuse a second time that no channel claims and that differs: which channels were sampled by it is not known.
+
+    It rises from row to row, and has times in common. One from another zero, such as an uptime, tells nothing.
+    """
+    time, claimed = found["time"], {clock_of(table, "-", label) for label in table.labels}
+    claimed |= {each.clock.label for each in found.values() if each.clock} | set(time.label.split(AND))
+    alone = [each.label for name, each in found.items() if name not in ("time", "u") and not each.clock]
+    for label in table.labels if alone and not table.clocks else ():
+        beside = label not in claimed and table.length(label) == reference.seconds.size
+        column = counts_time(table, label) if beside else None
+        if column is None or table.is_clock(label) != table.is_clock(time.label):
+            continue
+        try:
+            clock = _clock(table, column if column.unit else replace(column, unit=time.unit), u_max)
+        except InputError:  # text, or a time that can't be read
+            continue
+        its = clock.seconds + (clock.ahead_of(reference) or 0.0)
+        both = np.isfinite(its) & np.isfinite(reference.seconds)
+        its, ours = its[both], reference.seconds[both]
+        rises = its.size > 1 and np.all(np.diff(its) > 0) and its[0] <= ours[-1] and its[-1] >= ours[0]
+        if not column.unit:  # it may be a temperature, or the number of the row
+            rises = rises and abs(np.ptp(its) - np.ptp(ours)) <= ALIKE_SPANS * np.ptp(ours)
+        if rises and abs(float(np.median(its - ours))) > ROUNDED * reference.step:
+            raise InputError(
+                f"'{table.path}' has times '{time.label}' and '{label}' that differ, by {its[0] - ours[0]:.6g} s at "
+                f"first and {its[-1] - ours[-1]:.6g} s at last, and which is that of '{alone[-1]}' can't be told; name "
+                "each by its quantity, such as t_u_s and t_Q_s, or choose one for all: --columns "
+                f'"time={time.label}"'
             )
 
 

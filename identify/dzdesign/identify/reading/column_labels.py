@@ -46,6 +46,7 @@ LONGEST_NAME = 80
 CLOCK_OF = re.compile(
     r"((?i:time[ _]?stamp|time|zeit|x_?value)|[tT])(?:[\s_.:-]+|(?=[A-Z0-9]|d[pP]|$))(?:(?:of|for)\s)?(.*)"
 )
+ELAPSED = re.compile(r"elapsed|relative|clock|uhr", re.IGNORECASE)
 OF_CLOCK = re.compile(r"(.*?)[\s_.:-]+(time[ _]?stamp|time|zeit|t)", re.IGNORECASE)
 
 
@@ -258,6 +259,14 @@ def time_columns(table: Table) -> list[str]:
     units = {label: kind[1] for label in table.labels if (kind := _kind_of_clock(table, label))}
     claimed = {clock_of(table, "", label) for label in table.labels} if "?" in units.values() else set()
     return [label for label, unit in units.items() if unit != "?" or label in claimed]
+
+
+def counts_time(table: Table, label: str) -> Column | None:
+    """Return a column that counts time by its label, be it elapsed, a sensor's or a lone t, with its unit if known."""
+    name, unit = _name_and_unit(table, label)
+    if _kind_of_clock(table, label) is None and not (ELAPSED.fullmatch(name) and (not unit or fits(unit, "time"))):
+        return None
+    return Column(label=label, unit=unit if fits(unit, "time") else "")
 
 
 def clock_of(table: Table, quantity: str, label: str) -> str:

@@ -231,7 +231,7 @@ def _read_recording(
                 q_range = scaling.ends if quantity == "Q" else q_range
             data[quantity] = numbers if each is column else data[quantity] - numbers
     refuse_an_early_end(table, found, data)
-    lay_on_one_clock(table, found, data, u_max)
+    lay_on_one_clock(table, found, data, u_max, time_is_chosen="time" in chosen)
     if sample_rate is not None:
         data["time"] = np.arange(data["u"].size) / sample_rate
     edge, labels = metering_edge(found), {quantity: column.label for quantity, column in found.items()}
