@@ -28,7 +28,8 @@ def certificate_lines(compensator: Compensator, sign: int) -> list[str]:
     text = (
         f"Certificate of {compensator.certified_of}: {where}, this value lies below the "
         f"{100 * certificate.confidence:.6g}% lower bound of the {certificate.guard} threshold ({between}). "
-        f"The least margin is {units.text(1e3 * float(certificate.smallest_margin_V), '.3g mV')}, in addition to {_counted(compensator)}."
+        f"The least margin is {units.text(1e3 * float(certificate.smallest_margin_V), '.3g mV')}, "
+        f"in addition to {_counted(compensator)}."
     )
     if certificate.guard == "closing" and certificate.zero_flow_L_min is not None:
         text += f" Hence {compensator.valve.sides[SIDE_NAMES[sign]].zero_flow_in_words(units)}."
