@@ -20,8 +20,9 @@ NAMED_FILES = 3
 
 def about_recordings(tests: Sequence[RampTest]) -> tuple[Finding, ...]:
     """Return what is to be said of the recordings themselves, the most serious first."""
-    of_each = (item for test in tests for item in _about_one(test))
-    return most_serious_first([*_about_simulation(tests), *about_order(tests), *about_lost_rows(tests), *of_each])
+    by_name = sorted(tests, key=lambda test: test.source)  # `verify` reads the files again, in another order
+    of_each = (item for test in by_name for item in _about_one(test))
+    return most_serious_first([*_about_simulation(tests), *about_order(tests), *about_lost_rows(by_name), *of_each])
 
 
 def about_rest(tests: Sequence[RampTest], u_max: float) -> Iterator[Finding]:

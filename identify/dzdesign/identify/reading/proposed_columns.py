@@ -221,8 +221,9 @@ def _two_solenoids(table: Table, known: Mapping[str, Column], taken: set[str]) -
     for label in [each for each in labels if fits(_unit_of(table, each), "u") or each in named][:MOST_COMMANDS]:
         with suppress(InputError):
             numbers = table.numbers(label)
-            on = numbers > DRIVEN * np.fmax.reduce(numbers, initial=0.0)
-            if np.fmin.reduce(numbers, initial=0.0) >= 0 and on.any():
+            least = DRIVEN * np.fmax.reduce(numbers, initial=0.0)
+            on = numbers > least
+            if np.fmin.reduce(numbers, initial=0.0) >= -least and on.any():  # noise at rest is on both sides of zero
                 driven[label] = on
     pairs = [
         (one, other)
