@@ -233,7 +233,7 @@ def _certificate(compensator: Compensator, inputs: Sequence[InputCheck]) -> Figu
             "offset, beside half a count for the rounding; the statistical reserve is in that offset"
         )
         + (
-            f". F{at_zero.none_in_words(worst.guard, units)[1:]}"
+            f". F{at_zero.none_in_words(worst.guard, units)[1:].partition(' (the largest of')[0]}"
             if worst.zero_flow_L_min is None
             else f"; {at_zero.zero_flow_in_words(units)}"
         )
