@@ -92,6 +92,13 @@ def ended_early(bench: Bench, share: float):
     return csv({**plain(bench), "Q_Lmin": bench.q[kept]})
 
 
+def filled_up(bench: Bench, share: float, value: float | None):
+    """The same, and the logger filled the column up to the end: with a number, or the last value."""
+    kept = np.round(np.linspace(0, bench.q.size - 1, int(share * bench.q.size))).astype(int)
+    tail = np.full(bench.q.size - kept.size, bench.q[kept[-1]] if value is None else value)
+    return {**plain(bench), "Q_Lmin": np.concatenate([bench.q[kept], tail])}
+
+
 def own_times(bench: Bench, late_s: float, labels: Sequence[str]):
     """A column of time before each quantity; equal labels are told apart behind a NUL, which is not written."""
     time_q, q = forms.shifted(bench, late_s)
@@ -168,6 +175,15 @@ CLOCKS = {
     "csv-times-rounded": Form(write=one(lambda bench: another_time(bench, 0.0, "elapsed_s", zero=0.002))),
     "csv-column-shorter": Form(write=one(lambda bench: ended_early(bench, 0.995)), refused=("r1_0.csv", "Q_Lmin")),
     "csv-column-much-shorter": Form(write=one(lambda bench: ended_early(bench, 0.8)), refused=("r1_0.csv", "Q_Lmin")),
+    "csv-column-filled-with-zeros": Form(
+        write=one(lambda bench: filled_up(bench, 0.99, 0.0)), refused=("r1_0.csv", "Q_Lmin")
+    ),
+    "csv-column-filled-with-its-last": Form(
+        write=one(lambda bench: filled_up(bench, 0.99, None)), refused=("r1_0.csv", "Q_Lmin")
+    ),
+    "csv-column-filled-amid-flow": Form(
+        write=one(lambda bench: filled_up(bench, 0.8, None)), refused=("r1_0.csv", "Q_Lmin")
+    ),
     "twincat-scope": Form(
         write=one(twincat), options=("--columns", "u=uCmd:V,Q=fFlow:L/min,dP=fDeltaP:MPa")
     ),

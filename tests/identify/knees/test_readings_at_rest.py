@@ -115,9 +115,11 @@ class TestHiddenZero:
         ("zero", "changes"),
         [
             (-0.6, {}), (-0.3, {"noise": 0.02}), (-0.75, {"noise": 0.2}), (-0.6, {"pressures": (1.0,)}),
-            (-0.6, {"noise": 0.1, "step": 0.1}), (-0.6, {"sign": -1}), (-0.6, {"at": -0.02}), (-0.6, {"memory": 0.9}),
+            (-0.6, {"noise": 0.1, "step": 0.1}), (-0.6, {"noise": 0.003}), (-0.6, {"sign": -1}), (-0.6, {"at": -0.02}),
+            (-0.6, {"memory": 0.9}),
         ],
-        ids=["0.6", "little noise", "much noise", "one pressure", "coarse", "negative", "below zero", "slow noise"],
+        ids=["0.6", "little noise", "much noise", "one pressure", "coarse", "hardly any noise", "negative",
+             "below zero", "slow noise"],
     )  # fmt: skip
     def test_it_is_said_and_the_level_counts_it(self, zero, changes, wording):
         tests = self.cut_off(zero, **changes)

@@ -34,7 +34,7 @@ EXPLAINED, LEAK_ERRORS = 0.5, 4.0
 #: flow, and that at middle flow: less is a simulation's, or the flow's own.
 HIDES_NOISE, HIDES_ALL = 0.6, 0.95
 LOW_FLOW, MIDDLE_FLOW, FEWEST_AT_FLOW = (0.02, 0.1), (0.3, 0.6), 40
-NOISE_OVER_STEP, NOISE_OVER_FLOW, NOISE_OVER_MIDDLE = 0.5, 2e-4, 0.2
+NOISE_OVER_STEP, NOISE_OVER_FLOW, NOISE_OVER_MIDDLE = 0.5, 5e-5, 0.2
 #: Readings below this share of those at rest, and by so many standard deviations, of which so many follow each other
 #: and differ, are of a flow that was below zero and lost its sign.
 DIP, DIP_SIGMAS, FEWEST_DIPS = 0.6, 3.0, 2
@@ -286,7 +286,8 @@ def _hidden_in(test: RampTest, floor: float, largest: float, u_max: float) -> fl
     one = float(np.mean(rest == median(rest)))
     noise, middle = low, _noise_between(test.q, MIDDLE_FLOW) or 0.0
     steps = np.diff(np.unique(test.q))
-    step = float(np.median(steps)) if steps.size else 0.0
+    # Of fine readings most neighbours are further apart than a step: few samples lie on much flow.
+    step = float(np.quantile(steps, 0.05)) if steps.size else 0.0
     scatters = noise > max(NOISE_OVER_STEP * step, NOISE_OVER_FLOW * largest, NOISE_OVER_MIDDLE * middle)
     below = test.q[(test.q > 0) & (test.q < 2 * floor)]
     # The lowest step of the readings is none.
@@ -305,7 +306,7 @@ def _is_a_magnitude(q: np.ndarray, rest: np.ndarray) -> bool:
     dips = (q < min(zero - DIP_SIGMAS * noise, DIP * zero)) & (q > 0)
     through = np.count_nonzero(dips[1:] & dips[:-1] & (np.diff(q) != 0))
     no_dip_at_rest = zero > DIP_SIGMAS * noise and float(rest.min()) >= DIP * zero
-    return float(q.min()) >= 0 and no_dip_at_rest and through >= FEWEST_DIPS
+    return bool(float(q.min()) >= 0 and no_dip_at_rest and through >= FEWEST_DIPS)
 
 
 def _noise_between(q: np.ndarray, shares: tuple[float, float]) -> float | None:

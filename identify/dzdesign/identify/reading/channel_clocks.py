@@ -35,6 +35,9 @@ ALIKE_SPANS = 0.1
 PAUSE = 3.0
 #: Rows at the end in which a column may be blank beside others: the last one was written in part.
 LAST_ROWS, SHARE_OF_LAST = 2, 1e-3
+#: Rows at the end of a flow that repeat one value, so many times as long as any before, within so many standard
+#: deviations of the readings before, which turn so often: the column was filled up.
+HELD, LONGER_HELD, NEAR_HELD, TURNS = 10, 5, 4.0, 3
 #: A channel that has no reading in more than this share of the command's rows is said in any case.
 LOST = 0.1
 logger = logging.getLogger(__name__)
@@ -157,11 +160,12 @@ def _laid(
     if np.isnan(laid).all():
         raise none_in_common
     missing = np.count_nonzero(np.isnan(laid) & np.isfinite(times))
+    alike = np.isclose(clock.step, reference.step, rtol=1e-4)
+    steps = "" if alike else f" and has a step of {clock.step:.6g} s, not {reference.step:.6g} s"
     logger.log(
         logging.WARNING if missing > LOST * times.size else logging.INFO,
-        "%s: it begins %.6g s after that of '%s' and has a step of %.6g s, not %.6g s; laid on the command's clock, "
-        "with no reading in %d of %d rows", where, its[0] - ours[0], command.label, clock.step, reference.step, missing,
-        times.size,
+        "%s: it begins %.6g s after that of '%s'%s; laid on the command's clock, with no reading in %d of %d rows",
+        where, its[0] - ours[0], command.label, steps, missing, times.size,
     )  # fmt: skip
     return laid
 
@@ -219,12 +223,37 @@ def _refuse_another_time(table: Table, found: Mapping[str, Column], reference: C
             )
 
 
+def _held_to_the_end(values: np.ndarray) -> int:
+    """Return how many rows at the end repeat one value, of a column whose readings scatter up to there; else 0.
+
+    A meter that jumps to zero below its floor does not scatter about what it repeats.
+    """
+    if not np.isfinite(values[-HELD:]).all() or values.size < 4 * HELD:
+        return 0
+    ends = np.flatnonzero(np.diff(values, append=np.nan) != 0)
+    runs = np.diff(ends, prepend=-1)
+    tail = int(runs[-1])
+    before = values[: values.size - tail][-HELD:]
+    if tail < HELD or tail < LONGER_HELD * runs[:-1].max(initial=1) or before.size < HELD:
+        return 0
+    near = abs(values[-1] - np.median(before)) <= NEAR_HELD * np.std(before)
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(before))))
+    return tail if near and turns >= TURNS and np.isfinite(before).all() else 0
+
+
 def refuse_an_early_end(table: Table, found: Mapping[str, Column], data: Mapping[str, np.ndarray]) -> None:
     """Refuse a column without a time of its own that is blank to the end while others go on.
 
     It may have been laid beside them from its first row on with another clock. One that a logger wrote in part in its
-    last row is none, nor one with a reading in every tenth row.
+    last row is none, nor one with a reading in every tenth row. A flow that is filled up to the end has ended as well.
     """
+    flow = found["Q"]
+    if flow.clock is None and (held := _held_to_the_end(data["Q"])):
+        raise InputError(
+            f"'{table.path}' column '{flow.label}' repeats its last value to the last digit from "
+            f"{table.place(data['Q'].size - held)} on, {held} rows, as nowhere else, so it may have ended before the "
+            "others; export it with its own time, or cut these rows if the meter was switched off there"
+        )
     if all(np.isfinite(data[quantity][-1:]).all() for quantity in found):
         return
     last = {}
