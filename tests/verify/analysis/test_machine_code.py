@@ -15,6 +15,7 @@ def test_without_tools_the_targets_own_machine_alone_is_required(tmp_path, monke
     monkeypatch.setattr(machine_code, "read_compensator", lambda _: SimpleNamespace(current_drive=None))
     monkeypatch.setattr(machine_code, "read_firmware_manifest", lambda _: SimpleNamespace(target=target))
     monkeypatch.setattr(Machine, "missing", lambda _: "no tools")
+    (tmp_path / "manifest.json").touch()
     checks = machine_code.machine_code_checks(tmp_path, inputs=())
     assert [check.name.removeprefix("machine code of the ") for check in checks] == tried
     assert all(check.holds is None for check in checks)

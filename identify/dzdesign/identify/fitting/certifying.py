@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from dzdesign.core.artefact_types import own_result
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, InternalError
 from dzdesign.core.worded import Worded, worded
 from dzdesign.identify.constants import MPA, REFUSED, Premise
 from dzdesign.identify.fitting.bounds import DEGREES_OF_FREEDOM, FINEST_ERROR
@@ -125,7 +125,7 @@ def certify_thresholds(thresholds: Mapping[Guard, GuardedThreshold], tested: Tes
     for name, threshold in thresholds.items():
         try:
             curves[name] = _certify(threshold, tested)
-        except InputError:
+        except (InputError, InternalError):  # a guard beside the default one is left out
             if not curves:
                 raise
     return curves

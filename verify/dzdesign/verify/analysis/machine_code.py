@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.core.folder_contents import MANIFEST_NAME
 from dzdesign.verify.analysis.core_cost import core_cost
 from dzdesign.verify.current.current_checks import controller_on_machine
 from dzdesign.verify.evidence import InputCheck
@@ -52,8 +53,10 @@ def machine_code_checks(folder: Path, inputs: tuple[InputCheck, ...]) -> list[Ch
 
     Of a drive by current also one of its controller. Firmware for one of the machines needs no tools of the others.
     """
-    compensator, target = read_compensator(folder), read_firmware_manifest(folder).target
+    compensator = read_compensator(folder)
     names = [machine.name.lower() for machine in MACHINES]
+    with_manifest = (folder / MANIFEST_NAME).is_file()
+    target = read_firmware_manifest(folder).target if with_manifest else ""
     checks = []
     for machine, name in zip(MACHINES, names, strict=True):
         if target in names and target != name and machine.missing():
