@@ -14,6 +14,7 @@ LOADS = {"core/dzdesign/core/folder_swap.py", "dzdesign/dzdesign/batch/parent_wa
 STARTS = {
     "core/dzdesign/core/processes/running.py",
     "identify/dzdesign/identify/reading/binary/reader_process.py",
+    "verify/dzdesign/verify/integers/octave.py",
     "verify/dzdesign/verify/toolchain/confinement.py",
     "verify/dzdesign/verify/toolchain/served_process.py",
 }
