@@ -52,8 +52,6 @@ class Simulated:
             link_flags=self.link_flags,
             runner=self.runner,
             run_timeout_s=SLOW_S,
-            memory=0,
-            confined=not self.drive,  # Wine keeps files in the user's home
         )
 
 

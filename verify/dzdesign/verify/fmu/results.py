@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.scratch import scratch_folder
-from dzdesign.verify.toolchain.confinement import MOST_WRITTEN, run_confined
+from dzdesign.verify.toolchain.child_process import run_child
 from dzdesign.verify.toolchain.machines import Machine
 
 logger = logging.getLogger(__name__)
@@ -25,16 +25,13 @@ def results_of(
     """Run a program of this room and return its lines of numbers.
 
     One that fails, hangs, or whose binary ends it before its results are whole, is a `RequirementError`. What is
-    printed goes nowhere. A binary that sets out to forge results can: it runs in the same process.
+    printed goes nowhere.
     """
     with scratch_folder() as place:
         file = place / "results"
         command = [*machine.runner, str(program), *arguments, f"{drive}{file}"]
         begin = time.perf_counter()
-        ended = run_confined(
-            command, f"{what} on the {machine.name}", machine.run_timeout_s, memory=machine.memory, results=place,
-            confined=machine.confined,
-        )  # fmt: skip
+        ended = run_child(command, f"{what} on the {machine.name}", machine.run_timeout_s, place=place)
         logger.debug("%s (%.3f s)", shlex.join(command), time.perf_counter() - begin)
         lines = _lines(file)
     refusal = next((line.removeprefix(REFUSED)[:200] for line in lines if line.startswith(REFUSED)), "")
@@ -46,8 +43,4 @@ def results_of(
 
 
 def _lines(file: Path) -> list[str]:
-    """Return the lines of a file of results; of what is no plain file none."""
-    if file.is_symlink() or not file.is_file():
-        return []
-    with file.open("rb") as opened:
-        return opened.read(MOST_WRITTEN).decode("ascii", "replace").splitlines()
+    return file.read_text("ascii", "replace").splitlines() if file.is_file() else []
