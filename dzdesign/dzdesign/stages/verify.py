@@ -63,8 +63,7 @@ class VerifyArguments:
     mutate: Annotated[bool, Option(group=CHECKS)] = False
     """Insert a fault at every place of the C code, one at a time, and count the faults that are detected."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
-    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr. FMUs run every
-    input in Wine and in QEMU."""
+    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
     """Prove with Frama-C that nothing overflows a 16-bit int."""
 
