@@ -26,8 +26,9 @@ from tests.support.account_claims import BY_NUMBER
 ONE, ZERO = sympy.S.One, sympy.S.Zero
 
 
-def theorem(symbol, member, *grounds, **more):
-    return Kind.THEOREM("false", "", symbol, member, grounds=grounds, **more)
+def theorem(symbol, member, *grounds, eliminate=None, provided=(), **more):
+    stated = Kind.THEOREM("false", "").says(symbol, member)
+    return replace(stated.by(*grounds, eliminate=eliminate, provided=provided), **more)
 
 
 def at(number, *pairs):

@@ -106,11 +106,11 @@ def test_statements_check_themselves(wording):
     with pytest.raises(ValueError) as caught:
         replace(BY_NUMBER["(18)"], members=(s.u_O,))
     wording("a statement: defines itself", str(caught.value))
-    with pytest.raises(ValueError) as caught:
-        replace(BY_NUMBER["(18)"], grounds=())
+    with pytest.raises(RequirementError) as caught:
+        prove(changed("(18)", grounds=()))
     wording("a statement: without grounds", str(caught.value))
-    with pytest.raises(ValueError) as caught:
-        replace(BY_NUMBER["(1)"], grounds=(Ground(number="(2)"),))
+    with pytest.raises(RequirementError) as caught:
+        prove(changed("(1)", grounds=(Ground(number="(2)"),)))
     wording("a statement: given, with grounds", str(caught.value))
     with pytest.raises(ValueError, match="could not convert"):
         Value(label="", at=(), unit="V", published="about 2")

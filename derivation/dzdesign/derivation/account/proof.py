@@ -114,6 +114,9 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
 
 def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
     """Raise `RequirementError` if a statement rests on itself, a later one, an unknown one, or a copy of itself."""
+    if statement.kind.is_given == bool(statement.grounds):
+        wanted = "has no" if statement.kind.is_given else "needs"
+        raise RequirementError(f"{statement.number}: a statement of kind {statement.kind} {wanted} grounds")
     for ground in statement.grounds:
         if ground.number == statement.number:
             raise RequirementError(f"{statement.number} is its own premise")
@@ -230,7 +233,7 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
         replacements = dict(case.at)
         relations = tuple(relation_of(earlier[ground.number], ground, replacements) for ground in statement.grounds)
         provided = tuple(provision.xreplace(replacements) for provision in statement.provided)
-        found = solve_relations(relations, (statement.symbol, *statement.eliminate), provided)
+        found = solve_relations(relations, (statement.symbol, *_eliminated(statement, relations)), provided)
         if isinstance(found, str):
             return found
         solution = found.values
@@ -263,6 +266,14 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
     if unneeded:
         return f"the derivation does not need {', '.join(unneeded)}"
     return tuple(proofs)
+
+
+def _eliminated(statement: Statement, relations: Sequence[Relation]) -> tuple[Name, ...]:
+    """Return what is solved for beside the symbol: what the grounds are about, as many as there are grounds."""
+    if statement.eliminate is not None:
+        return statement.eliminate
+    named = dict.fromkeys((statement.symbol, *(relation.left for relation in relations)))
+    return tuple(named)[1 : len(relations)]
 
 
 def _conditions(member: sympy.Expr) -> list[sympy.Basic]:
