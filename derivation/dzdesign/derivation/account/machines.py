@@ -156,7 +156,7 @@ class PlainPlant:
 
     def transforms(self, s: float) -> tuple[float, float]:
         """Transforms of current and travel at one s, after steps of command and load: (s - A) z = z(0) + b/s."""
-        matrix = np.transpose([self.rates(*unit, 0.0, 0.0) for unit in np.eye(3)])
+        matrix = np.transpose([self.rates(i, x, v, 0.0, 0.0) for i, x, v in np.eye(3)])
         drive = np.array(self.rates(0.0, 0.0, 0.0, self.u_step, self.load_step))
         start = (self.i_init, self.x_init, self.v_init)
         current, travel, _ = np.linalg.solve(s * np.eye(3) - matrix, start + drive / s)

@@ -75,8 +75,7 @@ def _of_valve(valve: PlainValve) -> Iterator[Situation]:
                 yield _situation(valve, dP, u_i, under_law(name), at_dP1, partial(_drive, valve, name))
             if dP == valve.dP1:
                 for beta in (0.5, 1.0, 1.25):
-                    drives = partial(_scaled_drive, valve, lambda _, beta=beta: beta, valve.dP1)
-                    yield _situation(valve, dP, u_i, FREE_BETA, beta, drives)
+                    yield _situation(valve, dP, u_i, FREE_BETA, beta, partial(_scaled_drive, valve, beta, dP))
     yield from _with_transition(valve)
 
 
@@ -90,7 +89,7 @@ def _with_transition(valve: PlainValve) -> Iterator[Situation]:
         def drives(at: float, u_i: float, offset: float = closing * valve.u_min0) -> float:
             if u_i <= band:
                 return offset
-            top = _scaled_drive(valve, lambda _: opening, dP, dP, max(u_i, end))
+            top = _scaled_drive(valve, opening, dP, dP, max(u_i, end))
             return top if u_i >= end else offset + (top - offset) * (u_i - band) / (end - band)
 
         for u_i in (0.0, 0.4 * band, band, 0.7 * band + 0.3 * end, end, 0.7 * valve.u_max, valve.u_max):
@@ -103,7 +102,7 @@ def _with_transition(valve: PlainValve) -> Iterator[Situation]:
 def _drive(valve: PlainValve, name: str, dP: float, u_i: float) -> float:
     """What a law gives; of the two that the account is about without its formula."""
     if name == "paper":
-        return _scaled_drive(valve, lambda at: valve.threshold(at) / valve.u_min0, math.inf, dP, u_i)
+        return _scaled_drive(valve, valve.threshold(dP) / valve.u_min0, math.inf, dP, u_i)
     kappa, offset = valve.k * valve.x_max / valve.u_max, valve.threshold(dP)
     if name == "target":
         return kappa * u_i + offset
@@ -118,9 +117,9 @@ def _reference_drive(valve: PlainValve, u_i: float) -> float:
     return valve.command_for(wanted, valve.dP0)
 
 
-def _scaled_drive(valve: PlainValve, share: Callable[[float], float], on_at: float, dP: float, u_i: float) -> float:
+def _scaled_drive(valve: PlainValve, share: float, on_at: float, dP: float, u_i: float) -> float:
     """The paper's choice: the compensation signal of dP0, above dP0 a share of it; also at one other pressure drop."""
-    scaled = share(dP) if dP > valve.dP0 or dP == on_at else 1.0
+    scaled = share if dP > valve.dP0 or dP == on_at else 1.0
     return u_i + scaled * (_reference_drive(valve, u_i) - u_i)
 
 
