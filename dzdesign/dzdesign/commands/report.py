@@ -10,7 +10,11 @@ from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say
 
 Arguments = ReportArguments
-EXAMPLES = ("dzdesign report demo", "dzdesign report evidence -o for_review.html")
+EXAMPLES = (
+    "dzdesign report evidence",
+    "dzdesign report evidence --firmware firmware -o for_review.html",
+    "dzdesign report calibrated",
+)
 
 
 def run(arguments: Arguments, json: bool) -> int:
@@ -35,15 +39,15 @@ def run(arguments: Arguments, json: bool) -> int:
 def _beside_evidence(folder: Path) -> Path:
     """Return where `verify` leaves its report, or a place in the folder where there is no evidence.
 
-    Of an output it is a place beside it: a file that its manifest does not name would be taken for a change of it.
+    Of firmware and another output it is a place beside it: what its manifest does not name would be a change of it.
     """
-    from dzdesign.report.artefact_folder import VERIFICATION_NAME
+    from dzdesign.report.artefacts import EVIDENCE, root_of
     from dzdesign.report.valve_report import REPORT_NAME
-    from dzdesign.verify.outputs.folder import holds_output
+    from dzdesign.verify.evidence import Evidence
 
     if not folder.is_dir():
         raise InputError(f"'{folder}' is not a folder, expected one with artefacts of dzdesign; check the name")
-    for place in (folder, folder / "evidence"):
-        if (place / VERIFICATION_NAME).is_file():
+    for place in (folder, folder / EVIDENCE):
+        if (place / Evidence.FILE_NAME).is_file():
             return place / REPORT_NAME
-    return (folder.resolve().parent if holds_output(folder) else folder) / REPORT_NAME
+    return root_of(folder.resolve()) / REPORT_NAME

@@ -158,7 +158,8 @@ def _verify_code(
     from dzdesign.block_checks import blocks_checked, given_blocks
     from dzdesign.regeneration import regenerated
     from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
-    from dzdesign.report.valve_report import with_report
+    from dzdesign.report.artefacts import chain_of_evidence
+    from dzdesign.report.valve_report import REPORT_NAME, make_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
@@ -201,7 +202,8 @@ def _verify_code(
     if arguments.output is not None:
         output = Path(arguments.output)
         manifest = evidence_manifest(verification.evidence)
-        files = with_report(evidence_files(verification), folder, output, verification.derived)
+        chain = chain_of_evidence(verification.evidence, verification.curves, output, folder)
+        files = {**evidence_files(verification), REPORT_NAME: make_report(chain).html.encode()}
         write_folder(output, files, manifest)
     return verification
 

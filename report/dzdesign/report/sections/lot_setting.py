@@ -11,11 +11,11 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot.valves import LotSide
-from dzdesign.report.chain import Chain
-from dzdesign.report.compensator_sides import SIGNS, laws_of
-from dzdesign.report.figures.figure import csv_text
+from dzdesign.identify.valve.model import SIDES
+from dzdesign.report.artefacts import Chain, laws_of
+from dzdesign.report.cells import Cell, in_number_font, number, recorded, table_of
+from dzdesign.report.figure import csv_text
 from dzdesign.report.page import Figure, Section
-from dzdesign.report.sections.cells import Cell, in_number_font, number, recorded, table_of
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
@@ -54,7 +54,7 @@ def lot_costs(compensator: Compensator) -> tuple[LotCost, ...]:
 
 
 def _costs_of_side(compensator: Compensator, name: str) -> Iterator[LotCost]:
-    exact = ExactLaw(compensator, SIGNS[name])
+    exact = ExactLaw(compensator, SIDES[name])
     counts_per_V = exact.compare_max / float(compensator.u_max_V)
 
     @cache  # the valves of a lot are tested at the same few pressure drops

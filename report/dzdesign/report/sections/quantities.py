@@ -15,7 +15,7 @@ from dzdesign.assess.quantities import LOSS, Reading
 from dzdesign.assess.thinned_curves import Line, gain_of, hysteresis_of, linearity_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
-from dzdesign.report.characteristic.curves import CharacteristicCurve, Origin, origin_of, same_pressure
+from dzdesign.report.sections.curves import CharacteristicCurve, Origin, origin_of, same_pressure
 from dzdesign.verify.loop_results import PressureResult
 
 #: Keys in the order of a test report.
