@@ -18,17 +18,15 @@ EXAMPLES = (
 
 
 def run(arguments: Arguments, json: bool) -> int:
-    """Make report.html; 1 if a requirement does not hold or was not checked, or the files do not belong together."""
+    """Make report.html; 1 if a requirement does not hold or was not checked."""
     output = arguments.output or _beside_evidence(Path(arguments.folder))
     made = report(replace(arguments, output=output))
     for line in made.missing:
         say(f"missing: {line}")
-    for line in made.faults:
-        say(f"does not fit: {line}")
     if json:
         verdict = {"holds": made.holds, "verdict": made.verdict}
         outputs = {"outputs": [asdict(each) for each in made.outputs.listed], "other_outputs": made.outputs.others}
-        print_json({"report": str(output), **verdict, "faults": made.faults, "missing": made.missing, **outputs})
+        print_json({"report": str(output), **verdict, "missing": made.missing, **outputs})
     else:
         print(made.verdict)
         print_outputs(made.outputs)

@@ -39,7 +39,8 @@ def report(arguments: ReportArguments) -> "Report":
     Raises
     ------
     InputError
-        If there is nothing to report, or a file is not an artefact. A requirement that does not hold is not an error.
+        If there is nothing to report, a file is not an artefact, or one was changed. A requirement that does not hold
+        is not an error.
     """
     from dzdesign.report.logo import logo_uri
     from dzdesign.report.lot.folder import is_lot, refuse_uncalibrated

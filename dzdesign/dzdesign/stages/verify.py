@@ -158,14 +158,13 @@ def _verify_code(
     from dzdesign.block_checks import blocks_checked, given_blocks
     from dzdesign.regeneration import regenerated
     from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
-    from dzdesign.report.artefacts import chain_of_evidence
-    from dzdesign.report.valve_report import REPORT_NAME, make_report
+    from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.toolchain.compiled_core import core_answers
-    from dzdesign.verify.verification import evidence_files, evidence_manifest
+    from dzdesign.verify.verification import evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
     plant, digest = None, None
@@ -202,9 +201,7 @@ def _verify_code(
     if arguments.output is not None:
         output = Path(arguments.output)
         manifest = evidence_manifest(verification.evidence)
-        chain = chain_of_evidence(verification.evidence, verification.curves, output, folder)
-        files = {**evidence_files(verification), REPORT_NAME: make_report(chain).html.encode()}
-        write_folder(output, files, manifest)
+        write_folder(output, with_report(verification, folder, output), manifest)
     return verification
 
 

@@ -1,13 +1,13 @@
 """What a report is of: the artefacts of one folder, from the evidence back to the valve.
 
-Each lies where its command writes it. From the evidence back each states the hash of what it was made from: a file
-whose hash is another was changed, or is of something else; it is named in the report, and not used.
+Each lies where its command writes it, and states the hash of what it was made from. A file whose hash is another was
+changed since, or is of something else: no report is made of it.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from dzdesign.assess.assessment import Assessment
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
@@ -22,7 +22,6 @@ from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.design.side_law import SideLaw
 from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
-from dzdesign.report.reproduction import Reproduction
 from dzdesign.verify.closed_loop.evidence_curves import Curves, read_curves
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.firmware.unchanged_files import added_files
@@ -35,7 +34,6 @@ ROLES: Mapping[str, tuple[str, type[Artefact]]] = {
     "compensator": ("compensator", Compensator),
     "valve": ("valve", ValveModel),
     "assessment": ("assessment of recordings", Assessment),
-    "reproduction": ("the paper's numbers", Reproduction),
 }
 #: Manifests of the folders of one stage, whose neighbours belong to it; a valve's folder of a batch has another.
 STAGES = {family_of(schema_of(kind)) for kind in (Evidence, OutputEvidence, FirmwareManifest, OutputManifest)}
@@ -44,6 +42,7 @@ EVIDENCE, FIRMWARE = "evidence", "firmware"
 WROTE = "`dzdesign verify` wrote another one"
 #: Of a valve, what a design for commands of both signs has made untrue: that one side is left out.
 OF_ONE_SIGN = "two-sides"
+Kind = TypeVar("Kind", bound=Artefact)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +57,9 @@ class Place:
 class Chain:
     """What a report is of; an artefact that was not found is None.
 
-    `places` is where each was found, by its role; `curves` the numbers of the evidence by the files' names. `faults` do
-    not fit (changed, or of another chain) and are not used; `missing` names what is not there, and which command makes
-    it. `root` is the folder around all of them.
+    Evidence has its firmware, a firmware its compensator, and that its valve. `root` is the folder around them,
+    `places` where each was found, by its role; `curves` are the numbers of the evidence by the files' names. `missing`
+    names what is not there, and which command makes it.
     """
 
     root: Path | None = None
@@ -69,10 +68,8 @@ class Chain:
     compensator: Compensator | None = None
     valve: ValveModel | None = None
     assessment: Assessment | None = None
-    reproduction: Reproduction | None = None
     places: Mapping[str, Place] = field(default_factory=dict)
     curves: Mapping[str, Curves] = field(default_factory=dict)
-    faults: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
 
     @property
@@ -85,22 +82,24 @@ def read_chain(folder: Path, firmware: Path | None = None) -> Chain:
     """Read the artefacts of a folder: of evidence, or with evidence, firmware, compensator.json or valve.json in it.
 
     `firmware` is the folder that the evidence is of; by default the one of the name that the evidence states, beside
-    it.
+    it. What was changed since it was written, or is of something else, is an `InputError`.
     """
     if not folder.is_dir():
         raise InputError(f"'{folder}' is not a folder, expected one with artefacts of dzdesign; check the name")
     folder = folder.resolve()
-    reading = _Reading(root_of(folder))
-    place = folder if (folder / Evidence.FILE_NAME).is_file() else reading.root / EVIDENCE
-    evidence = reading.evidence(place)
-    of_evidence = Path(evidence.made_from[0].source).parent.name if evidence and evidence.made_from else FIRMWARE
-    of_folder = folder if folder not in (place, reading.root) else reading.root / of_evidence
-    chain = reading.follow(evidence, firmware or of_folder, (reading.root, folder))
+    root = root_of(folder)
+    place = folder if (folder / Evidence.FILE_NAME).is_file() else root / EVIDENCE
+    reading = _Reading(root)
+    evidence = reading.evidence(place) if (place / Evidence.FILE_NAME).is_file() else None
+    if evidence:
+        firmware = firmware or root / Path(evidence.made_from[0].source).parent.name
+    else:
+        firmware = firmware or (folder if folder != root else root / FIRMWARE)
+    chain = reading.follow(evidence, firmware, (root, folder))
     if not chain.places:
         raise InputError(
-            "; ".join(reading.unreadable)
-            or f"'{folder}' has no artefact of dzdesign, expected verification.json, firmware, compensator.json or "
-            "valve.json; give the folder that `dzdesign demo`, `verify` or `codegen` wrote"
+            f"'{folder}' has no artefact of dzdesign, expected verification.json, firmware, compensator.json or "
+            "valve.json; give the folder that `dzdesign demo`, `verify` or `design` wrote"
         )
     return chain
 
@@ -128,77 +127,59 @@ class _Reading:
         self.curves: dict[str, Curves] = {}
         self.found: dict[str, Any] = {}
         self.places: dict[str, Place] = {}
-        self.faults: list[str] = []
         self.missing: list[str] = []
-        self.unreadable: list[str] = []
 
-    def evidence(self, place: Path) -> Evidence | None:
+    def evidence(self, place: Path) -> Evidence:
         """Read what `verify` wrote: the artefact and its curves, each as the manifest beside them states it."""
-        path = place / Evidence.FILE_NAME
-        if not path.is_file():
-            self.miss("evidence")
-            return None
-        stated = (manifest_of(place) or {"files": {}})["files"]
-        if not stated:
-            what = f"{MANIFEST_NAME} beside {place.name}/{Evidence.FILE_NAME}, which `dzdesign verify` writes"
-            self.missing.append(f"{what}: nothing tells whether that is as written")
-        for curves in sorted(place.glob("*.csv")):
-            if self._is_of(curves, stated.get(curves.name), WROTE):
-                try:
-                    self.curves[curves.name] = read_curves(curves.read_text(encoding="utf-8"))
-                except ValueError as error:
-                    self.faults.append(f"'{curves.name}' is no table of numbers ({error}): not used")
-        evidence: Evidence | None = self._link("evidence", path, stated.get(path.name), WROTE)
+        manifest = manifest_of(place)
+        stated = manifest["files"] if manifest else {}
+        if Evidence.FILE_NAME not in stated:
+            raise InputError(f"'{place / MANIFEST_NAME}' does not state its files; run `dzdesign verify` again")
+        for path in (place / name for name in stated if name.endswith(".csv")):
+            _check(path, stated[path.name], WROTE)
+            try:
+                self.curves[path.name] = read_curves(path.read_text(encoding="utf-8"))
+            except ValueError as error:
+                raise InputError(f"'{path}' is no table of numbers ({error}); run `dzdesign verify` again") from error
+        evidence = self._read("evidence", Evidence, place / Evidence.FILE_NAME, stated[Evidence.FILE_NAME], WROTE)
+        if not evidence.made_from:
+            raise InputError(f"'{place / Evidence.FILE_NAME}': 'made_from' is empty; run `dzdesign verify` again")
         return evidence
 
-    def follow(self, evidence: Evidence | None, firmware_folder: Path, beside: tuple[Path, ...]) -> Chain:
-        """Read what the evidence is of, what that was made from, and what `assess` and `reproduce` left `beside`."""
-        manifest, path = manifest_of(firmware_folder), None
+    def follow(self, evidence: Evidence | None, folder: Path, beside: tuple[Path, ...]) -> Chain:
+        """Read the firmware in a folder, what it was made from, and the other artefacts `beside` it."""
+        manifest, stated, of = manifest_of(folder), None, "the firmware was made from another one"
         if manifest and family_of(manifest["schema"]) == family_of(schema_of(FirmwareManifest)):
-            path = firmware_folder / MANIFEST_NAME
-        stated = evidence.made_from[0].sha256 if evidence and evidence.made_from else None
-        firmware: FirmwareManifest | None = self._link("firmware", path, stated, "the evidence is of another one")
-        if firmware:
-            self.faults += changes_since(firmware_folder, firmware, evidence)
-            beside = (firmware_folder, *beside)
-        made_from, path = firmware.origin.compensator_json if firmware else None, _first(Compensator, beside)
-        compensator = self._link("compensator", path, made_from, "the firmware was made from another one")
-        if compensator:
-            self._take_valve(compensator, _first(ValveModel, beside))
-        else:
-            self._link("valve", _first(ValveModel, beside), None)
-        for role in ("assessment", "reproduction"):
-            if path := _first(ROLES[role][1], beside):
-                self._link(role, path, None)
-        self._leave_strangers_out()
-        missing = (*self.missing, *self.unreadable)
-        return Chain(root=self.root, **self.found, places=self.places, curves=self.curves, faults=tuple(self.faults),
-                     missing=missing)  # fmt: skip
+            verified = evidence.made_from[0].sha256 if evidence else None
+            path = folder / MANIFEST_NAME
+            firmware = self._read("firmware", FirmwareManifest, path, verified, "the evidence is of another one")
+            _refuse_changes(folder, firmware, evidence)
+            beside, stated = (folder, *beside), firmware.origin.compensator_json
+        elif evidence:
+            raise InputError(f"'{folder}' is not the firmware that the evidence is of; give its folder with --firmware")
+        valve_json = _first(ValveModel, beside)
+        if compensator_json := _first(Compensator, beside):
+            compensator = self._read("compensator", Compensator, compensator_json, stated, of)
+            self._take_valve(compensator, valve_json)
+        elif valve_json:
+            self._read("valve", ValveModel, valve_json)
+        if assessment_json := _first(Assessment, beside):
+            self._read("assessment", Assessment, assessment_json)
+            self._leave_strangers_out()
+        absent = [ROLES[role] for role in ("evidence", "firmware", "compensator", "valve") if role not in self.found]
+        missing = [*self.missing, *(f"{label}: made by `{written_by(schema_of(kind))}`" for label, kind in absent)]
+        return Chain(root=self.root, **self.found, places=self.places, curves=self.curves, missing=tuple(missing))
 
-    def _link(self, role: str, path: Path | None, stated: str | None, otherwise: str = "") -> Any:
-        """Read an artefact, if its hash is the one that is stated; without one that can't be read the rest is reported.
-        """
-        if path is None or not self._is_of(path, stated, otherwise):
-            return self.miss(role, stated)
-        label, kind = ROLES[role]
-        try:
-            artefact = read_artefact(read_bytes(path, label), kind, self._name(path))
-        except InputError as error:
-            # What the evidence rests on must not go missing without a word: its verdict would stand.
-            (self.faults if role == "compensator" and self.found else self.unreadable).append(f"{label}: {error}")
-            return None
-        return self.take(role, artefact, Place(self._name(path), digest_of(path)))
-
-    def take(self, role: str, artefact: Artefact, place: Place) -> Artefact:
-        """Keep an artefact of a role."""
-        self.found[role], self.places[role] = artefact, place
+    def _read(self, role: str, kind: type[Kind], path: Path, stated: str | None = None, otherwise: str = "") -> Kind:
+        """Read an artefact, whose hash is the one that is stated."""
+        digest = _check(path, stated, otherwise)
+        artefact = read_artefact(read_bytes(path, ROLES[role][0]), kind, str(path))
+        self.take(role, artefact, Place(self._name(path), digest))
         return artefact
 
-    def miss(self, role: str, stated: str | None = None) -> None:
-        """Say what is missing, and which command makes it."""
-        label, kind = ROLES[role]
-        of = f" of SHA-256 {stated}" if stated else ""
-        self.missing.append(f"{label}{of}: made by `{written_by(schema_of(kind))}`")
+    def take(self, role: str, artefact: Artefact, place: Place) -> None:
+        """Keep an artefact of a role."""
+        self.found[role], self.places[role] = artefact, place
 
     def _take_valve(self, compensator: Compensator, path: Path | None) -> None:
         """Take the valve's file; where that is another by now or not here, the valve that the compensator holds."""
@@ -214,47 +195,52 @@ class _Reading:
 
     def _leave_strangers_out(self) -> None:
         """Leave out an assessment whose recordings BEFORE are not the valve's."""
-        valve, assessment = self.found.get("valve"), self.found.get("assessment")
-        if valve and assessment and not {each.sha256 for each in valve.made_from} & {
-            each.sha256 for each in assessment.made_from
-        }:
+        known, compared = (
+            {each.sha256 for each in self.found[role].made_from} if role in self.found else set()
+            for role in ("valve", "assessment")
+        )
+        if known and not known & compared:
             del self.found["assessment"]
             name = self.places.pop("assessment").name
             self.missing.append(f"assessment of recordings of this valve: {name} compares others, so it is not shown")
-
-    def _is_of(self, path: Path, stated: str | None, otherwise: str) -> bool:
-        """Tell whether a file has the hash that is stated; of another one say so."""
-        digest = digest_of(path)
-        if stated not in (None, digest):
-            self.faults.append(f"{self._name(path)} has the SHA-256 {digest}, but {otherwise}, of {stated}: not used")
-        return stated in (None, digest)
 
     def _name(self, path: Path) -> str:
         place = path.resolve()
         return place.name if place.parent == self.root else f"{place.parent.name}/{place.name}"
 
 
+def _check(path: Path, stated: str | None, otherwise: str) -> str:
+    """Return the hash of a file, which must be the one that is stated."""
+    digest = digest_of(path) if path.is_file() else "none, as it is missing"
+    if stated not in (None, digest):
+        raise InputError(
+            f"'{path}' has the SHA-256 {digest}, but {otherwise}, of {stated}: the files do not belong together; give "
+            "the folder as it was written"
+        )
+    return digest
+
+
 def _first(kind: type[Artefact], places: tuple[Path, ...]) -> Path | None:
     return next((path for path in (place / kind.FILE_NAME for place in places) if path.is_file()), None)
 
 
-def changes_since(folder: Path, firmware: FirmwareManifest, evidence: Evidence | None) -> list[str]:
-    """Return a sentence on each file of a firmware that is another, or none, since it was verified, or generated.
+def _refuse_changes(folder: Path, firmware: FirmwareManifest, evidence: Evidence | None) -> None:
+    """Refuse a firmware with a file that is another, or none, since it was verified, or generated.
 
     A board file is its user's to change; but evidence is of the one that was there when it was made.
     """
+    if evidence and evidence.target != firmware.target:
+        raise InputError(f"the evidence is for {evidence.target}, '{folder}' for {firmware.target}; give its firmware")
     known = {**firmware.files, **(evidence.differing_files if evidence else {})}
     names = [*firmware.files, *added_files(folder, firmware)]
     there = {name: digest_of(folder / name) for name in names if (folder / name).is_file()}
     changed = sorted(name for name in known.keys() | there.keys() if there.get(name) != known.get(name))
     if evidence is None:
         changed = [name for name in changed if name in firmware.files and name not in firmware.board]
-    since = "`dzdesign verify`; run it on the folder again" if evidence else "`dzdesign codegen`"
-
-    def how(name: str) -> str:
-        return "was added" if name not in known else "was changed" if name in there else "is gone"
-
-    return [f"{folder.name}/{name} {how(name)} since {since}" for name in changed]
+    if changed:
+        how = "added" if changed[0] not in known else "changed" if changed[0] in there else "taken away"
+        since = "`dzdesign verify`: run it on the folder again" if evidence else "`dzdesign codegen`: run it again"
+        raise InputError(f"'{folder / changed[0]}' was {how} since {since}")
 
 
 def laws_of(compensator: Compensator | None) -> dict[str, SideLaw]:

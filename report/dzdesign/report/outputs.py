@@ -1,6 +1,6 @@
 """The outputs that were made of one compensator.json: their section, and what the verdict says of them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,8 +21,7 @@ from dzdesign.verify.output_evidence import OutputEvidence
 
 FIRMWARE, OUTPUT = (family_of(schema_of(kind)) for kind in (FirmwareManifest, OutputManifest))
 MANIFESTS: tuple[type[FirmwareManifest | OutputManifest], ...] = (FirmwareManifest, OutputManifest)
-OfOutput = Evidence | OutputEvidence
-EVIDENCE: tuple[type[OfOutput], ...] = (Evidence, OutputEvidence)
+EVIDENCE: tuple[type[Evidence | OutputEvidence], ...] = (Evidence, OutputEvidence)
 #: Verdicts, from the one that counts before all others.
 COUNTS_FIRST = (False, None, True)
 #: Folders that are looked into, and files that a sentence names.
@@ -32,29 +31,26 @@ MOST, NAMED = 500, 5
 def outputs_in(root: Path, compensator_json: str) -> MadeOutputs:
     """Return the outputs in the folders of a valve that were made of this compensator.json, with their evidence.
 
-    Evidence counts for the manifest whose hash it states. What can't be read, and what is of another compensator, is a
-    sentence.
+    What can't be read, and what is of another compensator, is a sentence.
     """
-    folders = sorted(each for each in root.iterdir() if each.is_dir() and not each.name.startswith("."))[:MOST]
     listed: list[MadeOutput] = []
     others: list[str] = []
-    evidence = _evidence_in(folders, others)
+    folders = sorted(each for each in root.iterdir() if each.is_dir() and not each.name.startswith("."))[:MOST]
     for folder in folders:
         path, header = folder / MANIFEST_NAME, manifest_of(folder)
-        family = family_of(header["schema"]) if header else ""
-        if family not in (FIRMWARE, OUTPUT):
+        if header is None or family_of(header["schema"]) not in (FIRMWARE, OUTPUT):
             continue
         try:
             manifest = read_artefact(read_bytes(path, "manifest"), MANIFESTS, f"{folder.name}/{path.name}")
+            output = _with_evidence(_output(folder, manifest), folders)
         except InputError as error:
             others.append(f"'{folder.name}' is not listed: {error}")
             continue
-        origin, output = manifest.origin.compensator_json, _output(folder, manifest)
-        if origin == compensator_json:
-            listed.append(_with_evidence(output, evidence))
+        if manifest.origin.compensator_json == compensator_json:
+            listed.append(output)
         else:
             what = f"{output.place} ({output.kind}) was made from another compensator.json"
-            others.append(f"{what}, of SHA-256 {origin}: not listed")
+            others.append(f"{what}, of SHA-256 {manifest.origin.compensator_json}: not listed")
     return MadeOutputs(listed=tuple(listed), others=tuple(others))
 
 
@@ -89,31 +85,21 @@ def _is(path: Path, digest: str) -> bool:
     return path.is_file() and digest_of(path) == digest
 
 
-def _evidence_in(folders: Sequence[Path], unused: list[str]) -> dict[str, OfOutput]:
-    """Return the evidence in some folders by its place, and say of which it is not used."""
-    found: dict[str, OfOutput] = {}
-    for path in (folder / kind.FILE_NAME for folder in folders for kind in EVIDENCE):
-        if not path.is_file():
-            continue
-        place, manifest = f"{path.parent.name}/{path.name}", manifest_of(path.parent)
-        try:
-            if manifest and not _is(path, manifest["files"].get(path.name, "")):
-                raise InputError("it was changed since `dzdesign verify` wrote it")
-            found[place] = read_artefact(read_bytes(path, "evidence"), EVIDENCE, place)
-        except InputError as error:
-            unused.append(f"{place} is not used: {error}")
-    return found
-
-
-def _with_evidence(output: MadeOutput, evidence: Mapping[str, OfOutput]) -> MadeOutput:
-    """Return an output with what evidence says of it; of two about the same bytes what is worse counts."""
+def _with_evidence(output: MadeOutput, places: Sequence[Path]) -> MadeOutput:
+    """Return an output with what evidence of its manifest says; of two pieces of evidence what is worse counts."""
     said: list[MadeOutput] = []
-    for place, each in evidence.items():
-        if each.made_from and each.made_from[0].sha256 == output.sha256:
-            checks = each.all_checks if isinstance(each, Evidence) else each.checks
-            worst = min(checks, key=lambda check: COUNTS_FIRST.index(check.holds))
-            fault, inputs = "" if worst.holds else f"{worst.name}: {worst.text}", sum(one.inputs for one in each.inputs)
-            said.append(replace(output, holds=worst.holds, inputs=inputs, evidence=place, fault=fault))
+    for path in (place / kind.FILE_NAME for place in places for kind in EVIDENCE):
+        if not path.is_file() or output.sha256.encode() not in path.read_bytes():  # as evidence states what it is of
+            continue
+        name, manifest = f"{path.parent.name}/{path.name}", manifest_of(path.parent)
+        if manifest and not _is(path, manifest["files"].get(path.name, "")):
+            raise InputError(f"'{name}' was changed since `dzdesign verify` wrote it; run that again")
+        evidence: Evidence | OutputEvidence = read_artefact(read_bytes(path, "evidence"), EVIDENCE, name)
+        checks = evidence.all_checks if isinstance(evidence, Evidence) else evidence.checks
+        worst = min(checks, key=lambda check: COUNTS_FIRST.index(check.holds))
+        inputs = sum(each.inputs for each in evidence.inputs)
+        fault = "" if worst.holds else f"{worst.name}: {worst.text}"
+        said.append(replace(output, holds=worst.holds, inputs=inputs, evidence=name, fault=fault))
     return min(said, key=lambda one: COUNTS_FIRST.index(one.holds), default=output)
 
 
@@ -168,7 +154,7 @@ def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headlin
         return replace(headline, kind="bad", text=text, reasons=(*headline.reasons, *map(_reason, wrong)))
     untried = [each for each in others if each.holds is None]
     reasons = tuple(_reason(each) for each in untried if each.fault)
-    if made.listed and not (chain.faults or chain.firmware or chain.evidence):
+    if made.listed and not (chain.firmware or chain.evidence):
         held = ", ".join(each.place for each in made.listed if each.holds)
         if not untried:
             return replace(headline, kind="good", text=f"Every requirement holds of {held}; no C firmware is here")

@@ -55,11 +55,6 @@ class Headline:
         return False if self.some_failed else {"good": True, "bad": False}.get(self.kind)
 
 
-def misfit(faults: tuple[str, ...]) -> Headline:
-    """Return the verdict on files of which some are not what the others were made from."""
-    return Headline(kind="bad", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=faults)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
     """One number that matters: its label, the number itself and what it is of."""
@@ -175,8 +170,8 @@ class Report:
         Verdict; None if something was not checked, or is missing.
     verdict : str
         Verdict in words.
-    faults, missing : tuple of str
-        What is inconsistent, and what is missing.
+    missing : tuple of str
+        What is missing, and which command makes it.
     outputs : MadeOutputs
         For the report of a valve: the outputs made from its compensator.
     """
@@ -185,17 +180,15 @@ class Report:
     kind: str
     holds: bool | None
     verdict: str
-    faults: tuple[str, ...]
     missing: tuple[str, ...]
     outputs: MadeOutputs = MadeOutputs()
 
 
-def report_of(page: Page, faults: tuple[str, ...]) -> Report:
-    """Return the finished report of a page; `faults` name the files that do not fit."""
+def report_of(page: Page) -> Report:
+    """Return the finished report of a page."""
     verdict = page.verdict
     return Report(
-        html=render(page), kind=verdict.kind, holds=verdict.holds, verdict=verdict.text, faults=faults,
-        missing=tuple(page.missing),
+        html=render(page), kind=verdict.kind, holds=verdict.holds, verdict=verdict.text, missing=tuple(page.missing)
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain, laws_of
 from dzdesign.report.cells import counted, whole
-from dzdesign.report.page import Figure, Headline, misfit
+from dzdesign.report.page import Figure, Headline
 from dzdesign.report.sections.curves import BRANCHES, ORIGIN_WORDS, origin_of
 from dzdesign.report.sections.quantities import CharacteristicQuantities
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
@@ -28,7 +28,7 @@ from dzdesign.verify.untried import not_tried
 
 def headline(chain: Chain) -> Headline:
     """Return the verdict on a chain: good only if every requirement was checked and holds, and every file fits."""
-    evidence, judged = None if chain.faults else chain.evidence, _verdict(chain)
+    evidence, judged = chain.evidence, _verdict(chain)
     # Under a verdict that is bad nobody takes all for harmless, and what is missed needs the place.
     return replace(
         judged,
@@ -55,8 +55,6 @@ def _cautions(chain: Chain) -> Iterator[str]:
 
 def _verdict(chain: Chain) -> Headline:
     evidence = chain.evidence
-    if chain.faults:
-        return misfit(chain.faults)
     if evidence is None:
         if missed := [check for check in _limits(chain) if check.holds is not True]:
             count = len(_limits(chain))
@@ -69,8 +67,7 @@ def _verdict(chain: Chain) -> Headline:
     judged = _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
     if judged.kind != "good":
         return judged
-    absent = "" if chain.firmware else "the firmware that was verified is not here"
-    return replace(judged, text="; ".join(filter(None, [judged.text, evidence.reservation, absent])))
+    return replace(judged, text="; ".join(filter(None, [judged.text, evidence.reservation])))
 
 
 def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headline:

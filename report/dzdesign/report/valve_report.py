@@ -4,14 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from dzdesign.design.machine.words import not_counted
-from dzdesign.report.artefacts import Chain, read_chain
+from dzdesign.report.artefacts import Chain, chain_of_evidence, read_chain
 from dzdesign.report.figure import figure_style
 from dzdesign.report.outputs import outputs_in, outputs_sections, with_outputs
 from dzdesign.report.page import MadeOutputs, Page, Report, Section, report_of
 from dzdesign.report.sections.budget import budget_section
 from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
 from dzdesign.report.sections.closed_loop import loop_section
-from dzdesign.report.sections.conditions import acceptance_section, conditions_section
+from dzdesign.report.sections.conditions import conditions_section
 from dzdesign.report.sections.curves import characteristic_curves
 from dzdesign.report.sections.inputs import inputs_section
 from dzdesign.report.sections.law import account_of, integers_section, law_section
@@ -25,6 +25,7 @@ from dzdesign.report.sections.provenance import (
 from dzdesign.report.sections.quantities import characteristic_quantities
 from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import headline, key_figures, valve_name
+from dzdesign.verify.verification import Verification, evidence_files
 
 REPORT_NAME = "report.html"
 NO_OUTPUTS = MadeOutputs()
@@ -41,6 +42,12 @@ def report_of_folder(folder: Path, logo: str = "", firmware: Path | None = None)
     made_of = chain.places.get("compensator")
     outputs = outputs_in(chain.root, made_of.sha256) if chain.root and made_of else NO_OUTPUTS
     return make_report(chain, outputs, logo)
+
+
+def with_report(verification: Verification, firmware: Path, output: Path) -> dict[str, bytes]:
+    """Return the files of an evidence folder, to be written into `output`, with the report of what was verified."""
+    chain = chain_of_evidence(verification.evidence, verification.curves, output, firmware)
+    return {**evidence_files(verification), REPORT_NAME: make_report(chain).html.encode()}
 
 
 def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "") -> Report:
@@ -82,7 +89,7 @@ def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "")
         not_counted=not_counted(compensator),
         law=account_of(compensator.law) if compensator else None,
     )
-    return replace(report_of(page, chain.faults), outputs=outputs)
+    return replace(report_of(page), outputs=outputs)
 
 
 def _sections(chain: Chain) -> dict[str, Section]:
@@ -99,8 +106,6 @@ def _sections(chain: Chain) -> dict[str, Section]:
         "warnings": warnings_section(chain.valve, compensator),
         "provenance": provenance_section(chain),
     }
-    if acceptance := acceptance_section(chain.assessment, chain.reproduction):
-        sections["acceptance"] = acceptance
     if compensator:
         sections["remaining"] = remaining_section(compensator)
     if compensator and compensator.lot:

@@ -1,22 +1,21 @@
 """What lies in the folder of a lot, read back for its report: hashes decide what belongs to it.
 
 A finished lot states the hashes of its table and of its lot setting in batch.json, and the table those of each valve's
-artefacts. A file whose hash is another is named, and not used. Of a lot whose batch was stopped there is no table yet;
-then the valves' folders themselves are read.
+artefacts. Of a file whose hash is another no report is made.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, parse_document, read_bytes, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import Tool, schema_of
+from dzdesign.core.artefact_types import schema_of
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.folder_contents import digest_of
 from dzdesign.core.input_files import MOST_DOCUMENT
-from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.summary import AGAIN, OK, SUMMARY_NAME, VALVES, LotSummary, UnfinishedLot, ValveManifest
 from dzdesign.report.lot.table import (
@@ -29,9 +28,7 @@ from dzdesign.report.lot.table import (
     frame_of,
     read_manifest,
     read_table,
-    read_valve_folder,
     sides_of,
-    table_of_valves,
 )
 from dzdesign.report.outputs import change_in
 
@@ -49,27 +46,23 @@ Row = Mapping[str, Cell]
 class Lot:
     """What a report of a lot is of.
 
-    `summary` is None of a lot whose batch did not come to its end, `text` that of valves.csv, empty where it was not
-    used, `expected` how many valves the lot has, `hashes` the name and SHA-256 of each file that was read. `faults` do
-    not fit and were not used. `compared` says whether the valves' folders are there and were compared with the table,
+    `frame` is the table, empty where it is not there, and `text` that of valves.csv; `hashes` are the name and SHA-256
+    of each file that was read. `compared` says whether the valves' folders are there and were compared with the table,
     `warning_texts` has for each code of a warning its text in the first valve that has it.
     """
 
-    tool: Tool
-    summary: LotSummary | None
+    summary: LotSummary
     frame: "DataFrame"
-    text: str = ""
-    expected: int
+    text: str
     hashes: tuple[tuple[str, str], ...]
-    faults: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
-    compared: bool = False
-    warning_texts: Mapping[str, str] = field(default_factory=dict)
+    missing: tuple[str, ...]
+    compared: bool
+    warning_texts: Mapping[str, str]
 
     @property
     def units(self) -> RecordedUnits:
         """In which its valves were recorded."""
-        return self.summary.recorded_units if self.summary else AS_COMPUTED
+        return self.summary.recorded_units
 
     @property
     def sides(self) -> tuple[str, ...]:
@@ -110,20 +103,15 @@ def refuse_uncalibrated(folder: Path) -> None:
 
 
 def read_lot(folder: Path) -> Lot:
-    """Read the folder of a lot, finished or stopped."""
+    """Read the files of a finished lot; one that is not as batch.json and the table state it is an `InputError`."""
     content = read_bytes(folder / SUMMARY_NAME, "summary of a lot")
     kinds: tuple[type[LotSummary | UnfinishedLot], ...] = (LotSummary, UnfinishedLot)
-    found = read_artefact(content, kinds, str(folder / SUMMARY_NAME), AGAIN)
-    own_hash = (SUMMARY_NAME, sha256_of(content))
-    if isinstance(found, UnfinishedLot):
-        return _unfinished(folder, found, own_hash)
-    return _finished(folder, found, own_hash)
-
-
-def _finished(folder: Path, summary: LotSummary, own_hash: tuple[str, str]) -> Lot:
-    """Read the files of a finished lot, compared with the hashes that batch.json and the table state."""
-    path, hashes = folder / TABLE, [own_hash]
-    faults: list[str] = []
+    summary = read_artefact(content, kinds, str(folder / SUMMARY_NAME), AGAIN)
+    if isinstance(summary, UnfinishedLot):
+        raise InputError(
+            f"the batch in '{folder}' did not come to its end; give the same `dzdesign batch` again, which takes it up"
+        )
+    path, hashes = folder / TABLE, [(SUMMARY_NAME, sha256_of(content))]
     missing: list[str] = []
     if path.is_file() and path.stat().st_size > MOST_TABLE:
         raise InputError(
@@ -137,40 +125,31 @@ def _finished(folder: Path, summary: LotSummary, own_hash: tuple[str, str]) -> L
         stated[summary.lot_setting.file] = summary.lot_setting.sha256
     if summary.firmware:
         stated[f"{summary.firmware.folder}/{MANIFEST_NAME}"] = summary.firmware.manifest_sha256
-    content, frame = b"", frame_of([])
     for name, digest in stated.items():
         if not (folder / name).is_file():
             missing.append(f"{name}: `dzdesign batch` makes it, from the folders that are done")
-        elif (found := digest_of(folder / name)) != digest:
-            faults.append(f"{name} was changed since `dzdesign batch` wrote it (SHA-256 {found}, {SUMMARY_NAME} says "
-                          f"{digest}): not used")  # fmt: skip
-        else:
-            hashes += [(name, digest)] if name != "valves.parquet" else []
-            content = read_bytes(path, "file of the lot") if name == TABLE else content
-    if content:
-        frame = read_table(content, str(path))
-        counts = {"valves": (summary.valves, len(frame)),
-                  "calibrated": (summary.calibrated, int((frame["status"] == OK).sum()))}  # fmt: skip
-        faults[:0] = [
-            f"{SUMMARY_NAME} was changed: it counts {says} valves as '{key}', the table has {count}"
-            for key, (says, count) in counts.items() if says != count
-        ]  # fmt: skip
-    texts: dict[str, str] = {}
-    if (folder / VALVES).is_dir():
-        texts = _compared(folder / VALVES, summary, frame, faults)
+        elif digest_of(folder / name) != digest:
+            raise InputError(f"'{folder / name}' was changed since `dzdesign batch` wrote it; {AGAIN}")
+        elif name != "valves.parquet":
+            hashes.append((name, digest))
+    table = read_bytes(path, "table of the lot") if path.is_file() else None
+    frame = frame_of([]) if table is None else read_table(table, str(path))
+    if table is not None and (len(frame), int((frame["status"] == OK).sum())) != (summary.valves, summary.calibrated):
+        raise InputError(f"'{folder / SUMMARY_NAME}' counts other valves than the table has; {AGAIN}")
+    compared, texts = (folder / VALVES).is_dir(), {}
+    if compared:
+        texts = _compared(folder / VALVES, summary, frame)
     else:
         missing.append("the folders of the valves: they are not beside this table, so their hashes were not compared")
     return Lot(
-        tool=summary.tool, summary=summary, frame=frame, text=content.decode("utf-8"), expected=summary.valves,
-        hashes=tuple(hashes), compared=(folder / VALVES).is_dir(), warning_texts=texts, faults=tuple(faults),
-        missing=tuple(missing),
+        summary=summary, frame=frame, text=(table or b"").decode("utf-8"), hashes=tuple(hashes), compared=compared,
+        warning_texts=texts, missing=tuple(missing),
     )  # fmt: skip
 
 
-def _compared(valves: Path, summary: LotSummary, frame: "DataFrame", faults: list[str]) -> dict[str, str]:
-    """Compare each valve's artefacts with the table's hashes, and add to the faults; return a text of each warning."""
+def _compared(valves: Path, summary: LotSummary, frame: "DataFrame") -> dict[str, str]:
+    """Compare each valve's artefacts with the table's hashes; return a text of each warning."""
     other: list[str] = []
-    changed: list[str] = []
     texts: dict[str, str] = {}
     for row in frame.iter_rows(named=True):
         if not NAME.fullmatch(row["name"]):
@@ -181,14 +160,13 @@ def _compared(valves: Path, summary: LotSummary, frame: "DataFrame", faults: lis
             if stated and not (path.is_file() and digest_of(path) == stated):
                 other.append(f"{row['name']}/{file}")
             elif stated and path.name == MANIFEST_NAME and (change := change_in(path.parent)):
-                changed.append(f"{row['name']}/{path.parent.name}: {change}")
+                other.append(f"{row['name']}/{path.parent.name}: {change}")
             elif stated and file == ValveModel.FILE_NAME and not texts.keys() >= set(row["warnings"].split()):
                 valve = read_artefact(read_bytes(path, "valve"), ValveModel, str(path))
                 texts = {**{each.code: each.text for each in reversed(valve.warnings)}, **texts}
-    for what, names in (("files of valves are not those that the table was made from", other),
-                        ("folders of valves are not as `dzdesign batch` wrote them", changed)):  # fmt: skip
-        if names:
-            faults.append(f"{what} ({len(names)}): {and_more(names, NAMED)}")
+    if other:
+        what = f"{len(other)} files of '{valves}' are not as the table has them"
+        raise InputError(f"{what}: {and_more(other, NAMED)}; {AGAIN}")
     return texts
 
 
@@ -197,22 +175,3 @@ def _stated(row: Row, summary: LotSummary) -> Iterator[tuple[str, Cell]]:
     yield from ((file, row[column]) for column, file in HASHED.items())
     for target, output in summary.outputs.items():
         yield f"{output.folder}/{MANIFEST_NAME}", row.get(OUTPUT + target + OUTPUT_HASH)
-
-
-def _unfinished(folder: Path, found: UnfinishedLot, own_hash: tuple[str, str]) -> Lot:
-    """Read what a batch that was stopped, or still runs, has come to."""
-    names = [name for name in found.names if NAME.fullmatch(name)]
-    there = [name for name in names if (folder / VALVES / name / MANIFEST_NAME).is_file()]
-    valves, faults = [], []
-    for name in there:
-        try:
-            valves.append(read_valve_folder(folder / VALVES / name))
-        except InputError as error:
-            faults.append(str(error))
-    warnings = [warning for each in valves if each.compensator for warning in each.compensator.valve.warnings]
-    left = f"{len(names) - len(there)} of {len(names)} valves, the table and the lot setting"
-    return Lot(
-        tool=found.tool, summary=None, frame=table_of_valves(valves), expected=len(names), hashes=(own_hash,),
-        warning_texts={warning.code: warning.text for warning in reversed(warnings)}, faults=tuple(faults),
-        missing=(f"{left}: the batch did not come to its end; the same `dzdesign batch` takes it up",),
-    )  # fmt: skip

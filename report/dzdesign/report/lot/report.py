@@ -14,7 +14,7 @@ from dzdesign.report.lot.spread import EXTRA, FAR, TWENTY, Spread, spreads_of
 from dzdesign.report.lot.summary import DOES_NOT_HOLD
 from dzdesign.report.lot.table import column_of
 from dzdesign.report.lot.words import lot_budget_lines, untested_lines
-from dzdesign.report.page import Figure, Headline, Page, Report, misfit, report_of
+from dzdesign.report.page import Figure, Headline, Page, Report, report_of
 
 #: Valves that the verdict names, and anomalies.
 IN_VERDICT, ANOMALIES_IN_VERDICT = 8, 3
@@ -28,16 +28,16 @@ CARDS = (
 
 
 def report_of_lot(folder: Path, logo: str = "") -> Report:
-    """Make the report of the folder of a lot, finished or stopped; `logo` is a data: address."""
+    """Make the report of the folder of a lot; `logo` is a data: address."""
     lot = read_lot(folder)
     spreads = spreads_of(lot.frame, lot.units)
     missing = list(lot.missing)
-    if lot.summary and len(lot.calibrated) and not lot.summary.verified:
+    if len(lot.calibrated) and not lot.summary.verified:
         missing.append("the evidence of each valve: `dzdesign batch --verify` makes it")
     with figure_style():
         sections = sections_of(lot, spreads)
     page = Page(
-        title=f"Lot of {whole(lot.expected)} {'valve' if lot.expected == 1 else 'valves'}",
+        title=f"Lot of {whole(lot.summary.valves)} {'valve' if lot.summary.valves == 1 else 'valves'}",
         verdict=_headline(lot),
         figures=_cards(lot, spreads),
         template="lot.html.jinja",
@@ -45,20 +45,19 @@ def report_of_lot(folder: Path, logo: str = "") -> Report:
         missing=missing,
         logo=logo,
     )
-    return report_of(page, lot.faults)
+    return report_of(page)
 
 
 def _headline(lot: Lot) -> Headline:
     """Return the verdict: good only if every valve is calibrated and verified, and every file fits."""
-    anomalies = lot.summary.anomalies if lot.summary else ()
+    anomalies = lot.summary.anomalies
     lines = [f"odd: {text}" for text in anomalies[:ANOMALIES_IN_VERDICT]]
     warned = lot.calibrated.select("name", "warnings").iter_rows()
     simulated = [name for name, codes in warned if "simulated" in codes.split()]
     if simulated:
         lines.insert(0, f"SIMULATED recordings, not of measured valves: {and_more(simulated, IN_VERDICT)}")
-    if lot.summary:
-        lines += lot_budget_lines(lot.summary.budget)
-    if lot.summary and lot.summary.lot_setting:
+    lines += lot_budget_lines(lot.summary.budget)
+    if lot.summary.lot_setting:
         lines += untested_lines(lot.summary.lot_setting, lot.units)
     more = len(anomalies) - ANOMALIES_IN_VERDICT
     lines += [f"odd: {more} more, under “What the recordings leave open”"] if more > 0 else []
@@ -66,16 +65,11 @@ def _headline(lot: Lot) -> Headline:
 
 
 def _verdict(lot: Lot) -> Headline:
-    if lot.faults:
-        return misfit(lot.faults)
-    done, count, expected, failed = len(lot.calibrated), len(lot.frame), lot.expected, lot.failed
+    done, count, failed = len(lot.calibrated), len(lot.frame), lot.failed
     by_status = [
         (status, failed.filter(failed["status"] == status)["name"].to_list()) for status, _ in _statuses(lot)
     ]
     reasons = tuple(f"{whole(len(names))} {status}: {and_more(names, IN_VERDICT)}" for status, names in by_status)
-    if lot.summary is None:
-        text = f"NOT FINISHED: {whole(count)} of {whole(expected)} valves tried, {whole(done)} calibrated"
-        return Headline(kind="open", text=text, reasons=reasons)
     if not count:
         return Headline(kind="open", text="NOT KNOWN: the table is not here")
     words, outputs = f"{whole(done)} of {whole(count)} valves calibrated", lot.summary.outputs
@@ -104,7 +98,7 @@ def _cards(lot: Lot, spreads: Sequence[Spread]) -> tuple[Figure, ...]:
     """Return the numbers that matter: how many are calibrated, and need a look; and how the valves scatter."""
     done, failed, statuses = len(lot.calibrated), len(lot.failed), _statuses(lot)
     note = ", ".join(f"{whole(count)} {status}" for status, count in statuses) or "none left out"
-    if lot.summary and done:
+    if done:
         note += "; verified" if lot.summary.verified else "; not verified"
     kind = "text" if not failed else "bad" if DOES_NOT_HOLD in dict(statuses) or not done else "open"
     far = {name for spread in spreads for name, _ in spread.far()}
@@ -112,7 +106,7 @@ def _cards(lot: Lot, spreads: Sequence[Spread]) -> tuple[Figure, ...]:
     known = any(spread.limits for spread in spreads)
     odd = f"{whole(len(far))} beyond {FAR:g} robust s.d. in some quantity" if known else "too few to say which lie far"
     figures = [
-        Figure(label="Calibrated", value=f"{whole(done)} of {whole(lot.expected)}", note=note, kind=kind),
+        Figure(label="Calibrated", value=f"{whole(done)} of {whole(lot.summary.valves)}", note=note, kind=kind),
         Figure(
             label="Need a look",
             value=whole(failed + len(far)),

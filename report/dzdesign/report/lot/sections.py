@@ -88,7 +88,7 @@ def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
         "warnings": Section(),
         "provenance": _provenance_section(lot),
     }
-    if lot.summary and lot.summary.outputs:
+    if lot.summary.outputs:
         sections["outputs"] = Section(tables=(_outputs_table(lot.summary.outputs, lot.summary.verified),))
     return sections
 
@@ -247,7 +247,7 @@ def _spread_table(spreads: Sequence[Spread]) -> Table:
 
 def _budget_table(lot: Lot) -> Table | None:
     """Return the components of all budgets; None where there are none."""
-    lines = lot.summary.budget.lines if lot.summary and lot.summary.budget else ()
+    lines = lot.summary.budget.lines if lot.summary.budget else ()
     if not lines:
         return None
 
@@ -301,8 +301,6 @@ def _far_section(spreads: Sequence[Spread]) -> Section:
 
 
 def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
-    if lot.summary is None:
-        return Section(missing="The lot setting is made at the end of a batch.")
     setting = lot.summary.lot_setting
     if setting is None:
         return Section(missing=f"There is no lot setting: {lot.summary.why_no_lot_setting}.", optional=True)
@@ -462,7 +460,7 @@ def _recordings_section(lot: Lot) -> Section:
     for name, codes in lot.calibrated.select("name", "warnings").iter_rows():
         for code in codes.split():
             by_code.setdefault(code, []).append(name)
-    odd = tuple(f"Odd: {text}." for text in (lot.summary.anomalies if lot.summary else ()))
+    odd = tuple(f"Odd: {text}." for text in lot.summary.anomalies)
     count = len(lot.calibrated)
     if not by_code:
         return Section(lines=(*odd, *(("No recording of a calibrated valve has a warning.",) if count else ())))
@@ -482,7 +480,7 @@ def _recordings_section(lot: Lot) -> Section:
 
 def _provenance_section(lot: Lot) -> Section:
     lines = []
-    if lot.summary and len(lot.frame):
+    if len(lot.frame):
         hashed = lot.frame["inputs_sha256"].drop_nulls().len()
         lines.append(
             f"The table has, for {whole(hashed)} of its {whole(len(lot.frame))} valves, the SHA-256 of recordings and "
@@ -494,6 +492,6 @@ def _provenance_section(lot: Lot) -> Section:
         lot.hashes,
         ("file", lambda one: one[0]),
         ("SHA-256", lambda one: Cell(text=one[1], kind="hash")),
-        ("made by", lambda one: f"{lot.tool.name} {lot.tool.version}"),
+        ("made by", lambda one: f"{lot.summary.tool.name} {lot.summary.tool.version}"),
     )
     return Section(lines=tuple(lines), tables=(table,))

@@ -1,5 +1,6 @@
 """valves.csv: the table of a lot as a data frame, one row a valve, written, read back, and made from their folders."""
 
+import csv
 import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -125,8 +126,10 @@ def read_table(content: bytes, source: str) -> "DataFrame":
     import polars
 
     try:
-        frame = polars.read_csv(content.decode("utf-8").encode(), infer_schema=False)
-    except (UnicodeDecodeError, polars.exceptions.PolarsError) as error:
+        heading = next(csv.reader(io.StringIO(content.decode("utf-8"), newline="")), [])
+        # Polars leaves quotes in a heading doubled.
+        frame = polars.read_csv(content, infer_schema=False, new_columns=heading)
+    except (UnicodeDecodeError, csv.Error, polars.exceptions.PolarsError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(f"'{source}' is no table: {reason}; {AGAIN}") from error
     wanted = (*FIRST, *(column_of(side, column) for side in sides_of(frame.columns) for column in SIDE_COLUMNS), *LAST)

@@ -60,16 +60,12 @@ def loop_section(chain: Chain) -> Section:
     if not loop.pressures:
         return Section(missing=f"{NOT_CHECKED}: the closed loop did not run, see the requirements.")
     sides = dict.fromkeys(each.side for each in loop.pressures)
-    figures, missing, units = [], "", chain.recorded_units
+    figures, units = [], chain.recorded_units
     for side in sides:
         of_side = [each for each in loop.pressures if each.side == side]
         figures.append(dead_zone_figure(of_side, side, len(sides) > 1, units))
-        curves = chain.curves.get(closed_loop_name(side))
-        if curves is None:
-            missing = f"{closed_loop_name(side)} is missing, so the ramps are not drawn; `dzdesign verify` makes it."
-        else:
-            unseen = max((each.unseen_below_L_min for each in of_side if each.unseen_below_L_min), default=None)
-            figures.append(loop_figure(curves, side, len(sides) > 1, units, unseen))
+        unseen = max((each.unseen_below_L_min for each in of_side if each.unseen_below_L_min), default=None)
+        figures.append(loop_figure(chain.curves[closed_loop_name(side)], side, len(sides) > 1, units, unseen))
     return Section(
         figures=figures,
         tables=(
@@ -81,7 +77,6 @@ def loop_section(chain: Chain) -> Section:
             *current_tables(evidence.current_loop, units),
         ),
         lines=(_plant_line(loop),),
-        missing=missing,
     )
 
 

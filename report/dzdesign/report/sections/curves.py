@@ -68,8 +68,7 @@ def characteristic_curves(
     """Return the curves of all sides and pressure drops; `loops` are the evidence's, by the names of their files."""
     if assessment and (measured := tuple(_measured(assessment))):
         return measured
-    recorded = tuple(_recorded(valve)) if valve else ()
-    return (*recorded, *_simulated(loops, bare=not recorded))
+    return (*(_recorded(valve) if valve else ()), *_simulated(loops))
 
 
 def origin_of(recordings: ValveModel | Assessment) -> Origin:
@@ -139,24 +138,18 @@ def _samples_of(branch: RecordedBranch, sign: int, u_max_V: float) -> Points:
     return _points(samples.u_V, samples.q_L_min, sign / u_max_V, sign)
 
 
-def _simulated(loops: Mapping[str, Curves], *, bare: bool) -> Iterator[CharacteristicCurve]:
-    """Return the curves of the closed loop; those without the compensator only where nothing recorded shows them."""
-    for side in SIDES:
-        if columns := loops.get(closed_loop_name(side)):
-            yield from _loop_curves(side, columns, bare=bare)
-
-
-def _loop_curves(side: str, columns: Curves, *, bare: bool) -> Iterator[CharacteristicCurve]:
-    sets: dict[Set, str] = {"before": "q_without_", "after": "q_with_"} if bare else {"after": "q_with_"}
-    command, sign = columns["command_percent"] / 100, SIDES[side]
-    top = int(np.argmax(command)) + 1
-    for name, prefix in sets.items():
-        for column, flow in columns.items():
-            if column.startswith(prefix):
+def _simulated(loops: Mapping[str, Curves]) -> Iterator[CharacteristicCurve]:
+    """Return the curves of the closed loop, with the compensator."""
+    for side, sign in SIDES.items():
+        columns = loops.get(closed_loop_name(side), {})
+        for column in columns:
+            if column.startswith("q_with_"):
+                command, flow = columns["command_percent"] / 100, columns[column]
+                top = int(np.argmax(command)) + 1
                 yield CharacteristicCurve(
                     side=side,
-                    dp_MPa=float(column.removeprefix(prefix).removesuffix("_MPa_L_min")),
-                    set=name,
+                    dp_MPa=float(column.removeprefix("q_with_").removesuffix("_MPa_L_min")),
+                    set="after",
                     origin="simulated",
                     branches={
                         "opening": _thinned(command[:top], flow[:top], sign),

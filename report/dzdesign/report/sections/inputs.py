@@ -27,22 +27,18 @@ OTHER_SIGN = 8.0
 
 def inputs_section(chain: Chain) -> Section:
     """Return the section on the check of every input."""
-    if chain.evidence is None:
+    compensator = chain.compensator
+    if chain.evidence is None or compensator is None:
         return Section(missing="No evidence is here: `dzdesign verify` tries every input of the C code.")
     figures: list[ReportFigure] = []
     lines, missing = [], ""
     for each in chain.evidence.inputs:
         side = each.side
         lines += _input_lines(each, chain.recorded_units)
-        law = laws_of(chain.compensator).get(side)
-        drawn, zero = (chain.curves.get(name(side)) for name in (input_map_name, zero_command_name))
-        if drawn and law and chain.compensator:
-            figures.append(map_figure(drawn, zero, chain.compensator, each))
-        if zero and law:
-            figures.append(zero_figure(zero, side, law.certificate.guard, chain.recorded_units.of_side(side)))
-        for curves, name in ((drawn, input_map_name(side)), (zero, zero_command_name(side))):
-            if curves is None or law is None:
-                missing = f"{name} or its compensator is missing; `dzdesign verify` makes it."
+        drawn, zero = (chain.curves[name(side)] for name in (input_map_name, zero_command_name))
+        guard = laws_of(compensator)[side].certificate.guard
+        figures.append(map_figure(drawn, zero, compensator, each))
+        figures.append(zero_figure(zero, side, guard, chain.recorded_units.of_side(side)))
     if not chain.evidence.inputs:
         missing = f"{NOT_CHECKED}: the C code did not compile or did not run, see the requirements."
     return Section(figures=figures, lines=tuple(lines), missing=missing)
@@ -59,7 +55,7 @@ def _input_lines(found: InputCheck, units: RecordedUnits) -> list[str]:
 
 
 def map_figure(
-    curves: Curves, zero: Curves | None, compensator: Compensator, inputs: InputCheck
+    curves: Curves, zero: Curves, compensator: Compensator, inputs: InputCheck
 ) -> ReportFigure:
     """Draw what the core gives against command and pressure drop, and where it falls back or is wrong.
 
@@ -161,10 +157,8 @@ def _levels(output: np.ndarray) -> np.ndarray:
     return levels
 
 
-def _draw_zero_strip(axes: "Axes", zero: Curves | None, units: RecordedUnits) -> int:
+def _draw_zero_strip(axes: "Axes", zero: Curves, units: RecordedUnits) -> int:
     """Draw along zero command where the drive is certified and where not; return at how many codes it is not."""
-    if zero is None:
-        return 0
     dp, above = zero["dp_MPa"], zero["drive_V"] > zero["bound_V"]
     dp, ends = units.convert(dp, "MPa"), (0.0, 2.0)  # percent of command: wide enough to be seen
     axes.fill_betweenx(dp, *ends, where=~above, color=LIGHT["green"], lw=0, zorder=4)
