@@ -8,13 +8,13 @@ from pathlib import Path
 
 import polars
 import pytest
-from many_valves import write_lot
 
 from dzdesign.batch.valves import valves_of
 from dzdesign.command_line.cli import main
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.table import by_name, frame_of, read_table, safe, table_files
 from tests.support.html_pages import Page
+from tests.support.many_valves import write_lot
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
 
 pytestmark = pytest.mark.slow
