@@ -140,13 +140,13 @@ def text(name, right, wrong):
     """Change the native plant's C."""
 
     def fault(monkeypatch):
-        load = native_loop.ConfinedLibrary
+        load = native_loop.CompiledLibrary
 
         def changed(sources, *more):
             assert sources[name].count(right) == 1
             return load({**sources, name: sources[name].replace(right, wrong)}, *more)
 
-        monkeypatch.setattr(native_loop, "ConfinedLibrary", changed)
+        monkeypatch.setattr(native_loop, "CompiledLibrary", changed)
 
     return fault
 
@@ -169,10 +169,16 @@ FAULTS = {
     ),
     "a stop that throws back": text("plant.h", "end[SPEED] = 0.0;", "end[SPEED] *= -0.3;"),
     "a stop that is ignored": text("plant.h", "} else if (end[POSITION] > high) {", "} else if (0) {"),
-    "a stop that is met at the step's end": text("plant.h", "shorten(plant, flight, h, voltage, MEETS, to, from, end)", "h"),
-    "a stop that lets go at the step's end": text("plant.h", "shorten(plant, HELD, h, voltage, LEAVES, x, away, end)", "h"),
+    "a stop that is met at the step's end": text(
+        "plant.h", "shorten(plant, flight, h, voltage, MEETS, to, from, end)", "h"
+    ),
+    "a stop that lets go at the step's end": text(
+        "plant.h", "shorten(plant, HELD, h, voltage, LEAVES, x, away, end)", "h"
+    ),
     "the edge no event": text("plant.h", "plant->open = from > 0.0;", ""),
-    "a pulse at the period's end": text("plant_period.h", "if (compare > 0) {", "if (compare > 0) { phase(plant, 1e-5, 0.0);"),
+    "a pulse at the period's end": text(
+        "plant_period.h", "if (compare > 0) {", "if (compare > 0) { phase(plant, 1e-5, 0.0);"
+    ),
     "a compare value at once": text(
         "loop.c", "(in_force < plant->counts) ? in_force", "((int32_t)compare < plant->counts) ? (int32_t)compare"
     ),
@@ -216,7 +222,8 @@ def test_what_the_core_reads_is_what_the_sensors_show(scene):
     run = scene.loop.run(command, 2.0, "compensated", back_MPa=1.0, shown=shown, periods_per_record=2)
     before = np.concatenate([[2.0], run.dp_MPa])[:-1]
     for sensor, codes, pressure in (
-        (signals.pressure_a, run.code_a[:-50], 1.0 + before[:-50]), (signals.pressure_b, run.code_b, np.ones(command.size)),
+        (signals.pressure_a, run.code_a[:-50], 1.0 + before[:-50]), 
+        (signals.pressure_b, run.code_b, np.ones(command.size)),
     ):  # fmt: skip
         span = (sensor.full_code - sensor.zero_code + 1) / float(sensor.span_MPa)
         assert np.array_equal(codes, np.floor(sensor.zero_code + pressure * span + 1e-9))

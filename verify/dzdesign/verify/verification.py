@@ -12,6 +12,7 @@ from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs.not_covered import not_covered
+from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.closed_loop.evidence_curves import curve_files
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
@@ -33,7 +34,6 @@ from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.own_block import own_block_accepted
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
 from dzdesign.verify.firmware.unchanged_files import differing_files, files_unchanged, user_files
-from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EXACT_LAW, Check
 from dzdesign.verify.toolchain.host_compiler import host_compiler

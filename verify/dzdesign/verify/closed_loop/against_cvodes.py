@@ -32,14 +32,15 @@ WINDOW_S, LONGEST_S = 1.0, 4.0
 #: Zero command before it, beyond what an interlock waits for, s.
 REST_S = 0.01
 #: Over the share of the window that has passed: command, a ramp, steps up and down, and a last opening; pressure drop,
-#: as a share of the way from the lowest test to the highest; drive that is added, share of full command. Before the
-#: first step and after the last one they are what scenarios and drawn machines give the loop.
-COMMAND = ((0.0, 0.03, 0.25, 0.35, 0.35, 0.5, 0.5, 0.6, 0.6, 0.7, 0.85, 1.0), (0, 0, 0.3, 0, 1, 1, 0.5, 0.5, 0, 0, 0.6, 0))
+#: as a share of the way from the lowest test to the highest; drive that is added, share of full command.
+COMMAND = (
+    (0.0, 0.03, 0.25, 0.35, 0.35, 0.5, 0.5, 0.6, 0.6, 0.7, 0.85, 1.0), (0, 0, 0.3, 0, 1, 1, 0.5, 0.5, 0, 0, 0.6, 0),
+)  # fmt: skip
 SUPPLY, ADDED = ((0.0, 0.2, 0.45, 0.8), (0.0, 1.0, 0.4, 0.0)), ((0.0, 0.15, 0.65), (0.0, 0.02, -0.01))
 #: Times the drive, the oil's viscosity and its density.
 DRIVE, VISCOSITY, DENSITY = 1.03, 0.5, 0.97
-#: CVODES takes Adams' formulas, for states in A, A ms, mm, mm ms and m/s; against the same at 1e-14 a position is off by
-#: 5e-12 mm. It shows a phase at so many places.
+#: CVODES takes Adams' formulas, for states in A, A ms, mm, mm ms and m/s; against the same at 1e-14 a position is off
+#: by 5e-12 mm. It shows a phase at so many places.
 OPTIONS: dict[str, Any] = {
     "linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional",
     "reltol": 1e-12, "abstol": 1e-14, "max_num_steps": 1_000_000,
@@ -270,9 +271,8 @@ class CvodesSpool:
         def pull(milliseconds: float) -> float:
             return away * self._pull(float(self._path(milliseconds, free=False)[-1, 0]))
 
-        if pull(left) <= 0.0:
-            taken = left
-        else:
+        taken = left
+        if pull(left) > 0.0:
             taken = 0.0 if pull(SHORTEST_MS) > 0.0 else _root(pull, 0.0, left)
         self.state = self._path(max(taken, SHORTEST_MS), free=False)[-1]
         if taken < left:  # by a root's last digits it may not be free yet

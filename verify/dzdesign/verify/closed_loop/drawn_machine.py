@@ -1,7 +1,7 @@
-"""Machines drawn from the budget: what their places in each half-width do to the drive at zero command, and to the loop.
+"""Machines drawn from the budget: what their places in each half-width do to the drive at zero command and the loop.
 
-A machine passes flow at zero command if its drive there is above the threshold of its valve. `zero_drives` tells the drive
-of many machines at once, by the law, without a plant; `drawn_machine` puts one of them into the loop.
+A machine passes flow at zero command if its drive there is above the threshold of its valve. `ZeroDrives` tells the
+drive of many machines at once, by the law, without a plant; `drawn_machine` puts one of them into the loop.
 """
 
 from collections.abc import Mapping

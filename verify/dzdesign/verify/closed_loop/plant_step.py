@@ -1,4 +1,4 @@
-"""The plant's step: the Runge-Kutta step that CasADi makes of Eqs. (19)-(23), as C for any plant, and one plant's numbers.
+"""The plant's step: CasADi's Runge-Kutta step of Eqs. (19)-(23), as C for any plant, and the numbers of one plant.
 
 A step is taken in one of three states of the spool: open and shut on either side of the metering edge, where the
 equations are smooth, and held at a stop, where only the current goes on. plant.h shortens a step to where it meets a

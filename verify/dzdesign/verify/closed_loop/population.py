@@ -267,7 +267,8 @@ class _Side:
         gaps = self._tested.size - 1
         at_tests = np.arange(gaps + 1) * NODES
         flows = np.zeros(machines, dtype=bool)
-        index, margins, shares, nodes = np.empty(0, int), np.empty(0), np.empty((0, len(COMPONENTS))), np.empty((0, 2 * gaps + 1), int)
+        index, margins = np.empty(0, int), np.empty(0)
+        shares, nodes = np.empty((0, len(COMPONENTS))), np.empty((0, 2 * gaps + 1), int)
         for begin in range(0, machines, AT_ONCE):
             count = min(AT_ONCE, machines - begin)
             own = draw(count, self._places, worst, self._drawn)
