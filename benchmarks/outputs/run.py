@@ -23,7 +23,7 @@ PARTS = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the parts asked for and print what missed its limit."""
-    return run_parts(__doc__.splitlines()[0], PARTS, "blocks of one compensator; FMUs here alone", arguments)
+    return run_parts(__doc__.splitlines()[0], PARTS, "blocks of one compensator; FMUs not compiled again", arguments)
 
 
 if __name__ == "__main__":

@@ -92,9 +92,10 @@ def running(path: str, name: str, text: bytes) -> Iterator[RunningFunction]:
         (place / PROGRAM.name).write_bytes(PROGRAM.read_bytes())
         # It does little linear algebra, and a thread of a library for each core would only wait.
         own = {"HOME": str(place), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        kept = {each: value for each, value in os.environ.items() if each == "OCTAVE_HOME" or each[:6] != "OCTAVE"}
         with (place / "complaints").open("wb") as complaints:
             process = subprocess.Popen(
-                [path, *FLAGS, PROGRAM.name, name], cwd=place, env={**os.environ, **own}, stdin=subprocess.PIPE,
+                [path, *FLAGS, PROGRAM.name, name], cwd=place, env={**kept, **own}, stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE, stderr=complaints,
             )  # fmt: skip
             try:
