@@ -4,24 +4,8 @@ import sympy
 from sympy import Eq, Piecewise
 
 from dzdesign.derivation import scaling
-from dzdesign.derivation.account.published import (
-    COUNTS_PER_PIN_VOLT,
-    DUTY_COMMAND_V,
-    DUTY_WITH_PERCENT,
-    DUTY_WITHOUT_PERCENT,
-    FIRST,
-    LARGEST_CODE,
-    PIN_V,
-    SECOND,
-    U_MAX_V,
-)
-from dzdesign.derivation.account.scope import (
-    CODES_AT_PIN,
-    CODES_OF_COMMAND,
-    LAW_OFF_REFERENCE,
-    UP_TO_REFERENCE,
-    under_law,
-)
+from dzdesign.derivation.account.published import *
+from dzdesign.derivation.account.scope import *
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *

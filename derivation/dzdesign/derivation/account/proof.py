@@ -54,8 +54,6 @@ class Verdict:
     necessary: bool | None = None
     #: Grounds that follow only on a condition, which this statement therefore needs too.
     inherited: tuple[str, ...] = ()
-    #: Grounds, and their grounds, that are proved on a part of their range only.
-    limited_by: tuple[str, ...] = ()
     #: What is wrong with its units; empty where they are right.
     unit_error: str = ""
     #: What numbers say against it, which no proof can outweigh; empty where they agree.
@@ -169,15 +167,7 @@ def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapp
         )
     elif inherited and finding.outcome is Outcome.FOLLOWS_IF:
         finding = replace(finding, words=f"{finding.words}, and on the condition of {', '.join(inherited)}")
-    limits = tuple(dict.fromkeys(n for one in statement.grounds for n in _limits(verdicts[one.number], statement)))
-    return verdict(finding, proofs=proofs, inherited=inherited, limited_by=limits)
-
-
-def _limits(verdict: Verdict, user: Statement) -> tuple[str, ...]:
-    """Return which of a ground and its grounds is proved on a part that the user's scope does not say."""
-    ground = verdict.statement
-    is_said = ground.kind.is_given or (user.scope.implies(ground.scope) and not ground.provided)
-    return (() if is_said else (verdict.number,)) + verdict.limited_by
+    return verdict(finding, proofs=proofs, inherited=inherited)
 
 
 def _conditional(verdict: Verdict) -> tuple[str, ...]:

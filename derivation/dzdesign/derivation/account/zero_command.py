@@ -4,16 +4,7 @@ import sympy
 from sympy import Eq, Ne, Piecewise
 
 from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION
-from dzdesign.derivation.account.scope import (
-    AT_ZERO_COMMAND,
-    BARE,
-    FREE_BETA,
-    FREE_OPENING,
-    LAW_OFF_REFERENCE,
-    UP_TO_REFERENCE,
-    WITH_TRANSITION,
-    scope,
-)
+from dzdesign.derivation.account.scope import *
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *
@@ -47,22 +38,20 @@ ZERO_COMMAND = (
     .in_cases(Case(((u_min1, u_min0 - excess),), "threshold lower than at the reference"))
     .qualified_by("T9d")
     .numbers(
-        Value(
-            "simulation",
-            SIMULATION.at(),
+        SIMULATION.value(
+            "",
             "L/min",
             published=SIMULATION.zero_flow_without_beta,
             remark="read off a figure; 0.01 L/min is 0.002 V of threshold",
         ),
-        Value(
-            "first valve",
-            FIRST.at(),
+        FIRST.value(
+            "",
             "L/min",
             published=FIRST.zero_flow_without_beta,
             remark="If the paper's thresholds are the first flow that its meter shows (it starts at 0.6 L/min), "
             "T9d gives 1.69.",
         ),
-        Value("second valve", SECOND.at(), "L/min"),
+        SECOND.value("", "L/min"),
     ),
     Kind.THEOREM("beta(dP)", "correction coefficient from the fitted thresholds")
     .says(beta, f(dP1) / f(dP0))

@@ -9,13 +9,9 @@ from dzdesign.core.artefact_types import JsonText
 from dzdesign.derivation.presentation.formulas import to_python, to_text
 from dzdesign.derivation.symbols import QUANTITIES
 
-_KEYBOARD = str.maketrans({"−": "-", "–": "-", "≤": "<=", "≥": ">=", "→": "->", "“": '"', "”": '"'})
-
 
 class Formula(JsonText):
     """An expression, or a chain of equal ones, in a sentence or on a line of its own."""
-
-    __match_args__ = ("sides",)
 
     def __init__(self, *sides: sympy.Basic) -> None:
         self.sides = sides
@@ -30,8 +26,6 @@ class Formula(JsonText):
 class Reference(JsonText):
     """A statement that a sentence points to, with the words that name it there; its number unless given."""
 
-    __match_args__ = ("number", "words")
-
     def __init__(self, number: str, *words: "Part") -> None:
         self.number = number
         self.words = Words(*words) if words else Words(number)
@@ -43,26 +37,12 @@ class Reference(JsonText):
         return self.number
 
 
-class Code(JsonText):
-    """A word of the command line or of a file."""
-
-    __match_args__ = ("text",)
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-
-    def __str__(self) -> str:
-        return f"`{self.text}`"
-
-    json_text = __str__
-
-
 class Words(JsonText):
-    """Text, formulas, references and code in a row."""
+    """Text, formulas and references in a row; what stands between backquotes in a text is code."""
 
     def __init__(self, *parts: "Part") -> None:
         flat = (one for part in parts for one in (part.parts if isinstance(part, Words) else (part,)))
-        self.parts: tuple[str | Formula | Reference | Code, ...] = tuple(one for one in flat if one != "")
+        self.parts: tuple[str | Formula | Reference, ...] = tuple(one for one in flat if one != "")
 
     @classmethod
     def join(cls, parts: "Iterable[Part]", joint: str = ", ") -> "Words":
@@ -73,25 +53,19 @@ class Words(JsonText):
         return bool(self.parts)
 
     def __str__(self) -> str:
-        """Return them as ASCII text."""
-        return "".join(part.translate(_KEYBOARD) if isinstance(part, str) else str(part) for part in self.parts)
+        return "".join(map(str, self.parts))
 
     json_text = __str__
 
 
-Part = str | Formula | Reference | Code | Words
+Part = str | Formula | Reference | Words
 
-_SIGNS = ((" - ", " − "), ("<=", "≤"), (">=", "≥"), (" -> ", " → "))
-_MINUS = re.compile(r"(?<![\w)-])-(?=[\w(])")
-_RANGE = re.compile(r"(?<=[\d)])-(?=[\d(])")
-_PARTS = re.compile(r"`(?P<code>[^`]+)`|\$(?P<formula>[^$]+)\$|(?P<reference>\(\d+[a-z]?\)|\b[TL]\d+[a-z]?\b)")
+_PARTS = re.compile(r"\$(?P<formula>[^$]+)\$|(?P<reference>\(\d+[a-z]?\)|\b[TL]\d+[a-z]?\b)")
 _NAME = re.compile(r"[A-Za-z]\w*'?")
 
 
 def parse_prose(sentence: str, numbers: Collection[str] = ()) -> Words:
     """Split a sentence into text, symbols between dollars, and references to statements of `numbers`.
-
-    Its signs become those of print.
 
     Examples
     --------
@@ -99,17 +73,12 @@ def parse_prose(sentence: str, numbers: Collection[str] = ()) -> Words:
     ['Formula', 'str', 'Reference']
     """
     parts: list[Part] = []
-    sentence, end = _with_signs(sentence), 0
+    end = 0
     for found in _PARTS.finditer(sentence):
         if found["reference"] and found["reference"] not in numbers:
             continue
         parts.append(sentence[end : found.start()])
-        if found["code"]:
-            parts.append(Code(found["code"]))
-        elif found["reference"]:
-            parts.append(Reference(found["reference"]))
-        else:
-            parts += _symbols(found["formula"])
+        parts += _symbols(found["formula"]) if found["formula"] else [Reference(found["reference"])]
         end = found.end()
     return Words(*parts, sentence[end:])
 
@@ -122,10 +91,3 @@ def _symbols(formula: str) -> Iterator[Part]:
         yield Formula(by_name.get(found[0], sympy.Symbol(found[0])))
         end = found.end()
     yield formula[end:]
-
-
-def _with_signs(text: str) -> str:
-    """Put a minus, an en dash and a comparison in place of their spelling on a keyboard."""
-    for keyboard, printed in _SIGNS:
-        text = text.replace(keyboard, printed)
-    return _RANGE.sub("–", _MINUS.sub("−", text))

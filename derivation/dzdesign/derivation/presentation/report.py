@@ -8,13 +8,13 @@ from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError, nearest
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.proof import Verdict
-from dzdesign.derivation.account.published import transcribed
+from dzdesign.derivation.account.published import PRINTED
 from dzdesign.derivation.account.statement import Outcome, Statement
 from dzdesign.derivation.account.units import print_unit
 from dzdesign.derivation.presentation.content import DerivationReport, Entry, Term
 from dzdesign.derivation.presentation.formulas import to_python
-from dzdesign.derivation.presentation.prose import Formula, Words, parse_prose
-from dzdesign.derivation.presentation.wording import describe, refer
+from dzdesign.derivation.presentation.prose import Formula, Reference, Words, parse_prose
+from dzdesign.derivation.presentation.wording import correction, describe, refer
 from dzdesign.derivation.presentation.writers import HtmlWriter, TextWriter, write
 from dzdesign.derivation.symbols import QUANTITIES
 
@@ -100,7 +100,8 @@ def _number(text: str, names: dict[str, str]) -> str:
 def compose(verdicts: Sequence[Verdict], numbers: Sequence[str], misprints: Sequence[str] = ()) -> DerivationReport:
     """Say what the account found, of the statements to show."""
     book = {verdict.number: verdict for verdict in verdicts}
-    entries = tuple(describe(book[number], book) for number in numbers)
+    shown = [book[number] for number in numbers]
+    entries = tuple(describe(verdict, book) for verdict in shown)
     partial = len(numbers) < len(book)
     return DerivationReport(
         tool=THIS_TOOL,
@@ -108,19 +109,19 @@ def compose(verdicts: Sequence[Verdict], numbers: Sequence[str], misprints: Sequ
         title="Derivation of the dead-zone compensation law" + (", in part" if partial else ""),
         source="The paper: Wu et al. 2022, doi 10.11916/j.issn.1005-9113.20063.",
         holds=all(entry.as_expected for entry in entries) and not misprints,
-        summary=(*_summary(entries, [book[number] for number in numbers]), *_of_numbers(partial, misprints)),
-        wrong=tuple(_fault(entry) for entry in entries if _is_wrong(entry)),
+        summary=(*_summary(shown), *_of_numbers(partial, misprints)),
+        wrong=tuple(_fault(entry, book) for entry in entries if _is_wrong(entry)),
         conditional=tuple(_judged(entry) for entry in entries if entry.outcome is Outcome.FOLLOWS_IF),
-        symbols=_symbols([book[number].statement for number in numbers]),
+        symbols=_symbols([verdict.statement for verdict in shown]),
         statements=entries,
     )
 
 
 def _symbols(statements: Sequence[Statement]) -> tuple[Term, ...]:
     """Explain the symbols that occur."""
-    replaced = [pair for one in statements for ground in one.grounds for pair in ground.at]
-    replaced += [pair for one in statements for case in one.cases for pair in case.at]
-    sides = [side for one in statements for side in (one.symbol, *one.members)] + [value for _, value in replaced]
+    replacements = [part.at for one in statements for parts in (one.grounds, one.cases) for part in parts]
+    sides = [side for one in statements for side in (one.symbol, *one.members)]
+    sides += [value for pairs in replacements for _, value in pairs]
     used = set().union(*(side.free_symbols | {part.func for part in side.atoms(AppliedUndef)} for side in sides))
     names = sorted((name for name in QUANTITIES if name in used or name.func in used), key=lambda one: str(one).lower())
     return tuple(
@@ -141,51 +142,45 @@ def _of_numbers(partial: bool, misprints: Sequence[str]) -> Iterator[Words]:
         yield Words(f"{len(misprints)} of the paper's numbers are not as it prints them:")
         yield from (Words(parse_prose(text), ".") for text in misprints)
     elif not partial:
-        yield Words(
-            f"The {len(transcribed())} numbers of the paper stand each with its section; --paper looks them up."
-        )
+        yield Words(f"The {len(PRINTED)} numbers of the paper stand each with its section; --paper looks them up.")
 
 
-def _summary(entries: Sequence[Entry], verdicts: Sequence[Verdict]) -> tuple[Words, ...]:
+def _summary(verdicts: Sequence[Verdict]) -> Iterator[Words]:
     paper = [verdict for verdict in verdicts if verdict.number in PAPER_NUMBERS]
     wrong = [verdict for verdict in verdicts if not verdict.as_expected]
-    expected = (
-        f"{len(verdicts) - len(wrong)} of {len(verdicts)} statements have the verdict expected of them, "
-        "those that do not hold included"
+    yield Words(
+        f"{len(verdicts) - len(wrong)} of {len(verdicts)} statements have the verdict expected of them, ",
+        "those that do not hold included; these are not:" if wrong else "those that do not hold included.",
     )
-    lines = [Words(expected, "; these are not:" if wrong else ".")]
     for verdict in wrong:
-        expected = f" should be found to be “{verdict.statement.expected.value}”, but: "
+        expected = f' should be found to be "{verdict.statement.expected.value}", but: '
         unit = f"; its units: {verdict.unit_error}" if verdict.unit_error else ""
-        lines.append(Words(refer(verdict.statement), expected, parse_prose(verdict.words), unit, "."))
+        yield Words(refer(verdict.statement), expected, parse_prose(verdict.words), unit, ".")
     if paper:
         which = f"the {len(paper)} equations" if len(paper) > 1 else "the one equation"
         counts = "; ".join(
             f"{words}: {sum(verdict.outcome is outcome for verdict in paper)}" for outcome, words in _COUNTED.items()
         )
-        lines.append(Words(f"Of {which} of the paper in this report, {counts}."))
-    follow = [entry for entry in entries if entry.outcome in (Outcome.FOLLOWS, Outcome.FOLLOWS_IF)]
-    rearranged = [entry.reference for entry in follow if entry.rearranges]
+        yield Words(f"Of {which} of the paper in this report, {counts}.")
+    follow = [verdict for verdict in verdicts if verdict.outcome in (Outcome.FOLLOWS, Outcome.FOLLOWS_IF)]
+    rearranged = [Reference(verdict.number) for verdict in follow if verdict.statement.rearranges]
     if rearranged:
         derived = f"{len(follow) - len(rearranged)} statements are derived; "
-        lines.append(
-            Words(
-                derived, f"{len(rearranged)} only rearrange a definition or one premise: ", Words.join(rearranged), "."
-            )
-        )
-    return tuple(lines)
+        which = f"{len(rearranged)} only rearrange a definition or one premise: "
+        yield Words(derived, which, Words.join(rearranged), ".")
 
 
 def _is_wrong(entry: Entry) -> bool:
     return entry.outcome is Outcome.DOES_NOT_FOLLOW or bool(entry.corrected_by)
 
 
-def _fault(entry: Entry) -> Words:
+def _fault(entry: Entry, book: dict[str, Verdict]) -> Words:
     words = _judged(entry, otherwise=_CHOICE)
-    for line in entry.corrections:
+    for one in entry.corrected_by:
+        line = correction(book[entry.number].statement, book[one.number].statement, book)
         words = Words(words, " ", line.words, *((" ", line.formula) if line.formula else ()))
     return words
 
 
 def _judged(entry: Entry, otherwise: str = "") -> Words:
-    return Words(entry.reference, " ", entry.title, ": ", entry.judgement or otherwise)
+    return Words(Reference(entry.number), " ", entry.title, ": ", entry.judgement or otherwise)
