@@ -8,7 +8,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import Artefact
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.statement import Kind, Outcome
-from dzdesign.derivation.presentation.prose import Formula, Reference, Words, parse_prose
+from dzdesign.derivation.presentation.prose import Formula, Words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,14 +67,10 @@ class Entry:
     scope: Annotated[Words, Meta(description="Range in which it is proved; empty if it is proved everywhere.")]
     derivations: Annotated[tuple[Derivation, ...], Meta(description="Derivation of each case.")]
     differences: Annotated[tuple[Line, ...], Meta(description="Derived minus published, and the corrected form.")]
-    corrected_by: Annotated[tuple[Reference, ...], Meta(description="Statement that gives the correction.")]
-    see: Annotated[tuple[Reference, ...], Meta(description="Statements that qualify this one.")]
+    corrected_by: Annotated[str, Meta(description="Statement that gives the correction; empty if there is none.")]
+    see: Annotated[tuple[str, ...], Meta(description="Statements that qualify this one.")]
     figures: Annotated[tuple[Figure, ...], Meta(description="Numbers of dzdesign beside those of the paper.")]
     note: Annotated[Words, Meta(description="Remark for the reader.")]
-
-    @property
-    def name(self) -> Words:
-        return parse_prose(self.number)
 
     @property
     def mark(self) -> str:

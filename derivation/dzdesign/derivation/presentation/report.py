@@ -1,6 +1,6 @@
 """Renders the account of the paper for a terminal, for machines and for a browser."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from sympy.core.function import AppliedUndef
 
@@ -13,8 +13,8 @@ from dzdesign.derivation.account.statement import Outcome, Statement
 from dzdesign.derivation.account.units import print_unit
 from dzdesign.derivation.presentation.content import DerivationReport, Entry, Term
 from dzdesign.derivation.presentation.formulas import to_python
-from dzdesign.derivation.presentation.prose import Formula, Reference, Words, parse_prose
-from dzdesign.derivation.presentation.wording import correction, describe, refer
+from dzdesign.derivation.presentation.prose import Formula, Words, inline
+from dzdesign.derivation.presentation.wording import describe, refer
 from dzdesign.derivation.presentation.writers import HtmlWriter, TextWriter, write
 from dzdesign.derivation.symbols import QUANTITIES
 
@@ -24,11 +24,6 @@ _FORMATS: dict[str, Callable[[DerivationReport], str]] = {
     "html": lambda report: write(HtmlWriter, report),
 }
 FORMATS = tuple(_FORMATS)
-#: Of (6), which is given and yet corrected.
-_CHOICE = (
-    "the paper's choice. For a stop at every pressure drop it does not meet the target (16); where full command is the "
-    "limit, it meets it exactly, and the correction loses flow: T2d, T2e."
-)
 #: What is known of the sign of a symbol, as SymPy calls it and as the report does; the first that holds.
 _SIGNS = {"positive": "positive", "nonnegative": "zero or positive", "real": "of either sign"}
 _COUNTED = {
@@ -109,8 +104,8 @@ def compose(verdicts: Sequence[Verdict], numbers: Sequence[str], misprints: Sequ
         title="Derivation of the dead-zone compensation law" + (", in part" if partial else ""),
         source="The paper: Wu et al. 2022, doi 10.11916/j.issn.1005-9113.20063.",
         holds=all(entry.as_expected for entry in entries) and not misprints,
-        summary=(*_summary(shown), *_of_numbers(partial, misprints)),
-        wrong=tuple(_fault(entry, book) for entry in entries if _is_wrong(entry)),
+        summary=tuple(map(Words, _summary(shown, book, misprints))),
+        wrong=tuple(_fault(one) for one in entries if one.outcome is Outcome.DOES_NOT_FOLLOW or one.corrected_by),
         conditional=tuple(_judged(entry) for entry in entries if entry.outcome is Outcome.FOLLOWS_IF),
         symbols=_symbols([verdict.statement for verdict in shown]),
         statements=entries,
@@ -128,7 +123,7 @@ def _symbols(statements: Sequence[Statement]) -> tuple[Term, ...]:
         Term(
             name=to_python(name).partition("(")[0],
             symbol=Formula(name),
-            meaning=parse_prose(QUANTITIES[name].meaning),
+            meaning=Words(QUANTITIES[name].meaning),
             unit=print_unit(name),
             sign=next((words for sign, words in _SIGNS.items() if getattr(name, f"is_{sign}")), ""),
         )
@@ -136,51 +131,42 @@ def _symbols(statements: Sequence[Statement]) -> tuple[Term, ...]:
     )
 
 
-def _of_numbers(partial: bool, misprints: Sequence[str]) -> Iterator[Words]:
-    """Say whether the numbers that the paper prints were transcribed rightly."""
-    if misprints:
-        yield Words(f"{len(misprints)} of the paper's numbers are not as it prints them:")
-        yield from (Words(parse_prose(text), ".") for text in misprints)
-    elif not partial:
-        yield Words(f"The {len(PRINTED)} numbers of the paper stand each with its section; --paper looks them up.")
-
-
-def _summary(verdicts: Sequence[Verdict]) -> Iterator[Words]:
-    paper = [verdict for verdict in verdicts if verdict.number in PAPER_NUMBERS]
-    wrong = [verdict for verdict in verdicts if not verdict.as_expected]
-    yield Words(
-        f"{len(verdicts) - len(wrong)} of {len(verdicts)} statements have the verdict expected of them, ",
-        "those that do not hold included; these are not:" if wrong else "those that do not hold included.",
+def _summary(shown: Sequence[Verdict], book: Mapping[str, Verdict], misprints: Sequence[str]) -> Iterator[str]:
+    wrong = [verdict for verdict in shown if not verdict.as_expected]
+    yield (
+        f"{len(shown) - len(wrong)} of {len(shown)} statements have the verdict expected of them, those that do not "
+        f"hold included{'; these are not:' if wrong else '.'}"
     )
     for verdict in wrong:
-        expected = f' should be found to be "{verdict.statement.expected.value}", but: '
         unit = f"; its units: {verdict.unit_error}" if verdict.unit_error else ""
-        yield Words(refer(verdict.statement), expected, parse_prose(verdict.words), unit, ".")
-    if paper:
-        which = f"the {len(paper)} equations" if len(paper) > 1 else "the one equation"
-        counts = "; ".join(
-            f"{words}: {sum(verdict.outcome is outcome for verdict in paper)}" for outcome, words in _COUNTED.items()
-        )
-        yield Words(f"Of {which} of the paper in this report, {counts}.")
-    follow = [verdict for verdict in verdicts if verdict.outcome in (Outcome.FOLLOWS, Outcome.FOLLOWS_IF)]
-    rearranged = [Reference(verdict.number) for verdict in follow if verdict.statement.rearranges]
+        expected = verdict.statement.expected.value
+        yield f'{refer(verdict.number, book)} should be found to be "{expected}", but: {verdict.words}{unit}.'
+    outcomes = [verdict.outcome for verdict in shown if verdict.number in PAPER_NUMBERS]
+    if outcomes:
+        which = f"the {len(outcomes)} equations" if len(outcomes) > 1 else "the one equation"
+        counts = "; ".join(f"{words}: {outcomes.count(outcome)}" for outcome, words in _COUNTED.items())
+        yield f"Of {which} of the paper in this report, {counts}."
+    follow = [one for one in shown if one.outcome in (Outcome.FOLLOWS, Outcome.FOLLOWS_IF)]
+    rearranged = [one.number for one in follow if one.statement.rearranges]
     if rearranged:
-        derived = f"{len(follow) - len(rearranged)} statements are derived; "
-        which = f"{len(rearranged)} only rearrange a definition or one premise: "
-        yield Words(derived, which, Words.join(rearranged), ".")
+        yield (
+            f"{len(follow) - len(rearranged)} statements are derived; {len(rearranged)} only rearrange a definition or "
+            f"one premise: {', '.join(rearranged)}."
+        )
+    if misprints:
+        yield f"{len(misprints)} of the paper's numbers are not as it prints them: {'; '.join(misprints)}."
+    elif len(shown) == len(book):
+        yield f"The {len(PRINTED)} numbers of the paper stand each with its section; --paper looks them up."
 
 
-def _is_wrong(entry: Entry) -> bool:
-    return entry.outcome is Outcome.DOES_NOT_FOLLOW or bool(entry.corrected_by)
-
-
-def _fault(entry: Entry, book: dict[str, Verdict]) -> Words:
-    words = _judged(entry, otherwise=_CHOICE)
-    for one in entry.corrected_by:
-        line = correction(book[entry.number].statement, book[one.number].statement, book)
-        words = Words(words, " ", line.words, *((" ", line.formula) if line.formula else ()))
-    return words
+def _fault(entry: Entry) -> Words:
+    """Say what is wrong with a statement and what it should read; of a premise that is corrected, its note does."""
+    judged = _judged(entry, otherwise=entry.note.text).text
+    if not entry.corrected_by or not entry.differences:
+        return Words(judged)
+    line = entry.differences[-1]
+    return Words(f"{judged} {line.words.text}" + (f" {inline(*line.formula.sides)}" if line.formula else ""))
 
 
 def _judged(entry: Entry, otherwise: str = "") -> Words:
-    return Words(Reference(entry.number), " ", entry.title, ": ", entry.judgement or otherwise)
+    return Words(f"{entry.number} {entry.title.text}: {entry.judgement.text or otherwise}")

@@ -9,11 +9,14 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import sympy
+
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.presentation.content import DerivationReport, Entry, Figure, Line
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text
-from dzdesign.derivation.presentation.prose import Formula, Part, Reference, Words
+from dzdesign.derivation.presentation.prose import PARTS, Formula, Words
+from dzdesign.derivation.symbols import QUANTITIES
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -24,11 +27,6 @@ def write(writer: "type[TextWriter | HtmlWriter]", report: DerivationReport) -> 
     environment = strict_templates("dzdesign.derivation.presentation", lstrip_blocks=True, **writer.SYNTAX)
     environment.filters.update(writer({entry.number for entry in report.statements}).filters())
     return str(environment.get_template(writer.TEMPLATE).render(content=report))
-
-
-def references(found: Collection[Reference], by_number: bool = False) -> Words:
-    """Return references with commas between, by their numbers alone or by the words that name them."""
-    return Words.join(Reference(one.number) if by_number else one for one in found)
 
 
 def anchor(number: str) -> str:
@@ -59,13 +57,9 @@ class TextWriter:
     def __init__(self, linked: Collection[str] = ()) -> None:
         """Nothing can be pointed to in a plain text."""
 
-    def words(self, *parts: Part) -> str:
-        return "".join(map(self._part, Words(*parts).parts))
-
-    def _part(self, part: str | Formula | Reference) -> str:
-        if isinstance(part, Reference):
-            return self.words(part.words)
-        return _fixed(str(part)) if isinstance(part, Formula) else part
+    def words(self, words: Words | str) -> str:
+        text = words.text if isinstance(words, Words) else words
+        return str(Words(re.sub(r"\$([^$]+)\$", lambda found: _fixed(found[1]), text)))
 
     def display(self, formula: Formula, indent: str = "") -> str:
         """Return a formula on a line of its own; a chain has one member a line."""
@@ -84,7 +78,7 @@ class TextWriter:
         """Return what the template may apply."""
         return {
             "words": self.words, "display": self.display, "line": self.line, "figures": self.figures, "wrap": wrap,
-            "references": lambda found: self.words(references(found)), "head": _head, "labelled": _labelled,
+            "head": _head, "labelled": _labelled,
         }  # fmt: skip
 
     def line(self, line: Line, indent: str) -> str:
@@ -138,20 +132,22 @@ def _fixed(formula: str) -> str:
 # --- a page for a browser -----------------------------------------------------------------------------------
 
 #: A browser would break the line between a formula and the punctuation beside it.
-_TIED = re.compile(r"(\(?)(<math(?:(?!</math>).)*</math>)([,.;:)]*)")
-#: A formula in a sentence that is longer than this, as plain text, scrolls by itself where the page is narrow.
+_TIED = re.compile(r"\(?<math(?:(?!</math>).)*</math>[,.;:)]*")
+#: A formula in a sentence that is shorter than this is not broken.
 _LONG = 28
 #: Stands beside each verdict, so that its colour is not the only carrier; the word does the rest.
 _SIGNS = {Outcome.GIVEN: "▫", Outcome.FOLLOWS: "✓", Outcome.FOLLOWS_IF: "◐", Outcome.DOES_NOT_FOLLOW: "✗"}
 #: What a keyboard has, and what print has in its place.
 _PRINTED = (
-    (re.compile(r"`([^`]+)`"), r"<code>\1</code>"),
     (re.compile(r"&lt;="), "≤"),
     (re.compile(r"&gt;="), "≥"),
+    (re.compile(r"!="), "≠"),
     (re.compile(r" - "), " − "),
     (re.compile(r"(?<![\w)-])-(?=[\w(]|$)"), "−"),
     (re.compile(r"(?<=[\d)])-(?=[\d(])"), "–"),
 )
+_NAME = re.compile(r"(?P<base>[A-Za-z]\w*'?)(?:\((?:s|0|dP)\))?")
+_BY_NAME, _FUNCTIONS = {str(name): name for name in QUANTITIES}, {"sqrt": "√", "log": "ln "}
 
 
 class HtmlWriter:
@@ -166,25 +162,30 @@ class HtmlWriter:
     def __init__(self, linked: Collection[str] = ()) -> None:
         self.linked = linked
 
-    def words(self, *parts: Part) -> "Markup":
-        return _markup(_TIED.sub(_tie, "".join(map(self._part, Words(*parts).parts))))
+    def words(self, words: Words | Formula | str) -> "Markup":
+        text = f"${words}$" if isinstance(words, Formula) else words.text if isinstance(words, Words) else words
+        return _markup(_TIED.sub(r'<span class="tied">\g<0></span>', self._sentence(text)))
 
-    def _part(self, part: str | Formula | Reference) -> str:
-        if isinstance(part, Formula):
-            return self._formula(part)
-        if isinstance(part, Reference):
-            words = self.words(part.words)
-            return f'<a href="#{anchor(part.number)}">{words}</a>' if part.number in self.linked else words
-        text = escape(part)
-        for keyboard, printed in _PRINTED:
-            text = keyboard.sub(printed, text)
-        return text
+    def _sentence(self, text: str) -> str:
+        parts, end = [], 0
+        for found in PARTS.finditer(text):
+            parts += [_printed(text[end : found.start()]), self._part(found)]
+            end = found.end()
+        return "".join((*parts, _printed(text[end:])))
 
-    def _formula(self, formula: Formula) -> str:
-        chain = " = ".join(map(to_latex, formula.sides))
-        style = ' displaystyle="true"' if r"\frac" in chain else ""
-        math = f"<math{style}>{to_mathml(chain)}</math>"
-        return f'<span class="long">{math}</span>' if len(str(formula)) > _LONG else math
+    def name(self, number: str) -> "Markup":
+        """Return a statement's number, or what it is called, without a link."""
+        return _markup(_symbols(number) if number in _BY_NAME else escape(number))
+
+    def _part(self, found: re.Match[str]) -> str:
+        if found["code"]:
+            return f"<code>{escape(found['code'])}</code>"
+        if found["formula"]:
+            symbols = _symbols(found["formula"])
+            return f'<span class="tied">{symbols}</span>' if len(found["formula"]) < _LONG else symbols
+        number = found["to"] or found["number"]
+        words = self._sentence(found["words"]) if found["words"] else number
+        return f'<a href="#{anchor(number)}">{words}</a>' if number in self.linked else words
 
     def display(self, formula: Formula) -> "Markup":
         """Return a formula on a line of its own; a chain has one member a line."""
@@ -196,8 +197,7 @@ class HtmlWriter:
     def filters(self) -> dict[str, Callable[..., Any]]:
         """Return what the template may apply."""
         return {
-            "words": self.words, "display": self.display, "anchor": anchor,
-            "references": lambda found, **how: self.words(references(found, **how)),
+            "words": self.words, "display": self.display, "name": self.name, "anchor": anchor,
             "css": lambda outcome: outcome.replace(" ", "-"), "sign": lambda outcome: _SIGNS[Outcome(outcome)],
         }  # fmt: skip
 
@@ -208,5 +208,19 @@ def _markup(html: str) -> "Markup":
     return Markup(html)
 
 
-def _tie(found: re.Match[str]) -> str:
-    return f'<span class="tied">{found[0]}</span>' if found[1] or found[3] else found[0]
+def _printed(text: str) -> str:
+    text = escape(text)
+    for keyboard, printed in _PRINTED:
+        text = keyboard.sub(printed, text)
+    return text
+
+
+def _symbols(formula: str) -> str:
+    """Typeset each symbol of a formula in a sentence; the rest stands as it is."""
+    parts, end = [], 0
+    for found in _NAME.finditer(formula):
+        name = found[0] if found[0] in _BY_NAME else found["base"]
+        symbol = _FUNCTIONS.get(name) or f"<math>{to_mathml(to_latex(_BY_NAME.get(name, sympy.Symbol(name))))}</math>"
+        parts += [_printed(formula[end : found.start()].replace("*", "\N{THIN SPACE}")), symbol]
+        end = found.start() + len(name)
+    return "".join((*parts, _printed(formula[end:].replace("*", "\N{THIN SPACE}"))))
