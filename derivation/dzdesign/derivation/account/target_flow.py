@@ -29,7 +29,7 @@ def flow_under(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol)
 
 _PAPER_LAW = LAW_OFF_REFERENCE & scope(FIXED_OPENING) & BEFORE_STOP
 _TARGET_LAW = TARGET_OFF_REFERENCE & scope(FIXED_OPENING)
-_AT_DP1 = (Ground("(5)"), Ground("gamma_1"), Ground("(15)"), Ground("(16)"))
+_AT_DP1 = ("(5)", "gamma_1", "(15)", "(16)")
 _UNKNOWN_AT_DP1 = (x, u_i_prime, u_O, u_min1, gamma_1, K_1, Q_O_prime)
 
 #: Theorem 1: which flow the laws give.
@@ -38,7 +38,7 @@ TARGET = (
     .says(Q, Q_O)
     .by(
         *flow_under("(14)", u_min0, dP0),
-        *(Ground(number) for number in ("(9)", "(8)", "gamma_0")),
+        *("(9)", "(8)", "gamma_0"),
         eliminate=(x, u_i_prime, u_O, Q_O, K_0, gamma_0),
     )
     .within(LAW_AT_REFERENCE),
@@ -110,6 +110,10 @@ TARGET = (
     ),
 )
 
+_AT_FULL_COMMAND = (
+    *("(5)", "gamma_1", "T2c", "full command", "(16)"),
+    Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
+)
 _FULL_COMMAND_IS_THE_LIMIT = scope(FREE_OPENING)
 
 #: Theorem 2: full command.
@@ -161,9 +165,8 @@ FULL_COMMAND = (
     .says(Q, Q_max1 * u_i / u_max, Q_O_prime)
     .by(
         *flow_under("(18)", u_min1, dP1),
-        *("(5)", "gamma_1", "T2c", "full command", "(16)"),
-        Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
-        eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
+        *_AT_FULL_COMMAND,
+        eliminate=(*_UNKNOWN_AT_DP1, Q_max1, x_max),
     )
     .within(LAW_OFF_REFERENCE, _FULL_COMMAND_IS_THE_LIMIT)
     .qualified_by("T1c", "T2e")
@@ -175,9 +178,8 @@ FULL_COMMAND = (
     .says(Q, Q_O_prime * (u_max - u_min0) / (u_max - beta * u_min0))
     .by(
         *flow_under("L3", u_min1, dP1),
-        *("(5)", "gamma_1", "T2c", "full command", "(16)"),
-        Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
-        eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
+        *_AT_FULL_COMMAND,
+        eliminate=(*_UNKNOWN_AT_DP1, Q_max1, x_max),
     )
     .within(TARGET_OFF_REFERENCE, _FULL_COMMAND_IS_THE_LIMIT)
     .qualified_by("T1d", "T1e")

@@ -5,7 +5,7 @@ from sympy import Eq, Ne, Piecewise
 
 from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION
 from dzdesign.derivation.account.scope import *
-from dzdesign.derivation.account.statement import Case, Ground, Kind, Value
+from dzdesign.derivation.account.statement import Case, Ground, Kind
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *
 from dzdesign.derivation.transition import LAW_COMMAND, LOWERED_BY, SHARE
@@ -90,11 +90,11 @@ SHAPE = (
     .by(Ground("(14)", ((u_O, u_min), (u_i, u_dz))))
     .within(UP_TO_REFERENCE)
     .numbers(
-        Value(
-            "for a threshold 1 % of $u_max$ above $u_min0$, first valve",
+        FIRST.value(
+            "for a threshold 1 % of $u_max$ above $u_min0$",
+            "%",
             of=(u_min - u_min0) / (k * x_max),
-            at=(*FIRST.at(), (u_min, sympy.Rational("5.49"))),
-            unit="%",
+            also=((u_min, sympy.Rational("5.49")),),
         )
     )
     .remark("The threshold is higher at a lower pressure drop, and the paper holds $u_0$ there."),
@@ -169,10 +169,7 @@ TRANSITION = (
     .says(Q, sympy.S.Zero)
     .by("T3a")
     .within(_BAND, beta * u_min0 <= u_min1, beta * u_min0 <= u_max)
-    .in_cases(
-        Case(((u_min1, _OFFSET + guard),), "$beta u_min0$ below the threshold"),
-        Case(((u_min1, _OFFSET),), "$beta u_min0$ at the threshold"),
-    )
+    .in_cases(*_THREE_CASES[:2])
     .qualified_by("T10a")
     .remark("The drive is that of zero command (T10a), and so is the flow."),
 )
