@@ -6,8 +6,8 @@ from zipfile import ZipFile
 
 import pytest
 
-from dzdesign.codegen.fmu import binaries
-from dzdesign.codegen.fmu.archive import archive
+from dzdesign.codegen.fmu import files as binaries
+from dzdesign.codegen.fmu.files import archive
 from dzdesign.codegen.other_targets import write_output
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.regeneration import output_regenerated
@@ -28,7 +28,7 @@ def folder(output, tmp_path, monkeypatch):
     monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
     write_output(output, tmp_path / "fmus")
     yield tmp_path / "fmus"
-    binaries._version.cache_clear()
+    binaries.made_with.cache_clear()
 
 
 def edited(folder, name, change):
@@ -37,9 +37,6 @@ def edited(folder, name, change):
     with ZipFile(BytesIO(path.read_bytes())) as packed:
         files = {each: packed.read(each) for each in packed.namelist()}
     files[name] = change(files[name])
-    own = json.loads(files["extra/dzdesign/manifest.json"])
-    own["files"] |= {each: sha256_of(files[each]) for each in own["files"]}
-    files["extra/dzdesign/manifest.json"] = (json.dumps(own, indent=2) + "\n").encode()
     path.write_bytes(archive(files))
     document = json.loads(manifest.read_text())
     document["files"][NAME] = sha256_of(path.read_bytes())
@@ -59,7 +56,7 @@ def test_a_file_edited_together_with_all_manifests_is_found(folder, name):
 
 @pytest.mark.parametrize("how", ("missing", "too old", "fails"))
 def test_without_its_compiler_it_is_not_checked_and_said_why(folder, monkeypatch, how):
-    binaries._version.cache_clear()
+    binaries.made_with.cache_clear()
     if how == "missing":
         monkeypatch.setattr(binaries, "find_spec", lambda name: None)
     elif how == "too old":
@@ -71,7 +68,7 @@ def test_without_its_compiler_it_is_not_checked_and_said_why(folder, monkeypatch
 
 
 def test_what_another_ziglang_made_is_not_checked_and_said_why(folder):
-    found = binaries.ziglang_version()
+    found = binaries.version("ziglang")
     this = f"ziglang {found}".encode()
     edited(folder, "extra/dzdesign/manifest.json", lambda text: text.replace(this, b"ziglang 0.99"))
     check = output_regenerated(folder)

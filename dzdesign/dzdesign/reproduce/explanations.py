@@ -21,7 +21,7 @@ from dzdesign.derivation.account.published import (
     U_MAX_V,
     PublishedValve,
 )
-from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.assumptions import OILS
 from dzdesign.reproduce.displacement_readings import DISPLACEMENT, half_digits_off
 from dzdesign.reproduce.offset_reading import offset_percent

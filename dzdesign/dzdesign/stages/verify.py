@@ -63,12 +63,9 @@ class VerifyArguments:
     mutate: Annotated[bool, Option(group=CHECKS)] = False
     """Insert a fault at every place of the C code, one at a time, and count the faults that are detected."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
-    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr. FMUs run every
-    input in Wine and in QEMU."""
+    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
     """Prove with Frama-C that nothing overflows a 16-bit int."""
-    run_changed: Annotated[bool, Option(group=CHECKS)] = False
-    """Compile and run changed code too. Give this option only for a folder that you trust."""
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
@@ -124,7 +121,7 @@ def verify_output_folder(
     if kind_for(folder, given).runs:
         with stage_progress("generating the output again"):
             again = output_again(folder)
-    with code_of_output(folder, again, run_changed=arguments.run_changed) as code, stage_progress() as stage:
+    with code_of_output(folder, again) as code, stage_progress() as stage:
         verification = verify_output(folder, given, stage, code)
     added = [output_regenerated(folder, again)]
     if recordings:
@@ -147,7 +144,7 @@ def _verify_firmware(
 
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
-    with code_of_firmware(folder, run_changed=arguments.run_changed) as code:
+    with code_of_firmware(folder) as code:
         return _verify_code(folder, code, arguments, plant_source, identified)
 
 
@@ -164,7 +161,7 @@ def _verify_code(
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.toolchain.compiled_core import core_answers
-    from dzdesign.verify.verification import evidence_files, evidence_manifest
+    from dzdesign.verify.verification import evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
     plant, digest = None, None
@@ -201,8 +198,7 @@ def _verify_code(
     if arguments.output is not None:
         output = Path(arguments.output)
         manifest = evidence_manifest(verification.evidence)
-        files = with_report(evidence_files(verification), folder, output, verification.derived)
-        write_folder(output, files, manifest)
+        write_folder(output, with_report(verification, folder, output), manifest)
     return verification
 
 

@@ -41,11 +41,7 @@ class OutputKind:
 #: Target, as the manifest names it, to its checks.
 KINDS: Mapping[str, OutputKind] = {
     "iec61131": OutputKind(module="dzdesign.verify.structured_text.checks"),
-    "fmu": OutputKind(
-        module="dzdesign.verify.fmu.checks",
-        options={"--machine-code": "dzdesign.verify.fmu.other_machines"},
-        runs=True,
-    ),
+    "fmu": OutputKind(module="dzdesign.verify.fmu.checks", runs=True),
     "matlab": OutputKind(module="dzdesign.verify.matlab.checks", runs=True),
     "amplifier": OutputKind(module="dzdesign.verify.amplifier.output_checks"),
 }
