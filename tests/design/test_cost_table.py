@@ -13,8 +13,7 @@ from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.designing import design
 from dzdesign.design.fixed.characteristic import Characteristic
 from dzdesign.design.fixed.dead_zones import dead_zones
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.terminal.tables import print_compensator
 
 BAR = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0), flow=FlowUnit(unit="mL/s", factor=1000 / 60))

@@ -13,8 +13,7 @@ from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
 from dzdesign.design.lot.setting import lot_setting
 from dzdesign.design.machine.allowance import allowance_of
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.model import ValveModel

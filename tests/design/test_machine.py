@@ -22,7 +22,7 @@ from dzdesign.design.machine.bench_current import check_bench_current, recorded_
 from dzdesign.design.machine.colder_coil import colder_coil
 from dzdesign.design.offset import above_tests
 from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_certificates, prove_derived
 from tests.support.machine_oracle import worst_margin_mV
 

@@ -15,7 +15,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.lot.setting import lot_setting
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
 from dzdesign.verify.firmware.compensator_checks import law_follows

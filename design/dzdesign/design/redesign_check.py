@@ -11,7 +11,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.lot.margins import prove_lot
 from dzdesign.design.lot.valves import LotSide
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.design.signals import SIDE_NAMES
 
 #: Coarsest unit of the law's coefficients, see `dzdesign.design.quantise`.

@@ -5,7 +5,7 @@ import pytest
 from dzdesign.codegen.project import target_named
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.report.lot.budget import lot_budget, lot_budget_lines, lot_budget_table
 
 

@@ -20,7 +20,7 @@ from dzdesign.design.lot.margins import lot_margins, prove_lot
 from dzdesign.design.lot.pressures import Lacking, common_interval, lacking_in, without_narrow
 from dzdesign.design.lot.setting import lot_setting
 from dzdesign.design.lot.valves import LotSide
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
 from dzdesign.report.sections.lot_setting import lot_costs

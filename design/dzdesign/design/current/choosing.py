@@ -46,11 +46,12 @@ STEPS_OF_SEARCH = 16
 class CurrentSensor:
     """Voltage at the converter's pin for a current, and for the supply where that is measured."""
 
-    V_per_A: Annotated[float, quantity("V/A", "Shunt resistance times amplifier gain.", gt=0)]
-    offset_V: Annotated[float, quantity("V", "Voltage at the pin at zero current.", ge=0)] = 0.0
-    supply_divider: Annotated[
-        float, quantity("1", "Ratio of the supply's voltage divider; 0 if the supply is not measured.", ge=0)
-    ] = 0.0
+    V_per_A: Annotated[float, quantity("V/A", gt=0)]
+    """Shunt resistance times amplifier gain."""
+    offset_V: Annotated[float, quantity("V", ge=0)] = 0.0
+    """Voltage at the pin at zero current."""
+    supply_divider: Annotated[float, quantity("1", ge=0)] = 0.0
+    """Ratio of the supply's voltage divider; 0 if the supply is not measured."""
 
     def __post_init__(self) -> None:
         if not self.V_per_A > 0 or self.offset_V < 0 or not 0 <= self.supply_divider < 1:

@@ -31,49 +31,34 @@ from dzdesign.design.target_inputs import Converter
 class CurrentDrive:
     """Current control of a drive: the law's output is the set point, and full drive is the rated current."""
 
-    circuit: Annotated[CoilCircuit, Meta(description="Declared coil and supply.")]
-    sensor: Annotated[CurrentSensor, Meta(description="Voltages at the pins of the converter.")]
-    sampling: Annotated[
-        CurrentSampling, Meta(description="Times at which the current is sampled and the interrupt is triggered.")
-    ]
-    loop: Annotated[CurrentLoop, Meta(description="Controller in the integers of the firmware.")]
-    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin over all corners and currents.")]
-    gain_margin: Annotated[float, quantity("1", "Least gain margin over all corners and currents.")]
-    rise_s: Annotated[float, quantity("s", "Rise time from 10 to 90 % of the rated current at the slowest corner.")]
-    least_rise_s: Annotated[float, quantity("s", "Rise time at that corner with the switch always on.")]
-    fall_s: Annotated[
-        float,
-        quantity("s", "Fall time from 90 to 10 % at the slowest corner, where the freewheeling diode determines it."),
-    ]
-    overshoot: Annotated[
-        float, quantity("1", "Largest overshoot of the step response, relative to the height of the step.")
-    ]
-    release_overshoot_A: Annotated[
-        float,
-        quantity(
-            "A",
-            "Largest overshoot at any corner when the current is released to a set point; 0 if it is at "
-            "most half a code of the sensor.",
-            ge=0,
-        ),
-    ]
-    dither_above_counts: Annotated[
-        int,
-        Meta(
-            description="Largest excess of the current's peak over that of the set point under dither, at any corner.",
-            ge=0,
-            le=65535,
-        ),
-    ]
-    dither_below_counts: Annotated[
-        int,
-        Meta(
-            description="Largest deficit of the current's peak against that of the set point under dither, if the loop "
-            "can't follow the wave.",
-            ge=0,
-            le=65535,
-        ),
-    ]
+    circuit: CoilCircuit
+    """Declared coil and supply."""
+    sensor: CurrentSensor
+    """Voltages at the pins of the converter."""
+    sampling: CurrentSampling
+    """Times at which the current is sampled and the interrupt is triggered."""
+    loop: CurrentLoop
+    """Controller in the integers of the firmware."""
+    phase_margin_deg: Annotated[float, quantity("deg")]
+    """Least phase margin over all corners and currents."""
+    gain_margin: Annotated[float, quantity("1")]
+    """Least gain margin over all corners and currents."""
+    rise_s: Annotated[float, quantity("s")]
+    """Rise time from 10 to 90 % of the rated current at the slowest corner."""
+    least_rise_s: Annotated[float, quantity("s")]
+    """Rise time at that corner with the switch always on."""
+    fall_s: Annotated[float, quantity("s")]
+    """Fall time from 90 to 10 % at the slowest corner, where the freewheeling diode determines it."""
+    overshoot: Annotated[float, quantity("1")]
+    """Largest overshoot of the step response, relative to the height of the step."""
+    release_overshoot_A: Annotated[float, quantity("A", ge=0)]
+    """Largest overshoot at any corner when the current is released to a set point; 0 if it is at most half a code of
+    the sensor."""
+    dither_above_counts: Annotated[int, Meta(ge=0, le=65535)]
+    """Largest excess of the current's peak over that of the set point under dither, at any corner."""
+    dither_below_counts: Annotated[int, Meta(ge=0, le=65535)]
+    """Largest deficit of the current's peak against that of the set point under dither, if the loop can't follow the
+    wave."""
 
     def __post_init__(self) -> None:
         if self.phase_margin_deg < LEAST_PHASE_DEG:

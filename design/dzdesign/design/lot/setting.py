@@ -30,7 +30,7 @@ from dzdesign.design.lot.valves import LotValve
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.design.quantise import finest_units
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES

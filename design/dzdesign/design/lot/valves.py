@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated
 
-from msgspec import Meta
-
 from dzdesign.core.artefact_types import RuleError, Sha256, quantity
 from dzdesign.identify.constants import Premise
 from dzdesign.identify.valve.certified_bound import CertifiedBound
@@ -23,26 +21,18 @@ from dzdesign.identify.valve.staircase import Direction
 class LotSide:
     """Lower bounds of a valve's guarded threshold for one sign of the command."""
 
-    trend: Annotated[
-        Direction | None,
-        Meta(
-            description="Trend of the threshold over the pressure drop; null if fewer than two pressure drops were "
-            "tested."
-        ),
-    ]
-    confidence: Annotated[float, quantity("1", "Joint confidence level of all bounds.", ge=0.5, le=1)]
-    premise: Annotated[Premise, Meta(description="Premise of the bound between the tests.")]
-    curvature_V_MPa2: Annotated[
-        tuple[SecondDifference, ...],
-        quantity(
-            "V/MPa2",
-            "Bound M of the curvature in each interval between neighbouring tests; 0 for line, empty for monotone.",
-        ),
-    ]
-    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa", "Tested pressure drops, in ascending order.")]
-    u_lower_V: Annotated[
-        tuple[Voltage, ...], quantity("V", "Lower bound of the threshold at each tested pressure drop.")
-    ]
+    trend: Direction | None
+    """Trend of the threshold over the pressure drop; null if fewer than two pressure drops were tested."""
+    confidence: Annotated[float, quantity("1", ge=0.5, le=1)]
+    """Joint confidence level of all bounds."""
+    premise: Premise
+    """Premise of the bound between the tests."""
+    curvature_V_MPa2: Annotated[tuple[SecondDifference, ...], quantity("V/MPa2")]
+    """Bound M of the curvature in each interval between neighbouring tests; 0 for line, empty for monotone."""
+    dp_MPa: Annotated[tuple[PressureDrop, ...], quantity("MPa")]
+    """Tested pressure drops, in ascending order."""
+    u_lower_V: Annotated[tuple[Voltage, ...], quantity("V")]
+    """Lower bound of the threshold at each tested pressure drop."""
 
     def __post_init__(self) -> None:
         if not self.dp_MPa or len(self.dp_MPa) != len(self.u_lower_V):
@@ -77,12 +67,14 @@ class LotSide:
 class LotValve:
     """A valve of the lot."""
 
-    name: Annotated[str, Meta(description="Name of the valve in the table of the batch.")]
-    valve_sha256: Annotated[Sha256, Meta(description="SHA-256 of its valve.json.")]
-    positive: Annotated[LotSide, Meta(description="Bounds for positive commands.")]
-    negative: Annotated[
-        LotSide | None, Meta(description="Bounds for negative commands; null if the setting drives none.")
-    ] = None
+    name: str
+    """Name of the valve in the table of the batch."""
+    valve_sha256: Sha256
+    """SHA-256 of its valve.json."""
+    positive: LotSide
+    """Bounds for positive commands."""
+    negative: LotSide | None = None
+    """Bounds for negative commands; null if the setting drives none."""
 
     def side(self, sign: int) -> LotSide | None:
         """Return the bounds of one sign of command."""
