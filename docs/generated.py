@@ -39,7 +39,7 @@ API = (
     ("dzdesign.stages.calibration", ("CalibrationImage", "ReadCalibration")),
     ("dzdesign.stages.export", ("AmplifierExport",)),
     ("dzdesign.codegen.amplifier.setting", ("AmplifierSetting",)),
-    ("dzdesign.design.fixed.dead_zones", ("FixedDeadZone",)),
+    ("dzdesign.design.fixed_offset", ("FixedDeadZone",)),
     ("dzdesign.codegen.calibration.reading", ("CalibrationReading", "SideReading", "NodeReading", "DriveReading")),
     ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),

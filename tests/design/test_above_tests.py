@@ -12,11 +12,11 @@ from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.design.above_tests import AboveChoice
+from dzdesign.design.beta_table import STEP_CODES
 from dzdesign.design.certificate import guarded_curve, prove_certificates
 from dzdesign.design.designing import design
-from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.table.linear_programme import STEP_CODES
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.exhaustive.above_tests import check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

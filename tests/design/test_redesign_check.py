@@ -14,7 +14,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot.setting import lot_setting
+from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify

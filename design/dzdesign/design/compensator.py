@@ -3,30 +3,79 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
+from math import lcm
+from threading import local
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
+from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of, to_json_bytes
 from dzdesign.core.documents import sha256_of, to_json
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
-from dzdesign.derivation.scaling import drive
+from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
 from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
-from dzdesign.design.line_in_beta import line_in_beta
-from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.design.valve_hash import sha256_of_valve
 from dzdesign.design.zero_band import CommandError
 from dzdesign.identify.valve.model import ValveModel
+
+#: The last valve and its hash: a design makes several compensators of one valve, each of which states the hash.
+LAST = local()
+
+
+def sha256_of_valve(valve: ValveModel) -> str:
+    """Return the SHA-256 of the valve.json of a valve; known again by its identity, for a valve never changes."""
+    if getattr(LAST, "valve", None) is not valve:
+        LAST.sha256, LAST.valve = sha256_of(to_json_bytes(valve)), valve
+    digest: str = LAST.sha256
+    return digest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineInBeta:
+    """Counts at a command: ``(start + code * slope) / unit``, each a number at beta 0 and what a beta of 1 adds."""
+
+    start: tuple[int, int]
+    slope: tuple[int, int]
+    unit: int
+
+    def counts(self, code: int | Fraction, beta: Fraction) -> Fraction:
+        """Return the counts of the law at codes of command, from zero, and a beta."""
+        codes, parts = code.numerator, code.denominator
+        none, more = (start * parts + codes * slope for start, slope in zip(self.start, self.slope, strict=True))
+        up = none * beta.denominator + more * beta.numerator
+        return Fraction(up, self.unit * parts * beta.denominator)
+
+
+@lru_cache(maxsize=64)
+def line_in_beta(name: str, kappa: Fraction, u_min0_over_u_max: Fraction, n_adc: int, n_full: int) -> LineInBeta:
+    """Return the law of a name as such a line, from the law itself at three betas.
+
+    The arguments are those of `evaluate_line`; a law that is not straight in beta is a `RequirementError`.
+    """
+    at = [
+        evaluate_line(
+            law(name), beta=beta, kappa=kappa, u_min0_over_u_max=u_min0_over_u_max, n_adc=n_adc, n_full=n_full
+        )
+        for beta in (0, 1, 2)
+    ]
+    if any(2 * one != none + two for none, one, two in zip(*at, strict=True)):
+        raise RequirementError(f"the law '{name}' is not straight in beta")
+    parts = [part for line in at[:2] for part in (line.start, line.slope)]
+    unit = lcm(*(part.denominator for part in parts))
+    start, slope, start_one, slope_one = (part.numerator * (unit // part.denominator) for part in parts)
+    return LineInBeta(start=(start, start_one - start), slope=(slope, slope_one - slope), unit=unit)
+
 
 Codes = Annotated[int, Meta(ge=0, le=65535)]
 

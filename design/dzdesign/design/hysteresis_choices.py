@@ -8,9 +8,8 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import between_tests, read_dead_zone, remaining_dead_zone
+from dzdesign.design.costs_at_tests import between_tests, corners_of, read_dead_zone, remaining_dead_zone
 from dzdesign.design.designing import design
-from dzdesign.design.law_corners import corners_of
 from dzdesign.design.options import options_of
 from dzdesign.design.play import LEVELS
 from dzdesign.design.signals import SIDE_NAMES

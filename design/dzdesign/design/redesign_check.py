@@ -9,12 +9,12 @@ from dzdesign.core.value_differences import differences
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot.margins import prove_lot
-from dzdesign.design.lot.valves import LotSide
+from dzdesign.design.lot_margins import prove_lot
+from dzdesign.design.lot_valves import LotSide
 from dzdesign.design.options import options_of
 from dzdesign.design.signals import SIDE_NAMES
 
-#: Coarsest unit of the law's coefficients, see `dzdesign.design.quantise`.
+#: Coarsest unit of the law's coefficients, see `dzdesign.design.side_design`.
 COARSEST = Fraction(1, 2**12)
 #: Characters before the first difference of two texts that a message shows.
 CONTEXT = 12

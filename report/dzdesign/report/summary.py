@@ -8,7 +8,7 @@ from dzdesign.assess.limits import LIMITED
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED, verdict_words
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.words import reach_of_certificate
+from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import Chain
 from dzdesign.report.characteristic.curves import BRANCHES, ORIGIN_WORDS

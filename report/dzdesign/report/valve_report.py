@@ -7,7 +7,7 @@ from pathlib import Path
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import schema_of
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.words import not_counted
+from dzdesign.design.machine.accounting import not_counted
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder

@@ -10,8 +10,15 @@ from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.errors import InputError
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
 from dzdesign.design.current.loop import CORRECTION_SHIFT, LARGEST_ERROR, LARGEST_GAIN, CurrentLoop, SupplyCorrection
-from dzdesign.design.current.margins import SEARCH_GRID, Gains, worst_margins
-from dzdesign.design.current.step_response import SensorLine, StepResponse, released_overshoot_A, step_responses
+from dzdesign.design.current.responses import (
+    SEARCH_GRID,
+    Gains,
+    SensorLine,
+    StepResponse,
+    released_overshoot_A,
+    step_responses,
+    worst_margins,
+)
 from dzdesign.design.target_inputs import Converter
 
 #: Phase margin that the gains are chosen for, and the least that a loop may have.

@@ -1,9 +1,10 @@
-"""`CurrentDrive`: current control as compensator.json keeps it, with what it was designed for and what it holds."""
+"""`CurrentDrive`: current control as `design` chose it, with its margins, its steps, and what it makes of a dither."""
 
 from dataclasses import dataclass
 from math import ceil, isfinite
 from typing import Annotated
 
+import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
@@ -20,11 +21,56 @@ from dzdesign.design.current.choosing import (
     worst_step,
 )
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
-from dzdesign.design.current.dither_response import dither_departure
 from dzdesign.design.current.loop import CurrentLoop
-from dzdesign.design.current.margins import worst_margins
-from dzdesign.design.current.step_response import STEP_S, released_overshoot_A, step_responses
+from dzdesign.design.current.responses import (
+    STEP_S,
+    SensorLine,
+    released_overshoot_A,
+    run_loop,
+    step_responses,
+    worst_margins,
+)
 from dzdesign.design.target_inputs import Converter
+
+#: Set points about which the wave is tried, of the rated current; for how long, until it has settled and after.
+SHARES = (0.25, 0.5, 0.75)
+SETTLED_S, SEEN_S = 0.2, 0.1
+
+
+def dither_departure(
+    loop: CurrentLoop,
+    circuit: CoilCircuit,
+    sampling: CurrentSampling,
+    sensor: SensorLine,
+    *,
+    counts: int,
+    ticks: int,
+) -> tuple[int, int]:
+    """Return by how many counts the current's peak lies above the set point's at most, and below it at most.
+
+    The certificate keeps the dither's peak free under the threshold: of a controlled current its own, which overshoots
+    the wave's steps or does not reach their top, the largest mean of a PWM period at the worst corner. Both are 0 or
+    more; `counts` is the wave's peak, `ticks` the PWM periods of half of it.
+    """
+    above, below = [0.0], [0.0]
+    for share in SHARES if counts else ():
+        set_point, tops = round(share * loop.full_counts), (share + counts / loop.full_counts) * circuit.rated_A
+        able = [corner for corner in circuit.corners() if circuit.duty(corner, tops) < 1]
+        if not able or not counts < set_point <= loop.full_counts - counts:
+            continue
+        settled, seen = (round(seconds * sampling.tick_Hz) for seconds in (SETTLED_S, SEEN_S))
+        wave = _wave(set_point, counts, ticks, settled + seen)
+        means, _ = run_loop(loop, circuit, able, sampling, sensor, wave)
+        peaks = means[settled:].max(axis=0) * loop.full_counts / circuit.rated_A - set_point - counts
+        above.append(float(peaks.max()))
+        below.append(float(-peaks.min()))
+    return ceil(max(above)), ceil(max(below))
+
+
+def _wave(set_point: int, counts: int, ticks: int, periods: int) -> np.ndarray:
+    up: np.ndarray = np.arange(periods) % (2 * ticks) < ticks
+    wave: np.ndarray = set_point + np.where(up, counts, -counts)
+    return wave
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.design.machine.budget import ADDED_IN_FULL, Budget, BudgetLine
-from dzdesign.design.machine.words import reach_of_certificate
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.budget import budget_figure
 from dzdesign.report.figures.figure import csv_text

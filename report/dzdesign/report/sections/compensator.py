@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from fractions import Fraction
 
+from dzdesign.design.above_tests import above_in_words, below_in_words
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
-from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.report.compensator_sides import laws_of
 from dzdesign.report.figures.figure import csv_text
 from dzdesign.report.figures.law import law_figure

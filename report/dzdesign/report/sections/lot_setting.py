@@ -10,7 +10,7 @@ import numpy as np
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot.valves import LotSide
+from dzdesign.design.lot_valves import LotSide
 from dzdesign.report.chain import Chain
 from dzdesign.report.compensator_sides import SIGNS, laws_of
 from dzdesign.report.figures.figure import csv_text

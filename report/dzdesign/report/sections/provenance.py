@@ -2,7 +2,7 @@
 
 from dzdesign.core.artefact_types import Artefact
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.signal_descriptions import signals_in_words
+from dzdesign.design.pressure_inputs import signals_in_words
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.chain import KINDS, Chain
 from dzdesign.report.compensator_sides import standing_warnings

@@ -3,7 +3,7 @@
 Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That is proved as for one
 valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling anywhere; the others lie above it by
 more than a million times the error of the double precision in which that was found. That it lies under the bounds of
-every valve is proved of each of them, by `prove_lot`, here and wherever the file is read.
+every valve is proved of each of them, by `prove_lot`, here and by `verify`.
 
 A compensator's file holds the valve that its certificate follows from. The common one holds a real valve of the batch,
 its *carrier*, and never an invented one with the least thresholds of all: no ramp test ever showed that.
@@ -18,24 +18,22 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
-from dzdesign.design.ceiling.exact_row import least_of
-from dzdesign.design.ceiling.offset_ceiling import OffsetCeiling, offset_ceiling
-from dzdesign.design.ceiling.offset_curve import OffsetCurve
+from dzdesign.design.above_tests import AboveChoice
+from dzdesign.design.beta_table import STEP_CODES, choose_beta_table
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
-from dzdesign.design.designing import design, left_by_machine, over, prove_monotone, travel
-from dzdesign.design.lot.margins import LotMargin, prove_lot
-from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.designing import design, prove_monotone
+from dzdesign.design.exact_row import least_of
+from dzdesign.design.lot_margins import LotMargin, prove_lot
+from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.machine.allowance import Allowance
-from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.options import options_of
-from dzdesign.design.quantise import finest_units
+from dzdesign.design.side_design import finest_units, left_by_machine, over, travel
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES
-from dzdesign.design.table.beta_table import choose_beta_table
-from dzdesign.design.table.linear_programme import STEP_CODES
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
