@@ -11,7 +11,7 @@ is run.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -23,8 +23,8 @@ from dzdesign.core.scratch import scratch_folder
 if TYPE_CHECKING:
     from dzdesign.regeneration import OutputAgain
 
-#: What else to do, where a command has the option.
-RUN_CHANGED = ", or give --run-changed to run code that you trust all the same"
+#: What else to do.
+OWN_CODE = ", or write a target for code of your own"
 #: Endings of code in an output other than a C firmware.
 OF_OUTPUTS = (".c", ".h", ".m", ".mex", ".fmu")
 #: Files that a sentence names.
@@ -33,29 +33,26 @@ AGAIN = "make the folder again with `dzdesign codegen`"
 
 
 @contextmanager
-def code_of_firmware(folder: Path, *, run_changed: bool = False, otherwise: str = RUN_CHANGED) -> Iterator[Path]:
-    """Give a folder with the code of a firmware that may be compiled and run: a private copy, or with `run_changed` it.
-
-    Changed code is a `RequirementError`, in which `otherwise` is what else the user can do.
-    """
-    with nullcontext(folder) if run_changed else _written(refuse_changed_firmware(folder, otherwise)) as code:
+def code_of_firmware(folder: Path) -> Iterator[Path]:
+    """Give a private copy of the code of a firmware that may be compiled and run; changed: a `RequirementError`."""
+    with _written(refuse_changed_firmware(folder)) as code:
         yield code
 
 
 @contextmanager
-def code_of_output(folder: Path, again: "OutputAgain | None", *, run_changed: bool = False) -> Iterator[Path]:
+def code_of_output(folder: Path, again: "OutputAgain | None") -> Iterator[Path]:
     """Do the same for an output other than a C firmware, of which `again` is what is generated now.
 
     It is None of an output of which nothing is run as it is: that is read from its own folder.
     """
-    if run_changed or again is None:
+    if again is None:
         yield folder
         return
     with _written(refuse_changed_output(folder, again)) as code:
         yield code
 
 
-def refuse_changed_firmware(folder: Path, otherwise: str = RUN_CHANGED) -> dict[str, bytes]:
+def refuse_changed_firmware(folder: Path) -> dict[str, bytes]:
     """Return the code of a firmware, path to content, with the data that it is run on; of changed code an error."""
     from dzdesign.codegen.project import TARGET_NAMES
     from dzdesign.design.firmware_manifest import BLOCK_FILE
@@ -66,29 +63,29 @@ def refuse_changed_firmware(folder: Path, otherwise: str = RUN_CHANGED) -> dict[
     read_compensator(folder)  # one that can't be read is no changed code
     reason = not_generated_here(manifest, TARGET_NAMES)
     if manifest.target not in TARGET_NAMES:
-        raise _refusal(folder, reason, otherwise)
+        raise _refusal(folder, reason)
     try:
         firmware = firmware_again(folder, manifest)
     except InputError as error:
-        raise _refusal(folder, str(error), otherwise) from error
+        raise _refusal(folder, str(error)) from error
     code = {name: text.encode() for name, text in firmware.files.items() if _is_firmware_code(name)}
     there = (path.relative_to(folder).as_posix() for path in (folder / "core").rglob("*"))
     if others := _differing(folder, code, filter(_is_firmware_code, [*manifest.files, *manifest.core, *there])):
-        raise _refusal(folder, reason or _words(others), otherwise)
+        raise _refusal(folder, reason or _words(others))
     if (block := folder / BLOCK_FILE).is_file():  # data, and tried as such
         code[BLOCK_FILE] = read_bytes(block, "calibration block")
     return {**code, "compensator.json": firmware.files["compensator.json"].encode()}
 
 
-def refuse_changed_output(folder: Path, again: "OutputAgain", otherwise: str = RUN_CHANGED) -> dict[str, bytes]:
+def refuse_changed_output(folder: Path, again: "OutputAgain") -> dict[str, bytes]:
     """Return the code of an output other than a C firmware, and its compensator.json; of changed code an error."""
     if again.output is None:
-        raise _refusal(folder, again.reason, otherwise)
+        raise _refusal(folder, again.reason)
     contents = again.output.contents
     code = {name: content for name, content in contents.items() if name.lower().endswith(OF_OUTPUTS)}
     there = (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
     if others := _differing(folder, code, (name for name in there if name.lower().endswith(OF_OUTPUTS))):
-        raise _refusal(folder, _words(others), otherwise)
+        raise _refusal(folder, _words(others))
     return {**code, "compensator.json": contents["compensator.json"]}
 
 
@@ -117,9 +114,9 @@ def _words(names: list[str]) -> str:
     return f"{and_more(names, MOST_NAMED)} {verb} not what {this} generates from its compensator.json"
 
 
-def _refusal(folder: Path, reason: str, otherwise: str) -> RequirementError:
+def _refusal(folder: Path, reason: str) -> RequirementError:
     words = f"the code in '{folder}' was neither compiled nor run: {reason}"
-    return RequirementError(f"{words}; {AGAIN}{otherwise}")
+    return RequirementError(f"{words}; {AGAIN}{OWN_CODE}")
 
 
 @contextmanager

@@ -95,7 +95,7 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     firmware = Path(arguments.firmware) if arguments.firmware is not None else None
     dither = read["dither"] and read["dither"].of(AS_COMPUTED, plant.u_max_V)
     with (
-        nullcontext() if firmware is None else code_of_firmware(firmware, otherwise="") as code,
+        nullcontext() if firmware is None else code_of_firmware(firmware) as code,
         stage_progress() as stage,
     ):
         files, manifest = simulated_files(

@@ -66,8 +66,6 @@ class VerifyArguments:
     """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
     """Prove with Frama-C that nothing overflows a 16-bit int."""
-    run_changed: Annotated[bool, Option(group=CHECKS)] = False
-    """Compile and run changed code too. Give this option only for a folder that you trust."""
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
@@ -123,7 +121,7 @@ def verify_output_folder(
     if kind_for(folder, given).runs:
         with stage_progress("generating the output again"):
             again = output_again(folder)
-    with code_of_output(folder, again, run_changed=arguments.run_changed) as code, stage_progress() as stage:
+    with code_of_output(folder, again) as code, stage_progress() as stage:
         verification = verify_output(folder, given, stage, code)
     added = [output_regenerated(folder, again)]
     if recordings:
@@ -146,7 +144,7 @@ def _verify_firmware(
 
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
-    with code_of_firmware(folder, run_changed=arguments.run_changed) as code:
+    with code_of_firmware(folder) as code:
         return _verify_code(folder, code, arguments, plant_source, identified)
 
 

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import polars
 import pytest
-from many_valves import PRESSURES_MPa, lot_bench, write_lot
 
 from dzdesign.batch.calibration import Task
 from dzdesign.batch.command import useful_jobs
@@ -38,6 +37,7 @@ from dzdesign.report.lot.valve_folder import read_manifest
 from dzdesign.stages.identify import IdentifyChoices
 from dzdesign.verify.requirements import RAMPS
 from tests.support.crashing_work import die_over_bad
+from tests.support.many_valves import PRESSURES_MPa, lot_bench, write_lot
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from many_valves import write_lot
 
 from dzdesign.batch import outputs as outputs_module
 from dzdesign.batch.arguments import BatchArguments
@@ -30,6 +29,7 @@ from dzdesign.stages import verify as verify_stage
 from dzdesign.verify.output_evidence import TriedInputs
 from dzdesign.verify.requirements import FILES
 from tests.dzdesign.batch.test_batch import NOTHING, tree
+from tests.support.many_valves import write_lot
 from tests.support.paths import GOLDENS
 
 PLC = WantedOutput(target="iec61131", settings={"dialect": "codesys", "interface": "plc"}, folder="plc")

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import polars
 import pytest
-from many_valves import write_lot
 
 from dzdesign.batch.valves import valves_of
 from dzdesign.command_line.cli import main
@@ -17,6 +16,7 @@ from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.table import read_table, safe_cell, table_files
 from dzdesign.report.lot.valve_names import by_name
 from tests.support.html_pages import Page
+from tests.support.many_valves import write_lot
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
 
 pytestmark = pytest.mark.slow

@@ -11,7 +11,6 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from many_valves import recordings, write_lot
 
 from dzdesign.batch.printing import print_lot
 from dzdesign.batch.results import Results
@@ -29,6 +28,7 @@ from dzdesign.report.lot.spread import EXTRA, FAR, LEVELS, quantiles, spread_of
 from dzdesign.report.lot.summary import LotSettingSummary, SmallestMargin, UntestedPressures
 from dzdesign.report.lot.table import SideFigures
 from tests.support.html_pages import HOSTILE, Page
+from tests.support.many_valves import recordings, write_lot
 from tests.support.schema_checks import overlooked, problems
 from tests.support.synthetic_lots import lot_rows, with_figures, write_lot_folder
 

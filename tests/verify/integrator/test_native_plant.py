@@ -228,13 +228,13 @@ def text(name, right, wrong):
     """Change the native plant's C."""
 
     def fault(monkeypatch):
-        load = native_loop.ConfinedLibrary
+        load = native_loop.CompiledLibrary
 
         def changed(sources, *more):
             assert sources[name].count(right) == 1
             return load({**sources, name: sources[name].replace(right, wrong)}, *more)
 
-        monkeypatch.setattr(native_loop, "ConfinedLibrary", changed)
+        monkeypatch.setattr(native_loop, "CompiledLibrary", changed)
 
     return fault
 

@@ -21,7 +21,6 @@ from tests.support.matlab_mutants import killers, mutants
 from tests.support.octave import OCTAVE, compensator_of, needs_octave, sampled_codes, written
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 from tests.support.synthetic import needs_compiler
-from tests.verify.toolchain.test_confinement import with_landlock
 
 pytestmark = needs_compiler
 SIDES = {"dz_comp": 1, "dz_comp_negative": -1}
@@ -185,7 +184,7 @@ def test_without_octave_the_function_is_not_checked_and_the_c_is(folder, few, mo
 
 @pytest.mark.parametrize("name", ["dz_comp.m", "setup_c_caller.m", "core/dz_comp.c", "core/dz_comp.h"])
 def test_what_is_not_as_generated_is_not_run(folder, name, monkeypatch):
-    for runs in ("run_program", "run_confined"):
+    for runs in ("run_program", "run_child"):
         monkeypatch.setattr(octave_module, runs, lambda *_, **__: pytest.fail("a program was run"))
     edited(folder, name, "\n", "\n\n", told=False)
     (check,) = checks_of(folder).checks
@@ -196,7 +195,7 @@ def test_what_is_not_as_generated_is_not_run(folder, name, monkeypatch):
 
 @pytest.mark.parametrize("line", ["system('touch it');", "if true\nend", "x = @sin;", "!touch it", "cd ..;"])
 def test_what_is_not_of_the_subset_is_not_run_though_the_manifest_has_it(folder, line, monkeypatch):
-    for runs in ("run_program", "run_confined"):
+    for runs in ("run_program", "run_child"):
         monkeypatch.setattr(octave_module, runs, lambda *_, **__: pytest.fail("a program was run"))
     edited(folder, "dz_comp.m", "    % ---- signals ----\n", f"    {line}\n")
     (check,) = checks_of(folder).checks
@@ -213,29 +212,6 @@ def test_octave_runs_nothing_of_the_users(folder, tmp_path, monkeypatch):
     (home / "bitshift.m").write_text("error('a function of the user''s was run');\n")
     with sampled_codes(folder, compensator_of(GOLDENS)) as asked:
         assert judged_in_octave(OCTAVE, "dz_comp", (folder / "dz_comp.m").read_bytes(), asked).faults == 0
-
-
-@needs_octave
-@with_landlock
-def test_octave_writes_in_the_folder_of_answers_alone(tmp_path, monkeypatch):
-    functions, answers = tmp_path / "functions", tmp_path / "answers"
-    functions.mkdir()
-    answers.mkdir()
-    program = tmp_path / "writes.m"
-    program.write_text("for path = argv()'\n  printf('%d ', fopen(path{1}, 'w') >= 0);\nend\nprintf('%s', pwd());\n")
-    monkeypatch.setattr(octave_module, "PROGRAMS", tmp_path)
-    places = [answers / "made", functions / "made", tmp_path / "made", program]
-    printed = run_octave(OCTAVE, program.name, list(map(str, places)), functions, answers)
-    assert printed.split() == ["1", "0", "0", "0", str(functions)] and program.stat().st_size
-    assert run_octave(OCTAVE, program.name, list(map(str, places)), functions).split()[:4] == ["0"] * 4
-
-
-@needs_octave
-def test_a_function_that_takes_too_much_memory_is_a_requirement_error(tmp_path, monkeypatch):
-    (tmp_path / "takes.m").write_text("x = zeros(1, 2 ^ 30); disp(numel(x) + 1);\n")
-    monkeypatch.setattr(octave_module, "PROGRAMS", tmp_path)
-    with pytest.raises(RequirementError, match=r"Octave ended with exit status 1: .*(memory|dimension)"):
-        run_octave(OCTAVE, "takes.m", [], tmp_path)
 
 
 @needs_octave

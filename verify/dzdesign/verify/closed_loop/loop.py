@@ -17,7 +17,7 @@ from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
 from dzdesign.verify.toolchain.bound_block import core_sources
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
 PERIODS_PER_RECORD = 25
@@ -128,7 +128,7 @@ class ClosedLoop:
         #: Of a drive by current the coil, at a supply.
         self.coil = nominal_coil(compensator) if firmware and compensator else None
         sources |= coil_sources(self.coil)
-        self._library = ConfinedLibrary(sources, [DZ_LOOP], "the closed loop", FLOATING)
+        self._library = CompiledLibrary(sources, [DZ_LOOP], "the closed loop", FLOATING)
         #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
         self._dither = dither or _recorded_dither(compensator)
         #: Without a compensator no code is read, and any scaling serves.

@@ -11,7 +11,7 @@ from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.state_check import PROGRAMS, tick_macro
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 
 #: `struct trace` of programs/coil_loop.h.
 TRACE = np.dtype([("mean_A", "<f8"), ("compare", "<u2"), ("total", "<u2"), ("faults", "<u2"), ("_", "<u2")])
@@ -112,7 +112,7 @@ class CoilSimulation:
         names = ("coil.h", "coil_loop.c", "coil_loop.h")
         sources = {name: (PROGRAMS / name).read_text("utf-8") for name in names}
         own = {name: core[name] for name in ("dz_current.c", "dz_current.h")}
-        self._library = ConfinedLibrary(
+        self._library = CompiledLibrary(
             sources | own | {"tick.h": tick_macro(around.loop)}, [COIL_LOOP], "the coil's loop"
         )
 

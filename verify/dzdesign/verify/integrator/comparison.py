@@ -20,7 +20,7 @@ from dzdesign.verify.integrator.reference_loop import ReferenceLoop, ReferenceRu
 from dzdesign.verify.integrator.windows import Window, course_of, windows_of
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import NATIVE_PLANT, Check
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
 
 #: Largest differences: of the position over the stroke, and of the flow over the largest one of the window.
 MOST_APART = 1e-5
@@ -48,13 +48,13 @@ def compare_with_integrator(
 
 
 def _compared(firmware: Path, windows: Sequence[Window]) -> Iterator[PlantComparison]:
-    library: ConfinedLibrary | None = None
+    library: CompiledLibrary | None = None
     for window in windows:
         library = library or compiled_core(firmware, window.scene.loop.coil)
         yield compare(window, library)
 
 
-def compare(window: Window, library: ConfinedLibrary) -> PlantComparison:
+def compare(window: Window, library: CompiledLibrary) -> PlantComparison:
     """Run one window in both loops, from rest, and return what is between them.
 
     The native loop runs twice: with a record for each period, and as the ramps of the closed loop have it; and in the

@@ -9,7 +9,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.verify.closed_loop.coil_in_loop import CoilAtSupply
 from dzdesign.verify.current.state_check import tick_macro
 from dzdesign.verify.toolchain.bound_block import core_sources
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 
 #: Of programs/core_calls.c, and those that only a drive by current has.
 OF_DRIVE = (
@@ -27,7 +27,7 @@ OF_CONTROLLER = (
 MOST_OCTETS, MOST_TICKS = 2**16, 2**16
 
 
-def compiled_core(firmware: Path, coil: CoilAtSupply | None) -> ConfinedLibrary:
+def compiled_core(firmware: Path, coil: CoilAtSupply | None) -> CompiledLibrary:
     """Return the core of a firmware folder, compiled, with the functions of programs/core_calls.c."""
     sources = core_sources(firmware)
     text = files(__package__).joinpath("programs").joinpath("core_calls.c").read_text(encoding="utf-8")
@@ -36,13 +36,13 @@ def compiled_core(firmware: Path, coil: CoilAtSupply | None) -> ConfinedLibrary:
     if coil is not None:
         sources["tick.h"] = tick_macro(coil.around.loop)
         options, functions = ("-DWITH_CURRENT",), (*OF_DRIVE, *OF_CONTROLLER)
-    return ConfinedLibrary({**sources, "core_calls.c": text}, functions, "the core", options)
+    return CompiledLibrary({**sources, "core_calls.c": text}, functions, "the core", options)
 
 
 class CompiledDrive:
     """One drive on its way: the functions of dz_drive.h."""
 
-    def __init__(self, library: ConfinedLibrary, sign: int) -> None:
+    def __init__(self, library: CompiledLibrary, sign: int) -> None:
         self._library, self._sign = library, sign
         self._memory = _memory(library, "core_bytes")
         #: PWM periods from one sample to the next.
@@ -70,7 +70,7 @@ class CompiledDrive:
 class CompiledController:
     """One current controller on its way: the functions of dz_current.h."""
 
-    def __init__(self, library: ConfinedLibrary, sum_of_no_current: int) -> None:
+    def __init__(self, library: CompiledLibrary, sum_of_no_current: int) -> None:
         self._library = library
         self._memory = _memory(library, "controller_bytes")
         library.call("controller_init", self._memory, sum_of_no_current)
@@ -80,12 +80,12 @@ class CompiledController:
         return self._library.call("controller_tick", self._memory, set_point, total, supply_code)
 
 
-def _memory(library: ConfinedLibrary, name: str) -> np.ndarray:
+def _memory(library: CompiledLibrary, name: str) -> np.ndarray:
     """Return room for a state, whose size one of the functions tells."""
     return np.zeros(_counted(library, name, MOST_OCTETS), dtype=np.uint8)
 
 
-def _counted(library: ConfinedLibrary, name: str, most: int) -> int:
+def _counted(library: CompiledLibrary, name: str, most: int) -> int:
     """Return a size that the code itself tells; one that no code has is an error, before it is anything's size."""
     count = library.call(name)
     if not 0 < count <= most:

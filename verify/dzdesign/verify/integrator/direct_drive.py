@@ -9,13 +9,13 @@ import numpy as np
 from dzdesign.verify.closed_loop.loop import LoopRun
 from dzdesign.verify.integrator.compiled_calls import CompiledDrive
 from dzdesign.verify.integrator.windows import REST_S, Course, Window
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
 
 #: A standing command, as a share of full command, and for how long the drive has it beyond its own ramps, s.
 STANDING, STANDS_S = 0.5, 0.2
 
 
-def unlike_direct_values(window: Window, library: ConfinedLibrary, course: Course, compensated: LoopRun) -> int:
+def unlike_direct_values(window: Window, library: CompiledLibrary, course: Course, compensated: LoopRun) -> int:
     """Return in how many PWM periods the native loop's direct command has another wave than the drive gives it.
 
     `course` has a value for each period, and `compensated` is the native run through it, whose pressures are real ones.
@@ -33,7 +33,7 @@ def unlike_direct_values(window: Window, library: ConfinedLibrary, course: Cours
     return int(np.count_nonzero(run.compare != expected))
 
 
-def _wave_of_drive(window: Window, library: ConfinedLibrary, pressures: tuple[int, int]) -> np.ndarray:
+def _wave_of_drive(window: Window, library: CompiledLibrary, pressures: tuple[int, int]) -> np.ndarray:
     """Return what the compiled drive adds to its law over one wave, from the first period of its upper half on, (P,).
 
     Of a drive that adds nothing it is a zero.

@@ -22,7 +22,7 @@ from dzdesign.verify.integrator.edge import edge_of
 from dzdesign.verify.integrator.spool import Acting, CvodesSpool, SpoolState
 from dzdesign.verify.integrator.switched_coil import SwitchedCoil
 from dzdesign.verify.integrator.windows import Course
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
 
 PERIOD_MS = 1e3 * PWM_PERIOD_S
 #: A pressure as near as this to the border of a code, in codes, may be converted to either.
@@ -49,7 +49,7 @@ class ReferenceLoop:
     """One plant, one side of a drive, from rest."""
 
     def __init__(
-        self, plant: Plant | StandIn, library: ConfinedLibrary, signals: Signals, sign: int, coil: CoilAtSupply | None,
+        self, plant: Plant | StandIn, library: CompiledLibrary, signals: Signals, sign: int, coil: CoilAtSupply | None,
         *, without_dither: bool, drive: float = 1.0,
     ) -> None:  # fmt: skip
         self._parameters, self._signals, self._sign = plant.parameters, signals, sign

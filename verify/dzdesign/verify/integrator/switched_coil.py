@@ -13,13 +13,13 @@ from dzdesign.verify.closed_loop.coil_in_loop import CoilAtSupply
 from dzdesign.verify.integrator.compiled_calls import CompiledController
 from dzdesign.verify.integrator.cvodes import Cvodes
 from dzdesign.verify.integrator.spool import SHORTEST_MS
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
 
 
 class SwitchedCoil:
     """A coil at a supply, with its sensor, around the compiled controller; begins without current."""
 
-    def __init__(self, coil: CoilAtSupply, library: ConfinedLibrary) -> None:
+    def __init__(self, coil: CoilAtSupply, library: CompiledLibrary) -> None:
         around = coil.around
         self._corner, self._circuit, self._sampling = coil.corner, around.circuit, around.sampling
         self._sensor, self._converter = around.sensor, around.converter

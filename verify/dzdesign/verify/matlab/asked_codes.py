@@ -58,7 +58,7 @@ class AskedCodes:
     def judged(self, answers: Mapping[str, Path], text: bytes, what: str) -> Findings:
         """Return what the check finds of the answers, output to file, of a function with this text."""
         program = _program(self.folder, self.sign, self.any_command, answers, core=None)
-        return _checked(program, self.prepared, self.sample, text, what, self.folder)
+        return _checked(program, self.prepared, self.sample, text, what)
 
 
 @contextmanager
@@ -69,7 +69,7 @@ def asked_codes(
     with scratch_folder() as folder:
         made = core.compiled()
         program = _program(folder, sign, any_command, {}, made)
-        compiled = _checked(program, prepared, sample, made.read_bytes(), f"the core {core.name}", folder)
+        compiled = _checked(program, prepared, sample, made.read_bytes(), f"the core {core.name}")
         yield AskedCodes(
             folder=folder, sign=sign, prepared=prepared, sample=sample, compiled=compiled, any_command=any_command
         )
@@ -93,8 +93,8 @@ def _program(folder: Path, sign: int, any_command: int, answers: Mapping[str, Pa
     return HOST.link(objects if core is None else [*objects, core], "the check of answers")
 
 
-def _checked(program: Path, prepared: bytes, sample: bool, checked: bytes, what: str, folder: Path) -> Findings:
-    printed = HOST.run(program, [str(stored(prepared)), *(["sample"] if sample else [])], what, folder)
+def _checked(program: Path, prepared: bytes, sample: bool, checked: bytes, what: str) -> Findings:
+    printed = HOST.run(program, [str(stored(prepared)), *(["sample"] if sample else [])], what)
     return findings_of(printed, sha256_of(checked), what)
 
 
@@ -118,7 +118,7 @@ def answers_of(
         files = [part for name in functions for part in (name, str(_answers(asked, name, output, first)))]
         number = str(OUTPUTS.index(output) + 1)
         arguments = [number, str(asked.codes(output)), str(first), str(count), *files]
-        run_octave(octave, "answers_of.m", arguments, work, asked.folder / ANSWERS, len(functions))
+        run_octave(octave, "answers_of.m", arguments, work, len(functions))
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, 4)) as pool:
         list(pool.map(run, jobs))

@@ -11,7 +11,7 @@ from pathlib import Path
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.programs import find_program
 from dzdesign.core.processes.running import run_program
-from dzdesign.verify.toolchain.confinement import run_confined
+from dzdesign.verify.toolchain.child_process import run_child
 
 PROGRAMS = Path(str(files("dzdesign.verify.matlab"))) / "programs"
 #: The one without a window first.
@@ -55,24 +55,22 @@ def available_octave() -> Octave:
 
 
 def run_octave(
-    path: str, program: str, arguments: Sequence[str], folder: Path, results: Path | None = None, functions: int = 1
+    path: str, program: str, arguments: Sequence[str], folder: Path, functions: int = 1
 ) -> str:
     """Run a program of this room in a folder and return what it prints; if it fails or hangs, `RequirementError`.
 
-    It writes nowhere but in `results`, and has the time of so many functions.
+    It has the time of so many functions.
     """
     command = [path, *FLAGS, str(PROGRAMS / program), *arguments]
-    ended = run_confined(
-        command, "Octave", TIMEOUT_S * functions, results=results, place=folder, more=_variables(folder),
-    )  # fmt: skip
+    ended = run_child(command, "Octave", TIMEOUT_S * functions, place=folder, environment=_environment(folder))
     if ended.reason:
         said = " ".join((ended.complaint or ended.printed).split())[:LONGEST]
         raise RequirementError(f"Octave ended with {ended.reason}: {said}")
     return ended.printed
 
 
-def _variables(folder: Path) -> Mapping[str, str]:
-    """Return variables by which Octave finds no settings and no other functions of the user's."""
-    own = {"OCTAVE_HOME": os.environ["OCTAVE_HOME"]} if "OCTAVE_HOME" in os.environ else {}
+def _environment(folder: Path) -> Mapping[str, str]:
+    """Return an environment in which Octave finds no settings and no other functions of the user's."""
     # It does little linear algebra, and a thread of a library for each core would only wait.
+    own = {name: value for name, value in os.environ.items() if name == "OCTAVE_HOME" or not name.startswith("OCTAVE")}
     return {**own, "HOME": str(folder), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}

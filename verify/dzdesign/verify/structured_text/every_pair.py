@@ -15,7 +15,7 @@ from dzdesign.verify.structured_text.evaluator import Evaluator
 from dzdesign.verify.structured_text.exact_block import ExactBlock, Sensor
 from dzdesign.verify.structured_text.syntax import RANGES, FunctionBlock, Kind, Place
 from dzdesign.verify.structured_text.to_c import HEADER, block_in_c, place_of
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function, Given
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function, Given
 
 PROGRAM = Path(__file__).parent / "programs" / "every_pair.c"
 #: Pressures of a PLC, 0.1 bar, whose differences are tried with every command, and those tried at zero command.
@@ -115,10 +115,10 @@ class TriedBlock:
         self.block, self.kinds, self.of_codes = block, kinds, tables.of_codes
         self.tables, self.exact = tables, tables.exact
         sources = {HEADER: block_in_c(block, kinds), PROGRAM.name: PROGRAM.read_text(encoding="utf-8")}
-        self._libraries: SimpleQueue[ConfinedLibrary] = SimpleQueue()
+        self._libraries: SimpleQueue[CompiledLibrary] = SimpleQueue()
         for _ in range(SIDE_BY_SIDE):
-            self._libraries.put(ConfinedLibrary(sources, FUNCTIONS, "the function block as C", options))
-        self._prepared: set[ConfinedLibrary] = set()
+            self._libraries.put(CompiledLibrary(sources, FUNCTIONS, "the function block as C", options))
+        self._prepared: set[CompiledLibrary] = set()
 
     @property
     def pressures(self) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
 from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of, bound_files
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
 #: Source of each sign of command, and what its functions' names end with.
@@ -119,7 +119,7 @@ def core_answers(folder: Path, sign: int, codes: np.ndarray) -> np.ndarray:
     sources = {**core.sources, f"{ANSWERS.name}.c": _read(PROGRAMS / f"{ANSWERS.name}.c")}
     texts = {name: text.decode(errors="surrogateescape") for name, text in sources.items()} | bound_files(folder)
     called = _defines(held=False, macros=("DZ_COMP", "DZ_STATUS"), names=[f"dz_{name}{ending}" for name in CALLED[:2]])
-    library = ConfinedLibrary(texts, [ANSWERS], f"the core {core.name}", called)
+    library = CompiledLibrary(texts, [ANSWERS], f"the core {core.name}", called)
     given, found = np.ascontiguousarray(codes, dtype=np.uint16), np.zeros((len(codes), 2), dtype=np.uint16)
     library.call(ANSWERS.name, given, len(given), found)
     return found

@@ -1,4 +1,4 @@
-"""Tries a statement on every valve and in every situation in which it is meant to hold.
+"""A referee of numbers: tries a statement on every valve and in every situation in which it is meant to hold.
 
 A statement that is proved must be true there, and so must each ground, taken as the statement takes it: then a proof
 can't join what never holds together. One that follows on a condition must be true where that holds, false somewhere
@@ -12,11 +12,10 @@ from functools import lru_cache
 import sympy
 from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
-from sympy.logic.boolalg import Boolean
 
 from dzdesign.derivation.account.proof import Verdict, relation_of
-from dzdesign.derivation.account.referee.situations import Situation, situations
 from dzdesign.derivation.account.scope import Scope
+from dzdesign.derivation.account.situations import Situation, situations
 from dzdesign.derivation.account.statement import Ground, Statement
 from dzdesign.derivation.symbols import Name, dP, u_i
 
@@ -31,35 +30,35 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
         if len({place.numbers.get(name) for place in places}) == 1:
             return f"it is to hold for every {name}, and its scope ({statement.scope}) leaves one value"
     free, silent = _left_free(statement.scope), set(statement.grounds)
-    tried, is_refuted, is_met, is_general = False, False, False, False
-    unmet: dict[tuple[float, ...], str] = {}
+    tried = is_refuted = is_met = is_general = False
+    true_unmet: dict[tuple[float, ...], str] = {}
     for place in places:
         objection = _ground_objection(statement, statements, place, silent)
         if objection:
             return objection
         try:
-            wrong = _difference(statement, place)
-            meets = _meets(statement, place)
+            wrong, meets = _difference(statement, place), _meets(statement, place)
         except NoNumberError:
             continue
-        tried, is_met = True, is_met or meets
-        is_general = is_general or free <= place.general
         if wrong and verdict.holds and meets:
             return f"{wrong}: {place.words}"
-        is_refuted = is_refuted or bool(wrong)
+        tried, is_met, is_refuted = True, is_met or meets, is_refuted or bool(wrong)
+        is_general = is_general or free <= place.general
         if not meets:
             alike = _alike(statement, place)
-            unmet[alike] = "" if wrong else unmet.get(alike, place.words)
+            true_unmet[alike] = "" if wrong else true_unmet.get(alike, place.words)
+    scope = statement.scope or "everywhere"
     if not tried:
-        return f"no situation of its scope ({statement.scope or 'everywhere'}) has numbers for its symbols"
+        return f"no situation of its scope ({scope}) has numbers for its symbols"
     if silent:
         return f"no situation of its scope has numbers for its ground {', '.join(sorted(map(str, silent)))}"
     if verdict.holds and not is_met:
         return "no valve in its scope meets its condition"
     if not is_general:
-        names = " and ".join(sorted(map(str, free)))
-        return f"its scope ({statement.scope or 'everywhere'}) leaves only special values of {names}, and says none"
-    true_without = next(filter(None, unmet.values()), "")
+        return (
+            f"its scope ({scope}) leaves only special values of {' and '.join(sorted(map(str, free)))}, and says none"
+        )
+    true_without = next(filter(None, true_unmet.values()), "")
     if true_without:
         return f"it is true without its condition: {true_without}"
     if not is_refuted and (statement.condition is not None or not verdict.holds):
@@ -74,12 +73,9 @@ def _left_free(scope: Scope) -> set[Name]:
 
 
 def _admits(statement: Statement, place: Situation) -> bool:
+    said = (*statement.scope.comparisons, *statement.provided)
     try:
-        return (
-            statement.scope.admits(place.settings)
-            and holds(statement.scope.where, place)
-            and all(holds(provision, place) for provision in statement.provided)
-        )
+        return statement.scope.admits(place.settings) and all(holds(one, place) for one in said)
     except NoNumberError:
         return False
 
@@ -170,24 +166,14 @@ def evaluate(expression: sympy.Expr, situation: Situation) -> float:
     return float(value)
 
 
-def holds(condition: Boolean, situation: Situation) -> bool:
-    """Whether a comparison, or several joined by and, or, not, holds in a situation."""
-    if condition in (sympy.true, sympy.false):
-        return bool(condition)
-    if isinstance(condition, sympy.And):
-        return all(holds(one, situation) for one in condition.args)
-    if isinstance(condition, sympy.Or):
-        return any(holds(one, situation) for one in condition.args)
-    if isinstance(condition, sympy.Not):
-        return not holds(condition.args[0], situation)
-    if not isinstance(condition, Relational):
-        raise TypeError(f"{condition} is no comparison")
-    left, right = evaluate(condition.lhs, situation), evaluate(condition.rhs, situation)
-    if isinstance(condition, sympy.Eq | sympy.Ne):
-        return agree(left, right) == isinstance(condition, sympy.Eq)
+def holds(comparison: Relational, situation: Situation) -> bool:
+    """Whether a comparison holds in a situation."""
+    left, right = evaluate(comparison.lhs, situation), evaluate(comparison.rhs, situation)
+    if isinstance(comparison, sympy.Eq | sympy.Ne):
+        return agree(left, right) == isinstance(comparison, sympy.Eq)
     if agree(left, right):
-        return condition.rel_op in ("<=", ">=")
-    return (left < right) == (condition.rel_op in ("<", "<="))
+        return comparison.rel_op in ("<=", ">=")
+    return (left < right) == (comparison.rel_op in ("<", "<="))
 
 
 def _number(name: sympy.Expr, situation: Situation) -> float:
@@ -204,7 +190,6 @@ def _number(name: sympy.Expr, situation: Situation) -> float:
 def _compiled(expression: sympy.Expr) -> tuple[Callable[..., float | None], tuple[sympy.Expr, ...]]:
     stand_ins = {function: sympy.Dummy() for function in expression.atoms(AppliedUndef)}
     plain = expression.xreplace(stand_ins)
-    functions = {stand_in: function for function, stand_in in stand_ins.items()}
+    names = {stand_in: function for function, stand_in in stand_ins.items()}
     arguments = sorted(plain.free_symbols, key=str)
-    names = tuple(functions.get(name, name) for name in arguments)
-    return sympy.lambdify(arguments, plain, modules="math"), names
+    return sympy.lambdify(arguments, plain, modules="math"), tuple(names.get(one, one) for one in arguments)

@@ -35,7 +35,7 @@ def _columns(test: RampTest) -> dict[str, np.ndarray]:
 
 
 def _file(columns: dict[str, np.ndarray]) -> bytes:
-    return ramp_file_bytes(columns, ("SIMULATED for a benchmark; not a measurement.",), compress=False)
+    return ramp_file_bytes(columns, ("SIMULATED; not a measurement.",), compress=False)
 
 
 def recordings(number: int, seed: int) -> dict[str, bytes]:

@@ -11,9 +11,7 @@ from typing import Any
 import sympy
 
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account.referee.machines import (
-    PLANTS,
-    VALVES,
+from dzdesign.derivation.account.machines import (
     PlainPlant,
     PlainValve,
     drawn_commands,
@@ -40,7 +38,6 @@ _STEP = 1e-5  # of a difference quotient
 _JUST_ABOVE = 1 + 1e-12  # times dP0: the limit from above
 #: What a pressure drop and a command make of the command.
 _Drive = Callable[[float, float], float]
-_S = 1.5  # at which transforms are taken of the plants that are not drawn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,45 +56,27 @@ class Situation:
 @cache
 def situations() -> tuple[Situation, ...]:
     """Return all of them."""
-    found = [one for valve in (*VALVES, *drawn_valves()) for one in _of_valve(valve)]
-    plants = [(plant, _S) for plant in PLANTS]
-    found += [_of_plant(valve, plant, at, dP) for valve in VALVES for plant, at in plants for dP in _drops(valve)]
-    pairs = zip(drawn_valves(), (*drawn_plants(), *drawn_plants()), strict=False)
-    return (*found, *(_of_plant(valve, *plant, dP) for valve, plant in pairs for dP in _drops(valve)))
-
-
-def _drops(valve: PlainValve) -> tuple[float, ...]:
-    """The two pressure drops, one below both and one above; of a drawn valve drawn ones beside the two."""
-    if valve in drawn_valves():
-        return valve.dP0, valve.dP1, *drawn_drops(valve)
-    return valve.dP0, valve.dP1, 0.5 * min(valve.dP0, valve.dP1), 2 * max(valve.dP0, valve.dP1)
-
-
-def _commands(valve: PlainValve, dP: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The commands of a bare valve, of both signs, and those behind a compensator."""
-    top = valve.u_max
-    if valve in drawn_valves():
-        general = tuple(drawn_commands(valve, dP))
-        return (0.0, top, -top, *general, *(-one for one in general[1:])), (0.0, top, *general)
-    seen0 = valve.command_for(valve.Q_floor, valve.dP0)
-    return (0.0, 1.5, seen0, 6.25, top, -1.5, -6.25, -top), (0.0, 0.5, 2.0, top)
+    found = [one for valve in drawn_valves() for one in _of_valve(valve)]
+    pairs = zip(drawn_valves(), 2 * drawn_plants(), strict=True)
+    return (*found, *(_of_plant(valve, *plant, dP) for valve, plant in pairs for dP in drawn_drops(valve)))
 
 
 def _of_valve(valve: PlainValve) -> Iterator[Situation]:
-    beta = valve.threshold(valve.dP1) / valve.threshold(valve.dP0)
-    for dP in _drops(valve):
-        bare, compensated = _commands(valve, dP)
-        for u_i in bare:
-            yield _situation(valve, dP, u_i, BARE, beta, _straight)
+    """A bare valve at commands of both signs, and one behind a compensator at those from zero to full."""
+    at_dP1 = valve.threshold(valve.dP1) / valve.u_min0
+    first_seen = valve.command_for(valve.Q_floor, valve.dP0)
+    for dP in drawn_drops(valve):
+        small, *others = drawn_commands(valve, dP)
+        compensated = (0.0, valve.u_max, small, *others)
+        for u_i in (*compensated, first_seen, -valve.u_max, *(-one for one in others)):
+            yield _situation(valve, dP, u_i, BARE, at_dP1, lambda _, u_i: u_i)
         for u_i in compensated:
             for name in LAW_NAMES:
-                yield _situation(valve, dP, u_i, under_law(name), beta, partial(_drive, valve, name))
-        if dP == valve.dP1:
-            yield from _with_transition(valve)
-        for u_i in compensated:
+                yield _situation(valve, dP, u_i, under_law(name), at_dP1, partial(_drive, valve, name))
             if dP == valve.dP1:
-                for free in (0.5, 1.0, 1.25):
-                    yield _situation(valve, dP, u_i, FREE_BETA, free, partial(_freely_scaled_drive, valve, free))
+                for beta in (0.5, 1.0, 1.25):
+                    yield _situation(valve, dP, u_i, FREE_BETA, beta, partial(_scaled_drive, valve, beta, dP))
+    yield from _with_transition(valve)
 
 
 def _with_transition(valve: PlainValve) -> Iterator[Situation]:
@@ -110,24 +89,20 @@ def _with_transition(valve: PlainValve) -> Iterator[Situation]:
         def drives(at: float, u_i: float, offset: float = closing * valve.u_min0) -> float:
             if u_i <= band:
                 return offset
-            top = _scaled_drive(valve, opening, max(u_i, end))
+            top = _scaled_drive(valve, opening, dP, dP, max(u_i, end))
             return top if u_i >= end else offset + (top - offset) * (u_i - band) / (end - band)
 
         for u_i in (0.0, 0.4 * band, band, 0.7 * band + 0.3 * end, end, 0.7 * valve.u_max, valve.u_max):
             place = _situation(valve, dP, u_i, WITH_TRANSITION, closing, drives)
             passed = min(max((u_i - band) / (end - band), 0.0), 1.0)
-            own = {s.beta_o: opening, s.u_z: band, s.u_t: end, s.width: end - band, s.share: passed}
+            own = {s.beta_o: opening, s.u_z: band, s.u_t: end, s.share: passed}
             yield replace(place, numbers={**place.numbers, **own})
-
-
-def _straight(dP: float, u_i: float) -> float:
-    return u_i
 
 
 def _drive(valve: PlainValve, name: str, dP: float, u_i: float) -> float:
     """What a law gives; of the two that the account is about without its formula."""
     if name == "paper":
-        return _paper_drive(valve, dP, u_i)
+        return _scaled_drive(valve, valve.threshold(dP) / valve.u_min0, math.inf, dP, u_i)
     kappa, offset = valve.k * valve.x_max / valve.u_max, valve.threshold(dP)
     if name == "target":
         return kappa * u_i + offset
@@ -142,26 +117,15 @@ def _reference_drive(valve: PlainValve, u_i: float) -> float:
     return valve.command_for(wanted, valve.dP0)
 
 
-def _scaled_drive(valve: PlainValve, share: float, u_i: float) -> float:
-    """The compensation signal of dP0, a share of it."""
-    return u_i + share * (_reference_drive(valve, u_i) - u_i)
-
-
-def _freely_scaled_drive(valve: PlainValve, share: float, dP: float, u_i: float) -> float:
-    """The same, switched on above dP0."""
-    return _scaled_drive(valve, share if dP > valve.dP0 or dP == valve.dP1 else 1.0, u_i)
-
-
-def _paper_drive(valve: PlainValve, dP: float, u_i: float) -> float:
-    """The paper's choice: the compensation signal of dP0, times the ratio of thresholds above dP0."""
-    return _scaled_drive(valve, valve.threshold(dP) / valve.u_min0 if dP > valve.dP0 else 1.0, u_i)
+def _scaled_drive(valve: PlainValve, share: float, on_at: float, dP: float, u_i: float) -> float:
+    """The paper's choice: the compensation signal of dP0, above dP0 a share of it; also at one other pressure drop."""
+    scaled = share if dP > valve.dP0 or dP == on_at else 1.0
+    return u_i + scaled * (_reference_drive(valve, u_i) - u_i)
 
 
 def _situation(valve: PlainValve, dP: float, u_i: float, drive: Setting, beta: float, drives: _Drive) -> Situation:
     spool = FIXED_OPENING if valve.has_stop else FREE_OPENING
-    # One of the drawn commands in two, and one of the others.
-    at_pin = u_i == 2.0 or (valve in drawn_valves() and not valve.fall)
-    codes, u_O = CODES_AT_PIN if at_pin else CODES_OF_COMMAND, drives(dP, u_i)
+    codes, u_O = CODES_OF_COMMAND if valve.fall else CODES_AT_PIN, drives(dP, u_i)
     numbers = {
         **_constants(valve),
         **_at_drop(valve, dP),
@@ -181,7 +145,7 @@ def _situation(valve: PlainValve, dP: float, u_i: float, drive: Setting, beta: f
 
 def _general(valve: PlainValve, dP: float, u_i: float) -> frozenset[s.Name]:
     is_general = {s.dP: dP not in (valve.dP0, valve.dP1), s.u_i: abs(u_i) not in (0.0, valve.u_max)}
-    return frozenset(name for name, here in is_general.items() if here and valve in drawn_valves())
+    return frozenset(name for name, here in is_general.items() if here)
 
 
 def _left(threshold: float, drives: Callable[[float], float]) -> float:
@@ -200,14 +164,12 @@ def _constants(valve: PlainValve) -> dict[s.Name, float]:
         **numbers,
         **{s.u_max: valve.u_max, s.k: valve.k, s.x_max: valve.x_max, s.Q_floor: valve.Q_floor},
         **{s.C_d: valve.C_d, s.W: valve.W, s.rho: valve.rho, s.scale: valve.scale},
-        s.kappa: valve.k * valve.x_max / valve.u_max,
         s.gamma_0: per_opening * math.sqrt(valve.dP0),
         s.gamma_1: per_opening * math.sqrt(valve.dP1),
         s.fall: numbers[s.u_seen0] - numbers[s.u_seen1],
         s.n: math.log(numbers[s.Q_max1] / numbers[s.Q_max0]) / math.log(valve.dP1 / valve.dP0),
         s.q_x: valve.k * valve.x_max,
-        # Distances that only decide between cases.
-        **{s.headroom: 0.5, s.guard: 0.25, s.excess: 0.25, s.above: 0.5, s.below: 0.5, s.rest: 0.5},
+        **{s.headroom: 0.5, s.above: 0.5},  # which only decide between cases
         **{s.n_adc: valve.n_adc, s.V_adc: valve.V_adc, s.n_V: valve.n_adc / valve.V_adc, s.n_full: valve.n_full},
     }
 
@@ -278,9 +240,7 @@ def _of_command(
             s.n_pwm: valve.n_full * u_O / valve.u_max,
         },
         **{s.V_pin: pin, s.n_i: valve.n_adc * pin / valve.V_adc},
-        s.K_c: (valve.V_adc if codes == CODES_AT_PIN else valve.u_max)
-        / valve.n_adc
-        * (1.25 if u_i == 0.5 or (codes == CODES_AT_PIN and not valve.has_stop) else valve.K_c_share),
+        s.K_c: (valve.V_adc if codes == CODES_AT_PIN else valve.u_max) / valve.n_adc * valve.K_c_share,
     }
     if u_i < 0:
         return numbers
@@ -296,7 +256,7 @@ def _of_command(
 
 def _of_plant(valve: PlainValve, plant: PlainPlant, at_s: float, dP: float) -> Situation:
     """The simulation model at one moment, and its transforms at one s."""
-    i, x_e, v = 0.75 * at_s / _S, 0.625, -0.25 * at_s
+    i, x_e, v = 0.5 * at_s, 0.625, -0.25 * at_s
     di_dt, dx_e_dt, dv_dt = plant.rates(i, x_e, v, plant.u_step, plant.load_step)
     feedback = plant.K_fi * i
     names = "K_a K_fi K_i R_c r_p L_c m_e B_e K_et i_init x_init v_init a"
