@@ -290,8 +290,6 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     document["sides"]["positive"]["certificate"]["guard"] = "mean"
     content = json.dumps(document).encode()
     Path("compensator.json").write_bytes(content)
-    assert main(["codegen", "compensator.json", "-o", "wrong"]) == 2
-    assert "certificate does not hold" in capsys.readouterr().err
     firmware = generate(read_artefact(content, Compensator, "compensator.json"), "f28335", content)
     write_folder(Path("wrong"), firmware.files, firmware.manifest)
     assert main(["verify", "wrong"]) == 1
