@@ -2,7 +2,6 @@
 
 from fractions import Fraction
 
-import numpy as np
 import pytest
 
 from dzdesign.codegen.project import target_named
@@ -88,17 +87,6 @@ def _with_command(signals, command):
     from dataclasses import replace
 
     return replace(signals, command=command)
-
-
-def test_the_doubles_find_the_exact_limit(falling, rising):
-    """What decides which valves are proved exactly agrees with the exact curve, on either side of every node too."""
-    for each in (falling, rising):
-        curve = guarded_curve(each.valve.positive, "closing", "hold")
-        places = [Fraction(number, 64) for number in range(1, 400)]
-        places += [node + tiny for node in curve.dp_MPa for tiny in (-Fraction(1, 10**6), 0, Fraction(1, 10**6))]
-        exact = [min(value for value in (curve.at(dp), curve.bound(dp)) if value is not None) for dp in places]
-        found = curve.in_doubles(np.array([float(dp) for dp in places]))
-        np.testing.assert_allclose(found, [float(value) for value in exact], atol=1e-9)
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """Remaining dead zone and hysteresis of each treatment of hysteresis: the table and advice of `dzdesign design`."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -76,16 +76,7 @@ def hysteresis_choices(compensator: Compensator) -> tuple[HysteresisChoice, ...]
         if other.left < best.left - WORTH:
             best = other
     return tuple(
-        HysteresisChoice(
-            given=each.given,
-            onset=each.onset,
-            reading=each.reading,
-            hysteresis=each.hysteresis,
-            largest=each.largest,
-            refused=each.refused,
-            recommended=each is best and each.onset is not None,
-        )
-        for each in found
+        replace(each, recommended=each is best and each.onset is not None) for each in found
     )
 
 

@@ -10,15 +10,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor, lcm
 
-import numpy as np
-
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
 from dzdesign.design.above_tests import OffsetAbove
 from dzdesign.design.exact_row import ExactRow
 from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound, NEAR_MPa
+from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 
 #: valve.json has seven decimals, so a sum of two of its numbers is right to this, in V.
 DECIMALS = Fraction(1, 10**6)
@@ -67,20 +65,6 @@ class OffsetCurve:
         if self.above is not None and dp_MPa > self.dp_MPa[-1]:
             return self.above.bound_at(dp_MPa)
         return None if self.certified is None else self.certified.at(dp_MPa)
-
-    def in_doubles(self, dp_MPa: np.ndarray) -> np.ndarray:
-        """Return the offset in double precision, V, and where a bound is certified the lower of both.
-
-        The pressure drops rise.
-        """
-        nodes, offset = (np.array([float(value) for value in values]) for values in (self.dp_MPa, self.offset_V))
-        value: np.ndarray = np.interp(dp_MPa, nodes, offset)
-        if self.above is not None:
-            value = np.where(dp_MPa > nodes[-1], self.above.in_doubles(dp_MPa), value)
-        if self.hold_below_MPa is not None:
-            hold = float(self.hold_below_MPa)
-            value = np.where(dp_MPa <= hold + NEAR_MPa, np.minimum(value, np.interp(hold, nodes, offset)), value)
-        return value if self.certified is None else np.minimum(value, self.certified.in_doubles(dp_MPa))
 
 
 def certified_V(curve: OffsetCurve, dp_MPa: Fraction) -> Fraction:

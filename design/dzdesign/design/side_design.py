@@ -214,7 +214,7 @@ def side_law(
     top = (opening or certified).at(reference)
     if opening is None and options.machine:
         top = left_by_machine(top, ceiling, signals, reference, u_max)
-    u_min0 = _offset_at_reference(top / u_max, signals, units)
+    u_min0 = offset_at_reference(top / u_max, signals, units.coefficient)
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
     table = partial(choose_beta_table, u_min0=u_min0, trend=side.trend, denominator=units.beta, above_one=above_one)
     beta = table(ceiling, above=above if goes_on else None)
@@ -258,9 +258,9 @@ def _refuse_no_offset(limits: ExactRow, options: DesignOptions) -> None:
     )
 
 
-def _offset_at_reference(top: Fraction, signals: Signals, units: Units) -> Fraction:
+def offset_at_reference(top: Fraction, signals: Signals, coefficient: int) -> Fraction:
     """Return u_min0 over u_max: half a count below, for the offset's compare value may be rounded up."""
-    u_min0 = over(top - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
+    u_min0 = over(top - Fraction(1, 2 * signals.compare_max), "down", coefficient)
     if u_min0 <= 0:
         raise InputError(f"u_min0 is {float(top):.2%} of full command, less than one count of the PWM: no dead zone")
     return u_min0
