@@ -12,8 +12,8 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.chosen_units import read_units
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
-from dzdesign.design.machine.words import not_counted, reach_of_certificate, taken_off
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.machine.accounting import not_counted, reach_of_certificate, taken_off
+from dzdesign.design.options import options_of
 from dzdesign.report.figure import figure_style
 from dzdesign.report.sections.budget import budget_section, shown_places
 

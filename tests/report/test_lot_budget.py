@@ -5,7 +5,7 @@ import pytest
 from dzdesign.batch.summary import lot_budget
 from dzdesign.codegen.project import target_named
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.report.lot.words import lot_budget_lines
 
 
