@@ -12,6 +12,7 @@ from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs.not_covered import not_covered
+from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, loop_curves
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
@@ -32,7 +33,6 @@ from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.own_block import own_block_accepted
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
 from dzdesign.verify.firmware.unchanged_files import differing_files, files_unchanged, user_files
-from dzdesign.verify.integrator.comparison import compare_with_integrator
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EXACT_LAW, Check
 from dzdesign.verify.toolchain.host_compiler import host_compiler
@@ -209,7 +209,7 @@ def _run_core(
         return _Run(core=core, current=CurrentChecks(), loop=FirmwareLoop())
     current, scenes = current_checks(folder, compensator, say), building.result()
     loop = close_the_loop(scenes, compensator, plant, sequence, tolerances, say, watch)
-    compared, native_plant = compare_with_integrator(folder, scenes, say)
+    compared, native_plant = compare_with_cvodes(scenes, say)
     return _Run(core=core, current=current, loop=loop, compared=compared, of_plant=(native_plant,))
 
 
