@@ -121,7 +121,7 @@ def reported_demo(example_valve, tmp_path_factory):
     from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.loop import RampSequence
-    from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
+    from dzdesign.verify.verification import evidence_manifest, verify
 
     folder = tmp_path_factory.mktemp("reported")
     valve_json = to_json_bytes(example_valve)
@@ -133,6 +133,6 @@ def reported_demo(example_valve, tmp_path_factory):
     write_folder(folder / "firmware", firmware.files, firmware.manifest)
     evidence = verify(folder / "firmware", sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
     evidence = evidence.with_checks(regenerated(folder / "firmware"))
-    files = with_report(evidence_files(evidence), folder / "firmware", folder / "evidence")
+    files = with_report(evidence, folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", files, evidence_manifest(evidence.evidence))
     return folder

@@ -58,7 +58,7 @@ def take_the_rest_as_held(monkeypatch):
     monkeypatch.setattr(verification, "_try_core", lambda *_: verification._Core(checks=held))
     monkeypatch.setattr(verification, "scenes_of", lambda *_: None)
     monkeypatch.setattr(verification, "board_compiles", lambda *_: BoardCompiled())
-    monkeypatch.setattr(valve_report, "with_report", lambda files, *_: files)
+    monkeypatch.setattr(valve_report, "with_report", lambda found, *_: verification.evidence_files(found))
     for name in ("law_follows", "certificate_follows"):
         monkeypatch.setattr(verification, name, _once(getattr(verification, name)))
 

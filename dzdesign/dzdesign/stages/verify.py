@@ -161,7 +161,7 @@ def _verify_code(
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.toolchain.compiled_core import core_answers
-    from dzdesign.verify.verification import evidence_files, evidence_manifest
+    from dzdesign.verify.verification import evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
     plant, digest = None, None
@@ -198,8 +198,7 @@ def _verify_code(
     if arguments.output is not None:
         output = Path(arguments.output)
         manifest = evidence_manifest(verification.evidence)
-        files = with_report(evidence_files(verification), folder, output, verification.derived)
-        write_folder(output, files, manifest)
+        write_folder(output, with_report(verification, folder, output), manifest)
     return verification
 
 

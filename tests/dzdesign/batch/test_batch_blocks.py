@@ -22,7 +22,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
-from dzdesign.report.lot.valve_folder import read_valve_folder
+from dzdesign.report.lot.table import read_valve_folder
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
 from tests.dzdesign.batch.test_batch import tree

@@ -21,10 +21,9 @@ from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.folder import read_lot
-from dzdesign.report.lot.output_types import ValveOutput
 from dzdesign.report.lot.report import report_of_lot
-from dzdesign.report.lot.summary import LotSummary
-from dzdesign.report.lot.valve_folder import ValveFolder, ValveManifest, read_manifest
+from dzdesign.report.lot.summary import LotSummary, ValveManifest, ValveOutput
+from dzdesign.report.lot.table import ValveFolder, read_manifest
 from dzdesign.stages import verify as verify_stage
 from dzdesign.verify.output_evidence import TriedInputs
 from dzdesign.verify.requirements import FILES

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
@@ -14,7 +14,7 @@ from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs.not_covered import not_covered
 from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
-from dzdesign.verify.closed_loop.evidence_curves import curve_files
+from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, loop_curves
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
@@ -22,9 +22,8 @@ from dzdesign.verify.closed_loop.population import NOT_DECLARED
 from dzdesign.verify.closed_loop.tolerances import Tolerances
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
-from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
+from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
-from dzdesign.verify.exhaustive.input_map import InputMap, map_inputs
 from dzdesign.verify.exhaustive.lot_check import lot_checked
 from dzdesign.verify.exhaustive.stored_vectors import vectors_follow
 from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
@@ -47,8 +46,8 @@ class Verification(ShownInNotebooks):
 
     #: Every requirement that was tried, with its figures; stored as verification.json.
     evidence: Evidence
-    #: What the core gives over its inputs, one a sign of command, to be drawn.
-    maps: tuple[InputMap, ...]
+    #: The numbers of the figures by the names of their files: the core's answers over its inputs, and the ramps.
+    curves: Mapping[str, Curves]
     #: The ramps in closed loop, one a side and tested pressure drop.
     loops: tuple[LoopComparison, ...]
     #: What the firmware was made from, where designing it again gave every number.
@@ -145,7 +144,12 @@ def verify(
         mutants=None,
         not_covered=not_covered(compensator),
     )
-    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=compensator if law.holds else None)
+    return Verification(
+        evidence=evidence,
+        curves={**loop_curves(loop.loops), **core.curves},
+        loops=loop.loops,
+        derived=compensator if law.holds else None,
+    )
 
 
 def _read(
@@ -174,7 +178,7 @@ class _Core:
 
     checks: tuple[Check, ...]
     inputs: tuple[InputCheck, ...] = ()
-    maps: tuple[InputMap, ...] = ()
+    curves: Mapping[str, Curves] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,9 +221,10 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
     say("comparing every input with the exact law")
     signs, units = compensator.signals.signs, compensator.valve.recorded_units
     try:
-        inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
+        tried = [every_input(folder, sign, compensator) for sign in signs]
     except RequirementError as error:
         return _Core(checks=(compiles, EXACT_LAW.check(holds=False, text=str(error))))
+    inputs = tuple(found for found, _ in tried)
     return _Core(
         checks=(
             compiles,
@@ -228,7 +233,7 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
             drive_follows(folder, compensator),
         ),
         inputs=inputs,
-        maps=tuple(map_inputs(folder, compensator, sign) for sign in signs),
+        curves={name: columns for _, curves in tried for name, columns in curves.items()},
     )
 
 
@@ -241,5 +246,4 @@ def evidence_manifest(evidence: Artefact) -> Mapping[str, object]:
 def evidence_files(verification: Verification) -> dict[str, bytes]:
     """Return the files of the evidence folder: verification.json, and curves to draw."""
     contents = {Evidence.FILE_NAME: to_json_bytes(verification.evidence)}
-    contents |= {name: text.encode() for name, text in curve_files(verification.loops, verification.maps).items()}
-    return contents
+    return contents | {name: csv_of(columns).encode() for name, columns in verification.curves.items()}

@@ -15,7 +15,7 @@ from dzdesign.assess.quantities import LOSS, Reading
 from dzdesign.assess.thinned_curves import Line, gain_of, hysteresis_of, linearity_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
-from dzdesign.report.characteristic.curves import CharacteristicCurve, Origin, origin_of, same_pressure
+from dzdesign.report.sections.curves import CharacteristicCurve, Origin, origin_of, same_pressure
 from dzdesign.verify.loop_results import PressureResult
 
 #: Keys in the order of a test report.
@@ -68,11 +68,9 @@ def characteristic_quantities(
     if assessment:
         origin = origin_of(assessment)
         return CharacteristicQuantities(pressures=tuple(_of_assessment(assessment)), before=origin, after=origin)
-    pressures = _with_symmetry(list(_of_valve_and_loop(valve, loops, curves)))
+    pressures = _with_symmetry(list(_of_valve_and_loop(valve, loops, curves))) if valve else ()
     return CharacteristicQuantities(
-        pressures=pressures,
-        before=origin_of(valve) if valve else "simulated" if loops else None,
-        after="simulated" if loops else None,
+        pressures=pressures, before=origin_of(valve) if valve else None, after="simulated" if loops else None
     )
 
 
@@ -108,27 +106,20 @@ def _loss(item: PressureAssessment) -> Found | None:
 
 
 def _of_valve_and_loop(
-    valve: ValveModel | None, loops: Sequence[PressureResult], curves: Sequence[CharacteristicCurve]
+    valve: ValveModel, loops: Sequence[PressureResult], curves: Sequence[CharacteristicCurve]
 ) -> Iterator[PressureQuantities]:
-    tests = [(name, test) for name, side in valve.sides.items() for test in side.tests] if valve else []
-    places = [(name, test.dp_MPa) for name, test in tests] or [(loop.side, loop.dp_MPa) for loop in loops]
-    for side, dp in places:
-        test = next((test for name, test in tests if name == side and test.dp_MPa == dp), None)
+    for side, test in ((name, test) for name, each in valve.sides.items() for test in each.tests):
+        dp, u_max = test.dp_MPa, valve.u_max_V
         loop = next((each for each in loops if each.side == side and same_pressure(each.dp_MPa, dp)), None)
-        level = loop.reading_flow_L_min if loop else test.noise_level_L_min if test else 0.0
-        u_max = valve.u_max_V if valve else None
+        level = loop.reading_flow_L_min if loop else test.noise_level_L_min
         bare, driven = (_lines(curves, side, dp, name) for name in ("before", "after"))
         rated = max((float(line.q.max()) for line in bare.values()), default=0.0)
-        before = _shape(bare, rated, u_max, valve.meter.floor_L_min if valve else 0.0)
-        if test and valve:
-            before |= _of_test(test, valve.u_max_V, level, bare) | _at_zero(test, bare)
-        elif loop:
-            before |= _of_loop_without(loop)
+        before = _shape(bare, rated, u_max, valve.meter.floor_L_min)
         yield PressureQuantities(
             side=side,
             dp_MPa=dp,
             reading_flow_L_min=level,
-            before=before,
+            before=before | _of_test(test, u_max, level, bare) | _at_zero(test, bare),
             after=_shape(driven, rated, u_max) | (_of_loop(loop) if loop else {}),
         )
 
@@ -142,7 +133,7 @@ def _lines(curves: Sequence[CharacteristicCurve], side: str, dp: float | None, n
     return {}
 
 
-def _shape(lines: Mapping[str, Line], rated: float, u_max: float | None, floor: float = 0.0) -> dict[str, Found]:
+def _shape(lines: Mapping[str, Line], rated: float, u_max: float, floor: float = 0.0) -> dict[str, Found]:
     """Return what the shape of a curve comes to."""
     if not lines:
         return {}
@@ -152,7 +143,7 @@ def _shape(lines: Mapping[str, Line], rated: float, u_max: float | None, floor: 
     return {
         "hysteresis": Found(None if widest is None or np.isnan(widest) else 100 * widest),
         "linearity": Found(None if departure is None else 100 * departure),
-        "gain": Found(None if gain is None or u_max is None else gain / u_max),
+        "gain": Found(None if gain is None else gain / u_max),
         "largest_flow": Found(max(float(line.q.max()) for line in both)),
     }
 
@@ -173,15 +164,6 @@ def _at_zero(test: TestResult, lines: Mapping[str, Line]) -> dict[str, Found]:
     if not any(line.u.size and line.u.min() <= NEAR_ZERO for line in lines.values()):
         return {}
     return {"flow_at_zero": Found(test.leak_L_min) if test.leak_L_min else Found(None, test.noise_level_L_min)}
-
-
-def _of_loop_without(loop: PressureResult) -> dict[str, Found]:
-    return {
-        "onset_opening": Found(100 * loop.dead_zone_opening),
-        "onset_closing": Found(100 * loop.dead_zone_closing),
-        "dead_zone_opening": Found(100 * loop.reading_opening_without),
-        "dead_zone_closing": Found(100 * loop.reading_closing_without),
-    }
 
 
 def _of_loop(loop: PressureResult) -> dict[str, Found]:

@@ -14,11 +14,10 @@ from msgspec import UnsetType
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.measured_curves import MeasuredCurve
 from dzdesign.assess.options import SETS, Set
-from dzdesign.core.errors import InputError
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.recorded_curve import RecordedBranch
-from dzdesign.verify.closed_loop.evidence_curves import closed_loop_name, read_curves
+from dzdesign.verify.closed_loop.evidence_curves import Curves, closed_loop_name
 
 #: Where a curve is from: recordings of a valve, recordings that are simulated themselves, or a simulated closed loop.
 Origin = Literal["recorded", "example", "simulated"]
@@ -64,13 +63,12 @@ class CharacteristicCurve:
 
 
 def characteristic_curves(
-    valve: ValveModel | None, assessment: Assessment | None, loops: Mapping[str, str]
+    valve: ValveModel | None, assessment: Assessment | None, loops: Mapping[str, Curves]
 ) -> tuple[CharacteristicCurve, ...]:
-    """Return the curves of all sides and pressure drops; `loops` are the CSV files of the evidence by their names."""
+    """Return the curves of all sides and pressure drops; `loops` are the evidence's, by the names of their files."""
     if assessment and (measured := tuple(_measured(assessment))):
         return measured
-    recorded = tuple(_recorded(valve)) if valve else ()
-    return (*recorded, *_simulated(loops, bare=not recorded))
+    return (*(_recorded(valve) if valve else ()), *_simulated(loops))
 
 
 def origin_of(recordings: ValveModel | Assessment) -> Origin:
@@ -140,30 +138,18 @@ def _samples_of(branch: RecordedBranch, sign: int, u_max_V: float) -> Points:
     return _points(samples.u_V, samples.q_L_min, sign / u_max_V, sign)
 
 
-def _simulated(loops: Mapping[str, str], *, bare: bool) -> Iterator[CharacteristicCurve]:
-    """Return the curves of the closed loop; those without the compensator only where nothing recorded shows them."""
-    for side in SIDES:
-        name = closed_loop_name(side)
-        if name not in loops:
-            continue
-        try:
-            yield from _loop_curves(side, read_curves(loops[name]), bare=bare)
-        except (ValueError, KeyError) as error:
-            reason = f"'{name}' is no table of ramps ({error}); make it again with `dzdesign verify`"
-            raise InputError(reason) from error
-
-
-def _loop_curves(side: str, columns: Mapping[str, np.ndarray], *, bare: bool) -> Iterator[CharacteristicCurve]:
-    sets: dict[Set, str] = {"before": "q_without_", "after": "q_with_"} if bare else {"after": "q_with_"}
-    command, sign = columns["command_percent"] / 100, SIDES[side]
-    top = int(np.argmax(command)) + 1
-    for name, prefix in sets.items():
-        for column, flow in columns.items():
-            if column.startswith(prefix):
+def _simulated(loops: Mapping[str, Curves]) -> Iterator[CharacteristicCurve]:
+    """Return the curves of the closed loop, with the compensator."""
+    for side, sign in SIDES.items():
+        columns = loops.get(closed_loop_name(side), {})
+        for column in columns:
+            if column.startswith("q_with_"):
+                command, flow = columns["command_percent"] / 100, columns[column]
+                top = int(np.argmax(command)) + 1
                 yield CharacteristicCurve(
                     side=side,
-                    dp_MPa=float(column.removeprefix(prefix).removesuffix("_MPa_L_min")),
-                    set=name,
+                    dp_MPa=float(column.removeprefix("q_with_").removesuffix("_MPa_L_min")),
+                    set="after",
                     origin="simulated",
                     branches={
                         "opening": _thinned(command[:top], flow[:top], sign),

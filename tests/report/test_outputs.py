@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.other_targets import generate_output, settings_of, write_output
 from dzdesign.codegen.project import generate, write_firmware
 from dzdesign.command_line.cli import main
@@ -15,14 +13,11 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
-from dzdesign.report.chain import Chain, Place
-from dzdesign.report.outputs.folder_outputs import outputs_of_folder
-from dzdesign.report.outputs.made_output import MadeOutput, MadeOutputs
-from dzdesign.report.outputs.section import outputs_sections, with_outputs
-from dzdesign.report.page import Headline
+from dzdesign.report.artefacts import Chain, Place
+from dzdesign.report.outputs import change_in, outputs_in, outputs_sections, with_outputs
+from dzdesign.report.page import Headline, MadeOutput, MadeOutputs
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.exhaustive.block_check import BlockCheck
 from dzdesign.verify.output_evidence import OutputEvidence, TriedInputs
 from dzdesign.verify.requirements import FILES
 from dzdesign.verify.verification import evidence_manifest
@@ -76,7 +71,7 @@ def put_evidence(place, folder, *, holds=True, text="yes"):
 
 
 def listed(folder, digest):
-    return {each.place: each for each in outputs_of_folder(folder, digest).listed}
+    return {each.place: each for each in outputs_in(folder, digest).listed}
 
 
 def test_each_output_stands_with_its_hash_and_without_evidence_it_is_not_verified(folder, digest):
@@ -87,21 +82,6 @@ def test_each_output_stands_with_its_hash_and_without_evidence_it_is_not_verifie
         assert (each.verdict, each.is_wrong) == ("NOT VERIFIED", False)
     assert [each.kind for each in found.values()] == ["C firmware", "iec61131"]
     assert found["plc/"].settings == "dialect codesys, interface plc"
-    assert listed(folder / "plc", digest) == listed(folder / "firmware", digest) == found
-
-
-def test_the_parameters_of_an_amplifier_are_listed_with_their_device_and_checked(folder, digest, compensator, document):
-    given = {"device": "csv", "table_dp": "2 MPa"}
-    output = generate_output(compensator, "amplifier", settings_of("amplifier", given), document)
-    write_output(output, folder / "amplifier")
-    found = listed(folder, digest)["amplifier/"]
-    assert (found.kind, found.settings) == ("amplifier", "device csv, table-dp 2 MPa")
-    put_evidence(folder / "evidence", folder / "amplifier")
-    assert listed(folder, digest)["amplifier/"].verdict == "HOLDS"
-    path = folder / "amplifier" / "csv.csv"
-    path.write_bytes(path.read_bytes().replace(b"0.4640", b"0.4641"))
-    found = listed(folder, digest)["amplifier/"]
-    assert found.verdict == "CHANGED" and "csv.csv" in found.changed
 
 
 @pytest.mark.parametrize("name", ["plc_evidence", "any name"])
@@ -110,13 +90,6 @@ def test_evidence_is_found_by_the_hash_of_the_manifest(folder, digest, name):
     found = listed(folder, digest)
     assert (found["plc/"].verdict, found["plc/"].inputs) == ("HOLDS", INPUTS)
     assert found["plc/"].evidence == f"{name}/evidence.json" and found["firmware/"].holds is None
-
-
-def test_evidence_of_another_manifest_is_none_of_it(folder, digest, compensator, document):
-    put_evidence(folder / "plc_evidence", folder / "plc")
-    codes = generate_output(compensator, "iec61131", {"dialect": "codesys", "interface": "codes"}, document)
-    write_output(codes, folder / "plc")
-    assert listed(folder, digest)["plc/"].verdict == "NOT VERIFIED"
 
 
 def test_of_two_pieces_of_evidence_the_one_that_does_not_hold_counts(folder, digest):
@@ -143,9 +116,9 @@ def test_changed_evidence_is_not_used_and_said(folder, digest):
     put_evidence(folder / "plc_evidence", folder / "plc", holds=False)
     path = folder / "plc_evidence" / OutputEvidence.FILE_NAME
     path.write_bytes(path.read_bytes().replace(b'"holds": false', b'"holds": true'))
-    made = outputs_of_folder(folder, digest)
-    assert made.listed[1].holds is None
-    assert "plc_evidence/evidence.json is not used" in made.others[0] and "was changed" in made.others[0]
+    made = outputs_in(folder, digest)
+    assert [each.place for each in made.listed] == ["firmware/"]
+    assert "'plc' is not listed: 'plc_evidence/evidence.json' was changed" in made.others[0]
 
 
 @pytest.mark.parametrize("change", ["edit", "delete", "add"])
@@ -163,10 +136,19 @@ def test_an_output_whose_files_are_others_is_changed_whatever_its_evidence_says(
     assert ("other.st" if change == "add" else "FB_DeadZone.st") in found.changed
 
 
+@pytest.mark.parametrize("name", ["core/dz_comp.c", "compensator.json"])
+def test_a_firmware_is_compared_with_its_manifest_but_for_what_is_the_users_to_fill_in(folder, name):
+    assert change_in(folder / "firmware") == ""
+    (folder / "firmware" / name).unlink()
+    assert name in change_in(folder / "firmware")
+    (folder / "firmware" / MANIFEST_NAME).write_text("{}")
+    assert MANIFEST_NAME in change_in(folder / "firmware")
+
+
 def test_an_output_of_another_compensator_is_said_and_not_listed(folder, digest, compensator):
     other = replace(compensator, made_from=(SourceFile(source="valve.json", sha256="1" * 64),))
     write_output(generate_output(other, "iec61131", settings_of("iec61131", {})), folder / "theirs")
-    made = outputs_of_folder(folder, digest)
+    made = outputs_in(folder, digest)
     assert [each.place for each in made.listed] == ["firmware/", "plc/"]
     (line,) = made.others
     assert line.startswith("theirs/ (iec61131) was made from another compensator.json")
@@ -176,44 +158,9 @@ def test_what_can_not_be_read_hinders_no_other(folder, digest):
     path = folder / "plc" / MANIFEST_NAME
     document = json.loads(path.read_bytes())
     path.write_text(json.dumps({**document, "target": 3}))
-    made = outputs_of_folder(folder, digest)
+    made = outputs_in(folder, digest)
     assert [each.place for each in made.listed] == ["firmware/"]
     assert made.others[0].startswith("'plc' is not listed: ")
-
-
-def test_a_manifest_that_names_files_outside_its_folder_is_not_followed(folder, digest):
-    path = folder / "plc" / MANIFEST_NAME
-    document = json.loads(path.read_bytes())
-    path.write_text(json.dumps({**document, "files": {"../compensator.json": "0" * 64}}))
-    assert [each.place for each in outputs_of_folder(folder, digest).listed] == ["firmware/"]
-
-
-def test_blocks_and_generated_texts_stand_alone(folder, digest, compensator):
-    octets = pack(block_of(compensator, digest))
-    (folder / "calibration.bin").write_bytes(octets)
-    other = pack(block_of(compensator, "2" * 64))
-    (folder / "other.bin").write_bytes(other)
-    (folder / "valve.dcf").write_bytes(
-        f"{BANNER}; Made from compensator.json with the SHA-256 {digest}.\r\n[FileInfo]\r\n".encode()
-    )
-    (folder / "notes.txt").write_text(f"compensator.json {digest}")
-    made = outputs_of_folder(folder, digest)
-    found = {each.place: each for each in made.listed}
-    assert list(found) == ["calibration.bin", "valve.dcf", "firmware/", "plc/"]
-    assert found["calibration.bin"].sha256 == sha256_of(octets) and found["calibration.bin"].holds is None
-    assert (found["valve.dcf"].kind, found["valve.dcf"].settings) == ("generated file", "template cia408.toml")
-    assert [line.partition(" ")[0] for line in made.others] == ["other.bin"]
-
-
-def test_a_block_that_a_batch_tried_has_that_check(folder, digest, compensator):
-    octets = pack(block_of(compensator, digest))
-    (folder / "calibration.bin").write_bytes(octets)
-    check = BlockCheck(
-        tool=THIS_TOOL, made_from=(SourceFile(source="compensator.json", sha256=digest),),
-        block_sha256=sha256_of(octets), check_sha256="0" * 64, refused=1, inputs=(),
-    )  # fmt: skip
-    (folder / BlockCheck.FILE_NAME).write_bytes(to_json_bytes(check))
-    assert listed(folder, digest)["calibration.bin"].verdict == "DOES NOT HOLD"
 
 
 def test_evidence_of_the_firmware_is_that_of_verify(folder, digest):
@@ -262,7 +209,7 @@ WRONG = MadeOutput(kind="fmu", settings="", place="fmu/", sha256="0" * 64, holds
 def test_a_wrong_output_takes_the_verdict_and_is_named(kind):
     said = Headline(kind=kind, text="as it was", reasons=("one",))
     chain = Chain(evidence=evidence_with())
-    right = MadeOutputs(listed=(replace(WRONG, holds=True), replace(WRONG, holds=None, place="valve.dcf")))
+    right = MadeOutputs(listed=(replace(WRONG, holds=True),))
     assert with_outputs(said, right, chain) == said
     found = with_outputs(said, MadeOutputs(listed=(WRONG,)), chain)
     assert found.kind == "bad" and found.reasons == ("one", "DOES NOT HOLD: fmu/ (fmu): inputs: 3 wrong")
@@ -297,5 +244,3 @@ def test_without_a_firmware_the_verdict_is_of_the_outputs():
     found = with_outputs(said, MadeOutputs(listed=(good, open_)), Chain())
     assert (found.kind, found.text) == ("open", "NOT VERIFIED: fmu/; every requirement holds of plc/")
     assert with_outputs(said, MadeOutputs(), Chain()) == said
-    faulty = Chain(faults=("one",))
-    assert with_outputs(said, MadeOutputs(listed=(good,)), faulty) == said

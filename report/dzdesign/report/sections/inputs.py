@@ -1,4 +1,4 @@
-"""The map of the C code's output against command and pressure drop, with what is wrong or falls back."""
+"""Sections on the evidence: every input, closed loop, requirements."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -6,10 +6,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
-from dzdesign.report.compensator_sides import laws_of
-from dzdesign.report.figures.figure import LIGHT, Curves, ReportFigure, new_figure, to_report_figure
-from dzdesign.report.sections.cells import whole
+from dzdesign.report.artefacts import Chain, laws_of
+from dzdesign.report.cells import (
+    whole,
+)
+from dzdesign.report.figure import LIGHT, ReportFigure, legend_below, new_figure, to_report_figure
+from dzdesign.report.page import Section
+from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, input_map_name, zero_command_name
 from dzdesign.verify.evidence import InputCheck
 
 if TYPE_CHECKING:
@@ -20,8 +25,37 @@ if TYPE_CHECKING:
 OTHER_SIGN = 8.0
 
 
+def inputs_section(chain: Chain) -> Section:
+    """Return the section on the check of every input."""
+    compensator = chain.compensator
+    if chain.evidence is None or compensator is None:
+        return Section(missing="No evidence is here: `dzdesign verify` tries every input of the C code.")
+    figures: list[ReportFigure] = []
+    lines, missing = [], ""
+    for each in chain.evidence.inputs:
+        side = each.side
+        lines += _input_lines(each, chain.recorded_units)
+        drawn, zero = (chain.curves[name(side)] for name in (input_map_name, zero_command_name))
+        guard = laws_of(compensator)[side].certificate.guard
+        figures.append(map_figure(drawn, zero, compensator, each))
+        figures.append(zero_figure(zero, side, guard, chain.recorded_units.of_side(side)))
+    if not chain.evidence.inputs:
+        missing = f"{NOT_CHECKED}: the C code did not compile or did not run, see the requirements."
+    return Section(figures=figures, lines=tuple(lines), missing=missing)
+
+
+def _input_lines(found: InputCheck, units: RecordedUnits) -> list[str]:
+    line = (
+        f"{found.side.capitalize()} commands: {whole(found.inputs)} pairs of command and pressure-difference code "
+        f"compared with the exactly rounded law, {whole(found.wrong)} wrong, largest error {found.largest_error} "
+        f"counts; {found.over_compensated} pressure codes over-compensated, smallest margin of the C code's compare "
+        f"values {units.text(1e3 * found.smallest_margin_V, '.3f mV')}."
+    )
+    return [line, f"First wrong: {found.first_wrong}."] if found.first_wrong else [line]
+
+
 def map_figure(
-    curves: Curves, zero: Curves | None, compensator: Compensator, inputs: InputCheck
+    curves: Curves, zero: Curves, compensator: Compensator, inputs: InputCheck
 ) -> ReportFigure:
     """Draw what the core gives against command and pressure drop, and where it falls back or is wrong.
 
@@ -58,7 +92,7 @@ def map_figure(
         f"Map of the output against command and pressure drop. {whole(inputs.inputs)} pairs checked, "
         f"{whole(inputs.wrong)} wrong. On the drawn grid {wrong} of {grid.output.size} points are wrong, "
         f"{fallen} fall back to the safe value; {over} codes are over-compensated at zero command.",
-        curves.text,
+        csv_of(curves),
     )
 
 
@@ -79,10 +113,10 @@ def _grid_of(curves: Curves, compensator: Compensator, inputs: InputCheck) -> _G
     sign, units = inputs.sign, compensator.valve.recorded_units.of_side(inputs.side)
     command, volt = compensator.signals.command, float(compensator.u_max_V) / compensator.signals.compare_max
     towards_full = command.direction(sign) * command.span(sign)
-    codes, dp_codes = np.unique(curves.columns["command_code"]), np.unique(curves.columns["dp_code"])
-    order = np.lexsort((curves.columns["command_code"], curves.columns["dp_code"]))
+    codes, dp_codes = np.unique(curves["command_code"]), np.unique(curves["dp_code"])
+    order = np.lexsort((curves["command_code"], curves["dp_code"]))
     output, error, status = (
-        curves.columns[name][order].reshape(dp_codes.size, codes.size) for name in ("compare", "error", "status")
+        curves[name][order].reshape(dp_codes.size, codes.size) for name in ("compare", "error", "status")
     )
     return _Grid(
         u=100 * (codes - command.zero_code) / towards_full,
@@ -123,12 +157,49 @@ def _levels(output: np.ndarray) -> np.ndarray:
     return levels
 
 
-def _draw_zero_strip(axes: "Axes", zero: Curves | None, units: RecordedUnits) -> int:
+def _draw_zero_strip(axes: "Axes", zero: Curves, units: RecordedUnits) -> int:
     """Draw along zero command where the drive is certified and where not; return at how many codes it is not."""
-    if zero is None:
-        return 0
-    dp, above = zero.columns["dp_MPa"], zero.columns["drive_V"] > zero.columns["bound_V"]
+    dp, above = zero["dp_MPa"], zero["drive_V"] > zero["bound_V"]
     dp, ends = units.convert(dp, "MPa"), (0.0, 2.0)  # percent of command: wide enough to be seen
     axes.fill_betweenx(dp, *ends, where=~above, color=LIGHT["green"], lw=0, zorder=4)
     axes.fill_betweenx(dp, *ends, where=above, facecolor="#ff2d2d", edgecolor="#ffffff", hatch="xxxx", lw=0, zorder=4)
     return int(above.sum())
+
+
+def zero_figure(curves: Curves, side: str, guard: str, units: RecordedUnits) -> ReportFigure:
+    """Draw the output at zero command under the threshold's lower bound, at every code of the tested interval.
+
+    From zero_command_<side>.csv.
+    """
+    dp, drive, bound = (curves[name] for name in ("dp_MPa", "drive_V", "bound_V"))
+    above = drive > bound
+    least = int(np.argmin(bound - drive))
+    margin, at = units.text(1e3 * (bound - drive)[least], ".2f mV"), units.text(dp[least], ".2f MPa")
+    dp, drive, bound = units.convert(dp, "MPa"), units.convert(drive, "V"), units.convert(bound, "V")
+    figure = new_figure(3.4, legend_rows=2)
+    axes = figure.subplots()
+    axes.fill_between(dp, drive, bound, where=~above, step="mid", color=LIGHT["green"], alpha=0.16, lw=0,
+                      label="margin")  # fmt: skip
+    axes.step(dp, bound, where="mid", color=LIGHT["green"], lw=1.8, label=f"lower bound of the {guard} threshold")
+    axes.plot(dp, drive, "--", color=LIGHT["purple"], lw=1.7, label="drive at zero command, of the compiled C")
+    if above.any():
+        axes.fill_between(dp, drive, bound, where=above, step="mid", facecolor="none", edgecolor=LIGHT["vermilion"],
+                          hatch="xxxx", lw=1, label="OVER-COMPENSATED")  # fmt: skip
+    axes.plot(dp[least], drive[least], "o", ms=9, mfc="none", mec=LIGHT["ink"], mew=1.3)
+    axes.annotate(margin, (dp[least], drive[least]), xytext=(9, 7),
+                  textcoords="offset points", ha="left", va="bottom", fontsize=8.5)  # fmt: skip
+    axes.margins(y=0.14)
+    axes.set(xlabel=f"pressure drop dP ({units.label('MPa')})", ylabel=f"command u ({units.label('V')})")
+    if units.falling:
+        axes.invert_yaxis()
+    legend_below(figure, 2)
+    return to_report_figure(
+        figure,
+        f"zero-{side}",
+        f"Zero command, {side} side, where it matters most: the output against what is certified, at "
+        "every code of the tested interval. Ringed: the smallest margin. What is certified outside the interval stands "
+        "beside the law.",
+        f"At {int(above.sum())} of {dp.size} codes of the pressure drop the output at zero command lies above the "
+        f"threshold's lower bound; the smallest margin is {margin} at {at}.",
+        csv_of(curves),
+    )

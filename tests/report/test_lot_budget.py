@@ -2,11 +2,11 @@
 
 import pytest
 
+from dzdesign.batch.summary import lot_budget
 from dzdesign.codegen.project import target_named
-from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
 from dzdesign.design.option_texts import options_of
-from dzdesign.report.lot.budget import lot_budget, lot_budget_lines, lot_budget_table
+from dzdesign.report.lot.words import lot_budget_lines
 
 
 def designed(valve, **texts):
@@ -31,8 +31,6 @@ def test_a_line_has_the_least_the_median_and_the_largest_of_all_valves(lot):
         assert line.contribution_mV == pytest.approx(max(max(one.contribution_mV) for one in of_valves), abs=1e-4)
     assert lines["ageing"].origin == ("default", "declared")
     assert lines["amplifier"].price_percent[2] > 2 * lines["amplifier"].price_percent[0]
-    table = lot_budget_table(budget, AS_COMPUTED)
-    assert [row[0].text for row in table.rows] == list(lines)
 
 
 def test_a_lot_without_a_machine_says_so_and_a_mixed_one_says_both(lot, example_compensator):
@@ -42,4 +40,4 @@ def test_a_lot_without_a_machine_says_so_and_a_mixed_one_says_both(lot, example_
     assert line == "The certificates cover the valve as recorded and the declared machine."
     mixed = lot_budget({**lot, "c": example_compensator})
     assert len(mixed.certified_of) == 2 and "of some valves" in lot_budget_lines(mixed)[0]
-    assert lot_budget({}) is None and lot_budget_lines(None) == () and lot_budget_table(None, AS_COMPUTED) is None
+    assert lot_budget({}) is None and lot_budget_lines(None) == ()

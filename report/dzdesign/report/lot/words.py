@@ -1,14 +1,33 @@
-"""The lot setting in sentences, for the terminal and for the page."""
+"""A lot's setting and certificates in sentences, for the terminal and for the page."""
 
 from collections.abc import Sequence
 
 from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.report.lot.spread import EXTRA, TWENTY
-from dzdesign.report.lot.summary import LotSettingSummary, LotSummary, Quantiles, UntestedPressures
+from dzdesign.report.lot.summary import LotBudget, LotSettingSummary, LotSummary, Quantiles, UntestedPressures
 
 #: Valves of one sentence that are named.
 NAMED = 3
+#: Said where the lot setting leaves some valve less dead zone than its own.
+NEGATIVE_COST = (
+    "a negative cost: with the lot setting that valve has less dead zone than with its own, at each of its tests; it "
+    "is certified all the same, for the lot's offset lies below the valve's bound too"
+)
+
+
+def lot_budget_lines(budget: LotBudget | None) -> tuple[str, ...]:
+    """Return what the certificates of a lot are of, as a line for a person."""
+    if budget is None:
+        return ()
+    if len(budget.certified_of) > 1:
+        return (f"The certificates cover, of some valves, {', of others '.join(budget.certified_of)}.",)
+    if any("machine" in each for each in budget.certified_of):
+        return (f"The certificates cover {budget.certified_of[0]}.",)
+    return (
+        "The certificates cover the valves as recorded: no machine was declared, so coil temperature, "
+        "supply voltage, pressure sensors, oil and ageing are not counted.",
+    )
 
 
 def checked_line(setting: LotSettingSummary, units: RecordedUnits) -> str:
@@ -54,13 +73,6 @@ def _coarse_lines(inside: Sequence[UntestedPressures], units: RecordedUnits) -> 
     if same := [each for each in free if each.coarser_V == 0]:
         lines.append(f"{_untested(same, units)}: that costs the lot setting nothing")
     return lines
-
-
-#: Said where the lot setting leaves some valve less dead zone than its own.
-NEGATIVE_COST = (
-    "a negative cost: with the lot setting that valve has less dead zone than with its own, at each of its tests; it "
-    "is certified all the same, for the lot's offset lies below the valve's bound too"
-)
 
 
 def cost_lines(summary: LotSummary) -> list[str]:

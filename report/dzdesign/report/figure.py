@@ -7,12 +7,12 @@ never in colour alone.
 
 import csv
 import io
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import quote
+from xml.etree import ElementTree
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.style import HUES, plot_style
@@ -39,6 +39,9 @@ DARK = {
 }
 #: Name of a variable of the page -> (light, dark).
 PALETTE = {name: (light, DARK[name]) for name, light in LIGHT.items()}
+#: As a page has them; without, each name in the markup would get a prefix of its own.
+for prefix, address in (("", "http://www.w3.org/2000/svg"), ("xlink", "http://www.w3.org/1999/xlink")):
+    ElementTree.register_namespace(prefix, address)
 WIDTH = 7.4
 #: Left margin, and the width of numbers on the axis for which it has room: of ``5.150``.
 LEFT, TICKS_IN_MARGIN = 0.6, 0.345
@@ -62,14 +65,6 @@ class ReportFigure:
     svg: str
     csv: str
     narrow_svg: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Curves:
-    """A CSV file of the evidence: its text, and its columns as numbers."""
-
-    text: str
-    columns: "Mapping[str, np.ndarray]"
 
 
 def data_uri(text: str) -> str:
@@ -228,24 +223,27 @@ def _make_room_for_legend(figure: "Figure") -> None:
 
 
 def _svg_of(figure: "Figure", name: str, description: str, kind: str = "drawing") -> str:
-    """Return a figure, drawn in the colours of `LIGHT`, as markup; all ids begin with its name, unlike any other's."""
-    from markupsafe import escape
+    """Return a figure, drawn in the colours of `LIGHT`, as markup whose ids follow from its name."""
+    from matplotlib import rc_context
 
     out = io.StringIO()
-    figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
-    text = out.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r'\b(id|xlink:href|clip-path)="(url\()?(#?)(?!data:)', rf'\1="\2\3{name}-', text)
-    text = re.sub(rf"url\(#(?!{re.escape(name)}-)", f"url(#{name}-", text)
+    with rc_context({"svg.hashsalt": name}):  # same input, same ids
+        figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+    drawing = ElementTree.fromstring(out.getvalue())
+    box = drawing.get("viewBox", "")
+    size = dict(zip(("width", "height"), box.split()[2:], strict=True))
+    drawing.attrib = {"class": kind, "role": "img", "aria-label": description, "viewBox": box, **size}
+    for part in [each for each in drawing if each.tag.endswith("metadata")]:
+        drawing.remove(part)
+    for part in drawing.iter():
+        if part.tag.endswith("}g"):
+            part.attrib.pop("id", None)  # Matplotlib numbers its groups alike in every figure
+        if "style" in part.attrib:
+            part.attrib["style"] = _in_page_colours(part.attrib["style"])
+    return ElementTree.tostring(drawing, encoding="unicode")
+
+
+def _in_page_colours(style: str) -> str:
     for variable, (light, _) in PALETTE.items():
-        text = text.replace(light, f"var(--fig-{variable})")
-    box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)
-    width, height = map(float, box.groups()) if box else (1.0, 1.0)
-    head = (
-        f'<svg class="{kind}" role="img" aria-label="{escape(description)}" viewBox="0 0 {width:g} {height:g}" '
-        f'width="{width:g}" height="{height:g}" xmlns="http://www.w3.org/2000/svg" '
-        'xmlns:xlink="http://www.w3.org/1999/xlink">'
-    )
-    return head + re.sub(r"\n\s*", "\n", text[text.index(">") + 1 :])
+        style = style.replace(light, f"var(--fig-{variable})")
+    return style
