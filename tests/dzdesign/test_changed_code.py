@@ -193,7 +193,7 @@ def test_structured_text_is_read_and_has_its_verdict(example_compensator, tmp_pa
     class Verified(Exception):
         pass
 
-    def verify_output(given, options, say, code):
+    def verify_output(given, options, say, code, forms):
         raise Verified(given, code)
 
     monkeypatch.setattr(dispatch, "verify_output", verify_output)

@@ -107,10 +107,12 @@ def verify_output_folder(
 ) -> "OutputVerification":
     """Verify an output other than a C firmware; `identified` is as in `verify_firmware`."""
     from dzdesign.changed_code import code_of_output
+    from dzdesign.codegen.integers.law import forms_of
     from dzdesign.regeneration import output_again, output_regenerated
     from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.outputs.dispatch import SCHEMA, kind_for, output_evidence_files, verify_output
+    from dzdesign.verify.outputs.folder import read_output_manifest
     from dzdesign.verify.verification import evidence_manifest
 
     given = [flag_of(name) for name in OF_FIRMWARE if getattr(arguments, name)]
@@ -122,7 +124,8 @@ def verify_output_folder(
         with stage_progress("generating the output again"):
             again = output_again(folder)
     with code_of_output(folder, again) as code, stage_progress() as stage:
-        verification = verify_output(folder, given, stage, code)
+        forms = forms_of(read_compensator(folder), read_output_manifest(folder))
+        verification = verify_output(folder, given, stage, code, forms)
     added = [output_regenerated(folder, again)]
     if recordings:
         with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, schema_of, to_json_bytes
@@ -15,6 +17,7 @@ from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
+from dzdesign.verify.integers.every_pair import Program
 from dzdesign.verify.output_evidence import OutputChecks, OutputEvidence
 from dzdesign.verify.outputs.folder import files_unchanged, manifest_follows, read_output_manifest
 from dzdesign.verify.requirements import Check
@@ -29,8 +32,9 @@ CheckOutput = Callable[[Path, OutputManifest, Compensator, Say], OutputChecks]
 class OutputKind:
     """One kind of output, and where its checks stand."""
 
-    #: Module with ``checks``, a `CheckOutput`.
+    #: Module with a `CheckOutput`, and its name there; one with a name of its own takes the generator's forms, too.
     module: str
+    checks: str = ""
     #: Options of `verify`, as flags such as --machine-code, that make sense for it beside --output and --ramps, to the
     #: module with the ``checks`` that are made where one is given.
     options: Mapping[str, str] = field(default_factory=dict)
@@ -40,9 +44,9 @@ class OutputKind:
 
 #: Target, as the manifest names it, to its checks.
 KINDS: Mapping[str, OutputKind] = {
-    "iec61131": OutputKind(module="dzdesign.verify.structured_text.checks"),
+    "iec61131": OutputKind(module="dzdesign.verify.integers.checks", checks="block_checks"),
     "fmu": OutputKind(module="dzdesign.verify.fmu.checks", runs=True),
-    "matlab": OutputKind(module="dzdesign.verify.matlab.checks", runs=True),
+    "matlab": OutputKind(module="dzdesign.verify.integers.checks", checks="function_checks", runs=True),
     "amplifier": OutputKind(module="dzdesign.verify.amplifier.output_checks"),
 }
 
@@ -87,19 +91,25 @@ def kind_for(folder: Path, options: Sequence[str] = ()) -> OutputKind:
 
 
 def verify_output(
-    folder: Path, options: Sequence[str] = (), say: Say = lambda _: None, code: Path | None = None
+    folder: Path,
+    options: Sequence[str] = (),
+    say: Say = lambda _: None,
+    code: Path | None = None,
+    forms: Mapping[str, Program] = MappingProxyType({}),
 ) -> OutputVerification:
     """Verify the folder of an output, made by `dzdesign codegen`.
 
     `options` are the flags that were given; one that makes no sense for this kind is an `InputError`, and so is a
     folder that is no output. What is compiled and run is taken from `code`, by default the folder itself. `say` is told
-    each stage before it begins.
+    each stage before it begins. `forms` are the generator's evaluations of an output's texts, by the names of their
+    files: functions of arrays of inputs.
     """
     kind, manifest = kind_for(folder, options), read_output_manifest(folder)
     compensator = read_compensator(folder)
     unchanged = files_unchanged(folder, manifest)
-    modules = (kind.module, *(kind.options[flag] for flag in options))
-    rooms: list[CheckOutput] = [import_module(module).checks for module in modules]
+    rooms: list[CheckOutput] = [import_module(kind.options[flag]).checks for flag in options]
+    first = getattr(import_module(kind.module), kind.checks or "checks")
+    rooms.insert(0, partial(first, forms=forms) if kind.checks else first)
     found = [check(code or folder, manifest, compensator, say) for check in rooms]
     of_all: tuple[Check, ...] = (
         certificate_follows(compensator),
