@@ -120,7 +120,7 @@ FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="the coupled FMUs beha
 POPULATION = Requirement(
     id="population",
     title="no flow at zero command for random machines within the tolerances",
-    how="`verify --tolerances FILE`, with machines = 10000 in FILE and a declared machine",
+    how="`verify --tolerances FILE`, with machines = 1000000 in FILE and a declared machine",
 )
 OWN_PLANT = Requirement(
     id="own-plant", title="the closed-loop requirements hold with the machine's plant", how="`verify --plant`"
