@@ -215,7 +215,7 @@ def test_the_report_of_the_lot_lists_them_and_sees_another_manifest(made, tmp_pa
     assert read_lot(out).faults == ()
     block = out / "valves" / "V0001" / "plc" / "FB_DeadZone.st"
     text = block.read_bytes()
-    block.write_bytes(text.replace(b"status := 0;", b"status := 1;"))
+    block.write_bytes(text.replace(b"drive := ", b"drive := 1 + "))
     assert "V0001/plc: changed or missing: FB_DeadZone.st" in read_lot(out).faults[0]
     block.write_bytes(text)
     path = out / "valves" / "V0000" / "plc" / MANIFEST_NAME
