@@ -61,7 +61,7 @@ def _made(target: str) -> Output:
     of = compensator()
     settings = {"iec61131": BLOCK_SETTINGS, "fmu": {"plant": ""}}.get(target, {})
     with patch.object(binaries, "PLATFORMS", ()):
-        return generate_output(of, target, settings, to_json_bytes(of))
+        return generate_output(of, target, settings)
 
 
 def _output(target: str) -> Mapping[str, bytes]:

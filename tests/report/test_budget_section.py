@@ -8,7 +8,6 @@ from dataclasses import replace
 import pytest
 
 from dzdesign.codegen.project import generate, target_named
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.chosen_units import read_units
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
@@ -86,7 +85,7 @@ def test_c_and_readme_say_what_is_certified(example_valve, machine, target):
         (bare, "Certificate of the valve as recorded: ", "No machine was declared"),
         (declared, "Certificate of the valve as recorded and the declared machine: ", "supply (default)"),
     ):
-        files = generate(compensator, target, to_json_bytes(compensator)).files
+        files = generate(compensator, target).files
         header = " ".join(files["core/dz_comp.h"].replace("\n *", " ").split())
         assert of in header and said in header
         readme = next(text for path, text in files.items() if path.endswith("README.md"))

@@ -4,13 +4,14 @@ import pytest
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.folder_contents import digest_of
 from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
 from dzdesign.report import artefact_folder
 from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.artefact_folder import read_artefact_folder
 from dzdesign.report.summary import headline
 from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.firmware.unchanged_files import differing_files
+from dzdesign.verify.firmware.reproduced import changed_board_files, user_files
 from tests.support.attacked_firmware import add, edit
 from tests.support.evidence import evidence_with
 
@@ -22,7 +23,9 @@ PROJECT, OWN = "f28335/dzdesign.projectspec", "board/adc.c"
 def put_evidence(root, **changes):
     """Write what `verify` would of a firmware whose requirements all hold."""
     content = (root / "firmware" / MANIFEST_NAME).read_bytes()
-    found = differing_files(root / "firmware", read_firmware_manifest(root / "firmware"))
+    folder, manifest = root / "firmware", read_firmware_manifest(root / "firmware")
+    names = (*changed_board_files(folder, manifest), *user_files(folder, manifest.files))
+    found = {name: digest_of(folder / name) for name in names}
     made_from = (SourceFile(source=f"firmware/{MANIFEST_NAME}", sha256=sha256_of(content)),)
     evidence = evidence_with(**{"made_from": made_from, "differing_files": found, **changes})
     add(root, "evidence/verification.json", to_json_bytes(evidence).decode())

@@ -270,7 +270,7 @@ def test_a_valve_that_was_edited_within_the_compensator_is_found(copied):
     )  # fmt: skip
     change_evidence(copied, lambda each: each["made_from"][0].update(sha256=sha256_of(manifest)))
     report = report_of_folder(copied)
-    said = "'valve_sha256' is"
+    said = "'valve.content_sha256' is"
     assert any(said in fault for fault in report.faults), (report.faults, report.missing)
     assert report.kind == "bad"
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from dzdesign.codegen.fmu import binaries
 from dzdesign.codegen.other_targets import Output, generate_output
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.fmu.fmu_file import HERE, FmuFile
@@ -38,7 +37,7 @@ def plant_setting(plant: Plant = PLANT) -> str:
 def fmus_of(compensator: Compensator, plant: Plant | None = PLANT) -> Output:
     """Return the FMUs, with the binaries of the platforms that `binaries.PLATFORMS` has now."""
     settings = {"plant": plant_setting(plant) if plant else ""}
-    return generate_output(compensator, "fmu", settings, to_json_bytes(compensator))
+    return generate_output(compensator, "fmu", settings)
 
 
 def written(output: Output, folder: Path) -> Path:

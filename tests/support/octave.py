@@ -4,7 +4,6 @@ import pytest
 
 from dzdesign.codegen.other_targets import generate_output, write_output
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
@@ -23,7 +22,7 @@ def compensator_of(root):
 
 def output_of(made):
     """Return the output for MATLAB of a compensator."""
-    return generate_output(made, "matlab", {}, to_json_bytes(made))
+    return generate_output(made, "matlab", {})
 
 
 def written(made, folder):

@@ -24,7 +24,6 @@ from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.design.valve_hash import sha256_of_valve
 from dzdesign.design.zero_band import CommandError
 from dzdesign.identify.valve.model import ValveModel
 
@@ -106,9 +105,6 @@ class Compensator(ShownInNotebooks, Artefact):
         ),
     ] = None
     costs: Annotated[tuple[str, ...], Meta(description="Cost of each safe choice, in words.")]
-    valve_sha256: Annotated[
-        str, Meta(description="SHA-256 of `valve` as `identify` writes it, which reveals a change.")
-    ] = field(init=False)
     valve: Annotated[ValveModel, Meta(description="Identified valve from which the compensator was designed.")]
     lot_sha256: Annotated[
         str | None, Meta(description="SHA-256 of `lot` as stored here; null for the setting of a single valve.")
@@ -136,7 +132,6 @@ class Compensator(ShownInNotebooks, Artefact):
         for sign in self.signals.signs:
             self._check_side(sign)
         lot_json = to_json({"lot": [as_document(valve) for valve in self.lot]}).encode()
-        object.__setattr__(self, "valve_sha256", sha256_of_valve(self.valve))
         object.__setattr__(self, "lot_sha256", sha256_of(lot_json) if self.lot else None)
 
     def _check_codes(self) -> None:

@@ -10,7 +10,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.report.lot.valve_folder import ValveManifest
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.firmware.unchanged_files import added_files
+from dzdesign.verify.firmware.reproduced import added_files
 
 VERIFICATION_NAME = Evidence.FILE_NAME
 #: No larger file is read, and no more of them in a folder: an artefact is far smaller.
@@ -118,7 +118,7 @@ def _added_in(place: Path, manifest: bytes | None) -> list[str]:
     if manifest is None or not is_of(manifest, schema_of(FirmwareManifest)):
         return []
     try:
-        return added_files(place, read_artefact(manifest, FirmwareManifest, MANIFEST_NAME))
+        return added_files(place, read_artefact(manifest, FirmwareManifest, MANIFEST_NAME).files)
     except InputError:
         return []
 

@@ -66,7 +66,7 @@ def test_no_name_is_a_word_of_the_standard_or_of_a_tool(text):
 def output(root, dialect, interface):
     made = compensator(root)
     settings = {"dialect": dialect, "interface": interface}
-    return generate_output(made, "iec61131", settings, to_json_bytes(made)).files
+    return generate_output(made, "iec61131", settings).files
 
 
 def plcopen_text(content):

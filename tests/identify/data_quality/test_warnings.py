@@ -12,7 +12,7 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of, to_json
+from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
@@ -28,6 +28,7 @@ from dzdesign.report.artefact_chain import chain_of
 from dzdesign.report.summary import headline
 from dzdesign.report.valve_report import make_report
 from tests.conftest import default_options
+from tests.support.attacked_firmware import sealed
 from tests.support.paths import ROOT
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
@@ -108,7 +109,7 @@ class TestSimulated:
         assert document["valve"]["simulated"] is True
         if not whole:
             document["valve"]["warnings"] = []
-        document["valve_sha256"] = sha256_of(to_json(document["valve"]).encode())
+        sealed(document["valve"])
         path = tmp_path / "compensator.json"
         path.write_text(to_json(document))
         assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == (0 if whole else 2)

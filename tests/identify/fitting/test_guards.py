@@ -291,7 +291,7 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     Path("compensator.json").write_bytes(content)
     assert main(["codegen", "compensator.json", "-o", "wrong"]) == 2
     assert "certificate does not hold" in capsys.readouterr().err
-    firmware = generate(read_artefact(content, Compensator, "compensator.json"), "f28335", content)
+    firmware = generate(read_artefact(content, Compensator, "compensator.json"), "f28335")
     write_folder(Path("wrong"), firmware.files, firmware.manifest)
     assert main(["verify", "wrong"]) == 1
     out = capsys.readouterr().out

@@ -24,7 +24,7 @@ from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.exhaustive.block_check import BlockCheck
 from dzdesign.verify.output_evidence import OutputEvidence, TriedInputs
-from dzdesign.verify.requirements import FILES
+from dzdesign.verify.requirements import REPRODUCED
 from dzdesign.verify.verification import evidence_manifest
 from tests.support.evidence import evidence_with
 from tests.support.paths import GOLDENS
@@ -50,14 +50,14 @@ def digest(document):
 
 @pytest.fixture(scope="module")
 def plc(compensator, document):
-    return generate_output(compensator, "iec61131", settings_of("iec61131", {}), document)
+    return generate_output(compensator, "iec61131", settings_of("iec61131", {}))
 
 
 @pytest.fixture
 def folder(tmp_path, compensator, document, plc):
     """A compensator with a firmware and a function block beside it."""
     (tmp_path / "compensator.json").write_bytes(document)
-    write_firmware(generate(compensator, "host", document), tmp_path / "firmware")
+    write_firmware(generate(compensator, "host"), tmp_path / "firmware")
     write_output(plc, tmp_path / "plc")
     return tmp_path
 
@@ -69,7 +69,7 @@ def put_evidence(place, folder, *, holds=True, text="yes"):
     evidence = OutputEvidence(
         tool=THIS_TOOL, made_from=made_from, target="iec61131", settings={},
         origin=FirmwareOrigin(compensator_json=none, valve_json=none, ramp_tests=()),
-        checks=(FILES.check(holds=holds, text=text),), inputs=(TriedInputs(name="all", inputs=INPUTS, wrong=0),),
+        checks=(REPRODUCED.check(holds=holds, text=text),), inputs=(TriedInputs(name="all", inputs=INPUTS, wrong=0),),
         versions={},
     )  # fmt: skip
     write_folder(place, {OutputEvidence.FILE_NAME: to_json_bytes(evidence)}, evidence_manifest(evidence))
@@ -92,7 +92,7 @@ def test_each_output_stands_with_its_hash_and_without_evidence_it_is_not_verifie
 
 def test_the_parameters_of_an_amplifier_are_listed_with_their_device_and_checked(folder, digest, compensator, document):
     given = {"device": "csv", "table_dp": "2 MPa"}
-    output = generate_output(compensator, "amplifier", settings_of("amplifier", given), document)
+    output = generate_output(compensator, "amplifier", settings_of("amplifier", given))
     write_output(output, folder / "amplifier")
     found = listed(folder, digest)["amplifier/"]
     assert (found.kind, found.settings) == ("amplifier", "device csv, table-dp 2 MPa")
@@ -114,7 +114,7 @@ def test_evidence_is_found_by_the_hash_of_the_manifest(folder, digest, name):
 
 def test_evidence_of_another_manifest_is_none_of_it(folder, digest, compensator, document):
     put_evidence(folder / "plc_evidence", folder / "plc")
-    codes = generate_output(compensator, "iec61131", {"dialect": "codesys", "interface": "codes"}, document)
+    codes = generate_output(compensator, "iec61131", {"dialect": "codesys", "interface": "codes"})
     write_output(codes, folder / "plc")
     assert listed(folder, digest)["plc/"].verdict == "NOT VERIFIED"
 

@@ -8,8 +8,8 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.folder_contents import manifest_of
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.firmware.unchanged_files import files_unchanged as firmware_unchanged
-from dzdesign.verify.outputs.folder import files_unchanged, read_output_manifest
+from dzdesign.verify.firmware.reproduced import change_since
+from dzdesign.verify.outputs.folder import read_output_manifest
 
 
 def change_in(folder: Path) -> str:
@@ -20,9 +20,7 @@ def change_in(folder: Path) -> str:
     manifest = manifest_of(folder)
     try:
         if manifest and family_of(manifest["schema"]) == family_of(schema_of(FirmwareManifest)):
-            check = firmware_unchanged(folder, read_firmware_manifest(folder))
-        else:
-            check = files_unchanged(folder, read_output_manifest(folder))
+            return change_since(folder, read_firmware_manifest(folder))
+        return change_since(folder, read_output_manifest(folder))
     except (InputError, OSError) as error:
         return str(error)
-    return "" if check.holds else check.text

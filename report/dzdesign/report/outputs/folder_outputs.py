@@ -16,8 +16,8 @@ from dzdesign.report.outputs.evidence_found import FoundEvidence, evidence_in
 from dzdesign.report.outputs.files_alone import FILES_ALONE
 from dzdesign.report.outputs.made_output import MadeOutput, MadeOutputs
 from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.firmware.unchanged_files import files_unchanged as firmware_unchanged
-from dzdesign.verify.outputs.folder import files_unchanged, read_output_manifest
+from dzdesign.verify.firmware.reproduced import change_since
+from dzdesign.verify.outputs.folder import read_output_manifest
 
 #: A file alone is not larger.
 LARGEST_ALONE = 1 << 20
@@ -84,14 +84,13 @@ def _in_place(place: Path, root: Path) -> Iterator[ReadOutput]:
 def _firmware(place: Path, root: Path) -> ReadOutput:
     manifest, digest = read_firmware_manifest(place), _digest(place)
     form = "numbers in a calibration block" if manifest.calibration == "block" else "numbers fixed in the core"
-    check = firmware_unchanged(place, manifest)
     return ReadOutput(
         output=MadeOutput(
             kind="C firmware",
             settings=f"{manifest.target}, {form}",
             place=_name(place, root),
             sha256=digest,
-            changed="" if check.holds else check.text,
+            changed=change_since(place, manifest),
         ),
         compensator_json=manifest.origin.compensator_json,
         verified_as=digest,
@@ -100,14 +99,13 @@ def _firmware(place: Path, root: Path) -> ReadOutput:
 
 def _output(place: Path, root: Path) -> ReadOutput:
     manifest, digest = read_output_manifest(place), _digest(place)
-    check = files_unchanged(place, manifest)
     return ReadOutput(
         output=MadeOutput(
             kind=manifest.target,
             settings=", ".join(setting_words(manifest.settings)),
             place=_name(place, root),
             sha256=digest,
-            changed="" if check.holds else check.text,
+            changed=change_since(place, manifest),
         ),
         compensator_json=manifest.origin.compensator_json,
         verified_as=digest,
