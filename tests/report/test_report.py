@@ -39,6 +39,7 @@ from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.loop_results import PressureResult
 from dzdesign.verify.requirements import AS_STATED
+from tests.support.attacked_firmware import sealed
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
@@ -410,7 +411,7 @@ def test_artefacts_are_found_by_their_hash_and_not_by_their_name(copied):
     other = json.loads((copied / "bench_7.json").read_bytes())
     other["u_max_V"] = 11.0
     (copied / "bench_7.json").unlink()
-    (copied / "valve.json").write_text(to_json(other))
+    (copied / "valve.json").write_text(to_json(sealed(other)))
     chain = chain_of(read_artefact_folder(copied))  # the compensator holds its valve; the file beside it is another
     assert chain.valve.u_max_V == 10.0
     assert [fault for fault in chain.faults if "valve.json has the SHA-256" in fault]
@@ -578,9 +579,8 @@ def test_one_ramp_test_is_one(reports):
 
 def test_an_assumed_repeatability_stands_beside_the_certificate(html, tmp_path):
     one = identify([synthetic_ramp(1.0, Truth(), seed=7, rate_Hz=10.0)])
-    valve_json = to_json_bytes(one)
-    (tmp_path / "valve.json").write_bytes(valve_json)
-    (tmp_path / "compensator.json").write_bytes(to_json_bytes(design(one, None, valve_json)))
+    (tmp_path / "valve.json").write_bytes(to_json_bytes(one))
+    (tmp_path / "compensator.json").write_bytes(to_json_bytes(design(one)))
     page = report_of_folder(tmp_path).html
     heads = [text[: text.index('<section id="data">')] for text in (page, html)]
     certificate, of_repeats = (head[head.index("Certificate") :] for head in heads)

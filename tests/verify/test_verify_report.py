@@ -15,6 +15,7 @@ from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_rep
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.untried import not_tried
 from dzdesign.verify.verification import SCHEMA
+from tests.support.attacked_firmware import sealed
 from tests.support.evidence import evidence_with
 from tests.support.synthetic import needs_compiler
 
@@ -43,9 +44,10 @@ def evidence_again(folder, output=None, change=lambda document: None):
 def strangers(folder):
     """Change or add what lies around a firmware, one way after another."""
     valve = json.loads((folder / "valve.json").read_bytes())
-    (folder / "valve.json").write_text(to_json({**valve, "u_max_V": 11.0}))
+    (folder / "valve.json").write_text(to_json(sealed({**valve, "u_max_V": 11.0})))
     yield "valve.json"
-    (folder / "compensator.json").write_text((folder / "compensator.json").read_text() + "\n")
+    compensator = json.loads((folder / "compensator.json").read_bytes())
+    (folder / "compensator.json").write_text(to_json({**compensator, "costs": []}))
     yield "compensator.json"
     shutil.copytree(folder / "firmware", folder / "a firmware")
     (folder / "a firmware/core/dz_comp.c").write_text("int edited;\n")

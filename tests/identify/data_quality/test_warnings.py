@@ -116,6 +116,7 @@ class TestSimulated:
         if not whole:
             wording("valve: simulated without its warning", capsys.readouterr().err)
         document["valve"] |= {"simulated": False, "warnings": as_document(compensator.valve)["warnings"]}
+        sealed(document["valve"])
         path.write_text(to_json(document))
         assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == 2
         wording("valve: a warning of simulation without one", capsys.readouterr().err)

@@ -22,6 +22,7 @@ from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
+from tests.support.attacked_firmware import sealed
 from tests.support.repeatable_valves import REPEATABLE, identify
 from tests.support.synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 
@@ -205,7 +206,7 @@ def document():
 
 class TestFile:
     def read(self, document):
-        return read_artefact(json.dumps(document).encode(), ValveModel, "valve.json")
+        return read_artefact(json.dumps(sealed(document)).encode(), ValveModel, "valve.json")
 
     def test_it_is_read_as_it_was_written(self, document):
         assert json.loads(to_json_bytes(self.read(document))) == document

@@ -27,7 +27,7 @@ SOURCES = {
     ".c", ".h", ".cc", ".cpp", ".cxx", ".hh", ".hpp", ".hxx", ".inc", ".inl", ".s", ".asm", ".cla", ".lib", ".a",
     ".ld", ".lds", ".lcf", ".icf", ".sct", ".cmd", ".def", ".mk", ".cmake", ".ninja", ".bat", ".props", ".targets",
     ".projectspec", ".ccxml", ".gel", ".syscfg", ".ioc", ".uvprojx", ".ewp", ".vcxproj",
-    ".st", ".xml", ".tcpou", ".m", ".mex", ".fmu",
+    ".st", ".xml", ".tcpou", ".m", ".p", ".mexa64", ".mexw64", ".mexmaci64", ".mexmaca64", ".fmu",
 }  # fmt: skip
 BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", ".project", ".cproject", ".ccsproject"}
 #: Files that a sentence names, and characters of a line that it shows.
