@@ -28,24 +28,24 @@ def page_of_a_file(monkeypatch):
 
 @pytest.fixture(scope="session", autouse=True)
 def short_windows_beside_casadi():
-    """Compare the plant with CasADi's integrator over 0.3 s, not 2 s: a third of what `verify` costs a test.
+    """Compare the plant with CasADi's CVODES over 0.3 s, not 1 s: much of what `verify` costs a test.
 
     They are whole in another process, which takes nothing of this patch: where a test runs the program, as the pages of
     docs/ do, and of `batch --verify` with two or more `--jobs`. In this process, `batch --jobs 1` too, they are whole
     where a test asks for `whole_windows`.
     """
-    from dzdesign.verify.integrator import windows
+    from dzdesign.verify.closed_loop import against_cvodes
 
-    whole_s = windows.WINDOWS_S
+    whole_s = against_cvodes.WINDOW_S
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(windows, "WINDOWS_S", 0.3)
+        patch.setattr(against_cvodes, "WINDOW_S", 0.3)
         yield whole_s
 
 
 @pytest.fixture
 def whole_windows(short_windows_beside_casadi, monkeypatch):
-    """Compare the plant with CasADi's integrator over all of what `verify` does."""
-    monkeypatch.setattr("dzdesign.verify.integrator.windows.WINDOWS_S", short_windows_beside_casadi)
+    """Compare the plant with CasADi's CVODES over all of what `verify` does."""
+    monkeypatch.setattr("dzdesign.verify.closed_loop.against_cvodes.WINDOW_S", short_windows_beside_casadi)
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def reported_demo(example_valve, tmp_path_factory):
     from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.loop import RampSequence
-    from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
+    from dzdesign.verify.verification import evidence_manifest, verify
 
     folder = tmp_path_factory.mktemp("reported")
     valve_json = to_json_bytes(example_valve)
@@ -132,6 +132,6 @@ def reported_demo(example_valve, tmp_path_factory):
     write_folder(folder / "firmware", firmware.files, firmware.manifest)
     again = regenerated(folder / "firmware")
     evidence = verify(folder / "firmware", again=again, sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
-    files = with_report(evidence_files(evidence), folder / "firmware", folder / "evidence")
+    files = with_report(evidence, folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", files, evidence_manifest(evidence.evidence))
     return folder

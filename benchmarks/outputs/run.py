@@ -27,7 +27,7 @@ PARTS = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the parts asked for and print what missed its limit."""
-    return run_parts(__doc__.splitlines()[0], PARTS, "mutants of one output of each kind; FMUs here alone", arguments)
+    return run_parts(__doc__.splitlines()[0], PARTS, "mutants of one kind; FMUs not compiled again", arguments)
 
 
 if __name__ == "__main__":

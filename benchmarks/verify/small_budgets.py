@@ -82,9 +82,11 @@ def right_and_wrong(
     Components that are not drawn stand at their worst ends; with none named all are drawn.
     """
     compensator = designed(valve, folder / "true", **true)
-    designed(change(valve), folder / "wrong", **(true | wrong))
-    right, short = (
-        run_population(scenes_of(folder / name, compensator, None), machines, SEED, drawn=drawn or COMPONENTS)
-        for name in ("true", "wrong")
+    short = designed(change(valve), folder / "wrong", **(true | wrong))
+    # What is drawn, and what the thresholds are bounded by, is that of the true budget.
+    laws = {"true": compensator, "wrong": replace(short, machine=compensator.machine, valve=compensator.valve)}
+    right, short_of_it = (
+        run_population(scenes_of(folder / name, law, None), machines, SEED, drawn=drawn or COMPONENTS)
+        for name, law in laws.items()
     )
-    return right, short
+    return right, short_of_it

@@ -14,8 +14,7 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.design.compensator import Compensator
-from dzdesign.report.lot.summary import OK
-from dzdesign.report.lot.valve_folder import ValveManifest
+from dzdesign.report.lot.summary import OK, ValveManifest
 from dzdesign.verify.requirements import EXACT_LAW, Check
 from tests.support.core_variants import variant
 

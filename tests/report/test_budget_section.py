@@ -13,7 +13,7 @@ from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
 from dzdesign.design.machine.words import not_counted, reach_of_certificate, taken_off
 from dzdesign.design.option_texts import options_of
-from dzdesign.report.figures.figure import figure_style
+from dzdesign.report.figure import figure_style
 from dzdesign.report.sections.budget import budget_section, shown_places
 
 DECLARED = {"coil_temperature": "-20..80 degC", "supply": "18..32 V", "oil": "0.4 %"}

@@ -11,7 +11,6 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
 from dzdesign.report.logo import LARGEST, logo_uri
 from dzdesign.report.lot.report import report_of_lot
-from dzdesign.report.lot.table import SideFigures, TableRow
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.synthetic import Truth, synthetic_ramp
 from tests.support.synthetic_lots import write_lot_folder
@@ -50,7 +49,7 @@ def test_a_report_with_a_logo_needs_nothing_from_outside(valve_folder, capsys):
 
 def test_a_lot_has_a_logo_too(tmp_path):
     (tmp_path / "logo.png").write_bytes(PNG)
-    rows = [TableRow(name="V1", status="failed", reason="no recording", sides={"": SideFigures()})]
+    rows = [{"name": "V1", "status": "failed", "reason": "no recording", "warnings": ""}]
     html = report_of_lot(write_lot_folder(tmp_path / "lot", rows), logo_uri(tmp_path / "logo.png")).html
     (image,) = Page(html).of("img")
     assert base64.b64decode(image["src"].removeprefix("data:image/png;base64,")) == PNG

@@ -6,7 +6,6 @@ import os
 import shutil
 import struct
 import zlib
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -142,9 +141,9 @@ def pages(reported_demo, tmp_path_factory):
     for place in (failing, missed, alone):
         (place / REPORT_NAME).write_text(report_of_folder(place).html, encoding="utf-8")
     rows = lot_rows(80, failed=(3, 4, 50))
-    rows[7] = replace(with_figures(rows[7], offset_V=4.2, knee_opening_V=4.4), name="unbroken" * 12)
-    rows[8] = replace(with_figures(rows[8], offset_V=4.25), name="\u5f01 <b>7</b>")
-    rows[3] = replace(rows[3], name="no-blank-in-it-" * 6, reason="unbroken" * 60)
+    rows[7] = with_figures(rows[7], offset_V=4.2, knee_opening_V=4.4, name="unbroken" * 12)
+    rows[8] = with_figures(rows[8], offset_V=4.25, name="\u5f01 <b>7</b>")
+    rows[3] |= {"name": "no-blank-in-it-" * 6, "reason": "unbroken" * 60}
     write_lot_folder(folder / "lot", rows)
     (folder / "logo.png").write_bytes(logo_png(300, 100))
     of_lot = report_of_lot(folder / "lot", logo_uri(folder / "logo.png"))

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from dzdesign.batch.blocks import BLOCK_IMAGE
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
 from dzdesign.design.firmware_manifest import BLOCK_FILE
-from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware
-from dzdesign.report.lot.valve_folder import FIRMWARE, ValveFolder
-from dzdesign.report.lot.valve_names import by_name
+from dzdesign.report.lot.summary import FIRMWARE, LOT_SETTING, LotFirmware
+from dzdesign.report.lot.table import ValveFolder, by_name
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.built_for import BuiltFor

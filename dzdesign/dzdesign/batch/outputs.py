@@ -9,7 +9,7 @@ from dzdesign.batch.arguments import BatchArguments
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.options import flag_of
-from dzdesign.report.lot.output_types import (
+from dzdesign.report.lot.summary import (
     DOES_NOT_HOLD,
     HOLDS,
     NOT_MADE,
@@ -18,7 +18,7 @@ from dzdesign.report.lot.output_types import (
     OutputVerdict,
     ValveOutput,
 )
-from dzdesign.report.lot.valve_folder import ValveFolder
+from dzdesign.report.lot.table import ValveFolder
 from dzdesign.stages.generate import chosen_of_outputs
 
 if TYPE_CHECKING:

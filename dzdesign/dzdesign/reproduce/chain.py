@@ -12,7 +12,7 @@ from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes, read_ramp_file
-from dzdesign.report.reproduction import Hashes, ReproducedValve
+from dzdesign.reproduce.artefact import Hashes, ReproducedValve
 from dzdesign.reproduce.load_and_oil import LoadAndOil, run_load_and_oil
 from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.reproduce.valve_runs import PRESSURES_MPA, ValveRuns, run_valve

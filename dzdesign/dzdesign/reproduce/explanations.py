@@ -20,7 +20,7 @@ from dzdesign.derivation.account.published import (
     PublishedValve,
 )
 from dzdesign.derivation.account.readings import DROP_ASSUMED, METER_ACCURACY_L_MIN
-from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.assumptions import OILS
 from dzdesign.reproduce.displacement_readings import DISPLACEMENT, half_digits_off
 from dzdesign.reproduce.offset_reading import offset_percent

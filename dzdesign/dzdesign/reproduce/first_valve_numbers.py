@@ -14,8 +14,8 @@ from dzdesign.derivation.account.published import (
     TEMPERATURE_CHANGE_PER_MILLE,
 )
 from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
-from dzdesign.report.reproduction import Driver, PaperNumber
 from dzdesign.reproduce import explanations
+from dzdesign.reproduce.artefact import Driver, PaperNumber
 from dzdesign.reproduce.load_and_oil import LoadAndOil
 from dzdesign.reproduce.rows import ONE_RECORD_PERCENT, Subject, around, row
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, ValveRuns, paper_duty_percent

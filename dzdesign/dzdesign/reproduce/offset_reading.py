@@ -11,7 +11,7 @@ from itertools import product as combinations
 
 from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, U_MAX_V
 from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
-from dzdesign.report.reproduction import Driver, PaperNumber
+from dzdesign.reproduce.artefact import Driver, PaperNumber
 from dzdesign.reproduce.recovered_valves import RecoveredValve, at_rest, half_digit
 from dzdesign.reproduce.rows import OF_THE_LOOP, Reason, Subject, command_around, flow_around, row
 from dzdesign.reproduce.valve_runs import PAPER, PRESSURES_MPA, ValveRuns

@@ -64,8 +64,7 @@ class VerifyArguments:
     mutate: Annotated[bool, Option(group=CHECKS)] = False
     """Insert a fault at every place of the C code, one at a time, and count the faults that are detected."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
-    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr. FMUs run every
-    input in Wine and in QEMU."""
+    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
     """Prove with Frama-C that nothing overflows a 16-bit int."""
 
@@ -166,7 +165,7 @@ def _verify_code(
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.requirements import REPRODUCED
     from dzdesign.verify.toolchain.compiled_core import core_answers
-    from dzdesign.verify.verification import evidence_files, evidence_manifest
+    from dzdesign.verify.verification import evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
     plant, digest = None, None
@@ -204,8 +203,7 @@ def _verify_code(
     if arguments.output is not None:
         output = Path(arguments.output)
         manifest = evidence_manifest(verification.evidence)
-        files = with_report(evidence_files(verification), folder, output, verification.derived)
-        write_folder(output, files, manifest)
+        write_folder(output, with_report(verification, folder, output), manifest)
     return verification
 
 

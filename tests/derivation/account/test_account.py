@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.derivation.account import identity
+from dzdesign.derivation.account import solving
 from dzdesign.derivation.account.account import SECTIONS, STATEMENTS
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.proof import judge
@@ -90,7 +90,7 @@ def test_a_derivation_can_be_read_to_its_end(statement, verdicts):
     for proof in verdict.proofs:
         assert proof.steps
         for step in proof.steps:
-            assert identity.agree(step.gives.xreplace(dict(proof.solution)), proof.solution[step.name])
+            assert solving.agree(step.gives.xreplace(dict(proof.solution)), proof.solution[step.name])
             assert step.ground in statement.grounds
 
 

@@ -7,8 +7,7 @@ import sympy
 
 from dzdesign.derivation import plant
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account import identity
-from dzdesign.derivation.account import symbol_units as units
+from dzdesign.derivation.account import solving, units
 from dzdesign.derivation.account.transfer import laplace
 from tests.support.account_claims import BY_NUMBER, FOREIGN, given
 
@@ -42,8 +41,8 @@ def test_units_of_a_comparison_are_seen():
 
 
 def test_roots_of_what_may_be_negative_are_not_merged():
-    assert not identity.agree(sympy.sqrt(s.u_1) * sympy.sqrt(s.u_2), sympy.sqrt(s.u_1 * s.u_2))
-    assert identity.agree(sympy.sqrt(s.dP0) * sympy.sqrt(s.dP1), sympy.sqrt(s.dP0 * s.dP1))
+    assert not solving.agree(sympy.sqrt(s.u_1) * sympy.sqrt(s.u_2), sympy.sqrt(s.u_1 * s.u_2))
+    assert solving.agree(sympy.sqrt(s.dP0) * sympy.sqrt(s.dP1), sympy.sqrt(s.dP0 * s.dP1))
 
 
 def test_the_laplace_transform_needs_a_linear_equation(monkeypatch, wording):

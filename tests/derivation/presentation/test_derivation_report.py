@@ -19,7 +19,7 @@ from dzdesign.derivation import symbols
 from dzdesign.derivation.account import account
 from dzdesign.derivation.account.account import STATEMENTS, verify_statements
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
-from dzdesign.derivation.account.identity import agree
+from dzdesign.derivation.account.solving import agree
 from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.presentation import formulas, prose, report, writers
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text

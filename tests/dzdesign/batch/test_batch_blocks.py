@@ -8,7 +8,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from many_valves import write_lot
 
 from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.lot_firmware import firmware_left
@@ -23,10 +22,11 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
-from dzdesign.report.lot.valve_folder import read_valve_folder
+from dzdesign.report.lot.table import read_valve_folder
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
 from tests.dzdesign.batch.test_batch import tree
+from tests.support.many_valves import write_lot
 from tests.support.synthetic import needs_compiler
 
 pytestmark = [pytest.mark.slow, needs_compiler]

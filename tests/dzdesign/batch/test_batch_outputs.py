@@ -8,7 +8,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from many_valves import write_lot
 
 from dzdesign.batch import outputs as outputs_module
 from dzdesign.batch.arguments import BatchArguments
@@ -22,14 +21,14 @@ from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.folder import read_lot
-from dzdesign.report.lot.output_types import ValveOutput
 from dzdesign.report.lot.report import report_of_lot
-from dzdesign.report.lot.summary import LotSummary
-from dzdesign.report.lot.valve_folder import ValveFolder, ValveManifest, read_manifest
+from dzdesign.report.lot.summary import LotSummary, ValveManifest, ValveOutput
+from dzdesign.report.lot.table import ValveFolder, read_manifest
 from dzdesign.stages import verify as verify_stage
 from dzdesign.verify.output_evidence import TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
 from tests.dzdesign.batch.test_batch import NOTHING, tree
+from tests.support.many_valves import write_lot
 from tests.support.paths import GOLDENS
 
 PLC = WantedOutput(target="iec61131", settings={"dialect": "codesys", "interface": "plc"}, folder="plc")

@@ -22,8 +22,8 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.identify.plots.frame import saved
 from dzdesign.identify.plots.style import plot_style
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
 from dzdesign.reproduce import chain, paper_figures, paper_numbers, recovered_valves, reproduction, rows
+from dzdesign.reproduce.artefact import Outcome, PaperNumber, Reproduction
 from dzdesign.reproduce.assumptions import HYSTERESIS_V
 from dzdesign.reproduce.recovered_valves import recover_stopped, recover_valves
 from dzdesign.reproduce.reproduction import subject_of

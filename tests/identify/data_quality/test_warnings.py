@@ -24,7 +24,7 @@ from dzdesign.identify.data_quality.catalogue import catalogue, most_serious_fir
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.valve.model import Warning_
-from dzdesign.report.artefact_chain import chain_of
+from dzdesign.report.artefacts import Chain
 from dzdesign.report.summary import headline
 from dzdesign.report.valve_report import make_report
 from tests.conftest import default_options
@@ -91,14 +91,11 @@ class TestSimulated:
             firmware = generate(compensator, "host")
             for name, text in firmware.files.items():
                 assert ("SIMULATED" in text) is simulated or name == "compensator.json", name
-            shelf = {
-                "valve.json": to_json_bytes(valve),
-                "compensator.json": to_json_bytes(compensator),
-            }
-            of_recording, *others = headline(chain_of(shelf)).cautions
+            shelf = Chain(valve=valve, compensator=compensator)
+            of_recording, *others = headline(shelf).cautions
             assert of_recording == reach_of_certificate(compensator)
             assert [text.startswith("SIMULATED") for text in others] == [True] * simulated
-            html = make_report(chain_of(shelf)).html
+            html = make_report(shelf).html
             assert ("SIMULATED recordings" in html[: html.index('<section id="data">')]) is simulated
 
     @pytest.mark.parametrize("whole", [True, False])
@@ -147,12 +144,9 @@ class TestBranchOrder:
         """The warning was written before anybody accepted it."""
         options = options_of({"accept": "branch-order"}, target_named("f28335").inputs())
         for valve, accepted in ((crossed, True), (identify([valve_at(dp) for dp in PRESSURES]), False)):
-            shelf = {
-                "valve.json": to_json_bytes(valve),
-                "compensator.json": to_json_bytes(design(valve, options)),
-            }
-            said = [line for line in headline(chain_of(shelf)).cautions if line.startswith("ACCEPTED warning, branch-")]
-            html = make_report(chain_of(shelf)).html
+            shelf = Chain(valve=valve, compensator=design(valve, options))
+            said = [line for line in headline(shelf).cautions if line.startswith("ACCEPTED warning, branch-")]
+            html = make_report(shelf).html
             words = re.sub("<[^>]*>|`", "", html)
             assert bool(said) is accepted
             assert ("ACCEPTED warning, branch-order" in html[: html.index('<section id="data">')]) is accepted
@@ -197,11 +191,8 @@ def test_a_side_that_the_firmware_leaves_out_is_said_from_identify_to_the_report
     assert not warned(one, "two-sides")
     wording.of_test(warning.text)
     for valve, said in ((both, True), (one, False)):
-        shelf = {
-            "valve.json": to_json_bytes(valve),
-            "compensator.json": to_json_bytes(design(valve)),
-        }
-        assert any("negative side" in text for text in headline(chain_of(shelf)).cautions) is said
+        shelf = Chain(valve=valve, compensator=design(valve))
+        assert any("negative side" in text for text in headline(shelf).cautions) is said
 
 
 class TestKneeErrors:

@@ -8,13 +8,13 @@ from pathlib import Path
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
-from dzdesign.core.folder_contents import digest_of
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs.not_covered import not_covered
+from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
-from dzdesign.verify.closed_loop.evidence_curves import curve_files
+from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, loop_curves
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
@@ -22,15 +22,19 @@ from dzdesign.verify.closed_loop.population import NOT_DECLARED
 from dzdesign.verify.closed_loop.tolerances import Tolerances
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
-from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
+from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
-from dzdesign.verify.exhaustive.input_map import InputMap, map_inputs
 from dzdesign.verify.exhaustive.lot_check import lot_checked
 from dzdesign.verify.firmware.compilation import BoardCompiled, board_compiles, check_include, compiles_strictly
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.firmware.own_block import own_block_accepted
-from dzdesign.verify.firmware.reproduced import Regenerated, changed_board_files, reproduced, user_files
-from dzdesign.verify.integrator.comparison import compare_with_integrator
+from dzdesign.verify.firmware.reproduced import (
+    Regenerated,
+    changed_board_files,
+    differing_files,
+    reproduced,
+    user_files,
+)
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EXACT_LAW, Check
 from dzdesign.verify.toolchain.host_compiler import host_compiler
@@ -44,8 +48,8 @@ class Verification(ShownInNotebooks):
 
     #: Every requirement that was tried, with its figures; stored as verification.json.
     evidence: Evidence
-    #: What the core gives over its inputs, one a sign of command, to be drawn.
-    maps: tuple[InputMap, ...]
+    #: The numbers of the figures by the names of their files: the core's answers over its inputs, and the ramps.
+    curves: Mapping[str, Curves]
     #: The ramps in closed loop, one a side and tested pressure drop.
     loops: tuple[LoopComparison, ...]
     #: What the firmware was made from, where designing it again gave every number.
@@ -114,16 +118,15 @@ def verify(
         run = _run_core(code, manifest, compensator, given, say, watch)
         block, board = own_block_accepted(code, manifest), board_compiles(folder, manifest, include)
     core, current, loop = run.core, run.current, run.loop
-    changed, own = changed_board_files(folder, manifest), user_files(folder, manifest.files)
     of_text = (same,) if same else ()
     checks = (*of_text, *block, *core.checks, *current.checks, *loop.checks, *run.of_plant, *board.checks)
     evidence = Evidence(
         tool=THIS_TOOL,
         made_from=(_manifest_source(folder),),
         target=manifest.target,
-        changed_board_files=changed,
-        user_files=own,
-        differing_files={name: digest_of(folder / name) for name in (*changed, *own)},
+        changed_board_files=changed_board_files(folder, manifest),
+        user_files=user_files(folder, manifest.files),
+        differing_files=differing_files(folder, manifest),
         board_not_compiled=board.not_compiled,
         checks=checks,
         inputs=core.inputs,
@@ -135,8 +138,12 @@ def verify(
         mutants=None,
         not_covered=not_covered(compensator),
     )
-    derived = compensator if same and same.holds else None
-    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=derived)
+    return Verification(
+        evidence=evidence,
+        curves={**loop_curves(loop.loops), **core.curves},
+        loops=loop.loops,
+        derived=compensator if same and same.holds else None,
+    )
 
 
 def _read(
@@ -165,7 +172,7 @@ class _Core:
 
     checks: tuple[Check, ...] = ()
     inputs: tuple[InputCheck, ...] = ()
-    maps: tuple[InputMap, ...] = ()
+    curves: Mapping[str, Curves] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,7 +203,7 @@ def _run_core(
         return _Run(core=core)
     current, scenes = current_checks(folder, compensator, say), building.result()
     loop = close_the_loop(scenes, compensator, plant, sequence, tolerances, say, watch)
-    compared, native_plant = compare_with_integrator(folder, scenes, say)
+    compared, native_plant = compare_with_cvodes(scenes, say)
     return _Run(core=core, current=current, loop=loop, compared=compared, of_plant=(native_plant,))
 
 
@@ -208,9 +215,10 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
     say("comparing every input with the exact law")
     signs, units = compensator.signals.signs, compensator.valve.recorded_units
     try:
-        inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
+        tried = [every_input(folder, sign, compensator) for sign in signs]
     except RequirementError as error:
         return _Core(checks=(compiles, EXACT_LAW.check(holds=False, text=str(error))))
+    inputs = tuple(found for found, _ in tried)
     return _Core(
         checks=(
             compiles,
@@ -219,7 +227,7 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
             drive_follows(folder, compensator),
         ),
         inputs=inputs,
-        maps=tuple(map_inputs(folder, compensator, sign) for sign in signs),
+        curves={name: columns for _, curves in tried for name, columns in curves.items()},
     )
 
 
@@ -232,5 +240,4 @@ def evidence_manifest(evidence: Artefact) -> Mapping[str, object]:
 def evidence_files(verification: Verification) -> dict[str, bytes]:
     """Return the files of the evidence folder: verification.json, and curves to draw."""
     contents = {Evidence.FILE_NAME: to_json_bytes(verification.evidence)}
-    contents |= {name: text.encode() for name, text in curve_files(verification.loops, verification.maps).items()}
-    return contents
+    return contents | {name: csv_of(columns).encode() for name, columns in verification.curves.items()}

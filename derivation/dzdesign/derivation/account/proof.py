@@ -14,10 +14,9 @@ from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.conditions import Finding, judge_condition
-from dzdesign.derivation.account.identity import agree
-from dzdesign.derivation.account.solving import Relation, Step, solve_relations
+from dzdesign.derivation.account.solving import Relation, Step, agree, solve_relations
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
-from dzdesign.derivation.account.symbol_units import find_unit_error
+from dzdesign.derivation.account.units import find_unit_error
 from dzdesign.derivation.symbols import Name
 
 
@@ -25,17 +24,13 @@ from dzdesign.derivation.symbols import Name
 class CaseProof:
     """The derivation of one case of a statement; most statements have a single one, without words."""
 
-    statement: Statement
     case: Case
     #: What the grounds give for the symbol.
     derived: sympy.Expr
     #: Derived minus published, one per member; zero where they agree.
     discrepancies: tuple[sympy.Expr, ...]
-    #: The grounds at the values at which the case uses them.
-    relations: tuple[Relation, ...]
-    #: The statement's symbol and the eliminated ones, solved for.
+    #: The statement's symbol and the eliminated ones, solved for; and how, one ground after another.
     solution: Mapping[Name, sympy.Expr]
-    #: How they were solved for, one ground after another.
     steps: tuple[Step, ...]
     #: The form in which a derivation states the result: as published, or as derived where the two differ.
     reached: sympy.Expr
@@ -104,16 +99,21 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
         if statement.number in earlier:
             raise RequirementError(f"{statement.number} is stated twice")
         check_grounds(statement, earlier, order)
-        verdict = _with_units(judge(statement, earlier, verdicts))
+        verdict, error = judge(statement, earlier, verdicts), find_unit_error(statement)
+        # What does not follow may be wrong in its units too, nothing else may.
+        verdict = replace(verdict, unit_error=error, as_expected=verdict.as_expected and not (error and verdict.holds))
         earlier[statement.number] = statement
-        verdicts[statement.number] = (
-            verdict if hear is None or not verdict.as_expected else overrule(verdict, hear(verdict, earlier))
-        )
+        if hear is not None and verdict.as_expected:
+            verdict = overrule(verdict, hear(verdict, earlier))
+        verdicts[statement.number] = verdict
     return tuple(verdicts.values())
 
 
 def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
     """Raise `RequirementError` if a statement rests on itself, a later one, an unknown one, or a copy of itself."""
+    if statement.kind.is_given == bool(statement.grounds):
+        wanted = "has no" if statement.kind.is_given else "needs"
+        raise RequirementError(f"{statement.number}: a statement of kind {statement.kind} {wanted} grounds")
     for ground in statement.grounds:
         if ground.number == statement.number:
             raise RequirementError(f"{statement.number} is its own premise")
@@ -131,13 +131,6 @@ def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order:
             raise RequirementError(f"{statement.number} rests on a copy of itself, {ground.number}")
 
 
-def _with_units(verdict: Verdict) -> Verdict:
-    """Check the units too: what does not follow may be wrong in them, nothing else may."""
-    error = find_unit_error(verdict.statement)
-    expected = verdict.as_expected and not (error and verdict.holds)
-    return replace(verdict, unit_error=error, as_expected=expected)
-
-
 def overrule(verdict: Verdict, objection: str) -> Verdict:
     """Return a verdict after the referee; with an objection the statement does not follow."""
     if not objection:
@@ -149,37 +142,35 @@ def overrule(verdict: Verdict, objection: str) -> Verdict:
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:
     """Judge one statement by its logic alone, from the earlier ones and their verdicts, both by number."""
 
-    def verdict(outcome: Outcome, words: str, flawed: bool = False, **found: Any) -> Verdict:
-        expected = outcome is statement.expected and not flawed
-        return Verdict(statement=statement, outcome=outcome, words=words, as_expected=expected, **found)
+    def verdict(finding: Finding, **found: Any) -> Verdict:
+        return Verdict(
+            statement=statement,
+            outcome=finding.outcome,
+            words=finding.words,
+            as_expected=finding.outcome is statement.expected and not finding.flawed,
+            necessary=finding.necessary,
+            **found,
+        )
 
     if statement.kind.is_given:
-        return verdict(Outcome.GIVEN, statement.kind.value)
+        return verdict(Finding(Outcome.GIVEN, statement.kind.value))
     proofs = _proofs(statement, earlier)
     if isinstance(proofs, str):
-        return verdict(Outcome.DOES_NOT_FOLLOW, f"does not follow: {proofs}", flawed=True)
-    differences = [value for proof in proofs for value in proof.discrepancies if value != 0]
-    finding = _finding(statement, proofs, differences)
+        return verdict(Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow: {proofs}", flawed=True))
     unsound = [ground.number for ground in statement.grounds if not verdicts[ground.number].holds]
     if unsound:
         words = f"rests on {', '.join(unsound)}, which does not follow"
-        return verdict(Outcome.DOES_NOT_FOLLOW, words, flawed=True, proofs=proofs)
+        return verdict(Finding(Outcome.DOES_NOT_FOLLOW, words, flawed=True), proofs=proofs)
+    finding = _finding(statement, proofs)
     inherited = tuple(dict.fromkeys(n for ground in statement.grounds for n in _conditional(verdicts[ground.number])))
-    outcome, words = finding.outcome, finding.words
-    if inherited and outcome is Outcome.FOLLOWS:
-        outcome, words = Outcome.FOLLOWS_IF, f"follows on the condition of {', '.join(inherited)}"
-    elif inherited and outcome is Outcome.FOLLOWS_IF:
-        words += f", and on the condition of {', '.join(inherited)}"
+    if inherited and finding.outcome is Outcome.FOLLOWS:
+        finding = replace(
+            finding, outcome=Outcome.FOLLOWS_IF, words=f"follows on the condition of {', '.join(inherited)}"
+        )
+    elif inherited and finding.outcome is Outcome.FOLLOWS_IF:
+        finding = replace(finding, words=f"{finding.words}, and on the condition of {', '.join(inherited)}")
     limits = tuple(dict.fromkeys(n for one in statement.grounds for n in _limits(verdicts[one.number], statement)))
-    return verdict(
-        outcome,
-        words,
-        flawed=finding.flawed,
-        proofs=proofs,
-        necessary=finding.necessary,
-        inherited=inherited,
-        limited_by=limits,
-    )
+    return verdict(finding, proofs=proofs, inherited=inherited, limited_by=limits)
 
 
 def _limits(verdict: Verdict, user: Statement) -> tuple[str, ...]:
@@ -194,7 +185,8 @@ def _conditional(verdict: Verdict) -> tuple[str, ...]:
     return itself + verdict.inherited if verdict.outcome is Outcome.FOLLOWS_IF else ()
 
 
-def _finding(statement: Statement, proofs: Sequence[CaseProof], differences: Sequence[sympy.Expr]) -> Finding:
+def _finding(statement: Statement, proofs: Sequence[CaseProof]) -> Finding:
+    differences = [value for proof in proofs for value in proof.discrepancies if value != 0]
     if statement.condition is not None:
         return judge_condition(statement.condition, differences)
     if differences:
@@ -230,7 +222,7 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
         replacements = dict(case.at)
         relations = tuple(relation_of(earlier[ground.number], ground, replacements) for ground in statement.grounds)
         provided = tuple(provision.xreplace(replacements) for provision in statement.provided)
-        found = solve_relations(relations, (statement.symbol, *statement.eliminate), provided)
+        found = solve_relations(relations, (statement.symbol, *_eliminated(statement, relations)), provided)
         if isinstance(found, str):
             return found
         solution = found.values
@@ -245,11 +237,9 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
         reached = derived if any(differences) else members[-1]
         proofs.append(
             CaseProof(
-                statement=statement,
                 case=case,
                 derived=derived,
                 discrepancies=differences,
-                relations=relations,
                 solution=solution,
                 steps=found.steps,
                 reached=reached,
@@ -263,6 +253,14 @@ def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[Cas
     if unneeded:
         return f"the derivation does not need {', '.join(unneeded)}"
     return tuple(proofs)
+
+
+def _eliminated(statement: Statement, relations: Sequence[Relation]) -> tuple[Name, ...]:
+    """Return what is solved for beside the symbol: what the grounds are about, as many as there are grounds."""
+    if statement.eliminate is not None:
+        return statement.eliminate
+    named = dict.fromkeys((statement.symbol, *(relation.left for relation in relations)))
+    return tuple(named)[1 : len(relations)]
 
 
 def _conditions(member: sympy.Expr) -> list[sympy.Basic]:

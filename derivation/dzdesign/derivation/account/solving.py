@@ -1,7 +1,7 @@
-"""Solves the grounds of a statement for its symbol and for what is eliminated, exactly, or says why not.
+"""Whether two expressions are one function; and the grounds of a statement, solved for its symbol step by step.
 
-Nothing is divided by what may be zero: a coefficient must be different from zero by the signs of its symbols, or by
-what the statement is provided with.
+The steps are the derivation that a reader gets. Nothing is divided by what may be zero: a coefficient must be different
+from zero by the signs of its symbols, or by what the statement is provided with.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,9 +10,34 @@ from functools import lru_cache
 
 import sympy
 
-from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.statement import Ground
 from dzdesign.derivation.symbols import Name
+
+
+def agree(left: sympy.Expr, right: sympy.Expr) -> bool:
+    """Decide whether two expressions are identical.
+
+    Exact for rational functions of symbols, of roots of single symbols, and of logarithms and applied functions,
+    which count as symbols of their own; logarithms of products are expanded first.
+
+    Examples
+    --------
+    >>> from dzdesign.derivation.symbols import dP, rho
+    >>> agree(sympy.sqrt(2 * dP / rho), sympy.sqrt(2) * sympy.sqrt(dP) / sympy.sqrt(rho))
+    True
+    """
+    if left == right:
+        return True
+    if left.has(sympy.Piecewise, sympy.nan) or right.has(sympy.Piecewise, sympy.nan):
+        return False
+    difference = left - right
+    if difference.has(sympy.log):
+        difference = sympy.expand_log(difference)
+    # A root and its symbol are two generators to `cancel`; writing each symbol as a square makes them one.
+    bases = {power.base for power in difference.atoms(sympy.Pow) if power.exp.is_Rational and not power.exp.is_Integer}
+    squares = {base: sympy.Dummy(positive=True) ** 2 for base in bases if base.is_Symbol and base.is_nonnegative}
+    return bool(sympy.cancel(difference.xreplace(squares)) == 0)
+
 
 _CONTRADICTION = "the premises contradict each other"
 _SEVERAL = "the premises allow several values"
@@ -38,6 +63,8 @@ class Step:
     ground: Ground
     name: Name
     gives: sympy.Expr
+    #: Whether the ground states the unknown as it stands.
+    as_stated: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +91,10 @@ def solve_relations(
     needed: set[sympy.Ne] = set()
     nonzero = [(provision.lhs - provision.rhs, provision) for provision in provided]
     sides = [(relation.left, relation.right) for relation in relations]
-    grounds, steps = [relation.ground for relation in relations], []
+    left_over, steps = list(relations), []
     while sides:
         index, name = _choose(sides, [name for name in unknowns if name not in solved], nonzero)
-        (left, right), ground = sides.pop(index), grounds.pop(index)
+        (left, right), relation = sides.pop(index), left_over.pop(index)
         if name is None:  # no unknown is left in it: it must be true by itself
             if not agree(left, right):
                 return _CONTRADICTION
@@ -81,7 +108,7 @@ def solve_relations(
         if name.is_nonzero:  # then what it equals is not zero either
             nonzero.append((sympy.numer(sympy.factor(value)), None))
         solved[name] = value
-        steps.append(Step(ground, name, value))
+        steps.append(Step(relation.ground, name, value, as_stated=relation.left == name))
         needed |= used
         sides = [tuple(side.xreplace({name: value}) for side in pair) for pair in sides]
     values = _put_back(solved, unknowns)

@@ -10,7 +10,7 @@ from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.proof import Verdict
 from dzdesign.derivation.account.published import transcribed
 from dzdesign.derivation.account.statement import Outcome, Statement
-from dzdesign.derivation.account.symbol_units import print_unit
+from dzdesign.derivation.account.units import print_unit
 from dzdesign.derivation.presentation.content import DerivationReport, Entry, Term
 from dzdesign.derivation.presentation.formulas import to_python
 from dzdesign.derivation.presentation.prose import Formula, Words, parse_prose

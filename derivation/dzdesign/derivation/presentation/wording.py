@@ -46,7 +46,7 @@ def describe(verdict: Verdict, book: Mapping[str, Verdict]) -> Entry:
         limited_by=verdict.limited_by,
         inherited=verdict.inherited,
         unit_error=verdict.unit_error,
-        derivations=tuple(_derivation(proof, book) for proof in verdict.proofs),
+        derivations=tuple(_derivation(proof, statement, book) for proof in verdict.proofs),
         differences=tuple(_differences(verdict, book)),
         corrections=(_correction(statement, corrected.statement, book),) if corrected else (),
         corrected_by=(Reference(statement.corrected_by),) if statement.corrected_by else (),
@@ -186,13 +186,13 @@ def _significant(number: float) -> str:
 # --- a derivation -------------------------------------------------------------------------------------------
 
 
-def _derivation(proof: CaseProof, book: Mapping[str, Verdict]) -> Derivation:
-    symbol, cases = proof.statement.symbol, proof.statement.cases
+def _derivation(proof: CaseProof, statement: Statement, book: Mapping[str, Verdict]) -> Derivation:
+    symbol, cases = statement.symbol, statement.cases
     where = parse_prose(proof.case.where, book)
     if cases:
         made = Words.join(Formula(*pair) for pair in proof.case.at)
         where = Words("Case: ", where, ", that is ", made) if where else Words("With ", made)
-    lines = [Line(words=_step(step, proof, book), formula=Formula(step.name, step.gives)) for step in proof.steps]
+    lines = [Line(words=_step(step, book), formula=Formula(step.name, step.gives)) for step in proof.steps]
     if to_text(proof.steps[-1].gives) != to_text(proof.reached) or len(proof.steps) > 1:
         lines.append(Line(words=Words("Together:"), formula=Formula(symbol, proof.reached)))
     if cases and not any(proof.discrepancies) and to_text(proof.published) != to_text(proof.reached):
@@ -205,8 +205,7 @@ def _derivation(proof: CaseProof, book: Mapping[str, Verdict]) -> Derivation:
     )
 
 
-def _step(step: Step, proof: CaseProof, book: Mapping[str, Verdict]) -> Words:
+def _step(step: Step, book: Mapping[str, Verdict]) -> Words:
     """Say from which ground a step comes, and for what it was solved if it does not stand there."""
-    as_stated = any(one.ground == step.ground and one.left == step.name for one in proof.relations)
-    solved: tuple[Part, ...] = () if as_stated else (", solved for ", Formula(step.name))
+    solved: tuple[Part, ...] = () if step.as_stated else (", solved for ", Formula(step.name))
     return Words("From ", _ground(step.ground, book), *solved, ":")

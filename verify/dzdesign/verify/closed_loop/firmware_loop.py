@@ -49,7 +49,7 @@ class FirmwareLoop:
     valve_at_corners: tuple[ValveAtCorners, ...] = ()
 
     def result(
-        self, plant: Plant | None, source: str, sha256: str | None, against_integrator: tuple[PlantComparison, ...]
+        self, plant: Plant | None, source: str, sha256: str | None, against_cvodes: tuple[PlantComparison, ...]
     ) -> ClosedLoopResult:
         """Return what the evidence has of the ramps and of the plant, given from a file or made of the recordings."""
         return ClosedLoopResult(
@@ -59,7 +59,7 @@ class FirmwareLoop:
             dynamics=None if plant else self.dynamics,
             back_MPa=self.backs_MPa,
             pressures=tuple(loop.result for loop in self.loops),
-            against_integrator=against_integrator,
+            against_cvodes=against_cvodes,
         )
 
 

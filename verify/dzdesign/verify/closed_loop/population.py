@@ -3,8 +3,9 @@
 Each component of the budget is drawn by itself, evenly between its ends: valve, coil, supply or current, sensors,
 converter, oil, ageing. The valve's threshold lies between the certified bound and as far on the other side of the
 plant's own, at every pressure drop; that of a stand-in, which is known at the tests, runs linearly between them. Each
-machine opens and closes at every tested pressure drop, and at one drawn between each two of them; then zero command is
-held, with the converter's noise. No formula stands in for the loop.
+machine closes at every tested pressure drop, and at one drawn between each two of them: its drive at zero command, with
+the converter's noise at its peak, is compared with that threshold. Those that come nearest to it run through the loop,
+where no formula stands in for it: they open and close at each of these pressure drops, then zero command is held.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -17,7 +18,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.machine import Machine
-from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, DrawnMachine, drawn_machine, worst_ends
+from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, ZeroDrives, drawn_machine, worst_ends
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RECORD_S
 from dzdesign.verify.closed_loop.scene import SETTLE_S, Scene
 from dzdesign.verify.closed_loop.stored_digits import DECIMALS
@@ -34,6 +35,8 @@ REST_S = 0.1
 #: Where the plant's closing threshold is found: so many pressure drops from one test to the next, one of which is
 #: drawn; and halvings of it.
 NODES, HALVINGS = 16, 17
+#: Machines that run through the loop; and how many are drawn at once, which a processor's cache has room for.
+IN_LOOP, AT_ONCE = 200, 2048
 #: So far within the tested pressure drops, MPa, their ends are inside them in doubles too.
 WITHIN_MPA = 1e-9
 NOT_DECLARED = (
@@ -159,12 +162,14 @@ def _certified(compensator: Compensator, sign: int) -> Callable[[np.ndarray], np
     return bound
 
 
-def draw(count: int, seed: int, worst: np.ndarray, drawn: Collection[str] = COMPONENTS) -> np.ndarray:
+def draw(
+    count: int, random: np.random.Generator, worst: np.ndarray, drawn: Collection[str] = COMPONENTS
+) -> np.ndarray:
     """Return where in its half-width each component of each machine lies, (count, components), from -1 to 1.
 
     Components that are not drawn stand at their worst ends. The first n of a larger number are the same.
     """
-    shares = np.random.default_rng(seed).uniform(-1, 1, (count, len(COMPONENTS)))
+    shares = random.uniform(-1, 1, (count, len(COMPONENTS)))
     kept = [name not in drawn for name in COMPONENTS]
     shares[:, kept] = worst[kept]
     return shares
@@ -173,38 +178,38 @@ def draw(count: int, seed: int, worst: np.ndarray, drawn: Collection[str] = COMP
 def run_population(
     scenes: Sequence[Scene], machines: int, seed: int, *, drawn: Collection[str] = COMPONENTS
 ) -> Population:
-    """Draw machines from the declared one, and run each at zero command.
+    """Draw machines from the declared one, compare each with its threshold, and run the nearest ones through the loop.
 
     Scenes of one side are one: its pressure drops. Components that are not `drawn` stand at their worst ends.
     """
     machine = scenes[0].compensator.machine
     if machine is None:
         raise InputError(NOT_DECLARED)
-    flows: dict[Side, np.ndarray] = {}
-    worst: tuple[float, DrawnMachine | None, float] = (-1.0, None, 0.0)
-    closed, count = 0, 0
-    for side in dict.fromkeys(scene.side for scene in scenes):
-        tests = [scene.dp_MPa for scene in scenes if scene.side == side]
-        scene = next(scene for scene in scenes if scene.side == side)
-        found = _Run.of(scene, tests, machine, machines, seed, drawn)
-        flows[side] = found.beyond_L_min
-        closed += found.never_open
-        count = max(count, found.pressures)
-        if found.worst_L_min > worst[0]:
-            worst = (found.worst_L_min, found.worst, found.worst_dp_MPa)
-    flowing = int(np.any([each > NO_FLOW_L_MIN for each in flows.values()], axis=0).sum())
+    sides: dict[Side, list[Scene]] = {}
+    for scene in scenes:
+        sides.setdefault(scene.side, []).append(scene)
+    found = [
+        _Side(own[0], [scene.dp_MPa for scene in own], machine, seed, drawn).of(machines) for own in sides.values()
+    ]
+    worst = min(found, key=lambda each: each.margins_V[0])
+    leaking = max(found, key=lambda each: each.largest_L_min)
+    flowing = int(np.any([each.flows for each in found], axis=0).sum())
     return Population(
         machines=machines,
         seed=seed,
         flowing=flowing,
-        never_open=closed,
         confidence=CONFIDENCE,
         upper_limit=upper_limit(flowing, machines),
-        pressures=count,
-        largest_L_min=round(max(worst[0], 0.0), DECIMALS),
-        largest_dp_MPa=round(worst[2], DECIMALS),
-        worst=worst[1].in_words() if worst[1] else {},
+        pressures=max(each.pressures for each in found),
+        least_margin_V=round(float(worst.margins_V[0]), DECIMALS),
+        least_dp_MPa=round(worst.nearest_MPa, DECIMALS),
+        worst={name: round(float(share), 6) for name, share in zip(COMPONENTS, worst.shares[0], strict=True)},
         drawn=tuple(name for name in COMPONENTS if name in drawn),
+        in_loop=sum(each.margins_V.size for each in found),
+        flowing_in_loop=sum(each.flowing_in_loop for each in found),
+        never_open=sum(each.never_open for each in found),
+        largest_L_min=round(max(leaking.largest_L_min, 0.0), DECIMALS),
+        largest_dp_MPa=round(leaking.largest_dp_MPa, DECIMALS),
     )
 
 
@@ -222,39 +227,91 @@ def upper_limit(flowing: int, machines: int, confidence: float = CONFIDENCE) -> 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
-    """What the machines of one side did."""
+class _Found:
+    """What the machines of one side do."""
 
-    #: (machines,): largest flow at zero command beyond what is allowed.
-    beyond_L_min: np.ndarray
-    #: Machines that did not open at some pressure drop: they say nothing.
-    never_open: int
+    #: (machines,): whether the drive at zero command is above the threshold at some pressure drop.
+    flows: np.ndarray
     pressures: int
-    worst: DrawnMachine
-    worst_L_min: float
-    worst_dp_MPa: float
+    #: Of the machines that come nearest, nearest first: by how much the threshold lies above the drive, V; where each
+    #: component lies in its half-width.
+    margins_V: np.ndarray
+    shares: np.ndarray
+    #: Where the nearest of all comes so near.
+    nearest_MPa: float
+    #: Of these in the loop: how many flow, how many do not open at some pressure drop, the largest flow at zero command
+    #: beyond what is allowed.
+    flowing_in_loop: int
+    never_open: int
+    largest_L_min: float
+    largest_dp_MPa: float
 
-    @classmethod
-    def of(
-        cls, scene: Scene, tested_MPa: Sequence[float], machine: Machine, machines: int, seed: int,
-        drawn: Collection[str],
-    ) -> "_Run":  # fmt: skip
-        tested = np.array(sorted(tested_MPa))
-        band = threshold_band(scene, tested_MPa)
-        shares = draw(machines, seed, worst_ends(scene), drawn)
+
+class _Side:
+    """The machines of one side, at the pressure drops of its tests and between them."""
+
+    def __init__(
+        self, scene: Scene, tested_MPa: Sequence[float], machine: Machine, seed: int, drawn: Collection[str]
+    ) -> None:
+        self._scene, self._machine, self._drawn = scene, machine, drawn
+        self._tested = np.array(sorted(tested_MPa))
+        self._band = threshold_band(scene, tested_MPa)
+        dp = self._band.dp_MPa
+        self._middle_V, self._half_V = self._band.middle_V, self._band.half_width_V(dp)
+        self._places = np.random.default_rng(seed)
         # Where the threshold of the plant was found: it need not be linear between two tests.
-        steps = np.random.default_rng([seed, 1]).integers(1, NODES, (machines, tested.size - 1))
-        between = band.dp_MPa[steps + NODES * np.arange(tested.size - 1)]
-        dp = np.concatenate([np.tile(tested, (machines, 1)), between], axis=1)
-        none = np.array([_no_flow(scene, one) for one in tested])
-        openings = Openings.of(dp.shape[1], settle_s=scene.settle_s, waits_s=scene.loop.waits_s)
+        self._between = np.random.default_rng([seed, 1])
 
-        def one(index: int) -> tuple[np.ndarray, np.ndarray]:
-            each = drawn_machine(scene, machine, shares[index], index)
-            moved_V = band.moved_V(dp[index], each.threshold)
+    def of(self, machines: int) -> _Found:
+        drives, worst = ZeroDrives(self._scene, self._machine), worst_ends(self._scene)
+        gaps = self._tested.size - 1
+        at_tests = np.arange(gaps + 1) * NODES
+        flows = np.zeros(machines, dtype=bool)
+        index, margins = np.empty(0, int), np.empty(0)
+        shares, nodes = np.empty((0, len(COMPONENTS))), np.empty((0, 2 * gaps + 1), int)
+        for begin in range(0, machines, AT_ONCE):
+            count = min(AT_ONCE, machines - begin)
+            own = draw(count, self._places, worst, self._drawn)
+            between = self._between.integers(1, NODES, (count, gaps)) + at_tests[:-1]
+            at = np.concatenate([np.tile(at_tests, (count, 1)), between], axis=1)
+            threshold_V = self._middle_V[at] + own[:, [COMPONENTS.index("recording")]] * self._half_V[at]
+            margin_V = (threshold_V - drives.at(own, self._band.dp_MPa[at])).min(axis=1)
+            flows[begin : begin + count] = margin_V < 0
+            near = np.flatnonzero(margin_V < margins[-1]) if margins.size == IN_LOOP else np.arange(count)
+            if not near.size:
+                continue
+            index, margins = np.append(index, begin + near), np.append(margins, margin_V[near])
+            shares, nodes = np.vstack([shares, own[near]]), np.vstack([nodes, at[near]])
+            nearest = np.argsort(margins, kind="stable")[:IN_LOOP]
+            index, margins, shares, nodes = index[nearest], margins[nearest], shares[nearest], nodes[nearest]
+        dp = self._band.dp_MPa[nodes]
+        first = self._middle_V[nodes[0]] + shares[0, COMPONENTS.index("recording")] * self._half_V[nodes[0]]
+        nearest_MPa = float(dp[0][np.argmin(first - drives.at(shares[:1], dp[:1])[0])])
+        beyond, opened = self._in_loop(index, shares, dp)
+        row, place = np.unravel_index(int(beyond.argmax()), beyond.shape)
+        return _Found(
+            flows=flows,
+            pressures=int(dp.shape[1]),
+            margins_V=margins,
+            shares=shares,
+            nearest_MPa=nearest_MPa,
+            flowing_in_loop=int((beyond > NO_FLOW_L_MIN).any(axis=1).sum()),
+            never_open=int((opened <= NO_FLOW_L_MIN).any(axis=1).sum()),
+            largest_L_min=float(beyond.max()),
+            largest_dp_MPa=float(dp[row, place]),
+        )
+
+    def _in_loop(self, index: np.ndarray, shares: np.ndarray, dp_MPa: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Run machines; return the flow at zero command beyond what is allowed, and before, at each pressure drop."""
+        scene = self._scene
+        openings = Openings.of(dp_MPa.shape[1], settle_s=scene.settle_s, waits_s=scene.loop.waits_s)
+
+        def one(place: int) -> tuple[np.ndarray, np.ndarray]:
+            each = drawn_machine(scene, self._machine, shares[place], int(index[place]))
+            moved_V = self._band.moved_V(dp_MPa[place], each.threshold)
             run = each.loop.run(
                 openings.command,
-                dp[index][openings.place],
+                dp_MPa[place][openings.place],
                 "compensated",
                 back_MPa=scene.back_MPa,
                 added_V=each.added_V - moved_V[openings.place],
@@ -264,14 +321,6 @@ class _Run:
             return openings.largest(flow, judged=True), openings.largest(flow, judged=False)
 
         with ThreadPoolExecutor(WORKERS) as pool:
-            at_zero, opened = (np.array(each) for each in zip(*pool.map(one, range(machines)), strict=True))
-        beyond = at_zero - np.interp(dp, tested, none - NO_FLOW_L_MIN)
-        machine_at, place = np.unravel_index(int(beyond.argmax()), beyond.shape)
-        return cls(
-            beyond_L_min=beyond.max(axis=1),
-            never_open=int((opened <= NO_FLOW_L_MIN).any(axis=1).sum()),
-            pressures=int(dp.shape[1]),
-            worst=drawn_machine(scene, machine, shares[machine_at], int(machine_at)),
-            worst_L_min=float(beyond.max()),
-            worst_dp_MPa=float(dp[machine_at, place]),
-        )
+            at_zero, opened = (np.array(each) for each in zip(*pool.map(one, range(index.size)), strict=True))
+        none = np.array([_no_flow(scene, one) for one in self._tested]) - NO_FLOW_L_MIN
+        return at_zero - np.interp(dp_MPa, self._tested, none), opened

@@ -25,7 +25,7 @@ COUNTS = ("plants", "machines", "seed")
 SEQUENCE = RampSequence(rest=1.0, ramp=10.0, top=0.5)
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 WORKERS = 2
-MOST_PLANTS = 100_000
+MOST = {"plants": 100_000, "machines": 100_000_000, "seed": 100_000}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,8 +74,8 @@ def read_tolerances(path: Path) -> Tolerances:
 
 def _count(path: Path, name: str, value: Any) -> int:
     least = 0 if name == "seed" else 1
-    if type(value) is not int or not least <= value <= MOST_PLANTS:
-        raise InputError(f"'{path}': {name} is {quoted(value)}, expected a whole number from {least} to {MOST_PLANTS}")
+    if type(value) is not int or not least <= value <= MOST[name]:
+        raise InputError(f"'{path}': {name} is {quoted(value)}, expected a whole number from {least} to {MOST[name]}")
     return value
 
 

@@ -14,7 +14,6 @@ from dzdesign.core.errors import and_more, quoted
 from dzdesign.core.folder_contents import digest_of
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify.requirements import REPRODUCED, Check
 
 #: Folder of a firmware for files of the user's own, beside those that were generated.
@@ -82,16 +81,10 @@ def reproduced(folder: Path, again: Regenerated) -> Check:
     return REPRODUCED.check(holds=True, text=text)
 
 
-def change_since(folder: Path, manifest: FirmwareManifest | OutputManifest) -> str:
-    """Return what was changed, added or taken away since a folder was generated, for who can't generate it again.
-
-    Empty where nothing was, but for what is the user's to fill in.
-    """
-    own = getattr(manifest, "board", ())
-    stated = {name: digest for name, digest in manifest.files.items() if name not in own}
-    if changed := [name for name, digest in stated.items() if _digest(folder / name) != digest]:
-        return f"changed or missing: {and_more(changed, MOST_NAMED)}"
-    return _added_fault(folder, manifest.files)
+def differing_files(folder: Path, manifest: FirmwareManifest) -> dict[str, str]:
+    """Return the SHA-256 of each file that was changed or added since it was generated: as it was verified."""
+    there = {name: _digest(folder / name) for name in (*manifest.files, *added_files(folder, manifest.files))}
+    return {name: digest for name, digest in sorted(there.items()) if digest not in ("", manifest.files.get(name))}
 
 
 def _digest(path: Path) -> str:
@@ -100,7 +93,7 @@ def _digest(path: Path) -> str:
 
 def changed_board_files(folder: Path, manifest: FirmwareManifest) -> tuple[str, ...]:
     """Return the files that the user fills in and that are no longer as generated."""
-    return tuple(name for name in sorted(manifest.board) if _digest(folder / name) not in ("", manifest.files[name]))
+    return tuple(name for name in differing_files(folder, manifest) if name in manifest.board)
 
 
 def user_files(folder: Path, generated: Collection[str]) -> tuple[str, ...]:

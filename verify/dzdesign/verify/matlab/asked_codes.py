@@ -16,7 +16,6 @@ from pathlib import Path
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.scratch import scratch_folder
-from dzdesign.verify.fmu.binary_core import text_flag
 from dzdesign.verify.matlab.octave import PROGRAMS, run_octave
 from dzdesign.verify.toolchain.compiled_core import CHECK, CompiledCore, Findings, findings_of
 from dzdesign.verify.toolchain.machines import HOST, stored
@@ -156,3 +155,9 @@ def _joined(asked: AskedCodes, name: str, output: str) -> Path | str:
                 shutil.copyfileobj(content, to, 1 << 20)
             piece.unlink()
     return whole
+
+
+def text_flag(macro: str, text: str) -> str:
+    """Return the flag that defines a string of C."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'-D{macro}="{escaped}"'

@@ -37,10 +37,7 @@ class OutputKind:
 #: Target, as the manifest names it, to its checks.
 KINDS: Mapping[str, OutputKind] = {
     "iec61131": OutputKind(module="dzdesign.verify.structured_text.checks"),
-    "fmu": OutputKind(
-        module="dzdesign.verify.fmu.checks",
-        options={"--machine-code": "dzdesign.verify.fmu.other_machines"},
-    ),
+    "fmu": OutputKind(module="dzdesign.verify.fmu.checks"),
     "matlab": OutputKind(module="dzdesign.verify.matlab.checks"),
     "amplifier": OutputKind(module="dzdesign.verify.amplifier.output_checks"),
 }
