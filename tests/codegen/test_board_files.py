@@ -123,7 +123,7 @@ def test_a_notebook_shows_what_was_kept(compensator, cortex):
 @pytest.mark.parametrize("name", ["cortex_m4/dz_tick.c", "core/dz_drive.c", "cortex_m4/Makefile", "compensator.json"])
 def test_any_other_file_that_was_changed_is_not_overwritten(compensator, cortex, name, wording):
     text = (cortex / name).read_text()
-    (cortex / name).write_text(text.replace("dzdesign", "mydesign", 1) + "\n")
+    (cortex / name).write_text(text.replace("1.0.0", "1.0.1", 1) + "\n")
     before = {path: path.read_bytes() for path in cortex.rglob("*") if path.is_file()}
     with wording.refusal(InputError):
         write_firmware(generate(compensator, "cortex-m4"), cortex)
