@@ -14,12 +14,12 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.verify.closed_loop.drive_corners import MOST_MOVED, valve_at_corners
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.plant import Plant, read_plant
-from dzdesign.verify.closed_loop.valve_at_corners import MOST_MOVED, valve_at_corners
 
 CONTROLLED = {
     "drive": "current",

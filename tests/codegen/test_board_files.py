@@ -65,7 +65,8 @@ def test_they_are_marked_in_their_first_lines_and_in_the_manifest(compensator):
         for name, text in firmware.files.items():
             head = " ".join(text.splitlines()[:4])
             assert ("Yours to edit" in head) is (name in target.board) and target.board <= firmware.files.keys()
-            assert name in ("compensator.json", ".gitattributes") or ("Do not edit" in head) is (name not in target.board)
+            bare = ("compensator.json", ".gitattributes")
+            assert name in bare or ("Do not edit" in head) is (name not in target.board)
     assert found["cortex-m4"] == tuple(f"cortex_m4/{name}" for name in BOARD)
     assert found["f28335"] == (PROJECT,) and found["host"] == ()
 

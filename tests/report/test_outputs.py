@@ -17,7 +17,6 @@ from dzdesign.report.artefacts import Chain, Place
 from dzdesign.report.outputs import change_in, outputs_in, outputs_sections, with_outputs
 from dzdesign.report.page import Headline, MadeOutput, MadeOutputs
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
-from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.output_evidence import OutputEvidence, TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
 from dzdesign.verify.verification import evidence_manifest
@@ -163,15 +162,6 @@ def test_what_can_not_be_read_hinders_no_other(folder, digest):
     assert made.others[0].startswith("'plc' is not listed: ")
 
 
-def test_evidence_of_the_firmware_is_that_of_verify(folder, digest):
-    manifest = sha256_of((folder / "firmware" / MANIFEST_NAME).read_bytes())
-    evidence = evidence_with(made_from=(SourceFile(source=f"firmware/{MANIFEST_NAME}", sha256=manifest),))
-    (folder / "evidence").mkdir()
-    (folder / "evidence" / Evidence.FILE_NAME).write_bytes(to_json_bytes(evidence))
-    found = listed(folder, digest)["firmware/"]
-    assert (found.verdict, found.evidence) == ("HOLDS", f"evidence/{Evidence.FILE_NAME}")
-
-
 # --- on the page ------------------------------------------------------------------------------------------------------
 
 
@@ -194,12 +184,6 @@ def test_without_another_output_than_the_firmware_there_is_no_such_section(folde
     for path in (folder / "plc").iterdir():
         path.unlink()
     assert 'id="outputs"' not in report_of_folder(folder).html
-
-
-def test_names_are_no_markup(folder):
-    (folder / "plc").rename(folder / "<b>plc")
-    html = report_of_folder(folder).html
-    assert "<b>plc" not in html and "&lt;b&gt;plc" in html
 
 
 WRONG = MadeOutput(kind="fmu", settings="", place="fmu/", sha256="0" * 64, holds=False, fault="inputs: 3 wrong")

@@ -51,7 +51,7 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         OtherTarget(
             name="iec61131",
             description="Structured Text of IEC 61131-3: a function block for a PLC, and PLCopen XML",
-            module="dzdesign.codegen.structured_text.files",
+            module="dzdesign.codegen.integers.plc",
             options={"dialect": ("codesys", "twincat"), "interface": ("plc", "codes")},
             folder="plc",
         ),
@@ -64,7 +64,7 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         OtherTarget(
             name="matlab",
             description="a function of MATLAB and Octave in integer arithmetic, and C for Simulink's C Caller block",
-            module="dzdesign.codegen.matlab.files",
+            module="dzdesign.codegen.integers.matlab",
         ),
         OtherTarget(
             name="amplifier",

@@ -105,10 +105,12 @@ def verify_output_folder(
     folder: Path, arguments: VerifyArguments, identified: "ValveModel | None" = None
 ) -> "OutputVerification":
     """Verify an output other than a C firmware; `identified` is as in `verify_firmware`."""
+    from dzdesign.codegen.integers.law import forms_of
     from dzdesign.regeneration import regenerated
     from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.outputs.dispatch import SCHEMA, kind_for, output_evidence_files, verify_output
+    from dzdesign.verify.outputs.folder import read_output_manifest
     from dzdesign.verify.verification import evidence_manifest
 
     given = [flag_of(name) for name in OF_FIRMWARE if getattr(arguments, name)]
@@ -119,7 +121,8 @@ def verify_output_folder(
     with stage_progress("designing and generating again"):
         again = regenerated(folder)
     with again.written() as code, stage_progress() as stage:
-        verification = verify_output(folder, given, stage, again, code)
+        forms = forms_of(read_compensator(folder), read_output_manifest(folder)) if again.files else {}
+        verification = verify_output(folder, given, stage, again, code, forms)
     added: list[Check] = []
     if recordings and verification.evidence.inputs:
         with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):

@@ -165,7 +165,7 @@ FAULTS = {
     "half the play": other_plant(hysteresis_V=0.5),
     "the play on the wrong side": text("plant_period.h", "(plant->play - plant->mean", "(plant->mean - plant->play"),
     "the play of this period's current": text(
-        "plant_period.h", "= plant->state[CHARGE] * p[PLANT_VOLTS_PER_CHARGE]", "= plant->state[CURRENT] * 6.0 / 6.6667"
+        "plant_period.h", "= plant->charge * p[PLANT_VOLTS_PER_CHARGE]", "= plant->state[CURRENT] * 6.0 / 6.6667"
     ),
     "a stop that throws back": text("plant.h", "end[SPEED] = 0.0;", "end[SPEED] *= -0.3;"),
     "a stop that is ignored": text("plant.h", "} else if (end[POSITION] > high) {", "} else if (0) {"),

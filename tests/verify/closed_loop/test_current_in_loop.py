@@ -10,12 +10,12 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.example import example_folder
+from dzdesign.verify.closed_loop.drive_corners import valve_at_corners, valve_at_corners_check
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.closed_loop.valve_at_corners import valve_at_corners, valve_at_corners_check
 from tests.codegen.test_current_control import MEASURED, TEXTS
 from tests.support.example_coil import COIL
 from tests.support.synthetic import needs_compiler

@@ -193,7 +193,7 @@ def test_a_recording_that_is_called_ten_times_too_good_fails(example_valve, tmp_
 
 
 def test_machines_need_no_plant_and_no_parameter(tmp_path, example_folder):
-    assert read_tolerances(example_folder / "machines.toml") == Tolerances(machines=10_000, seed=1)
+    assert read_tolerances(example_folder / "machines.toml") == Tolerances(machines=1_000_000, seed=1)
     path = tmp_path / "t.toml"
     path.write_text("machines = 12\nseed = 3")
     assert read_tolerances(path) == Tolerances(machines=12, seed=3)

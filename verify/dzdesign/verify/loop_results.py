@@ -106,7 +106,7 @@ class PlantComparison:
 
     side: Side
     dp_MPa: Annotated[
-        tuple[float, float], quantity("MPa", "Lowest and highest pressure drop at no flow.", ge=0, le=1000)
+        tuple[float, float], quantity("MPa", "Lowest and highest pressure drop at no flow.")
     ]
     seconds: Annotated[float, quantity("s", "Length of the window.", gt=0, le=1000)]
     step_s: Annotated[

@@ -259,7 +259,7 @@ class CvodesSpool:
         return plant.K_i_N_A * current - plant.K_et_N_m * 1e-3 * position - load + push_N
 
     def _is_held(self) -> bool:
-        position, speed = self.state[[2, 4]]
+        position, speed = float(self.state[2]), float(self.state[4])
         if speed != 0.0 or 0.0 < position < self.plant.stroke_mm:
             return False
         return (self._pull(float(self.state[0])) > 0.0) == (position > 0.0)
@@ -302,7 +302,7 @@ class CvodesSpool:
             self.state = self._path(met, free=True)[-1]
             self.state[2], self.state[4] = stop, 0.0
             self.impacts += 1
-            return met
+            return float(met)
         self.state = places[-1]
         return left
 

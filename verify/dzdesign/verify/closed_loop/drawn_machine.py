@@ -34,6 +34,8 @@ COMPONENTS = tuple(ENDS)
 PRESSURES = tuple(name for name in COMPONENTS if "pressure" in name or "converter" in name)
 #: A component's place in its half-width, of one machine or of many.
 Places = Mapping[str, Any]
+#: Of command, sensor A and sensor B.
+OfChannels = tuple[Any, Any, Any]
 
 
 def places_of(shares: np.ndarray) -> dict[str, Any]:
@@ -110,7 +112,7 @@ def _between(ends: tuple[float, float], share: Any) -> Any:
     return low + (high - low) * (share + 1) / 2
 
 
-def _errors(scene: Scene, machine: Machine, at: Places) -> tuple[tuple[Any, ...], tuple[Any, ...], tuple[int, ...]]:
+def _errors(scene: Scene, machine: Machine, at: Places) -> tuple[OfChannels, OfChannels, tuple[int, int, int]]:
     """Return offsets, gains and noise of command, sensor A and sensor B, as `ReadingErrors` has them.
 
     A wrong pressure drop on the bench is one of the sensor ahead.
@@ -148,7 +150,8 @@ class ZeroDrives:
         ends = np.array([0, exact.code_max])
         furthest = np.sort(exact.difference(ends, ends[::-1]))
         self._first = int(furthest[0])
-        reach = int(exact.difference(exact.a.zero_code + noise, exact.b.zero_code - noise)) * exact.turn + 1
+        peaks = np.array([exact.a.zero_code + noise]), np.array([exact.b.zero_code - noise])
+        reach = abs(int(exact.difference(*peaks)[0])) + 1
         # The last node is at the largest difference that sound sensors make.
         last = scene.compensator.beta_step_codes * (len(scene.compensator.side(scene.sign).beta) - 1)
         betas = exact.beta_numerators(np.minimum(np.arange(furthest[0], furthest[1] + 1), last))
@@ -183,16 +186,17 @@ class ZeroDrives:
             )
         ]  # fmt: skip
         place = exact.difference(*codes) - self._first
-        drive_V = self._drives[0][place]
+        drive_V: np.ndarray = self._drives[0][place]
         away = np.abs(np.trunc(command)) + noise
         if exact.transition_end and np.any(away > exact.zero_band):
             share = np.clip((away - self._ends[1]) / (self._ends[2] - self._ends[1]), 0.0, 1.0)
             drive_V = drive_V + share * (self._drives[2][place] - drive_V)
-        found: np.ndarray = (drive_V + _rest_V(scene, self._machine, at)) * ratio
-        return found
+        drives: np.ndarray = (drive_V + _rest_V(scene, self._machine, at)) * ratio
+        return drives
 
 
 def _largest_within(values: np.ndarray, reach: int) -> np.ndarray:
     """Return the largest value within a reach to either side of each."""
     padded = np.pad(values, reach, mode="edge")
-    return np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+    largest: np.ndarray = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+    return largest

@@ -11,11 +11,11 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.verify.closed_loop.coil_in_loop import HOLDING_H, coil_sources, nominal_coil
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
 from dzdesign.verify.closed_loop.plant_step import numbers_of, step_header
 from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
+from dzdesign.verify.current.coil_simulation import HOLDING_H, coil_sources, nominal_coil
 from dzdesign.verify.toolchain.bound_block import core_sources
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 

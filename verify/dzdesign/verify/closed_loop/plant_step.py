@@ -121,9 +121,9 @@ def numbers_of(plant: Plant) -> Numbers:
 def step_header() -> str:
     """Return the C code of the functions that plant.h calls; the same for every plant.
 
-    ``plant_open(state[5], h, voltage, push, supply_MPa, p) -> state[5]``
+    ``plant_open(state[4], h, voltage, push, supply_MPa, p) -> state[4]``
         is CasADi's Runge-Kutta step of the fourth order past the edge. The state is current, position, speed, and the
-        integrals of current and position; `push` is the acceleration by the play and by drive that is added.
+        integral of the position; `push` is the acceleration by the play and by drive that is added.
     ``plant_shut``
         is that before the edge, where `push` has all that acts; ``plant_held`` is that at a stop.
     ``plant_acting(x, supply_MPa, p) -> (acts in m/s², dp_MPa, Q_L_min)``
@@ -137,23 +137,28 @@ def step_header() -> str:
     p = ca.SX.sym("p", sum(sizes))
     parts = ca.vertsplit(p, [0, *np.cumsum(sizes).tolist()])
     named = SimpleNamespace(**dict(zip(NAMED, ca.vertsplit(parts[0]), strict=True)))
-    state, given = ca.SX.sym("state", 5), ca.SX.sym("given", 3)
+    state, given, supply = ca.SX.sym("state", 4), ca.SX.sym("given", 2), ca.SX.sym("supply")
     current, x, v = state[0], state[1], state[2]
-    voltage, push, supply = ca.vertsplit(given)
     h, position = ca.SX.sym("h"), ca.SX.sym("x")
+    # All that the time step multiplies, once: a stage then waits for one product less of the stage before it.
+    stepped = [h * each for each in (
+        named.DRIVE * given[0], given[1], named.DECAY, named.PULL, named.SPRING, named.DAMPING, named.PER_KG, 1.0,
+    )]  # fmt: skip
+    drive, push, decay, pull, spring, damping, per_kg, time = ca.vertsplit(ca.SX.sym("stepped", len(stepped)))
 
     def step(name: str, speed: Any, acceleration: Any) -> "casadi.Function":
-        rates = ca.vertcat(named.DRIVE * voltage - named.DECAY * current, speed, acceleration, current, x)
-        all_given = ca.vertcat(given, p)
-        runge_kutta = ca.simpleRK(ca.Function(name, [state, all_given], [rates]), 1, 4).expand()
-        return ca.Function(name, [state, h, *ca.vertsplit(given), p], [runge_kutta(state, all_given, h)])
+        rates = ca.vertcat(drive - decay * current, speed, acceleration, time * x)
+        of_all = ca.vertcat(drive, push, decay, pull, spring, damping, per_kg, time, supply, p)
+        runge_kutta = ca.simpleRK(ca.Function(name, [state, of_all], [rates]), 1, 4).expand()
+        end = runge_kutta(state, ca.vertcat(*stepped, supply, p), 1)
+        return ca.Function(name, [state, h, *ca.vertsplit(given), supply, p], [end])
 
     # In this order the spool's own terms, which each stage waits for, come last.
-    shut = (named.PULL * current + push) - (named.SPRING * x + named.DAMPING * v)
-    open_ = shut + named.PER_KG * equations().acting(x, supply, *parts[1:])[3]
+    shut = (pull * current + push) - (spring * x + damping * v)
+    open_ = (pull * current + push + per_kg * equations().acting(x, supply, *parts[1:])[3]) - (spring * x + damping * v)
     generator = ca.CodeGenerator("plant_step.c")
-    generator.add(step("plant_open", v, open_))
-    generator.add(step("plant_shut", v, shut))
+    generator.add(step("plant_open", time * v, open_))
+    generator.add(step("plant_shut", time * v, shut))
     generator.add(step("plant_held", 0, 0))
     force, dp_MPa, flow, _ = equations().acting(position, supply, *parts[1:])
     acting = [named.PER_KG * force, dp_MPa, flow]

@@ -110,7 +110,7 @@ class ThresholdBand:
         return middle + share * self.half_width_V(dp_MPa)
 
 
-def threshold_band(scene: Scene, tested_MPa: Sequence[float]) -> ThresholdBand:
+def threshold_band(scene: Scene, tested_MPa: Sequence[float] | np.ndarray) -> ThresholdBand:
     """Find where the plant of a scene closes, without the compensator, by halving; and what bounds it."""
     tested = np.array(sorted(tested_MPa))
     inner = [np.linspace(low, high, NODES, endpoint=False) for low, high in pairwise(tested)]
@@ -188,24 +188,22 @@ def run_population(
     sides: dict[Side, list[Scene]] = {}
     for scene in scenes:
         sides.setdefault(scene.side, []).append(scene)
-    found = [
-        _Side(own[0], [scene.dp_MPa for scene in own], machine, seed, drawn).of(machines) for own in sides.values()
-    ]
-    worst = min(found, key=lambda each: each.margins_V[0])
+    found = [MachinesOfSide(own, machine, seed, drawn).of(machines) for own in sides.values()]
+    worst = min(found, key=lambda each: float(each.compared.margins_V[0]))
     leaking = max(found, key=lambda each: each.largest_L_min)
-    flowing = int(np.any([each.flows for each in found], axis=0).sum())
+    flowing = int(np.any([each.compared.flows for each in found], axis=0).sum())
     return Population(
         machines=machines,
         seed=seed,
         flowing=flowing,
         confidence=CONFIDENCE,
         upper_limit=upper_limit(flowing, machines),
-        pressures=max(each.pressures for each in found),
-        least_margin_V=round(float(worst.margins_V[0]), DECIMALS),
+        pressures=max(each.compared.dp_MPa.shape[1] for each in found),
+        least_margin_V=round(float(worst.compared.margins_V[0]), DECIMALS),
         least_dp_MPa=round(worst.nearest_MPa, DECIMALS),
-        worst={name: round(float(share), 6) for name, share in zip(COMPONENTS, worst.shares[0], strict=True)},
+        worst={name: round(float(share), 6) for name, share in zip(COMPONENTS, worst.compared.shares[0], strict=True)},
         drawn=tuple(name for name in COMPONENTS if name in drawn),
-        in_loop=sum(each.margins_V.size for each in found),
+        in_loop=sum(each.compared.index.size for each in found),
         flowing_in_loop=sum(each.flowing_in_loop for each in found),
         never_open=sum(each.never_open for each in found),
         largest_L_min=round(max(leaking.largest_L_min, 0.0), DECIMALS),
@@ -227,87 +225,96 @@ def upper_limit(flowing: int, machines: int, confidence: float = CONFIDENCE) -> 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Found:
-    """What the machines of one side do."""
+class Compared:
+    """Machines of one side beside their thresholds, and of those that come nearest, nearest first, what they are."""
 
     #: (machines,): whether the drive at zero command is above the threshold at some pressure drop.
     flows: np.ndarray
-    pressures: int
-    #: Of the machines that come nearest, nearest first: by how much the threshold lies above the drive, V; where each
-    #: component lies in its half-width.
+    #: Which machine it is; by how much the threshold lies above its drive, V; where each component lies in its
+    #: half-width; its pressure drops, MPa, (.., pressures).
+    index: np.ndarray
     margins_V: np.ndarray
     shares: np.ndarray
+    dp_MPa: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Found:
+    """What the machines of one side do."""
+
+    compared: Compared
     #: Where the nearest of all comes so near.
     nearest_MPa: float
-    #: Of these in the loop: how many flow, how many do not open at some pressure drop, the largest flow at zero command
-    #: beyond what is allowed.
+    #: Of the nearest ones in the loop: how many flow, how many do not open at some pressure drop, the largest flow at
+    #: zero command beyond what is allowed.
     flowing_in_loop: int
     never_open: int
     largest_L_min: float
     largest_dp_MPa: float
 
 
-class _Side:
-    """The machines of one side, at the pressure drops of its tests and between them."""
+class MachinesOfSide:
+    """The machines of one side, whose scenes are its pressure drops."""
 
-    def __init__(
-        self, scene: Scene, tested_MPa: Sequence[float], machine: Machine, seed: int, drawn: Collection[str]
-    ) -> None:
-        self._scene, self._machine, self._drawn = scene, machine, drawn
-        self._tested = np.array(sorted(tested_MPa))
-        self._band = threshold_band(scene, tested_MPa)
-        dp = self._band.dp_MPa
-        self._middle_V, self._half_V = self._band.middle_V, self._band.half_width_V(dp)
-        self._places = np.random.default_rng(seed)
-        # Where the threshold of the plant was found: it need not be linear between two tests.
-        self._between = np.random.default_rng([seed, 1])
+    def __init__(self, scenes: Sequence[Scene], machine: Machine, seed: int, drawn: Collection[str]) -> None:
+        self._scene, self._machine, self._drawn, self._seed = scenes[0], machine, drawn, seed
+        self._tested = np.array(sorted(scene.dp_MPa for scene in scenes))
+        self._band = threshold_band(self._scene, self._tested)
+        self._half_V = self._band.half_width_V(self._band.dp_MPa)
+        self._drives = ZeroDrives(self._scene, machine)
 
-    def of(self, machines: int) -> _Found:
-        drives, worst = ZeroDrives(self._scene, self._machine), worst_ends(self._scene)
-        gaps = self._tested.size - 1
+    def compared(self, machines: int) -> Compared:
+        """Draw machines, and compare the drive of each at zero command with the threshold of its valve."""
+        worst, gaps = worst_ends(self._scene), self._tested.size - 1
+        places, steps = np.random.default_rng(self._seed), np.random.default_rng([self._seed, 1])
         at_tests = np.arange(gaps + 1) * NODES
         flows = np.zeros(machines, dtype=bool)
         index, margins = np.empty(0, int), np.empty(0)
         shares, nodes = np.empty((0, len(COMPONENTS))), np.empty((0, 2 * gaps + 1), int)
         for begin in range(0, machines, AT_ONCE):
             count = min(AT_ONCE, machines - begin)
-            own = draw(count, self._places, worst, self._drawn)
-            between = self._between.integers(1, NODES, (count, gaps)) + at_tests[:-1]
+            own = draw(count, places, worst, self._drawn)
+            # Where the threshold of the plant was found: it need not be linear between two tests.
+            between = steps.integers(1, NODES, (count, gaps)) + at_tests[:-1]
             at = np.concatenate([np.tile(at_tests, (count, 1)), between], axis=1)
-            threshold_V = self._middle_V[at] + own[:, [COMPONENTS.index("recording")]] * self._half_V[at]
-            margin_V = (threshold_V - drives.at(own, self._band.dp_MPa[at])).min(axis=1)
+            margin_V = self._margins_V(own, at).min(axis=1)
             flows[begin : begin + count] = margin_V < 0
             near = np.flatnonzero(margin_V < margins[-1]) if margins.size == IN_LOOP else np.arange(count)
-            if not near.size:
-                continue
-            index, margins = np.append(index, begin + near), np.append(margins, margin_V[near])
-            shares, nodes = np.vstack([shares, own[near]]), np.vstack([nodes, at[near]])
-            nearest = np.argsort(margins, kind="stable")[:IN_LOOP]
-            index, margins, shares, nodes = index[nearest], margins[nearest], shares[nearest], nodes[nearest]
-        dp = self._band.dp_MPa[nodes]
-        first = self._middle_V[nodes[0]] + shares[0, COMPONENTS.index("recording")] * self._half_V[nodes[0]]
-        nearest_MPa = float(dp[0][np.argmin(first - drives.at(shares[:1], dp[:1])[0])])
-        beyond, opened = self._in_loop(index, shares, dp)
+            if near.size:
+                index, margins = np.append(index, begin + near), np.append(margins, margin_V[near])
+                shares, nodes = np.vstack([shares, own[near]]), np.vstack([nodes, at[near]])
+                nearest = np.argsort(margins, kind="stable")[:IN_LOOP]
+                index, margins, shares, nodes = index[nearest], margins[nearest], shares[nearest], nodes[nearest]
+        return Compared(flows=flows, index=index, margins_V=margins, shares=shares, dp_MPa=self._band.dp_MPa[nodes])
+
+    def _margins_V(self, shares: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+        """Return by how much each threshold lies above the drive, at nodes of the band, V."""
+        threshold_V = self._band.middle_V[nodes] + shares[:, [COMPONENTS.index("recording")]] * self._half_V[nodes]
+        margins: np.ndarray = threshold_V - self._drives.at(shares, self._band.dp_MPa[nodes])
+        return margins
+
+    def of(self, machines: int) -> _Found:
+        """Return what the machines do, the nearest of them in the loop too."""
+        found = self.compared(machines)
+        nodes = np.searchsorted(self._band.dp_MPa, found.dp_MPa[:1])
+        beyond, opened = self._in_loop(found)
         row, place = np.unravel_index(int(beyond.argmax()), beyond.shape)
         return _Found(
-            flows=flows,
-            pressures=int(dp.shape[1]),
-            margins_V=margins,
-            shares=shares,
-            nearest_MPa=nearest_MPa,
+            compared=found,
+            nearest_MPa=float(found.dp_MPa[0, np.argmin(self._margins_V(found.shares[:1], nodes))]),
             flowing_in_loop=int((beyond > NO_FLOW_L_MIN).any(axis=1).sum()),
             never_open=int((opened <= NO_FLOW_L_MIN).any(axis=1).sum()),
             largest_L_min=float(beyond.max()),
-            largest_dp_MPa=float(dp[row, place]),
+            largest_dp_MPa=float(found.dp_MPa[row, place]),
         )
 
-    def _in_loop(self, index: np.ndarray, shares: np.ndarray, dp_MPa: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _in_loop(self, found: Compared) -> tuple[np.ndarray, np.ndarray]:
         """Run machines; return the flow at zero command beyond what is allowed, and before, at each pressure drop."""
-        scene = self._scene
+        scene, dp_MPa = self._scene, found.dp_MPa
         openings = Openings.of(dp_MPa.shape[1], settle_s=scene.settle_s, waits_s=scene.loop.waits_s)
 
         def one(place: int) -> tuple[np.ndarray, np.ndarray]:
-            each = drawn_machine(scene, self._machine, shares[place], int(index[place]))
+            each = drawn_machine(scene, self._machine, found.shares[place], int(found.index[place]))
             moved_V = self._band.moved_V(dp_MPa[place], each.threshold)
             run = each.loop.run(
                 openings.command,
@@ -321,6 +328,6 @@ class _Side:
             return openings.largest(flow, judged=True), openings.largest(flow, judged=False)
 
         with ThreadPoolExecutor(WORKERS) as pool:
-            at_zero, opened = (np.array(each) for each in zip(*pool.map(one, range(index.size)), strict=True))
+            at_zero, opened = (np.array(each) for each in zip(*pool.map(one, range(len(dp_MPa))), strict=True))
         none = np.array([_no_flow(scene, one) for one in self._tested]) - NO_FLOW_L_MIN
         return at_zero - np.interp(dp_MPa, self._tested, none), opened

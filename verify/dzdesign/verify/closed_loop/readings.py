@@ -48,8 +48,8 @@ class Channels:
     @property
     def converted_per_unit(self) -> np.ndarray:
         """Codes for one of what each channel measures, as a converter rounds: a span of n codes has n + 1 of them."""
-        spans: np.ndarray = self.fulls - self.zeros + np.sign(self.fulls - self.zeros)
-        return spans / self.spans
+        codes: np.ndarray = (self.fulls - self.zeros + np.sign(self.fulls - self.zeros)) / self.spans
+        return codes
 
     @property
     def codes_per_MPa(self) -> tuple[float, float]:

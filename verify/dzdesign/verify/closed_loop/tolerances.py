@@ -66,7 +66,7 @@ def read_tolerances(path: Path) -> Tolerances:
     counts = {name: _count(path, name, values.pop(name)) for name in COUNTS if name in values}
     if not values and ("plants" in counts or "machines" not in counts):
         raise InputError(
-            f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\", or machines = 10000 to draw "
+            f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\", or machines = 1000000 to draw "
             "machines from the declared budget"
         )
     return Tolerances(spreads={name: _spread(path, name, value) for name, value in values.items()}, **counts)

@@ -18,14 +18,15 @@
 #define EVENTS 16
 #define NEAR 4
 
-enum { CURRENT, POSITION, SPEED, CHARGE, TRAVEL, STATES };
+enum { CURRENT, POSITION, SPEED, TRAVEL, STATES };
 
 struct plant
 {
     const double *p;     /* the numbers of plant_step.py */
     const double *curve; /* the recorded characteristic, see plant_curve.h; none: the edge is that of Eq. (24) */
     int32_t counts;      /* of the compare value in a period */
-    double state[STATES]; /* A, m, m/s; A s and m s since the period began */
+    double state[STATES]; /* A, m, m/s; m s since the period began */
+    double charge;       /* A s since the period began */
     int open;            /* on which side of the edge; a plant in which nothing depends on the position has none */
     double supply_MPa;
     double acts; /* acceleration by preload and pressure drop where the spool is, m/s^2; known at a stop */
@@ -135,6 +136,14 @@ static inline int at_stop(const struct plant *plant)
     return (plant->state[POSITION] <= 0.0) || (plant->state[POSITION] >= plant->p[PLANT_STROKE_M]);
 }
 
+/* Whether a free spool is at a stop, or may come to one within the next steps. */
+static inline int is_near(const struct plant *plant, double h)
+{
+    const double reach = 2.0 * fabs(plant->state[SPEED]) * h, x = plant->state[POSITION];
+
+    return (x <= reach) || (x >= plant->p[PLANT_STROKE_M] - reach);
+}
+
 /* Moves for h, or to the first event; returns for how long. */
 static inline double move(struct plant *plant, double h, double voltage)
 {
@@ -159,6 +168,7 @@ static inline double move(struct plant *plant, double h, double voltage)
             return h;
         }
     }
+    h = is_near(plant, h) ? h / NEAR : h;
     step(plant, flight, h, voltage, end);
     reach = (fabs(v) + fabs(end[SPEED])) * h;
     if ((v * end[SPEED] < 0.0) && (end[POSITION] >= low) && (end[POSITION] <= high) &&
@@ -197,23 +207,16 @@ static inline double move(struct plant *plant, double h, double voltage)
     return h;
 }
 
-/* Whether a free spool may come to a stop within the next steps. */
-static inline int is_near(const struct plant *plant, double h)
-{
-    const double reach = 2.0 * fabs(plant->state[SPEED]) * h, x = plant->state[POSITION];
-
-    return (reach > 0.0) && ((x < reach) || (x > plant->p[PLANT_STROKE_M] - reach));
-}
-
 /* A part of the period at one voltage, in steps as short as the plant's fastest motion asks for. */
 static inline void phase(struct plant *plant, double seconds, double voltage)
 {
-    const int32_t steps = (int32_t)(seconds * plant->p[PLANT_STEPS_PER_S]) + 1;
-    const double h = seconds / steps;
+    const double *p = plant->p;
+    const int32_t steps = (int32_t)ceil(seconds * p[PLANT_STEPS_PER_S]);
+    const double h = seconds / steps, before = plant->state[CURRENT];
     double left = seconds;
 
     for (int32_t taken = 0; (taken < NEAR * steps + EVENTS) && (left > CLOSE * seconds); taken++) {
-        left -= move(plant, fmin(left, is_near(plant, h) ? h / NEAR : h), voltage);
+        left -= move(plant, fmin(left, h), voltage);
     }
     if (left > CLOSE * seconds) { /* to and fro at a stop: it stays there for the rest of the phase */
         double end[STATES];
@@ -221,6 +224,8 @@ static inline void phase(struct plant *plant, double seconds, double voltage)
         step(plant, HELD, left, voltage, end);
         memcpy(plant->state, end, sizeof end);
     }
+    /* Eqs. (19) to (21), integrated: they do not feel the spool. */
+    plant->charge += (p[PLANT_DRIVE] * voltage * seconds - (plant->state[CURRENT] - before)) / p[PLANT_DECAY];
 }
 
 #endif

@@ -46,7 +46,7 @@ static inline void plant_period(struct plant *plant, int32_t compare)
 
     plant->play = (plant->play < low) ? low : ((plant->play > high) ? high : plant->play);
     plant->push = (plant->play - plant->mean + plant->bias) * p[PLANT_PUSH];
-    plant->state[CHARGE] = plant->state[TRAVEL] = 0.0;
+    plant->charge = plant->state[TRAVEL] = 0.0;
     if (compare > 0) {
         phase(plant, on, p[PLANT_U_MAX_V]);
     }
@@ -54,7 +54,7 @@ static inline void plant_period(struct plant *plant, int32_t compare)
         phase(plant, p[PLANT_PERIOD_S] - on, 0.0);
     }
     plant->state[CURRENT] = (plant->state[CURRENT] < LEAST_A) ? 0.0 : plant->state[CURRENT];
-    plant->mean = plant->state[CHARGE] * p[PLANT_VOLTS_PER_CHARGE];
+    plant->mean = plant->charge * p[PLANT_VOLTS_PER_CHARGE];
     if (plant->curve) {
         /* At the mean position: the PWM's ripple stands out of it, as it does of a meter's reading. */
         curve_flow(plant, plant->state[TRAVEL] / p[PLANT_PERIOD_S]);
