@@ -85,7 +85,7 @@ def example_valve(example_tests):
 def default_options():
     """What `design` takes where no option is given."""
     from dzdesign.codegen.project import DEFAULT_TARGET, target_named
-    from dzdesign.design.option_texts import options_of
+    from dzdesign.design.options import options_of
 
     return options_of({}, target_named(DEFAULT_TARGET).inputs())
 

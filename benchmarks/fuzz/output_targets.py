@@ -16,7 +16,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.fixed.dead_zones import dead_zones
+from dzdesign.design.fixed_offset import dead_zones
 from dzdesign.verify.amplifier.checks import checks as amplifier_checks
 from dzdesign.verify.amplifier.readers import READERS
 from dzdesign.verify.matlab.operations import evaluated

@@ -21,7 +21,7 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 

@@ -15,7 +15,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.quantise import finest_units
+from dzdesign.design.side_design import finest_units
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import CommandSignal
 from dzdesign.verify.toolchain.host_compiler import STRICT, check_strictly, find_compilers

@@ -14,8 +14,8 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot.setting import lot_setting
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.lot_setting import lot_setting
+from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
 from dzdesign.verify.firmware.compensator_checks import law_follows
@@ -78,7 +78,7 @@ def test_what_design_wrote_follows(document):
     [
         (("sides", "positive", "drive_range_over_u_max"), [3, 5], "drive_range_over_u_max' is 0.600000, but"),
         (("signals", "command", "full_code"), 3000, "'signals.command.full_code' is 3000, but 4095 follows"),
-        (("signals", "pressure_a", "span_MPa"), [25, 1], "certificate"),
+        (("signals", "pressure_a", "span_MPa"), [25, 1], "'signals.pressure_a.span_MPa' is 25"),
         (("valve", "meter", "floor_L_min"), 0.1, "the rest of the file gives"),
         (("options", "output_max"), "90 %", "'drive_functions.compare_limit' is 60000, but 54000 follows"),
         (("options", "polarity"), "upside down", "--polarity is 'upside down'"),

@@ -10,7 +10,7 @@ import pytest
 from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.design.designing import design as design_valve
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.report.lot.summary import FailedValve, LotSummary
 from dzdesign.terminal.notebook import html_of
 from dzdesign.terminal.page import new_console

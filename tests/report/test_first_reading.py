@@ -11,7 +11,7 @@ from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain, standing_warnings
 from dzdesign.report.sections.closed_loop import scenarios_table

@@ -21,7 +21,7 @@ from dzdesign.core.artefact_types import as_document
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.report.lot.folder import read_lot
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.sections import sections_of

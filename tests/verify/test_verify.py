@@ -288,7 +288,7 @@ def test_what_could_not_be_checked_is_not_passed(tmp_path):
 def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, tmp_path):
     from dzdesign.codegen.project import generate, target_named
     from dzdesign.design.designing import design
-    from dzdesign.design.option_texts import options_of
+    from dzdesign.design.options import options_of
 
     options = options_of({"pressure_span": "5.1 MPa"}, target_named("f28335").inputs())
     firmware = generate(design(example_valve, options), "f28335")

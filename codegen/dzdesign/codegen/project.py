@@ -33,7 +33,7 @@ from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import BLOCK_FILE, VECTORS_NAME, Calibration, FirmwareManifest, FirmwareOrigin
-from dzdesign.design.machine.words import reach_of_certificate
+from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.design.target_inputs import Converter
 
 if TYPE_CHECKING:

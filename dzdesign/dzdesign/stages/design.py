@@ -43,7 +43,7 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
         If an option can't be read, or concerns negative commands of a valve that has none.
     """
     from dzdesign.codegen.project import target_named
-    from dzdesign.design.option_texts import options_of
+    from dzdesign.design.options import options_of
 
     options = options_of({name: getattr(choices, name) or "" for name in DEFAULTS}, target_named(target).inputs())
     if options.signals.command.negative_full_code is not None:

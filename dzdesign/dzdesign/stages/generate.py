@@ -158,7 +158,7 @@ def _plant_text(path: Path) -> str:
 
 
 def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bytes | None, bool]":
-    """Return the compensator whose numbers follow, its file, None without one, and whether it was designed here."""
+    """Return the compensator, its file, None without one, and whether it was designed here."""
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import Compensator
@@ -169,7 +169,8 @@ def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensato
 
     given = arguments.compensator
     if isinstance(given, Compensator):
-        return _proven(given, "the compensator", arguments), None, False
+        _refuse_other_choices(given, "the compensator", arguments)
+        return given, None, False
     source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
     document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
     if document["schema"] == VALVE_SCHEMA:
@@ -177,16 +178,15 @@ def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensato
         return design_valve(valve, design_options(arguments, target), content), None, True
     compensator = read_artefact(content, Compensator, source)
     refuse_without_options(compensator, source)
-    return _proven(compensator, f"'{source}'", arguments), content, False
+    _refuse_other_choices(compensator, f"'{source}'", arguments)
+    return compensator, content, False
 
 
-def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> "Compensator":
-    """Return a compensator whose numbers follow from its valve and options; refuse options that it was not given.
+def _refuse_other_choices(compensator: "Compensator", source: str, choices: DesignChoices) -> None:
+    """Refuse options that a compensator was not designed with.
 
     Its own may be given again, as by the options file of all commands.
     """
-    from dzdesign.design.redesign_check import prove_derived
-
     designed = compensator.options or {}
     for name in DEFAULTS:
         given = getattr(choices, name)
@@ -196,8 +196,3 @@ def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> 
                 f"{flag_of(name)} is {quoted(given)}, but {source} was designed {own}; leave the option out, or run "
                 "`dzdesign design` again"
             )
-    try:
-        prove_derived(compensator)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
-    return compensator

@@ -21,7 +21,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.recorded_units import CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.lot_valves import LotValve
 from tests.support.block_reader import hex_memory, members_of
 from tests.support.core_variants import variant
 from tests.support.paths import ROOT

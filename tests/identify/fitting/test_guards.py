@@ -16,7 +16,8 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.designing import DesignOptions, design
+from dzdesign.design.designing import design
+from dzdesign.design.options import DesignOptions
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.side import identify_side
@@ -289,8 +290,6 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     document["sides"]["positive"]["certificate"]["guard"] = "mean"
     content = json.dumps(document).encode()
     Path("compensator.json").write_bytes(content)
-    assert main(["codegen", "compensator.json", "-o", "wrong"]) == 2
-    assert "certificate does not hold" in capsys.readouterr().err
     firmware = generate(read_artefact(content, Compensator, "compensator.json"), "f28335", content)
     write_folder(Path("wrong"), firmware.files, firmware.manifest)
     assert main(["verify", "wrong"]) == 1

@@ -11,7 +11,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.example import example_folder
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence

@@ -10,9 +10,9 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.current.choosing import CurrentSensor, choose_loop, gains_of
 from dzdesign.design.current.circuit import CoilCircuit
-from dzdesign.design.current.margins import Gains, margins
+from dzdesign.design.current.responses import Gains, margins
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.verify.analysis import machine_code
 from dzdesign.verify.current.coil_simulation import CoilLoop
 from dzdesign.verify.current.current_checks import current_checks

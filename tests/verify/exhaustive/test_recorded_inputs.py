@@ -10,7 +10,7 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.recorded_drop import DropColumns

@@ -11,7 +11,7 @@ from dzdesign.codegen.structured_text.files import structured_text
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.structured_text.every_pair import ExactTables, TriedBlock

@@ -11,7 +11,7 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.pressure_inputs.not_covered import not_covered
+from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, loop_curves

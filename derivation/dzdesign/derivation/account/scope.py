@@ -61,13 +61,6 @@ class Scope:
     def __and__(self, other: "Scope") -> "Scope":
         return Scope(tuple(dict.fromkeys((*self.settings, *other.settings))), sympy.And(self.where, other.where))
 
-    def implies(self, other: "Scope") -> bool:
-        """Whether all that another scope says is said here too."""
-        aspects = {setting.aspect for setting in other.settings}
-        inside = all(one in other.settings for one in self.settings if one.aspect in aspects)
-        named = aspects <= {setting.aspect for setting in self.settings}
-        return inside and named and set(other.comparisons) <= set(self.comparisons)
-
     def admits(self, settings: frozenset[Setting]) -> bool:
         """Whether what is set up is one of the settings named, of each aspect; one with a beta of its own if named."""
         if settings & {FREE_BETA, WITH_TRANSITION} - set(self.settings):

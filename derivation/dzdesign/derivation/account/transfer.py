@@ -3,7 +3,7 @@
 import sympy
 from sympy import Eq, sqrt
 
-from dzdesign.derivation.account.equations import ORIFICE
+from dzdesign.derivation.account.equations import ORIFICE, beyond
 from dzdesign.derivation.account.published import SIMULATION
 from dzdesign.derivation.account.scope import BARE, EVERYWHERE, PLANT, scope
 from dzdesign.derivation.account.statement import Ground, Kind, Statement
@@ -120,7 +120,7 @@ TRANSFER_FUNCTION = (
         "$K_a K_fi$ / ($R_c + r_p$), and makes the current depend less on the coil's temperature by the same factor."
     ),
     Kind.DEFINITION("transfer function", "transfer function from command to flow").says(G, Q_s / U_i),
-    Kind.THEOREM("T6b", "transfer function of Eqs. (19)-(24) without load force")
+    Kind.THEOREM("T6b", "transfer function of Eqs. (19) to (24) without load force")
     .says(G, ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)))
     .by(
         "transfer function",
@@ -143,7 +143,7 @@ TRANSFER_FUNCTION = (
     .within(u_min <= u_O),
     Kind.THEOREM("T6d", "Eq. (24) is the dead-zone model (1) beyond the threshold")
     .says(Q, ORIFICE * x_e)
-    .by(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap")
+    .by(Ground("(1)", beyond(u_min)), "overlap")
     .within(BARE, u_min <= u_i)
     .if_(Eq(x_ov, 0), ruled_out_by=((x_ov, _OVERLAP_MM / 1000),), discrepancy=-ORIFICE * x_ov)
     .corrected("T6e")
@@ -153,6 +153,6 @@ TRANSFER_FUNCTION = (
     ),
     Kind.CORRECTED("T6e", "flow across an edge with overlap, opened")
     .says(Q, ORIFICE * (x_e - x_ov))
-    .by(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap")
+    .by(Ground("(1)", beyond(u_min)), "overlap")
     .within(BARE, u_min <= u_i),
 )

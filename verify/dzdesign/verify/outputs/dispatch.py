@@ -11,7 +11,7 @@ from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
-from dzdesign.design.pressure_inputs.not_covered import not_covered
+from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.firmware.recomputed_bounds import bounds_follow

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.ceiling import curve_row, exact_row
-from dzdesign.design.ceiling.curve_row import certified_row, offset_row
-from dzdesign.design.ceiling.exact_row import ExactRow, least_of
-from dzdesign.design.ceiling.offset_ceiling import offset_ceiling
-from dzdesign.design.ceiling.offset_curve import OffsetCurve, certified_V
+from dzdesign.design import exact_row
+from dzdesign.design import offset_ceiling as ceilings
+from dzdesign.design.above_tests import OffsetAbove
+from dzdesign.design.exact_row import ExactRow, least_of
 from dzdesign.design.machine.allowance import allowance_of
-from dzdesign.design.offset.above_tests import OffsetAbove
+from dzdesign.design.offset_ceiling import OffsetCurve, certified_row, certified_V, offset_ceiling, offset_row
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 
@@ -113,7 +112,7 @@ def test_the_least_of_windows_and_of_rows_is_exact():
 
 def test_doubles_alone_would_be_wrong(monkeypatch):
     """The fault that the test above must see: equal doubles taken for equal numbers."""
-    monkeypatch.setattr(exact_row.ExactRow, "_sorted_among_equals", lambda *given: [])
+    monkeypatch.setattr(exact_row.ExactRow, "_is_less", lambda *given: False)
     with pytest.raises(AssertionError):
         test_the_least_of_windows_and_of_rows_is_exact()
 
@@ -133,10 +132,10 @@ def test_a_corner_taken_for_a_stretch_is_seen(monkeypatch):
     )  # fmt: skip
     with pytest.raises(RequirementError):
         certified_row(high, SIGNALS, 400, 400)
-    monkeypatch.setattr(curve_row, "certified_V", lambda given, dp_MPa: given.at(dp_MPa))
-    curve_row.KNOWN.clear()
+    monkeypatch.setattr(ceilings, "certified_V", lambda given, dp_MPa: given.at(dp_MPa))
+    ceilings.KNOWN.clear()
     assert certified_row(high, SIGNALS, 400, 400)[0] == Fraction(9, 2)
-    curve_row.KNOWN.clear()
+    ceilings.KNOWN.clear()
 
 
 def test_doubles_are_the_nearest():

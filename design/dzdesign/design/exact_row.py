@@ -4,6 +4,7 @@ A quotient of two whole numbers in Python is the nearest double, and rounding to
 of two numbers with unlike doubles the larger double is of the larger number. Only equal doubles are compared exactly.
 """
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -90,38 +91,22 @@ class ExactRow(Sequence[Fraction]):
 
     def least_of_windows(self, width: int) -> "ExactRow":
         """Return the least of each `width` neighbouring numbers."""
-        ranks, holders = self._ranks()
-        found = np.lib.stride_tricks.sliding_window_view(ranks, width).min(axis=1)
-        places = holders[found].tolist()
-        parts = (tuple(map(part.__getitem__, places)) for part in (self.numerators, self.denominators))
+        doubles, found = self.doubles.tolist(), list[int]()
+        rising = deque[int]()  # places of a window, of numbers that rise: the first has its least
+        for place, double in enumerate(doubles):
+            while rising and (double < doubles[rising[-1]] or self._is_less(place, rising[-1])):
+                rising.pop()
+            rising.append(place)
+            if rising[0] <= place - width:
+                rising.popleft()
+            if place >= width - 1:
+                found.append(rising[0])
+        parts = (tuple(map(part.__getitem__, found)) for part in (self.numerators, self.denominators))
         return ExactRow(*parts)
 
-    def _ranks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rank of each number among all, equal ones alike, and of each rank a place that has it."""
-        order = np.argsort(self.doubles, kind="stable")
-        ordered = self.doubles[order]
-        starts = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
-        ends = np.append(starts[1:], len(self))
-        larger: list[int] = []  # where, among equal doubles, a larger number begins
-        for group in np.flatnonzero(ends - starts > 1).tolist():
-            larger += self._sorted_among_equals(order, int(starts[group]), int(ends[group]))
-        firsts = np.sort(np.append(starts, larger)).astype(np.intp)
-        ranks = np.empty(len(self), dtype=np.intp)
-        ranks[order] = np.repeat(np.arange(firsts.size), np.diff(np.append(firsts, len(self))))
-        return ranks, order[firsts]
-
-    def _sorted_among_equals(self, order: np.ndarray, begin: int, end: int) -> list[int]:
-        """Sort a stretch of `order` whose doubles are equal; return where in it a larger number begins."""
-        places = order[begin:end].tolist()
-        written = {(self.numerators[place], self.denominators[place]) for place in places}
-        if len(written) == 1:
-            return []
-        numbers = {place: self[place] for place in places}
-        places.sort(key=numbers.__getitem__)
-        order[begin:end] = places
-        return [
-            begin + at for at in range(1, len(places)) if numbers[places[at]] != numbers[places[at - 1]]
-        ]
+    def _is_less(self, place: int, other: int) -> bool:
+        """Tell whether one number is less than another, exactly."""
+        return self.numerators[place] * self.denominators[other] < self.numerators[other] * self.denominators[place]
 
 
 def least_of(rows: Sequence[ExactRow]) -> ExactRow:

@@ -1,6 +1,6 @@
-"""A curve at consecutive differences of pressure codes, exactly: between two of its corners a polynomial of the code.
+"""The certified offset over the pressure drop, exactly from valve.json; at every code; and what may be put out of it.
 
-The corners, and whatever is to be refused, are left to `OffsetCurve` and `certified_V` themselves.
+At consecutive codes a curve is a polynomial on each stretch between its nodes: whole numbers over one denominator.
 """
 
 from bisect import bisect_left
@@ -8,12 +8,82 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import ceil, lcm
+from math import ceil, floor, lcm
 
-from dzdesign.design.ceiling.exact_row import ExactRow
-from dzdesign.design.ceiling.offset_curve import DECIMALS, OffsetCurve, certified_V
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.worded import worded
+from dzdesign.design.above_tests import OffsetAbove
+from dzdesign.design.exact_row import ExactRow
+from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.signals import Signals
-from dzdesign.identify.valve.certified_bound import BoundPiece
+from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
+
+#: valve.json has seven decimals, so a sum of two of its numbers is right to this, in V.
+DECIMALS = Fraction(1, 10**6)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetCurve:
+    """An offset over the pressure drop and the bounds that hold it, exactly from the decimal numbers of valve.json."""
+
+    #: Nodes, from the first tested pressure drop to the last, rising.
+    dp_MPa: tuple[Fraction, ...]
+    #: Offset at each; linear between them.
+    offset_V: tuple[Fraction, ...]
+    #: Lower bound of the guarded threshold on that interval; None of an offset that nothing has to bound.
+    certified: CertifiedBound | None
+    #: Up to this dP0 the offset is at most the one there, as Eq. (7) holds beta = 1; None follows the tests.
+    hold_below_MPa: Fraction | None
+    #: How it goes on above the tests; None: the last offset is held, and nothing is certified.
+    above: OffsetAbove | None = None
+
+    def at(self, dp_MPa: Fraction) -> Fraction:
+        """Return the offset in V by the selector of Eq. (7).
+
+        For dP <= dP0 the paper holds beta = 1; where the threshold grows with dP that would over-compensate, so there
+        the smaller of the two is taken. Below the tested interval the first node is held.
+        """
+        if self.above is not None and dp_MPa > self.dp_MPa[-1]:
+            return self.above.at(dp_MPa)
+        value = self._straight(dp_MPa)
+        if self.hold_below_MPa is not None and dp_MPa <= self.hold_below_MPa:
+            value = min(value, self._straight(self.hold_below_MPa))
+        return value
+
+    def _straight(self, dp_MPa: Fraction) -> Fraction:
+        nodes, offset = self.dp_MPa, self.offset_V
+        if dp_MPa >= nodes[-1]:
+            return offset[-1]
+        if dp_MPa <= nodes[0]:
+            return offset[0]
+        right = bisect_left(nodes, dp_MPa)
+        share = (dp_MPa - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
+        return offset[right - 1] + share * (offset[right] - offset[right - 1])
+
+    def bound(self, dp_MPa: Fraction) -> Fraction | None:
+        """Return the lower bound of the guarded threshold at dP in V, or None where nothing is certified."""
+        if self.above is not None and dp_MPa > self.dp_MPa[-1]:
+            return self.above.bound_at(dp_MPa)
+        return None if self.certified is None else self.certified.at(dp_MPa)
+
+
+def certified_V(curve: OffsetCurve, dp_MPa: Fraction) -> Fraction:
+    """Return the offset that is certified at a pressure drop, V; a curve above its bound is refused."""
+    offset, bound = curve.at(dp_MPa), curve.bound(dp_MPa)
+    if bound is None:
+        return offset
+    if offset > bound + DECIMALS:
+        raise RequirementError(
+            worded(
+                "beta u_min0 is {offset:.4f V} at {dp:.3f MPa}, above the threshold's lower bound of {bound:.4f V}; "
+                "make valve.json again with `dzdesign identify`",
+                offset=float(offset),
+                dp=float(dp_MPa),
+                bound=float(bound),
+            )
+        )
+    return min(offset, bound)
+
 
 #: Coefficients of 1, x and x².
 Polynomial = tuple[Fraction, Fraction, Fraction]
@@ -172,3 +242,38 @@ def _least(stretch: _Stretch, step: Fraction, begin: int, end: int) -> tuple[lis
     if any(value > limit + slack for value, limit in zip(offset, bound, strict=True)):
         return None
     return list(map(min, offset, bound)), unit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetCeiling:
+    """Largest offset over u_max that the certificate allows, at every difference of pressure codes 0...code_max."""
+
+    #: Limit at each code, exact: the least over the pressures that the code may stand for.
+    limit: ExactRow
+    #: Codes inside the tested interval of the pressure drop.
+    certified: range
+
+
+def offset_ceiling(curve: OffsetCurve, u_max_V: Fraction, allowance: Allowance) -> OffsetCeiling:
+    """Return the limit of the offset at every pressure code.
+
+    It is the least certified offset over all pressure drops that the code may stand for, on the machine that moves the
+    threshold furthest, less what rounding and the dither add to the drive. A curve that lies above its bound somewhere
+    is refused: valve.json contradicts itself.
+    """
+    signals = allowance.signals
+    first, last = (signals.dp_code(end) for end in (curve.dp_MPa[0], curve.dp_MPa[-1]))
+    code_max = signals.largest_difference(allowance.sign)
+    if last > code_max:
+        raise InputError(
+            worded(
+                "the sensor's span of {span:g MPa} ends below the tested pressure drop of {tested:g MPa}; give the "
+                "real span with --pressure-span",
+                span=float(signals.pressure_a.span_MPa),
+                tested=float(curve.dp_MPa[-1]),
+            )
+        )
+    low, high = allowance.window
+    factor, kept = allowance.factor / u_max_V, allowance.kept
+    least = certified_row(curve, signals, low, code_max + high).least_of_windows(high - low + 1)
+    return OffsetCeiling(limit=least.line(factor, kept), certified=range(ceil(first), floor(last) + 1))

@@ -1,9 +1,8 @@
 """One setting for many valves: the largest offset that over-compensates none of them.
 
 Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That is proved as for one
-valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling anywhere; the others lie above it by
-more than a million times the error of the double precision in which that was found. That it lies under the bounds of
-every valve is proved of each of them, by `prove_lot`, here and wherever the file is read.
+valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling where one was tested. That it lies
+under the bounds of every valve is proved of each of them, by `prove_lot`, here and by `verify`.
 
 A compensator's file holds the valve that its certificate follows from. The common one holds a real valve of the batch,
 its *carrier*, and never an invented one with the least thresholds of all: no ramp test ever showed that.
@@ -18,27 +17,24 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
-from dzdesign.design.ceiling.exact_row import least_of
-from dzdesign.design.ceiling.offset_ceiling import OffsetCeiling, offset_ceiling
-from dzdesign.design.ceiling.offset_curve import OffsetCurve
+from dzdesign.design.above_tests import AboveChoice
+from dzdesign.design.beta_table import STEP_CODES, choose_beta_table
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
-from dzdesign.design.designing import design, left_by_machine, over, prove_monotone, travel
-from dzdesign.design.lot.margins import LotMargin, prove_lot
-from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.designing import design, prove_monotone
+from dzdesign.design.exact_row import ExactRow, least_of
+from dzdesign.design.lot_margins import LotMargin, prove_lot
+from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.machine.accounting import budget_of
-from dzdesign.design.machine.allowance import Allowance
-from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.quantise import finest_units
+from dzdesign.design.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling
+from dzdesign.design.options import options_of
+from dzdesign.design.side_design import finest_units, left_by_machine, offset_at_reference, over, travel
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES
-from dzdesign.design.table.beta_table import choose_beta_table
-from dzdesign.design.table.linear_programme import STEP_CODES
 from dzdesign.identify.valve.side_model import SideModel
 
-#: Of u_max: a ceiling that is nowhere this near to the least one can't be the least by a rounding error (1e-12).
+#: Of u_max: a valve whose ceiling comes this near to the least one of all holds the setting down.
 CLEAR = 1e-6
 #: What all compensators of a batch must have in common.
 SHARED = (
@@ -73,12 +69,11 @@ class LotSetting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Side:
-    """One sign of command of all valves: curves, and the exact ceilings of those that are binding."""
+    """One sign of command of all valves: curves, the least ceiling, and how far each valve's own lies above it."""
 
     sign: int
     models: Mapping[str, SideModel]
     curves: Mapping[str, OffsetCurve]
-    exact: Mapping[str, OffsetCeiling]
     least: OffsetCeiling
     nearness: Mapping[str, float]
     binding: frozenset[str]
@@ -194,45 +189,30 @@ def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float,
 
 
 def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
-    """Find the least ceiling of one sign of command: in doubles over all valves, exactly over those near it."""
-    signals, u_max = first.signals, first.u_max_V
-    allowance = first.allowance(sign)
+    """Find the least ceiling of one sign of command, exactly, and which valves hold it down."""
+    signals, allowance = first.signals, first.allowance(sign)
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
     above = AboveChoice.on(first.machine, first.above, STEP_CODES)
     curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
     low, high = _common_interval([curves])
-    above_least = _above_the_least(curves, allowance, float(u_max))
-    exact = {name: offset_ceiling(curves[name], u_max, allowance) for name in _near(curves, above_least)}
+    doubles, least = [], list[ExactRow]()
+    for curve in curves.values():  # of many valves the exact rows would fill the memory
+        limit = offset_ceiling(curve, first.u_max_V, allowance).limit
+        doubles.append(limit.doubles)
+        least = [least_of([*least, limit])]
     certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
-    ceiling = OffsetCeiling(limit=least_of([each.limit for each in exact.values()]), certified=certified)
+    ceiling = OffsetCeiling(limit=least[0], certified=certified)
     if ceiling.limit[: certified.stop].least() <= 0:
         raise InputError("one of the valves leaves no positive offset for a lot setting")
     tested = floor(signals.dp_code(max(curve.dp_MPa[-1] for curve in curves.values()))) + 1
+    above_least = np.array(doubles) - ceiling.limit.doubles
+    near = above_least[:, :tested].min(axis=1) < CLEAR
     return _Side(
-        sign=sign, models=models, curves=curves, exact=exact, least=ceiling,
+        sign=sign, models=models, curves=curves, least=ceiling,
         nearness=dict(zip(curves, map(float, above_least.mean(axis=1)), strict=True)),
-        binding=frozenset(_near(curves, above_least[:, :tested])),
+        binding=frozenset(name for name, is_near in zip(curves, near, strict=True) if is_near),
     )  # fmt: skip
-
-
-def _above_the_least(curves: Mapping[str, OffsetCurve], allowance: Allowance, u_max_V: float) -> np.ndarray:
-    """Return how far each valve's ceiling lies above the least of all, over u_max: a row a valve, a column a code.
-
-    Factors, rounding and dither lower all ceilings alike, so they are left out.
-    """
-    (low, high), signals = allowance.window, allowance.signals
-    code_max = signals.largest_difference(allowance.sign)
-    step = signals.dp_MPa(1)
-    dp_MPa = np.array([float(code * step) for code in range(low, code_max + high + 1)])
-    limits = np.array([curve.in_doubles(dp_MPa) / u_max_V for curve in curves.values()])
-    limits = np.lib.stride_tricks.sliding_window_view(limits, high - low + 1, axis=1).min(axis=2)
-    above: np.ndarray = limits - limits.min(axis=0)
-    return above
-
-
-def _near(names: Iterable[str], above_least: np.ndarray) -> list[str]:
-    return [name for name, distance in zip(names, above_least.min(axis=1), strict=True) if distance < CLEAR]
 
 
 def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[str]:
@@ -253,9 +233,7 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
     if first.machine:
         top = left_by_machine(top, side.least, first.signals, reference, u_max)
     scale = finest_units(first.signals, transition_codes=0).coefficient
-    u_min0 = over(top / u_max - Fraction(1, 2 * first.signals.compare_max), "down", scale)
-    if u_min0 <= 0:
-        raise InputError("the least offset of all valves is less than one count of the PWM")
+    u_min0 = offset_at_reference(top / u_max, first.signals, scale)
     goes_on = any(curve.above is not None for curve in side.curves.values())
     table = choose_beta_table(
         side.least,
@@ -281,11 +259,10 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
 def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
     """Prove the common law for one valve, on the whole interval that it was tested over."""
     curve = side.curves[name]
-    ceiling = side.exact.get(name) or offset_ceiling(curve, first.u_max_V, first.allowance(side.sign))
     return certify(
         side.models[name],
         curve,
-        ceiling,
+        offset_ceiling(curve, first.u_max_V, first.allowance(side.sign)),
         guard=first.side(side.sign).certificate.guard,
         signals=first.signals,
         u_max_V=first.u_max_V,

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.ceiling.exact_row import ExactRow
-from dzdesign.design.table.linear_programme import STEP_CODES, best_nodes, between_nodes
-from dzdesign.design.table.table_margins import TableMargins
+from dzdesign.design.beta_table import STEP_CODES, TableMargins, best_nodes, between_nodes
+from dzdesign.design.exact_row import ExactRow
 
 COUNT = 300
 

@@ -7,10 +7,10 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, and_more
+from dzdesign.design.beta_table import between_nodes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.signals import Signals
-from dzdesign.design.table.linear_programme import between_nodes
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 
 #: Over-compensated valves that a sentence names.
