@@ -14,25 +14,18 @@ from dzdesign.codegen.amplifier.setting import amplifier_setting
 from dzdesign.codegen.other_targets import Output, generate_output
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.fixed.dead_zones import dead_zones
+from dzdesign.design.fixed_offset import dead_zones
 from dzdesign.verify.amplifier.checks import checks as amplifier_checks
 from dzdesign.verify.amplifier.readers import READERS
-from dzdesign.verify.matlab.operations import evaluated
-from dzdesign.verify.matlab.subset import read_functions
-from dzdesign.verify.structured_text.checks import NAME
-from dzdesign.verify.structured_text.evaluator import Evaluator
-from dzdesign.verify.structured_text.imported_files import plcopen_faults, read_xml, tcpou_faults
-from dzdesign.verify.structured_text.parser import parse
-from dzdesign.verify.structured_text.syntax import FunctionBlock
-from dzdesign.verify.structured_text.to_c import block_in_c
-from dzdesign.verify.structured_text.type_check import check_types
+from dzdesign.verify.integers.text_values import TextValues
 
 TESTS = Path(__file__).parents[2] / "tests"
 #: Codes that a function in MATLAB is tried with, and numbers that a function block is.
 CODES = np.array([[0, 0, 0], [2048, 900, 600], [4095, 4095, 0], [65535, 1, 65535]])
-NUMBERS = np.array([0, 1, -1, 5000, -(2**31), 2**31 - 1])
+NUMBERS = np.array([0, 1, -1, 5000, -(2**31), 2**31 - 1], dtype=np.int32)
+REFUSALS = (RequirementError, ValueError)
 BLOCK_SETTINGS = {"interface": "plc", "dialect": "twincat"}
 
 
@@ -46,7 +39,7 @@ def compensator(folder: str = "goldens") -> Compensator:
 @cache
 def _made(target: str) -> Output:
     of = compensator()
-    return generate_output(of, target, {"iec61131": BLOCK_SETTINGS}.get(target, {}), to_json_bytes(of))
+    return generate_output(of, target, {"iec61131": BLOCK_SETTINGS}.get(target, {}))
 
 
 def _output(target: str) -> Mapping[str, bytes]:
@@ -59,35 +52,13 @@ def output_manifest() -> bytes:
 
 
 def _structured_text(data: bytes) -> None:
-    try:
-        text = data.decode("ascii")
-    except UnicodeDecodeError:
-        return
-    block = parse(text, f"{NAME}.st")
-    kinds = check_types(block, f"{NAME}.st")
-    block_in_c(block, kinds)
-    given = {each.name.lower(): NUMBERS for each in block.of_section("VAR_INPUT") if each.kind == "DINT"}
-    Evaluator(block, kinds, len(NUMBERS)).run(given)
-
-
-def _plc_file(data: bytes) -> None:
-    path = _place("block.xml")
-    path.write_bytes(data)
-    block, text = _block()
-    document = read_xml(path)
-    for faults in (plcopen_faults, tcpou_faults):
-        _read_all(faults(document, block, text))
-
-
-@cache
-def _block() -> tuple[FunctionBlock, str]:
-    text = _output("iec61131")[f"{NAME}.st"].decode("ascii")
-    return parse(text, f"{NAME}.st"), text
+    given = dict.fromkeys(("command", "pressure_a", "pressure_b"), NUMBERS)
+    TextValues(data.decode("ascii", "replace"), "st", "FB_DeadZone.st").run(given | {"at_rest": np.array(True)})
 
 
 def _matlab(data: bytes) -> None:
-    function, *_ = read_functions(data.decode("ascii", "replace"), "dz_comp.m")
-    evaluated(function, CODES)
+    function = TextValues(data.decode("ascii", "replace"), "m", "dz_comp.m")
+    function.run(dict(zip(("u", "p_a", "p_b"), CODES.T, strict=True)))
 
 
 def _amplifier(data: bytes) -> None:
@@ -128,8 +99,7 @@ def _of_output(target: str, *names: str) -> Callable[[], list[bytes]]:
 
 
 TARGETS = {
-    "structured-text": Target(run=_structured_text, seeds=_of_output("iec61131", f"{NAME}.st")),
-    "plc-file": Target(run=_plc_file, seeds=_of_output("iec61131", f"{NAME}.xml", f"{NAME}.TcPOU")),
-    "matlab": Target(run=_matlab, seeds=_of_output("matlab", "dz_comp.m")),
+    "structured-text": Target(run=_structured_text, seeds=_of_output("iec61131", "FB_DeadZone.st"), refusals=REFUSALS),
+    "matlab": Target(run=_matlab, seeds=_of_output("matlab", "dz_comp.m"), refusals=REFUSALS),
     "amplifier": Target(run=_amplifier, seeds=lambda: list(_amplifier_seeds())),
 }

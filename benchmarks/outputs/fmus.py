@@ -17,7 +17,7 @@ from dzdesign.codegen.other_targets import generate_output, write_output
 from dzdesign.codegen.project import target_named
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.example import example_folder
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.fmu import checks

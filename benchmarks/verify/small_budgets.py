@@ -8,7 +8,7 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of

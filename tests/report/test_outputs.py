@@ -17,9 +17,8 @@ from dzdesign.report.artefacts import Chain, Place
 from dzdesign.report.outputs import change_in, outputs_in, outputs_sections, with_outputs
 from dzdesign.report.page import Headline, MadeOutput, MadeOutputs
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
-from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.output_evidence import OutputEvidence, TriedInputs
-from dzdesign.verify.requirements import FILES
+from dzdesign.verify.requirements import REPRODUCED
 from dzdesign.verify.verification import evidence_manifest
 from tests.support.evidence import evidence_with
 from tests.support.paths import GOLDENS
@@ -45,14 +44,14 @@ def digest(document):
 
 @pytest.fixture(scope="module")
 def plc(compensator, document):
-    return generate_output(compensator, "iec61131", settings_of("iec61131", {}), document)
+    return generate_output(compensator, "iec61131", settings_of("iec61131", {}))
 
 
 @pytest.fixture
 def folder(tmp_path, compensator, document, plc):
     """A compensator with a firmware and a function block beside it."""
     (tmp_path / "compensator.json").write_bytes(document)
-    write_firmware(generate(compensator, "host", document), tmp_path / "firmware")
+    write_firmware(generate(compensator, "host"), tmp_path / "firmware")
     write_output(plc, tmp_path / "plc")
     return tmp_path
 
@@ -64,7 +63,7 @@ def put_evidence(place, folder, *, holds=True, text="yes"):
     evidence = OutputEvidence(
         tool=THIS_TOOL, made_from=made_from, target="iec61131", settings={},
         origin=FirmwareOrigin(compensator_json=none, valve_json=none, ramp_tests=()),
-        checks=(FILES.check(holds=holds, text=text),), inputs=(TriedInputs(name="all", inputs=INPUTS, wrong=0),),
+        checks=(REPRODUCED.check(holds=holds, text=text),), inputs=(TriedInputs(name="all", inputs=INPUTS, wrong=0),),
         versions={},
     )  # fmt: skip
     write_folder(place, {OutputEvidence.FILE_NAME: to_json_bytes(evidence)}, evidence_manifest(evidence))
@@ -163,15 +162,6 @@ def test_what_can_not_be_read_hinders_no_other(folder, digest):
     assert made.others[0].startswith("'plc' is not listed: ")
 
 
-def test_evidence_of_the_firmware_is_that_of_verify(folder, digest):
-    manifest = sha256_of((folder / "firmware" / MANIFEST_NAME).read_bytes())
-    evidence = evidence_with(made_from=(SourceFile(source=f"firmware/{MANIFEST_NAME}", sha256=manifest),))
-    (folder / "evidence").mkdir()
-    (folder / "evidence" / Evidence.FILE_NAME).write_bytes(to_json_bytes(evidence))
-    found = listed(folder, digest)["firmware/"]
-    assert (found.verdict, found.evidence) == ("HOLDS", f"evidence/{Evidence.FILE_NAME}")
-
-
 # --- on the page ------------------------------------------------------------------------------------------------------
 
 
@@ -194,12 +184,6 @@ def test_without_another_output_than_the_firmware_there_is_no_such_section(folde
     for path in (folder / "plc").iterdir():
         path.unlink()
     assert 'id="outputs"' not in report_of_folder(folder).html
-
-
-def test_names_are_no_markup(folder):
-    (folder / "plc").rename(folder / "<b>plc")
-    html = report_of_folder(folder).html
-    assert "<b>plc" not in html and "&lt;b&gt;plc" in html
 
 
 WRONG = MadeOutput(kind="fmu", settings="", place="fmu/", sha256="0" * 64, holds=False, fault="inputs: 3 wrong")

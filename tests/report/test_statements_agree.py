@@ -13,7 +13,7 @@ from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.report.figure import figure_style
 from dzdesign.report.page import Headline, Page, _cell, _finding, _tied, render

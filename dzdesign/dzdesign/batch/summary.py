@@ -32,7 +32,7 @@ from dzdesign.report.lot.table import column_of, extra_dead_zone
 if TYPE_CHECKING:
     from polars import DataFrame
 
-    from dzdesign.design.lot.setting import LotSetting
+    from dzdesign.design.lot_setting import LotSetting
 
 SETTING_NAME = "lot_compensator.json"
 #: Of a number in mV and of a price in percent: finer than any error here.
@@ -41,7 +41,7 @@ DIGITS = 5
 
 def lot_setting_of(designed: "Mapping[str, Compensator]") -> "tuple[LotSetting | None, str | None]":
     """Return the lot setting of the calibrated valves, by name; or why there is none."""
-    from dzdesign.design.lot.setting import lot_setting
+    from dzdesign.design.lot_setting import lot_setting
 
     try:
         return lot_setting(designed), None
@@ -117,7 +117,7 @@ def units_of_lot(designed: "Mapping[str, Compensator]") -> RecordedUnits:
 
 def setting_summary(setting: "LotSetting", designed: "Mapping[str, Compensator]") -> LotSettingSummary:
     """Return what batch.json says of the lot setting of these calibrated valves."""
-    from dzdesign.design.lot.pressures import lacking_in, without_narrow
+    from dzdesign.design.lot_valves import lacking_in, without_narrow
 
     lot = setting.compensator.lot
     lacking = lacking_in(lot)

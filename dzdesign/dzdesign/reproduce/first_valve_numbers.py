@@ -9,11 +9,11 @@ from dzdesign.derivation.account.published import (
     DUTY_WITHOUT_PERCENT,
     LOAD_COMMANDS_V,
     LOAD_DP_MPA,
+    METER_ACCURACY_L_MIN,
     PWM_AMPLITUDE_V,
     PWM_KHZ,
     TEMPERATURE_CHANGE_PER_MILLE,
 )
-from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
 from dzdesign.reproduce import explanations
 from dzdesign.reproduce.artefact import Driver, PaperNumber
 from dzdesign.reproduce.load_and_oil import LoadAndOil

@@ -6,11 +6,11 @@ from functools import partial
 from dzdesign.derivation.account.published import (
     ABOUT_LARGEST_L_MIN,
     DP0_MPA,
+    METER_ACCURACY_L_MIN,
     SATURATED_FROM_V,
     SECOND,
     U_MAX_V,
 )
-from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
 from dzdesign.reproduce import explanations
 from dzdesign.reproduce.artefact import Driver, PaperNumber
 from dzdesign.reproduce.displacement_readings import DISPLACEMENT, DISPLACEMENT_DEAD_ZONE

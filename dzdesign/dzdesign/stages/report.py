@@ -42,9 +42,9 @@ def report(arguments: ReportArguments) -> "Report":
         If there is nothing to report, a file is not an artefact, or one was changed. A requirement that does not hold
         is not an error.
     """
-    from dzdesign.report.logo import logo_uri
     from dzdesign.report.lot.folder import is_lot, refuse_uncalibrated
     from dzdesign.report.lot.report import report_of_lot
+    from dzdesign.report.page import logo_uri
     from dzdesign.report.valve_report import report_of_folder
 
     folder = Path(arguments.folder)

@@ -24,7 +24,7 @@ from dzdesign.design.side_law import SideLaw
 from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
 from dzdesign.verify.closed_loop.evidence_curves import Curves, read_curves
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.firmware.unchanged_files import added_files
+from dzdesign.verify.firmware.reproduced import added_files
 from dzdesign.verify.output_evidence import OutputEvidence
 
 #: Role of an artefact -> what it is called, and its type, from the evidence back to the recordings.
@@ -232,7 +232,7 @@ def _refuse_changes(folder: Path, firmware: FirmwareManifest, evidence: Evidence
     if evidence and evidence.target != firmware.target:
         raise InputError(f"the evidence is for {evidence.target}, '{folder}' for {firmware.target}; give its firmware")
     known = {**firmware.files, **(evidence.differing_files if evidence else {})}
-    names = [*firmware.files, *added_files(folder, firmware)]
+    names = [*firmware.files, *added_files(folder, firmware.files)]
     there = {name: digest_of(folder / name) for name in names if (folder / name).is_file()}
     changed = sorted(name for name in known.keys() | there.keys() if there.get(name) != known.get(name))
     if evidence is None:

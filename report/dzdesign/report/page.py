@@ -5,11 +5,14 @@ engine; only figures and formulas, made here, are markup.
 """
 
 import re
+from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import TOOL
+from dzdesign.core.artefact_files import TOOL, read_bytes
+from dzdesign.core.errors import InputError
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.core.verdicts import verdict_words
 from dzdesign.derivation.presentation.writers import anchor
@@ -25,6 +28,11 @@ LONGEST_WORD = 18
 OPTION, COMMAND = r"(?<![\w-])--[a-z][\w-]*", r"`([^`<>\s][^`<>]*)`"
 #: Kind of a verdict -> the sign before it.
 SIGNS = {"good": "✓", "bad": "✗", "open": "?"}
+#: First bytes of a format -> its media type. SVG is none of them: it can hold scripts and addresses.
+SIGNATURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"GIF87a": "image/gif",
+              b"GIF89a": "image/gif"}  # fmt: skip
+#: Bytes of a logo: a page is sent by mail.
+LARGEST_LOGO = 512 * 1024
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,3 +254,22 @@ def _cell(text: str) -> "markupsafe.Markup":
         Markup('<span class="breaks">{}</span>').format(broken(word)) if len(word) > LONGEST_WORD else escape(word)
         for word in re.split(r"(\s+)", text)
     )
+
+
+def logo_uri(path: Path) -> str:
+    """Return a logo as a data: address.
+
+    Raises
+    ------
+    InputError
+        If it can't be read, is too large, or is no PNG, JPEG or GIF.
+    """
+    content = read_bytes(path, "logo")
+    if len(content) > LARGEST_LOGO:
+        raise InputError(f"--logo '{path}' has {len(content)} bytes, expected at most {LARGEST_LOGO}; scale it down")
+    kind = next((kind for start, kind in SIGNATURES.items() if content.startswith(start)), None)
+    if kind is None:
+        raise InputError(
+            f"--logo '{path}' is no PNG, JPEG or GIF, expected one of these; SVG can hold scripts: save it as PNG"
+        )
+    return f"data:{kind};base64,{b64encode(content).decode()}"

@@ -9,7 +9,7 @@ from random_designs import random_designs
 from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
 from tests.support.golden_firmware import FULL, GOLDENS
 from tests.support.synthetic import needs_compiler

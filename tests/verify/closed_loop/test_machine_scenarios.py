@@ -11,7 +11,7 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.machine.machine import Machine
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, drive_corners, resistance_ratio
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import ClosedLoop, ReadingErrors

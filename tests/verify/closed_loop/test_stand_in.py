@@ -339,7 +339,7 @@ def test_a_leak_that_was_seen_flows_at_zero_command(leaking_valve):
 def test_a_leak_that_no_compensator_can_stop_is_said_and_is_no_failure(leaking_valve, tmp_path, wording):
     from dzdesign.codegen.project import generate, target_named
     from dzdesign.design.designing import design
-    from dzdesign.design.option_texts import options_of
+    from dzdesign.design.options import options_of
 
     compensator = design(leaking_valve, options_of({}, target_named("f28335").inputs()))
     made = generate(compensator, "f28335")

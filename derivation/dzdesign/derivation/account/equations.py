@@ -1,17 +1,10 @@
 """Eqs. (1)-(18), transcribed once: what the paper starts from, and what it derives from that."""
 
+import sympy
 from sympy import And, Eq, Piecewise, sqrt
 
-from dzdesign.derivation.account.scope import (
-    BARE,
-    BEFORE_STOP,
-    FIXED_OPENING,
-    LAW_AT_REFERENCE,
-    LAW_OFF_REFERENCE,
-    UP_TO_REFERENCE,
-    under_law,
-)
-from dzdesign.derivation.account.statement import Ground, Kind
+from dzdesign.derivation.account.scope import *
+from dzdesign.derivation.account.statement import Ground, Kind, Replacements
 from dzdesign.derivation.symbols import *
 
 #: The numbers of the paper's equations; the later ones stand in other modules.
@@ -19,6 +12,12 @@ PAPER_NUMBERS = tuple(f"({number})" for number in range(1, 33))
 
 #: Flow per opening.
 ORIFICE = C_d * W * sqrt(2 * dP / rho)
+
+
+def beyond(threshold: sympy.Symbol, distance: sympy.Symbol = u_i_prime) -> Replacements:
+    """Take Eq. (1) at a command beyond a threshold and up to full command."""
+    return (u_i, threshold + distance), (u_min, threshold), (u_max, threshold + distance + headroom)
+
 
 #: Section 1 up to Eq. (7), with the readings of its figures that the rest needs.
 APPROACH = (
@@ -95,18 +94,7 @@ AT_REFERENCE = (
     .qualified_by("T1a"),
     Kind.PAPER("(10)", "opening that passes the wanted flow")
     .says(x, Q_O / (C_d * W * sqrt(2 * dP0 / rho)))
-    .by(
-        Ground(
-            "(1)",
-            (
-                (Q, Q_O),
-                (dP, dP0),
-                (u_i, u_min0 + u_i_prime),
-                (u_min, u_min0),
-                (u_max, u_min0 + u_i_prime + headroom),
-            ),
-        )
-    )
+    .by(Ground("(1)", ((Q, Q_O), (dP, dP0), *beyond(u_min0))))
     .within(LAW_AT_REFERENCE),
     Kind.ASSUMPTION("(11)", "opening in proportion to the command beyond the threshold")
     .says(u_i_prime, k * x)

@@ -4,24 +4,8 @@ import sympy
 from sympy import Eq, Piecewise
 
 from dzdesign.derivation import scaling
-from dzdesign.derivation.account.published import (
-    COUNTS_PER_PIN_VOLT,
-    DUTY_COMMAND_V,
-    DUTY_WITH_PERCENT,
-    DUTY_WITHOUT_PERCENT,
-    FIRST,
-    LARGEST_CODE,
-    PIN_V,
-    SECOND,
-    U_MAX_V,
-)
-from dzdesign.derivation.account.scope import (
-    CODES_AT_PIN,
-    CODES_OF_COMMAND,
-    LAW_OFF_REFERENCE,
-    UP_TO_REFERENCE,
-    under_law,
-)
+from dzdesign.derivation.account.published import *
+from dzdesign.derivation.account.scope import *
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *
@@ -35,6 +19,7 @@ _CONVERTER = (
     (V_adc, sympy.Integer(PIN_V)),
     (n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),
 )
+_AT_2_V = ((u_i, sympy.Integer(DUTY_COMMAND_V)), (u_max, sympy.Integer(U_MAX_V)))
 _UP_TO_REFERENCE = Case(((dP1, dP0 - below),), "$dP <= dP0$")
 _ABOVE_REFERENCE = Case(((dP1, dP0 + above),), "$dP > dP0$")
 
@@ -219,23 +204,12 @@ CODES = (
     .by("duty", "(14)")
     .within(UP_TO_REFERENCE)
     .numbers(
-        Value(
-            "without compensation at 2 V",
-            of=u_i / u_max,
-            at=(*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
-            unit="%",
-            published=DUTY_WITHOUT_PERCENT,
-        ),
-        Value(
-            "second valve at 2 V",
-            (*SECOND.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
+        Value("without compensation at 2 V", _AT_2_V, "%", of=u_i / u_max, published=DUTY_WITHOUT_PERCENT),
+        SECOND.value("at 2 V", "%", also=_AT_2_V, published=DUTY_WITH_PERCENT),
+        FIRST.value(
+            "at 2 V",
             "%",
-            published=DUTY_WITH_PERCENT,
-        ),
-        Value(
-            "first valve at 2 V",
-            (*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
-            "%",
+            also=_AT_2_V,
             remark="Fig. 13 does not name its valve; its 55 % fits the second, not the first.",
         ),
     ),

@@ -1,22 +1,12 @@
-"""Theorems 7 and 9: flow over pressure drop, and what a meter that shows nothing below its floor does to thresholds."""
+"""Theorems 7 to 9: flow over pressure drop, what a measured flow can tell, and what the meter's floor hides."""
 
 import sympy
-from sympy import Eq, Ne, log, sqrt
+from sympy import Eq, Ne, Piecewise, log, sqrt
 
-from dzdesign.derivation.account.equations import ORIFICE
-from dzdesign.derivation.account.published import (
-    DP0_MPA,
-    DP1_MPA,
-    FIRST,
-    SECOND,
-    SIMULATION,
-    U_MAX_V,
-    VALVES,
-    PublishedValve,
-)
-from dzdesign.derivation.account.readings import DROP_ASSUMED
-from dzdesign.derivation.account.scope import BARE, CONSTANT_THRESHOLD, FIXED_OPENING, FREE_OPENING
-from dzdesign.derivation.account.statement import Ground, Kind, Value
+from dzdesign.derivation.account.equations import ORIFICE, beyond
+from dzdesign.derivation.account.published import *
+from dzdesign.derivation.account.scope import *
+from dzdesign.derivation.account.statement import Case, Ground, Kind, Value
 from dzdesign.derivation.symbols import *
 
 _DROPS = sympy.Rational(DP1_MPA, DP0_MPA)
@@ -34,7 +24,7 @@ FLOW_OVER_PRESSURE = (
     Kind.THEOREM("T7a", "exponent of the flow over the pressure drop")
     .says(n, log(Q_max1 / Q_max0) / log(dP1 / dP0))
     .rearranging("exponent", provided=(Ne(dP0, dP1),))
-    .numbers(*(Value(valve.name, valve.at(), "1", remark=DROP_ASSUMED if valve is SECOND else "") for valve in VALVES))
+    .numbers(SIMULATION.value("", "1"), FIRST.value("", "1"), SECOND.value("", "1", remark=DROP_ASSUMED))
     .remark(
         "The orifice equation has 0.5. The published drop is 1 and 5 MPa; a supply that gives way, or a pressure "
         "drop taken with the valve's own passages, lowers the exponent."
@@ -45,10 +35,7 @@ FLOW_OVER_PRESSURE = (
     .within(FIXED_OPENING)
     .numbers(
         Value("$K_1/K_0$ by Eq. (15)", of=sqrt(dP1 / dP0), at=FIRST.at(), unit="1"),
-        *(
-            Value(f"$K_1/K_0$ by the largest flows, {valve.name}", of=Q_max1 / Q_max0, at=valve.at(), unit="1")
-            for valve in VALVES
-        ),
+        *(valve.value("$K_1/K_0$ by the largest flows", "1", of=Q_max1 / Q_max0) for valve in VALVES),
         Value(
             "$K_1/K_0$ by Eq. (15) and the simulated openings",
             # Section 2.2: 1.8 mm with 54 % dead at 1 MPa; 0.1 mm less with 1 % more dead at 5 MPa.
@@ -68,11 +55,10 @@ FLOW_OVER_PRESSURE = (
         ruled_out_by=((n, log(sympy.Rational(FIRST.flow1) / sympy.Rational(FIRST.flow0)) / log(_DROPS)),),
     )
     .numbers(
-        Value(
-            "target at full command over the largest flow, first valve",
+        FIRST.value(
+            "target at full command over the largest flow",
+            "1",
             of=Q_max0 * sqrt(dP1 / dP0) / Q_max1,
-            at=FIRST.at(),
-            unit="1",
             remark="The line (16) with $K_1$ by Eq. (15) asks at 5 MPa for more flow than the valve has.",
         )
     )
@@ -92,6 +78,84 @@ FLOW_OVER_PRESSURE = (
     .corrected("(2)")
     .remark("The text below Eq. (1) ends the line at ($u_max$, $Q_max$), as Fig. 3 needs it."),
 )
+
+_REGIMES = (
+    Case(((u_O, u_min - guard),), "closed"),
+    Case(((u_O, u_min + y), (x_max, (y + rest) / k)), "opening"),
+    Case(((u_O, u_min + k * x_max + headroom),), "at the stop"),
+)
+#: Theorem 8: what can be identified from flow.
+IDENTIFIABILITY = (
+    Kind.ASSUMPTION("valve", "flow of a valve with a threshold and a stop")
+    .says(
+        Q,
+        Piecewise(
+            (0, u_O < u_min),
+            (ORIFICE * (u_O - u_min) / k, u_O < u_min + k * x_max),
+            (ORIFICE * x_max, u_min + k * x_max <= u_O),
+        ),
+    )
+    .within(FULL_STROKE)
+    .remark("Eqs. (1) and (11) up to the stop, for positive commands."),
+    Kind.THEOREM("T8a", "the flow is the same for $C_d lambda$, $k lambda$ and $x_max / lambda$")
+    .says(Q_scaled, Q)
+    .by("valve", Ground("valve", ((Q, Q_scaled), (C_d, scale * C_d), (k, scale * k), (x_max, x_max / scale))))
+    .within(FULL_STROKE)
+    .in_cases(*_REGIMES)
+    .remark(
+        "At every command and pressure drop, so no set of flow measurements tells these valves apart; nor "
+        "$C_d$, $W$ and $rho$, which enter as one product."
+    ),
+    Kind.THEOREM("T8b", "the sensitivity to $C_d$ is a combination of those to $k$ and $x_max$")
+    .says(dQ_dC_d, (x_max * dQ_dx_max - k * dQ_dk) / C_d)
+    .by(
+        Ground("valve", derivative=(C_d, dQ_dC_d)),
+        Ground("valve", derivative=(k, dQ_dk)),
+        Ground("valve", derivative=(x_max, dQ_dx_max)),
+    )
+    .within(FULL_STROKE, Ne(u_O, u_min + k * x_max))
+    .in_cases(*_REGIMES)
+    .remark(
+        "So ($C_d$, $k$, -$x_max$) is a null direction of the sensitivity matrix: its product with every row is "
+        "zero, however many commands and pressure drops are measured."
+    ),
+    Kind.DEFINITION("S", "flow per command beyond the threshold").says(s_flow, ORIFICE / k),
+    Kind.DEFINITION("travel", "command that full opening takes").says(q_x, k * x_max),
+    Kind.THEOREM("T8c", "the flow depends on $S$, $u_min$ and $k x_max$ only")
+    .says(
+        Q,
+        Piecewise((0, u_O < u_min), (s_flow * (u_O - u_min), u_O < u_min + q_x), (s_flow * q_x, u_min + q_x <= u_O)),
+    )
+    .by("valve", "S", "travel")
+    .within(FULL_STROKE)
+    .in_cases(*_REGIMES),
+    Kind.THEOREM("straight part", "flow beyond the threshold")
+    .says(Q, s_flow * (u_O - u_min))
+    .by(Ground("(1)", beyond(u_min, y)), "opening", "S")
+    .within(BEYOND_THRESHOLD)
+    .in_cases(Case(((u_O, u_min + y),), "beyond the threshold, before the stop")),
+    Kind.THEOREM("T8d", "$S$ from two samples on the straight part")
+    .says(s_flow, (Q_2 - Q_1) / (u_2 - u_1))
+    .by(
+        Ground("straight part", ((Q, Q_2), (u_O, u_2))),
+        Ground("straight part", ((Q, Q_1), (u_O, u_1))),
+        eliminate=(u_min,),
+        provided=(Ne(u_1, u_2),),
+    )
+    .remark("With T8e and T8f: these three are determined, and by T8b nothing else is."),
+    Kind.THEOREM("T8e", "$u_min$ from the same two samples")
+    .says(u_min, u_1 - Q_1 / s_flow, u_1 - Q_1 * (u_2 - u_1) / (Q_2 - Q_1))
+    .by(Ground("straight part", ((Q, Q_1), (u_O, u_1))), "T8d", eliminate=(s_flow,)),
+    Kind.THEOREM("T8f", "$k x_max$ from a sample at the stop")
+    .says(q_x, Q_max / s_flow)
+    .by(Ground("T8c", ((Q, Q_max), (u_O, u_min + q_x + headroom))))
+    .within(FIXED_OPENING)
+    .remark(
+        "Without such a sample $k x_max$ is only known to be larger than the largest command beyond the "
+        "threshold. Where $x_max$ is known otherwise, $k$ = ($k x_max$) / $x_max$."
+    ),
+)
+
 
 _FIRST = dict(FIRST.at())
 
@@ -125,16 +189,13 @@ METER_FLOOR = (
     .positive_exactly_if(sqrt(dP1) > sqrt(dP0))
     .numbers(
         *(
-            (
-                Value(
-                    f"in per cent of $u_max$, {valve.name}",
-                    of=Q_floor * (u_max - u_min0) / Q_max0 * (1 - sqrt(dP0 / dP1)) / u_max,
-                    at=valve.at(),
-                    unit="%",
-                    remark=f"the paper reads a fall of {_fall_percent(valve)} %" + assumed,
-                )
-                for valve, assumed in ((FIRST, ""), (SECOND, f"; {DROP_ASSUMED}"))
+            valve.value(
+                "in per cent of $u_max$",
+                "%",
+                of=Q_floor * (u_max - u_min0) / Q_max0 * (1 - sqrt(dP0 / dP1)) / u_max,
+                remark=f"the paper reads a fall of {_fall_percent(valve)} %" + assumed,
             )
+            for valve, assumed in ((FIRST, ""), (SECOND, f"; {DROP_ASSUMED}"))
         )
     )
     .remark(
@@ -153,11 +214,10 @@ METER_FLOOR = (
     .within(CONSTANT_THRESHOLD)
     .numbers(
         *(
-            Value(
-                f"in per cent of $u_max$, {valve.name}",
+            valve.value(
+                "in per cent of $u_max$",
+                "%",
                 of=Q_floor * ((u_max - u_min0) / Q_max0 - (u_max - u_min1) / Q_max1) / u_max,
-                at=valve.at(),
-                unit="%",
                 remark=f"of the {_fall_percent(valve)} % that the paper reads",
             )
             for valve in (FIRST, SECOND)
@@ -182,10 +242,10 @@ METER_FLOOR = (
     )
     .within(BARE, FREE_OPENING, Eq(u_i, u_seen0), Eq(dP, dP1), u_min1 <= u_seen0)
     .numbers(
-        Value(
-            "first valve",
-            (*FIRST.at(), (u_seen0, u_min0.subs(_FIRST)), (u_seen1, u_min1.subs(_FIRST))),
+        FIRST.value(
+            "",
             "L/min",
+            also=((u_seen0, u_min0.subs(_FIRST)), (u_seen1, u_min1.subs(_FIRST))),
             published=FIRST.zero_flow_without_beta,
             remark="6 % above what was measured, where the model without the floor (T3b) is 30 % below",
         )

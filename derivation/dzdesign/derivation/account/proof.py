@@ -14,7 +14,7 @@ from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.conditions import Finding, judge_condition
-from dzdesign.derivation.account.solving import Relation, Step, agree, solve_relations
+from dzdesign.derivation.account.solving import NotDerivedError, Relation, Step, agree, solve_relations
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
 from dzdesign.derivation.account.units import find_unit_error
 from dzdesign.derivation.symbols import Name
@@ -54,12 +54,8 @@ class Verdict:
     necessary: bool | None = None
     #: Grounds that follow only on a condition, which this statement therefore needs too.
     inherited: tuple[str, ...] = ()
-    #: Grounds, and their grounds, that are proved on a part of their range only.
-    limited_by: tuple[str, ...] = ()
     #: What is wrong with its units; empty where they are right.
     unit_error: str = ""
-    #: What numbers say against it, which no proof can outweigh; empty where they agree.
-    objection: str = ""
 
     @property
     def number(self) -> str:
@@ -69,12 +65,6 @@ class Verdict:
     def holds(self) -> bool:
         """Whether other statements may rely on it."""
         return self.outcome is not Outcome.DOES_NOT_FOLLOW
-
-    @property
-    def discrepancy(self) -> sympy.Expr | None:
-        """The first difference between what was derived and what is published, or None."""
-        differences = (value for proof in self.proofs for value in proof.discrepancies)
-        return next((sympy.factor(value) for value in differences if value != 0), None)
 
 
 #: Tries a statement that was judged, of an account given by number, on numbers; returns what they say against it.
@@ -136,7 +126,7 @@ def overrule(verdict: Verdict, objection: str) -> Verdict:
     if not objection:
         return verdict
     words = f"does not follow: {objection}"
-    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False, objection=objection)
+    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False)
 
 
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:
@@ -154,30 +144,22 @@ def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapp
 
     if statement.kind.is_given:
         return verdict(Finding(Outcome.GIVEN, statement.kind.value))
-    proofs = _proofs(statement, earlier)
-    if isinstance(proofs, str):
-        return verdict(Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow: {proofs}", flawed=True))
+    try:
+        proofs = _proofs(statement, earlier)
+    except NotDerivedError as reason:
+        return verdict(Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow: {reason}", flawed=True))
     unsound = [ground.number for ground in statement.grounds if not verdicts[ground.number].holds]
     if unsound:
         words = f"rests on {', '.join(unsound)}, which does not follow"
         return verdict(Finding(Outcome.DOES_NOT_FOLLOW, words, flawed=True), proofs=proofs)
     finding = _finding(statement, proofs)
     inherited = tuple(dict.fromkeys(n for ground in statement.grounds for n in _conditional(verdicts[ground.number])))
+    others = f"on the condition of {', '.join(inherited)}"
     if inherited and finding.outcome is Outcome.FOLLOWS:
-        finding = replace(
-            finding, outcome=Outcome.FOLLOWS_IF, words=f"follows on the condition of {', '.join(inherited)}"
-        )
+        finding = Finding(Outcome.FOLLOWS_IF, f"follows {others}")
     elif inherited and finding.outcome is Outcome.FOLLOWS_IF:
-        finding = replace(finding, words=f"{finding.words}, and on the condition of {', '.join(inherited)}")
-    limits = tuple(dict.fromkeys(n for one in statement.grounds for n in _limits(verdicts[one.number], statement)))
-    return verdict(finding, proofs=proofs, inherited=inherited, limited_by=limits)
-
-
-def _limits(verdict: Verdict, user: Statement) -> tuple[str, ...]:
-    """Return which of a ground and its grounds is proved on a part that the user's scope does not say."""
-    ground = verdict.statement
-    is_said = ground.kind.is_given or (user.scope.implies(ground.scope) and not ground.provided)
-    return (() if is_said else (verdict.number,)) + verdict.limited_by
+        finding = replace(finding, words=f"{finding.words}, and {others}")
+    return verdict(finding, proofs=proofs, inherited=inherited)
 
 
 def _conditional(verdict: Verdict) -> tuple[str, ...]:
@@ -213,45 +195,35 @@ def _sign_agrees(positive_if: Relational, proof: CaseProof) -> bool:
     return sympy.factor(sympy.cancel(sympy.factor(proof.derived) / (claim.gts - claim.lts))).is_positive is True
 
 
-def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[CaseProof, ...] | str:
-    """Derive every case, or say why one can't be."""
+def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[CaseProof, ...]:
+    """Derive every case."""
     proofs = []
     chosen: set[sympy.Basic] = set()
-    needed: set[sympy.Ne] = set()
-    for case in statement.cases_to_prove:
-        replacements = dict(case.at)
-        relations = tuple(relation_of(earlier[ground.number], ground, replacements) for ground in statement.grounds)
-        provided = tuple(provision.xreplace(replacements) for provision in statement.provided)
-        found = solve_relations(relations, (statement.symbol, *_eliminated(statement, relations)), provided)
-        if isinstance(found, str):
-            return found
-        solution = found.values
-        needed |= {one for one, here in zip(statement.provided, provided, strict=True) if here in found.needed}
+    for case in statement.cases or (Case((), ""),):
+        at = dict(case.at)
+        relations = tuple(relation_of(earlier[ground.number], ground, at) for ground in statement.grounds)
+        nonzero = tuple((one.lhs - one.rhs).xreplace(at) for one in statement.provided)
+        solution, steps = solve_relations(relations, (statement.symbol, *_eliminated(statement, relations)), nonzero)
         derived = solution[statement.symbol]
-        branches = [_branch(member, replacements, solution, chosen) for member in statement.members]
-        members = [branch.xreplace(replacements) for branch in branches if branch is not None]
-        if len(members) < len(branches):
-            return f"a case does not decide between the branches of {statement.number} itself"
+        branches = [_branch(member, at, solution, chosen) for member in statement.members]
+        members = [branch.xreplace(at) for branch in branches]
         published = [member.xreplace(solution) for member in members]
         differences = tuple(sympy.S.Zero if agree(derived, member) else derived - member for member in published)
-        reached = derived if any(differences) else members[-1]
         proofs.append(
             CaseProof(
                 case=case,
                 derived=derived,
                 discrepancies=differences,
                 solution=solution,
-                steps=found.steps,
-                reached=reached,
+                steps=steps,
+                reached=derived if any(differences) else members[-1],
                 published=branches[-1],
             )
         )
-    idle = [sympy.sstr(one) for member in statement.members for one in _conditions(member) if one not in chosen]
+    pieces = [member.args for member in statement.members if isinstance(member, sympy.Piecewise)]
+    idle = [sympy.sstr(condition) for args in pieces for _, condition in args if condition not in chosen]
     if idle:
-        return f"no case stands for {', '.join(idle)}"
-    unneeded = [sympy.sstr(provision) for provision in statement.provided if provision not in needed]
-    if unneeded:
-        return f"the derivation does not need {', '.join(unneeded)}"
+        raise NotDerivedError(f"no case stands for {', '.join(idle)}")
     return tuple(proofs)
 
 
@@ -263,13 +235,9 @@ def _eliminated(statement: Statement, relations: Sequence[Relation]) -> tuple[Na
     return tuple(named)[1 : len(relations)]
 
 
-def _conditions(member: sympy.Expr) -> list[sympy.Basic]:
-    return [condition for _, condition in member.args] if isinstance(member, sympy.Piecewise) else []
-
-
 def _branch(
     member: sympy.Expr, case: Mapping[Name, sympy.Expr], solution: Mapping[Name, sympy.Expr], chosen: set[sympy.Basic]
-) -> sympy.Expr | None:
+) -> sympy.Expr:
     """Return a member, of a piecewise one the branch that holds in a case, whose condition joins `chosen`."""
     if not isinstance(member, sympy.Piecewise):
         return member
@@ -279,8 +247,8 @@ def _branch(
             chosen.add(condition)
             return value
         if decided != sympy.false:
-            return None
-    return None
+            break
+    raise NotDerivedError("a case does not decide between the branches of the statement itself")
 
 
 def relation_of(

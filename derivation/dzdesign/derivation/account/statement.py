@@ -104,13 +104,11 @@ def _is_at_drop(name: Name, value: sympy.Expr) -> bool:
     return value in AT_PRESSURE_DROPS.get(name, ())
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
+class Case(NamedTuple):
     """One of the cases by which a piecewise statement is proved; the referee tries what they may leave out."""
 
     #: Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
     at: Replacements
-    #: The same in words.
     where: str
 
 
@@ -131,16 +129,6 @@ class Condition:
     #: What the paper calls the condition, in brackets.
     words: str = ""
 
-    def __post_init__(self) -> None:
-        equations = [equation for alternative in self.any_of for equation in alternative]
-        if not equations or not all(isinstance(equation, sympy.Eq) for equation in equations):
-            raise ValueError(f"a condition needs equations that may be true or false, got {self.any_of}")
-        decided = {symbol for equation in equations for symbol in equation.free_symbols}
-        if any(equation.lhs.free_symbols <= set(self.for_all) for equation in equations):
-            raise ValueError(
-                f"a condition on {sorted(map(str, decided & set(self.for_all)))} can't hold for all of them"
-            )
-
 
 @dataclass(frozen=True, slots=True)
 class Value:
@@ -159,10 +147,6 @@ class Value:
     published: str = ""
     #: What could explain a difference, or what the number means.
     remark: str = ""
-
-    def __post_init__(self) -> None:
-        if self.published:
-            float(self.published)
 
     def exact(self, statement: "Statement") -> sympy.Expr:
         """Return the number exactly, in `unit`."""
@@ -186,43 +170,28 @@ class Statement:
     It is declared in one chain: ``Kind.PAPER(number, title).says(...).by(...).within(...)``, and so on.
     """
 
-    #: The paper's number, or a name for what has none.
     number: str
-    #: What it says, in words.
     title: str
-    #: Where it comes from.
     kind: Kind
-    #: Left-hand side.
     symbol: Name
     #: Right-hand sides, as published. A statement that rests on this one uses the last.
     members: tuple[sympy.Expr, ...]
-    #: The premises; empty for what is taken as given.
     grounds: tuple[Ground, ...] = ()
     #: Symbols of the grounds that are solved for along with `symbol`; None for those that the grounds are about.
     eliminate: tuple[Name, ...] | None = None
-    #: Where the members are piecewise: the cases to prove it by.
     cases: tuple[Case, ...] = ()
-    #: What is needed beside the grounds.
     condition: Condition | None = None
-    #: The claim that the left-hand side is positive exactly if this holds.
     positive_if: Relational | None = None
-    #: Where it is meant to hold: the referee tries it there, and only there.
     scope: Scope = EVERYWHERE
     #: What must differ for the derivation, which divides by the difference.
     provided: tuple[sympy.Ne, ...] = ()
-    #: What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.
-    expected: Outcome = None  # type: ignore[assignment]  # what is usual of its kind, by __post_init__
-    #: Whether it only rearranges a definition or one premise: then it follows, and says nothing new.
+    #: What a correct account finds; what is usual of its kind and condition, unless given.
+    expected: Outcome = None  # type: ignore[assignment]  # by __post_init__
     rearranges: bool = False
-    #: Number of the statement that says what this one should read.
     corrected_by: str = ""
-    #: For what it should read so, in words; for everything unless given.
     corrected_for: str = ""
-    #: Statements that qualify this one.
     see: tuple[str, ...] = ()
-    #: Its numbers beside the paper's.
     values: tuple[Value, ...] = ()
-    #: What a reader should know beyond the verdict.
     note: str = ""
     #: Heading that it stands under.
     section: str = ""
@@ -286,11 +255,6 @@ class Statement:
     def remark(self, note: str) -> "Statement":
         """Say what a reader should know beyond the verdict."""
         return replace(self, note=note)
-
-    @property
-    def cases_to_prove(self) -> tuple[Case, ...]:
-        """Its cases; of a statement without, the only one."""
-        return self.cases or (Case((), ""),)
 
     @property
     def published(self) -> sympy.Eq:

@@ -3,20 +3,10 @@
 import sympy
 from sympy import Eq, Piecewise, sqrt
 
+from dzdesign.derivation.account.equations import beyond
 from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION, VALVES
-from dzdesign.derivation.account.scope import (
-    AT_FULL_COMMAND,
-    BARE,
-    BEFORE_STOP,
-    EDGE,
-    FIXED_OPENING,
-    FREE_OPENING,
-    LAW_AT_REFERENCE,
-    LAW_OFF_REFERENCE,
-    TARGET_OFF_REFERENCE,
-    scope,
-)
-from dzdesign.derivation.account.statement import Case, Ground, Kind, Value
+from dzdesign.derivation.account.scope import *
+from dzdesign.derivation.account.statement import Case, Ground, Kind
 from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.symbols import *
@@ -30,15 +20,7 @@ TIES = tuple(statement for name in LAW_NAMES for statement in law(name).statemen
 def flow_under(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> tuple[Ground, ...]:
     """What gives the valve's flow under a law, beyond the threshold at one pressure drop."""
     return (
-        Ground(
-            "(1)",
-            (
-                (dP, pressure),
-                (u_i, threshold + u_i_prime),
-                (u_min, threshold),
-                (u_max, threshold + u_i_prime + headroom),
-            ),
-        ),
+        Ground("(1)", ((dP, pressure), *beyond(threshold))),
         Ground("(11)"),
         Ground("Fig. 3, command", ((u_min0, threshold),)),
         Ground(law_number),
@@ -47,7 +29,7 @@ def flow_under(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol)
 
 _PAPER_LAW = LAW_OFF_REFERENCE & scope(FIXED_OPENING) & BEFORE_STOP
 _TARGET_LAW = TARGET_OFF_REFERENCE & scope(FIXED_OPENING)
-_AT_DP1 = (Ground("(5)"), Ground("gamma_1"), Ground("(15)"), Ground("(16)"))
+_AT_DP1 = ("(5)", "gamma_1", "(15)", "(16)")
 _UNKNOWN_AT_DP1 = (x, u_i_prime, u_O, u_min1, gamma_1, K_1, Q_O_prime)
 
 #: Theorem 1: which flow the laws give.
@@ -56,7 +38,7 @@ TARGET = (
     .says(Q, Q_O)
     .by(
         *flow_under("(14)", u_min0, dP0),
-        *(Ground(number) for number in ("(9)", "(8)", "gamma_0")),
+        *("(9)", "(8)", "gamma_0"),
         eliminate=(x, u_i_prime, u_O, Q_O, K_0, gamma_0),
     )
     .within(LAW_AT_REFERENCE),
@@ -69,15 +51,7 @@ TARGET = (
     .by(*flow_under("(18)", u_min1, dP1), *_AT_DP1, eliminate=_UNKNOWN_AT_DP1)
     .within(_PAPER_LAW)
     .numbers(
-        *(
-            Value(
-                f"flow over the target, {valve.name}",
-                of=beta + (1 - beta) * u_max / (k * x_max),
-                at=valve.at(),
-                unit="1",
-            )
-            for valve in VALVES
-        )
+        *(valve.value("flow over the target", "1", of=beta + (1 - beta) * u_max / (k * x_max)) for valve in VALVES)
     )
     .remark(f"Above the target wherever $beta < 1$ and $k x_max < u_max$. The numbers: {_DRIVE_LEFT_OVER}."),
     Kind.THEOREM("T1c", "the law (18) meets the target (16)")
@@ -106,7 +80,7 @@ TARGET = (
     .says(drive_left, u_max - k * x_max - beta * u_min0)
     .rearranging("drive left", Ground("L3", ((u_i, u_max),)))
     .within(TARGET_OFF_REFERENCE, AT_FULL_COMMAND)
-    .numbers(*(Value(f"at 5 MPa, {valve.name}", valve.at(), "V") for valve in (FIRST, SECOND)))
+    .numbers(FIRST.value("at 5 MPa", "V"), SECOND.value("at 5 MPa", "V"))
     .remark(
         "(1 - $beta$) $u_min0$ where $k x_max = u_max - u_min0$: the target asks for $x_max$ and not for more, "
         "though at a lower threshold the same command could open further. In flow it is what T1b gives above the "
@@ -136,6 +110,10 @@ TARGET = (
     ),
 )
 
+_AT_FULL_COMMAND = (
+    *("(5)", "gamma_1", "T2c", "full command", "(16)"),
+    Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
+)
 _FULL_COMMAND_IS_THE_LIMIT = scope(FREE_OPENING)
 
 #: Theorem 2: full command.
@@ -187,9 +165,8 @@ FULL_COMMAND = (
     .says(Q, Q_max1 * u_i / u_max, Q_O_prime)
     .by(
         *flow_under("(18)", u_min1, dP1),
-        *("(5)", "gamma_1", "T2c", "full command", "(16)"),
-        Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
-        eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
+        *_AT_FULL_COMMAND,
+        eliminate=(*_UNKNOWN_AT_DP1, Q_max1, x_max),
     )
     .within(LAW_OFF_REFERENCE, _FULL_COMMAND_IS_THE_LIMIT)
     .qualified_by("T1c", "T2e")
@@ -201,20 +178,14 @@ FULL_COMMAND = (
     .says(Q, Q_O_prime * (u_max - u_min0) / (u_max - beta * u_min0))
     .by(
         *flow_under("L3", u_min1, dP1),
-        *("(5)", "gamma_1", "T2c", "full command", "(16)"),
-        Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
-        eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
+        *_AT_FULL_COMMAND,
+        eliminate=(*_UNKNOWN_AT_DP1, Q_max1, x_max),
     )
     .within(TARGET_OFF_REFERENCE, _FULL_COMMAND_IS_THE_LIMIT)
     .qualified_by("T1d", "T1e")
     .numbers(
         *(
-            Value(
-                f"flow lost, {valve.name}",
-                of=1 - (u_max - u_min0) / (u_max - beta * u_min0),
-                at=valve.at(),
-                unit="%",
-            )
+            valve.value("flow lost", "%", of=1 - (u_max - u_min0) / (u_max - beta * u_min0))
             for valve in (FIRST, SIMULATION, SECOND)
         )
     )

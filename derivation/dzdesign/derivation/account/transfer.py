@@ -3,9 +3,9 @@
 import sympy
 from sympy import Eq, sqrt
 
-from dzdesign.derivation.account.equations import ORIFICE
+from dzdesign.derivation.account.equations import ORIFICE, beyond
 from dzdesign.derivation.account.published import SIMULATION
-from dzdesign.derivation.account.scope import BARE, EVERYWHERE, PLANT, scope
+from dzdesign.derivation.account.scope import BARE, PLANT
 from dzdesign.derivation.account.statement import Ground, Kind, Statement
 from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
 from dzdesign.derivation.symbols import *
@@ -26,9 +26,9 @@ _TITLES = {
 def _premise(number: str) -> Statement:
     title, note = _TITLES[number]
     equation = PLANT_EQUATIONS[number]
+    stated = Kind.PREMISE(number, title).says(equation.lhs, equation.rhs).remark(note)
     # Beyond the simulation model a valve has a dead zone, which (24) has not.
-    where, see = (scope(PLANT), ("T6d",)) if number == "(24)" else (EVERYWHERE, ())
-    return Kind.PREMISE(number, title).says(equation.lhs, equation.rhs).within(where).qualified_by(*see).remark(note)
+    return stated.within(PLANT).qualified_by("T6d") if number == "(24)" else stated
 
 
 def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
@@ -57,7 +57,7 @@ LAPLACE = (
 )
 
 
-def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
+def laplace(number: str) -> Ground:
     """Return a plant equation, of Eqs. (19)-(24), as a ground, transformed term by term.
 
     One that is not linear and homogeneous in the signals is refused: its transform is another one.
@@ -120,7 +120,7 @@ TRANSFER_FUNCTION = (
         "$K_a K_fi$ / ($R_c + r_p$), and makes the current depend less on the coil's temperature by the same factor."
     ),
     Kind.DEFINITION("transfer function", "transfer function from command to flow").says(G, Q_s / U_i),
-    Kind.THEOREM("T6b", "transfer function of Eqs. (19)-(24) without load force")
+    Kind.THEOREM("T6b", "transfer function of Eqs. (19) to (24) without load force")
     .says(G, ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)))
     .by(
         "transfer function",
@@ -143,7 +143,7 @@ TRANSFER_FUNCTION = (
     .within(u_min <= u_O),
     Kind.THEOREM("T6d", "Eq. (24) is the dead-zone model (1) beyond the threshold")
     .says(Q, ORIFICE * x_e)
-    .by(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap")
+    .by(Ground("(1)", beyond(u_min)), "overlap")
     .within(BARE, u_min <= u_i)
     .if_(Eq(x_ov, 0), ruled_out_by=((x_ov, _OVERLAP_MM / 1000),), discrepancy=-ORIFICE * x_ov)
     .corrected("T6e")
@@ -153,6 +153,6 @@ TRANSFER_FUNCTION = (
     ),
     Kind.CORRECTED("T6e", "flow across an edge with overlap, opened")
     .says(Q, ORIFICE * (x_e - x_ov))
-    .by(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap")
+    .by(Ground("(1)", beyond(u_min)), "overlap")
     .within(BARE, u_min <= u_i),
 )

@@ -4,17 +4,8 @@ import sympy
 from sympy import Eq, Ne, Piecewise
 
 from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION
-from dzdesign.derivation.account.scope import (
-    AT_ZERO_COMMAND,
-    BARE,
-    FREE_BETA,
-    FREE_OPENING,
-    LAW_OFF_REFERENCE,
-    UP_TO_REFERENCE,
-    WITH_TRANSITION,
-    scope,
-)
-from dzdesign.derivation.account.statement import Case, Ground, Kind, Value
+from dzdesign.derivation.account.scope import *
+from dzdesign.derivation.account.statement import Case, Ground, Kind
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *
 from dzdesign.derivation.transition import LAW_COMMAND, LOWERED_BY, SHARE
@@ -47,22 +38,20 @@ ZERO_COMMAND = (
     .in_cases(Case(((u_min1, u_min0 - excess),), "threshold lower than at the reference"))
     .qualified_by("T9d")
     .numbers(
-        Value(
-            "simulation",
-            SIMULATION.at(),
+        SIMULATION.value(
+            "",
             "L/min",
             published=SIMULATION.zero_flow_without_beta,
             remark="read off a figure; 0.01 L/min is 0.002 V of threshold",
         ),
-        Value(
-            "first valve",
-            FIRST.at(),
+        FIRST.value(
+            "",
             "L/min",
             published=FIRST.zero_flow_without_beta,
             remark="If the paper's thresholds are the first flow that its meter shows (it starts at 0.6 L/min), "
             "T9d gives 1.69.",
         ),
-        Value("second valve", SECOND.at(), "L/min"),
+        SECOND.value("", "L/min"),
     ),
     Kind.THEOREM("beta(dP)", "correction coefficient from the fitted thresholds")
     .says(beta, f(dP1) / f(dP0))
@@ -101,11 +90,11 @@ SHAPE = (
     .by(Ground("(14)", ((u_O, u_min), (u_i, u_dz))))
     .within(UP_TO_REFERENCE)
     .numbers(
-        Value(
-            "for a threshold 1 % of $u_max$ above $u_min0$, first valve",
+        FIRST.value(
+            "for a threshold 1 % of $u_max$ above $u_min0$",
+            "%",
             of=(u_min - u_min0) / (k * x_max),
-            at=(*FIRST.at(), (u_min, sympy.Rational("5.49"))),
-            unit="%",
+            also=((u_min, sympy.Rational("5.49")),),
         )
     )
     .remark("The threshold is higher at a lower pressure drop, and the paper holds $u_0$ there."),
@@ -180,10 +169,7 @@ TRANSITION = (
     .says(Q, sympy.S.Zero)
     .by("T3a")
     .within(_BAND, beta * u_min0 <= u_min1, beta * u_min0 <= u_max)
-    .in_cases(
-        Case(((u_min1, _OFFSET + guard),), "$beta u_min0$ below the threshold"),
-        Case(((u_min1, _OFFSET),), "$beta u_min0$ at the threshold"),
-    )
+    .in_cases(*_THREE_CASES[:2])
     .qualified_by("T10a")
     .remark("The drive is that of zero command (T10a), and so is the flow."),
 )

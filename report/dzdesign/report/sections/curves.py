@@ -4,7 +4,7 @@ An assessment of recordings leads. Without one, the curves without the compensat
 and those with it are of the simulated closed loop.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,6 +27,9 @@ ORIGIN_WORDS: Mapping[Origin, str] = {
 #: Most points of a simulated branch that are drawn.
 MOST_POINTS = 300
 BRANCHES = ("opening", "closing")
+Numbers = Sequence[float]
+#: Command and flow, and those of the samples.
+Branch = tuple[Numbers, Numbers, Numbers, Numbers]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,9 +83,12 @@ def origin_of(recordings: ValveModel | Assessment) -> Origin:
 def _measured(assessment: Assessment) -> Iterator[CharacteristicCurve]:
     for item in assessment.pressures:
         for name in SETS:
-            curve = measured_curve_of(item, name)
-            if curve is not None:
-                yield _measured_curve(item, name, curve, origin_of(assessment))
+            if curve := measured_curve_of(item, name):
+                branches = [
+                    (one.command_percent, one.q_L_min, one.sample_command_percent, one.sample_q_L_min) if one else None
+                    for one in (curve.rising, curve.falling)
+                ]
+                yield _curve(item.side, item.dp_MPa, name, origin_of(assessment), branches, 100.0)
 
 
 def measured_curve_of(item: PressureAssessment, name: Set) -> MeasuredCurve | None:
@@ -91,51 +97,33 @@ def measured_curve_of(item: PressureAssessment, name: Set) -> MeasuredCurve | No
     return None if ramps is None or isinstance(ramps.curve, UnsetType) else ramps.curve
 
 
-def _measured_curve(item: PressureAssessment, name: Set, curve: MeasuredCurve, origin: Origin) -> CharacteristicCurve:
-    sign = SIDES[item.side]
-    named = {word: branch for word, branch in zip(BRANCHES, (curve.rising, curve.falling), strict=True) if branch}
-    return CharacteristicCurve(
-        side=item.side,
-        dp_MPa=item.dp_MPa,
-        set=name,
-        origin=origin,
-        branches={
-            word: _points(branch.command_percent, branch.q_L_min, 0.01 * sign, sign) for word, branch in named.items()
-        },
-        samples=tuple(
-            _points(branch.sample_command_percent, branch.sample_q_L_min, 0.01 * sign, sign)
-            for branch in named.values()
-        ),
-    )
-
-
 def _recorded(valve: ValveModel) -> Iterator[CharacteristicCurve]:
     for name, side in valve.sides.items():
-        sign = SIDES[name]
         for test in side.tests:
-            named = {
-                word: branch
-                for word, branch in zip(BRANCHES, (test.recorded.rising, test.recorded.falling), strict=True)
-                if branch
-            }
-            yield CharacteristicCurve(
-                side=name,
-                dp_MPa=test.dp_MPa,
-                set="before",
-                origin=origin_of(valve),
-                branches={
-                    word: _points(branch.u_V, branch.q_L_min, sign / valve.u_max_V, sign)
-                    for word, branch in named.items()
-                },
-                samples=tuple(_samples_of(branch, sign, valve.u_max_V) for branch in named.values() if branch.samples),
-            )
+            both = (test.recorded.rising, test.recorded.falling)
+            branches = [(one.u_V, one.q_L_min, *_samples_of(one)) if one else None for one in both]
+            yield _curve(name, test.dp_MPa, "before", origin_of(valve), branches, valve.u_max_V)
 
 
-def _samples_of(branch: RecordedBranch, sign: int, u_max_V: float) -> Points:
+def _samples_of(branch: RecordedBranch) -> tuple[Numbers, Numbers]:
     samples = branch.samples
-    if isinstance(samples, UnsetType):
-        return _points((), (), sign, sign)
-    return _points(samples.u_V, samples.q_L_min, sign / u_max_V, sign)
+    return ((), ()) if isinstance(samples, UnsetType) else (samples.u_V, samples.q_L_min)
+
+
+def _curve(
+    side: str, dp_MPa: float | None, name: Set, origin: Origin, branches: Sequence[Branch | None], full: float
+) -> CharacteristicCurve:
+    """Return a recorded curve from command, in units of `full` command, flow, and samples of both, of each branch."""
+    sign = SIDES[side]
+    named = {word: each for word, each in zip(BRANCHES, branches, strict=True) if each}
+    return CharacteristicCurve(
+        side=side,
+        dp_MPa=dp_MPa,
+        set=name,
+        origin=origin,
+        branches={word: _points(each[0], each[1], sign / full, sign) for word, each in named.items()},
+        samples=tuple(_points(each[2], each[3], sign / full, sign) for each in named.values() if each[2]),
+    )
 
 
 def _simulated(loops: Mapping[str, Curves]) -> Iterator[CharacteristicCurve]:

@@ -13,7 +13,7 @@ from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.account.target_flow import TARGET, TIES
 from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.content import DerivationReport, Entry
-from dzdesign.derivation.presentation.prose import Words, parse_prose
+from dzdesign.derivation.presentation.prose import Words
 from dzdesign.derivation.presentation.report import closure, compose
 from dzdesign.derivation.presentation.writers import HtmlWriter
 from dzdesign.design.compensator import Compensator
@@ -173,7 +173,7 @@ def account_of(law_name: str) -> LawAccount:
     numbers = closure(STATEMENTS, [number])
     statements = [statement for statement in STATEMENTS if statement.number in numbers]
     return LawAccount(
-        note=parse_prose(law(law_name).note),
+        note=Words(law(law_name).note),
         derived=compose(prove(statements), numbers),
         main=frozenset(ground.number for ground in statements[-1].grounds) | {number},
         page=HtmlWriter(numbers),

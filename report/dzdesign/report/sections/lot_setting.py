@@ -5,7 +5,7 @@
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot.valves import LotSide, LotValve
+from dzdesign.design.lot_valves import LotSide, LotValve
 from dzdesign.identify.valve.model import SIDES
 from dzdesign.report.artefacts import Chain
 from dzdesign.report.cells import Cell, in_number_font, recorded, table_of

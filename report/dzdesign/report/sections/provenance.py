@@ -10,7 +10,7 @@ from dzdesign.core.verdicts import NOT_CHECKED, NOT_REQUIRED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import CostAtTest, costs_at_tests
-from dzdesign.design.signal_descriptions import signals_in_words
+from dzdesign.design.pressure_inputs import signals_in_words
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import ROLES, Chain, standing_warnings

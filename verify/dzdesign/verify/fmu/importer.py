@@ -5,16 +5,14 @@ The job is JSON: the name of a function here and its arguments; the answer is th
 """
 
 import json
-import signal
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import scratch_folder
+from dzdesign.verify.toolchain.child_process import run_child
 
 if TYPE_CHECKING:
     from fmpy.model_description import ModelDescription
@@ -120,14 +118,10 @@ def run_in_child(function: str, what: str, **arguments: Any) -> list[Row]:
         job, answer = place / "job", place / "answer"
         job.write_text(json.dumps({"function": function, **arguments}), encoding="utf-8")
         command = [sys.executable, "-P", "-m", "dzdesign.verify.fmu.importer", str(job), str(answer)]
-        try:
-            done = run_program(command, cwd=place, timeout=LONGEST_S)
-        except subprocess.TimeoutExpired as error:
-            raise RequirementError(f"{what} did not end within {LONGEST_S:g} s") from error
-        if done.returncode:
-            said = done.stderr.strip().splitlines()[-1:] or ["without a word"]
-            ended = signal.Signals(-done.returncode).name if done.returncode < 0 else f"status {done.returncode}"
-            raise RequirementError(f"{what} ended with {ended}: {said[0][:200]}")
+        ended = run_child(command, what, LONGEST_S, place=place)
+        if ended.reason:
+            said = ended.complaint.strip().splitlines()[-1:] or ["without a word"]
+            raise RequirementError(f"{what} ended with {ended.reason}: {said[0][:200]}")
         return json.loads(answer.read_text(encoding="utf-8"))  # type: ignore[no-any-return]
 
 
