@@ -100,9 +100,8 @@ def example_compensator(example_valve):
 @pytest.fixture(scope="session")
 def example_firmware(example_compensator):
     from dzdesign.codegen.project import generate
-    from dzdesign.core.artefact_types import to_json_bytes
 
-    return generate(example_compensator, "f28335", to_json_bytes(example_compensator))
+    return generate(example_compensator, "f28335")
 
 
 @pytest.fixture
@@ -125,14 +124,14 @@ def reported_demo(example_valve, tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("reported")
     valve_json = to_json_bytes(example_valve)
-    compensator = design(example_valve, default_options(), valve_json)
+    compensator = design(example_valve, default_options())
     compensator_json = to_json_bytes(compensator).decode()
     (folder / "valve.json").write_bytes(valve_json)
     (folder / "compensator.json").write_text(compensator_json, encoding="utf-8", newline="")
-    firmware = generate(compensator, "f28335", compensator_json.encode())
+    firmware = generate(compensator, "f28335")
     write_folder(folder / "firmware", firmware.files, firmware.manifest)
-    evidence = verify(folder / "firmware", sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
-    evidence = evidence.with_checks(regenerated(folder / "firmware"))
+    again = regenerated(folder / "firmware")
+    evidence = verify(folder / "firmware", again=again, sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
     files = with_report(evidence, folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", files, evidence_manifest(evidence.evidence))
     return folder

@@ -39,7 +39,7 @@ def compensator(folder: str = "goldens") -> Compensator:
 @cache
 def _made(target: str) -> Output:
     of = compensator()
-    return generate_output(of, target, {"iec61131": BLOCK_SETTINGS}.get(target, {}), to_json_bytes(of))
+    return generate_output(of, target, {"iec61131": BLOCK_SETTINGS}.get(target, {}))
 
 
 def _output(target: str) -> Mapping[str, bytes]:

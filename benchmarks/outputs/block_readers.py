@@ -16,7 +16,6 @@ from scoreboard import Row, print_rows
 
 from dzdesign.codegen.other_targets import generate_output
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 
 ROOT = Path(__file__).parents[2]
@@ -28,7 +27,7 @@ def texts(root: str, dialect: str, interface: str) -> dict[str, str]:
     source = ROOT / "tests" / root / "compensator.json"
     compensator = read_artefact(source.read_bytes(), Compensator, source.name)
     settings = {"dialect": dialect, "interface": interface}
-    files = generate_output(compensator, "iec61131", settings, to_json_bytes(compensator)).files
+    files = generate_output(compensator, "iec61131", settings).files
     found = {f"{NAME}.st": files[f"{NAME}.st"].decode()}
     parts = {each.tag.rpartition("}")[2]: each for each in ElementTree.fromstring(files[f"{NAME}.xml"]).iter()}
     plain, body = ("".join(parts[name].itertext()).strip("\n") for name in ("InterfaceAsPlainText", "body"))

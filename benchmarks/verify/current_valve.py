@@ -12,7 +12,6 @@ from stand_in_flow import RECORDINGS, ROOT
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
@@ -65,7 +64,7 @@ def _rows(name: str, compensator: Compensator, plant: Plant | None) -> list[Row]
         raise ValueError("the drive is by duty")
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "firmware"
-        firmware = generate(compensator, TARGET, to_json_bytes(compensator))
+        firmware = generate(compensator, TARGET)
         write_folder(folder, firmware.files, firmware.manifest)
         found = [valve_at_corners(scene, drive.circuit) for scene in scenes_of(folder, compensator, plant)]
     moved = max(found, key=lambda each: each.opening_largest - each.opening_least)

@@ -121,31 +121,6 @@ def test_the_project_builds_without_a_warning_and_its_selftest_holds(controlled,
     assert target == "host" or "99 interrupts, compare values of dz_current_tick()" in printed
 
 
-def test_the_manifest_states_every_constant_of_the_controller(controlled, tmp_path):
-    from dzdesign.verify.firmware.manifest import manifest_follows
-
-    firmware = generate(controlled, "host", to_json_bytes(controlled))
-    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    check = manifest_follows(tmp_path / "fw", firmware.manifest, controlled)
-    assert check.holds, check.text
-    source = tmp_path / "fw" / "core" / "dz_current.c"
-    source.write_text(source.read_text().replace("#define RATE UINT32_C(", "#define RATE UINT32_C(1"))
-    assert not manifest_follows(tmp_path / "fw", firmware.manifest, controlled).holds
-
-
-def test_a_table_of_plain_numbers_is_compared_with_the_manifest(example_valve, tmp_path):
-    from dzdesign.verify.firmware.manifest import manifest_follows
-
-    firmware = generate(play := design(example_valve, options({"hysteresis": "play"})), "host", to_json_bytes(play))
-    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    assert manifest_follows(tmp_path / "fw", firmware.manifest, play).holds
-    source = tmp_path / "fw" / "core" / "dz_drive.c"
-    text = source.read_text()
-    start = text.index("play_positive[")
-    source.write_text(text[:start] + text[start:].replace("u, ", "1u, ", 1))
-    assert "play_positive" in manifest_follows(tmp_path / "fw", firmware.manifest, play).text
-
-
 def test_a_target_without_current_control_is_refused(controlled):
     with pytest.raises(InputError, match="--drive"):
         options(TEXTS, "avr")

@@ -10,7 +10,6 @@ import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.designing import design
@@ -53,7 +52,7 @@ def core_of(tmp_path_factory):
 
     def call(compensator):
         folder = tmp_path_factory.mktemp("core") / "fw"
-        firmware = generate(compensator, "host", to_json_bytes(compensator))
+        firmware = generate(compensator, "host")
         write_folder(folder, firmware.files, firmware.manifest)
         library = folder.parent / "core.so"
         subprocess.run(["cc", "-shared", "-fPIC", "-o", library, folder / "core" / "dz_comp.c"], check=True)

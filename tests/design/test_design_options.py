@@ -8,6 +8,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import to_json_bytes
+from tests.support.attacked_firmware import sealed
 from tests.support.paths import GOLDENS_FULL
 
 #: A valve with both sides.
@@ -110,7 +111,7 @@ def test_a_guard_that_one_side_lacks_is_refused_with_those_that_serve_both(run, 
     document = json.loads(BOTH_SIDES.read_text())
     del document["sides"]["negative"]["certified"]["mean"]
     valve = tmp_path / "valve.json"
-    valve.write_text(json.dumps(document))
+    valve.write_text(json.dumps(sealed(document)))
     status, said, _ = run(valve, BOTH_SIGNS, "--guard", "mean")
     assert status == 2 and "the negative side's ramp tests do not bound the mean threshold" in said
     assert "take --guard closing" in said

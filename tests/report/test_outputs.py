@@ -18,7 +18,7 @@ from dzdesign.report.outputs import change_in, outputs_in, outputs_sections, wit
 from dzdesign.report.page import Headline, MadeOutput, MadeOutputs
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.output_evidence import OutputEvidence, TriedInputs
-from dzdesign.verify.requirements import FILES
+from dzdesign.verify.requirements import REPRODUCED
 from dzdesign.verify.verification import evidence_manifest
 from tests.support.evidence import evidence_with
 from tests.support.paths import GOLDENS
@@ -44,14 +44,14 @@ def digest(document):
 
 @pytest.fixture(scope="module")
 def plc(compensator, document):
-    return generate_output(compensator, "iec61131", settings_of("iec61131", {}), document)
+    return generate_output(compensator, "iec61131", settings_of("iec61131", {}))
 
 
 @pytest.fixture
 def folder(tmp_path, compensator, document, plc):
     """A compensator with a firmware and a function block beside it."""
     (tmp_path / "compensator.json").write_bytes(document)
-    write_firmware(generate(compensator, "host", document), tmp_path / "firmware")
+    write_firmware(generate(compensator, "host"), tmp_path / "firmware")
     write_output(plc, tmp_path / "plc")
     return tmp_path
 
@@ -63,7 +63,7 @@ def put_evidence(place, folder, *, holds=True, text="yes"):
     evidence = OutputEvidence(
         tool=THIS_TOOL, made_from=made_from, target="iec61131", settings={},
         origin=FirmwareOrigin(compensator_json=none, valve_json=none, ramp_tests=()),
-        checks=(FILES.check(holds=holds, text=text),), inputs=(TriedInputs(name="all", inputs=INPUTS, wrong=0),),
+        checks=(REPRODUCED.check(holds=holds, text=text),), inputs=(TriedInputs(name="all", inputs=INPUTS, wrong=0),),
         versions={},
     )  # fmt: skip
     write_folder(place, {OutputEvidence.FILE_NAME: to_json_bytes(evidence)}, evidence_manifest(evidence))

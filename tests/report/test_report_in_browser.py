@@ -14,6 +14,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.page import logo_uri
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
+from tests.support.attacked_firmware import sealed
 from tests.support.synthetic import needs_compiler
 from tests.support.synthetic_lots import lot_rows, with_figures, write_lot_folder
 
@@ -136,7 +137,7 @@ def pages(reported_demo, tmp_path_factory):
     alone.mkdir()
     valve = json.loads((reported_demo / "valve.json").read_bytes())
     valve["record"] = {"serial": "4711", "n" * 60: "unbroken" * 25, "oil": "HLP 46, 40 °C"}
-    (alone / "valve.json").write_text(to_json(valve))
+    (alone / "valve.json").write_text(to_json(sealed(valve)))
     for place in (failing, missed, alone):
         (place / REPORT_NAME).write_text(report_of_folder(place).html, encoding="utf-8")
     rows = lot_rows(80, failed=(3, 4, 50))

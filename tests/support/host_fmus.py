@@ -11,7 +11,6 @@ import fmpy
 from dzdesign.codegen.fmu import files
 from dzdesign.codegen.fmu.files import archive
 from dzdesign.codegen.other_targets import Output, generate_output
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.fmu.checks import Unpacked
@@ -39,7 +38,7 @@ def plant_setting(plant: Plant = PLANT) -> str:
 def fmus_of(compensator: Compensator, plant: Plant | None = PLANT) -> Output:
     """Return the FMUs, with the binaries of the platforms that `files.PLATFORMS` has now."""
     settings = {"plant": plant_setting(plant) if plant else ""}
-    return generate_output(compensator, "fmu", settings, to_json_bytes(compensator))
+    return generate_output(compensator, "fmu", settings)
 
 
 def written(output: Output, folder: Path) -> Path:

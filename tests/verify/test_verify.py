@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 import subprocess
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -18,9 +17,8 @@ from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.firmware.compensator_checks import certificate_follows
 from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.firmware.unchanged_files import files_unchanged
+from dzdesign.verify.firmware.reproduced import Regenerated, reproduced
 from dzdesign.verify.verification import verify
 from tests.support.synthetic import needs_compiler, with_side
 
@@ -112,22 +110,10 @@ def test_an_offset_above_the_bound_is_over_compensation(example_compensator, tmp
     assert result.over_compensated > 0 and not result.holds
 
 
-def test_a_certificate_that_says_too_much_is_found(example_compensator, wording):
-    """What the header promises beyond the tests is no property of the machine code, so no input shows it."""
-    honest = certificate_follows(example_compensator)
-    certificate = replace(example_compensator.positive.certificate, dp_MPa=(Fraction(0), Fraction(20)))
-    boastful = certificate_follows(with_side(example_compensator, certificate=certificate))
-    assert honest.holds and not boastful.holds
-    wording.of_test(boastful.text)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("each_core_once")
-def test_a_changed_file_fails_the_verification(firmware_folder):
-    readme = firmware_folder / "f28335" / "README.md"
-    readme.write_text(readme.read_text() + "\n")
-    result = verify(firmware_folder, sequence=QUICK)
-    assert [check.name for check in result.evidence.checks if not check.holds] == ["the generated files are unchanged"]
+def fault_of(folder, manifest):
+    """What is wrong with the folder, of which every generated file is as it lies there; empty if nothing is."""
+    check = reproduced(folder, Regenerated(files={name: (folder / name).read_bytes() for name in manifest.files}))
+    return "" if check.holds else check.text
 
 
 @pytest.mark.parametrize(
@@ -138,18 +124,10 @@ def test_source_and_project_files_that_were_added_are_refused(firmware_folder, n
     manifest = read_firmware_manifest(firmware_folder)
     for built in ("f28335/main.o", "f28335/firmware.out", "f28335/firmware.map"):
         (firmware_folder / built).write_text("")
-    assert files_unchanged(firmware_folder, manifest).holds
+    assert fault_of(firmware_folder, manifest) == ""
     (firmware_folder / name).parent.mkdir(exist_ok=True)
     (firmware_folder / name).write_text("")
-    added = files_unchanged(firmware_folder, manifest)
-    assert added.holds is False
-    wording.of_test(added.text)
-
-
-def test_a_file_whose_line_was_taken_from_the_manifest_is_refused(firmware_folder, wording):
-    manifest = read_firmware_manifest(firmware_folder)
-    files = {name: digest for name, digest in manifest.files.items() if name != "f28335/dz_isr.c"}
-    wording.of_test(files_unchanged(firmware_folder, replace(manifest, files=files)).text)
+    wording.of_test(fault_of(firmware_folder, manifest))
 
 
 def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder, wording):
@@ -157,43 +135,33 @@ def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder, wor
     for name in ("build/CMakeCache.txt", "build/Makefile", "build/CMakeFiles/3.30/CMakeCCompilerId.c"):
         (firmware_folder / name).parent.mkdir(parents=True, exist_ok=True)
         (firmware_folder / name).write_text("")
-    built = files_unchanged(firmware_folder, manifest)
-    assert built.holds
-    wording.of_test(built.text)
+    assert fault_of(firmware_folder, manifest) == ""
     for name in ("f28335/CMakeCache.txt", "f28335/extra.c", "CMakeCache.txt"):
         (firmware_folder / name).write_text("")
-    wording.of_test(files_unchanged(firmware_folder, manifest).text)
+    wording.of_test(fault_of(firmware_folder, manifest))
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake")
-def test_a_true_build_of_cmake_is_no_foreign_source(example_compensator, tmp_path, wording):
+def test_a_true_build_of_cmake_is_no_foreign_source(example_compensator, tmp_path):
     from dzdesign.codegen.project import generate
 
     firmware = generate(example_compensator, "host")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     subprocess.run(["cmake", "-S", "host", "-B", "host/build"], cwd=tmp_path / "fw", check=True, capture_output=True)
-    found = files_unchanged(tmp_path / "fw", read_firmware_manifest(tmp_path / "fw"))
-    assert found.holds
-    wording.of_test(found.text)
+    assert fault_of(tmp_path / "fw", read_firmware_manifest(tmp_path / "fw")) == ""
 
 
 def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder, wording):
     manifest = read_firmware_manifest(firmware_folder)
     (firmware_folder / "f28335" / "dz_comp.h").write_text("#define DZ_COMPARE_MAX 1u\n")  # goes before core's
-    shadowed = files_unchanged(firmware_folder, manifest)
-    assert shadowed.holds is False
-    wording.of_test(shadowed.text)
+    wording.of_test(fault_of(firmware_folder, manifest))
 
 
-@pytest.mark.usefixtures("each_core_once")
 def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder, wording):
     manifest = json.loads((firmware_folder / "manifest.json").read_text())
     (firmware_folder / "manifest.json").write_text(to_json(manifest | {"files": {}, "core": []}))
     with wording.refusal(InputError):
         verify(firmware_folder, sequence=QUICK)
-    (firmware_folder / "manifest.json").write_text(to_json(manifest | {"files": {}}))
-    result = verify(firmware_folder, sequence=QUICK)
-    assert "the generated files are unchanged" in {check.name for check in result.evidence.checks if not check.holds}
 
 
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
@@ -242,8 +210,9 @@ class TestPlant:
 def test_closed_loop_removes_the_dead_zone_and_without_beta_leaks(firmware_folder, example_folder):
     from dzdesign.verify.closed_loop.plant import read_plant
 
-    result = verify(firmware_folder, read_plant(example_folder / "plant.toml"), sequence=QUICK)
-    assert result.with_checks(regenerated(firmware_folder)).holds
+    plant, again = read_plant(example_folder / "plant.toml"), regenerated(firmware_folder)
+    result = verify(firmware_folder, plant, again=again, sequence=QUICK)
+    assert result.holds
     for loop in result.loops:
         # The quick ramp lags by some tens of millivolts.
         assert loop.result.dead_zone_opening > 0.5
@@ -293,4 +262,4 @@ def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, 
     options = options_of({"pressure_span": "5.1 MPa"}, target_named("f28335").inputs())
     firmware = generate(design(example_valve, options), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    assert verify(tmp_path / "fw", sequence=QUICK).with_checks(regenerated(tmp_path / "fw")).holds
+    assert verify(tmp_path / "fw", again=regenerated(tmp_path / "fw"), sequence=QUICK).holds

@@ -130,8 +130,6 @@ class Compensator(ShownInNotebooks, Artefact):
     supply, sensors, converter, oil or ageing."""
     costs: tuple[str, ...]
     """Cost of each safe choice, in words."""
-    valve_sha256: str = field(init=False)
-    """SHA-256 of `valve` as `identify` writes it, which reveals a change."""
     valve: ValveModel
     """Identified valve from which the compensator was designed."""
     lot_sha256: str | None = field(init=False)
@@ -157,7 +155,6 @@ class Compensator(ShownInNotebooks, Artefact):
         for sign in self.signals.signs:
             self._check_side(sign)
         lot_json = to_json({"lot": [as_document(valve) for valve in self.lot]}).encode()
-        object.__setattr__(self, "valve_sha256", sha256_of_valve(self.valve))
         object.__setattr__(self, "lot_sha256", sha256_of(lot_json) if self.lot else None)
 
     def _check_codes(self) -> None:

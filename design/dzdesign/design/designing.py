@@ -3,17 +3,16 @@
 from dataclasses import replace
 from fractions import Fraction
 
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import errors_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
-from dzdesign.design.beta_table import STEP_CODES
 from dzdesign.design.compensator import Compensator, sha256_of_valve
 from dzdesign.design.costs import costs_of
 from dzdesign.design.machine.allowance import allowance_of, check_bench_current, dither_reserve
+from dzdesign.design.offset.beta_table import STEP_CODES
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
 from dzdesign.design.pressure_inputs import ACCEPTED, refuse_hidden_failures, with_negative_drop
@@ -32,7 +31,7 @@ from dzdesign.identify.valve.reading_flow import default_reading_flow
 REVERSE_SHARE = Fraction(1, 100)
 
 
-def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
+def design(valve: ValveModel, options: DesignOptions | None = None) -> Compensator:
     """Design the compensator of a valve with rational coefficients, and prove the certificate on them.
 
     Parameters
@@ -41,8 +40,6 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         From `dzdesign.identify.identify` or valve.json.
     options : DesignOptions, optional
         Choices of the engineer.
-    valve_bytes : bytes, optional
-        The file that the valve was read from, for its hash; without it the hash is of what `identify` would write.
 
     Raises
     ------
@@ -52,10 +49,10 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         If a proof fails.
     """
     with errors_in(valve.recorded_units):
-        return _designed(valve, options or DesignOptions(), valve_bytes)
+        return _designed(valve, options or DesignOptions())
 
 
-def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | None) -> Compensator:
+def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
     law(options.law)
     if len(options.signals.signs) == 2:
         refuse_two_signs(valve, options.guard)
@@ -75,11 +72,10 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
         side = valve.positive if sign > 0 else valve.sides["negative"]
         allowance = allowance_of(signals, options.machine, sign=sign, dither_counts=reserve)
         laws[sign] = side_law(side, options, u_max, units, transition_codes, allowance)
-    digest = sha256_of_valve(valve) if valve_bytes is None else sha256_of(valve_bytes)
     request = options.request
     compensator = Compensator(
         tool=THIS_TOOL,
-        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=digest),),
+        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=sha256_of_valve(valve)),),
         target=request.target if request else None,
         options=request.options if request else None,
         law=options.law,

@@ -49,8 +49,7 @@ def prove_derived(compensator: Compensator) -> None:
             raise InputError(f"{error}; make it again with `dzdesign batch`") from error
         _prove_lot_setting(compensator, redesigned)
         redesigned = replace(redesigned, sides=compensator.sides, lot=compensator.lot, costs=compensator.costs)
-    # The hash of valve.json counts its spacing, which is not kept.
-    redesigned = replace(redesigned, tool=compensator.tool, made_from=compensator.made_from)
+    redesigned = replace(redesigned, tool=compensator.tool)
     for found in differences(compensator, redesigned):
         stated, follows = _from_where_they_differ(found.stated, found.follows)
         raise InputError(

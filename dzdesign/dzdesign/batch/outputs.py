@@ -100,7 +100,7 @@ def make_output(wanted: WantedOutput, of: ForOutputs) -> ValveOutput:
 
     verdict: OutputVerdict = NOT_MADE
     try:
-        output = generate_output(of.compensator, wanted.target, wanted.settings, of.document)
+        output = generate_output(of.compensator, wanted.target, wanted.settings)
         write_folder(of.place / wanted.folder, output.contents, output.manifest)
         verdict = NOT_VERIFIED
         return _verified(wanted, of) if of.verify else _found(wanted, verdict)

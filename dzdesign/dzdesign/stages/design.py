@@ -98,7 +98,7 @@ def design(arguments: DesignArguments) -> "Compensator":
         compensator = design_valve(arguments.valve, options)
     else:
         content = read_bytes(Path(arguments.valve), "valve file")
-        compensator = design_valve(read_artefact(content, ValveModel, os.fspath(arguments.valve)), options, content)
+        compensator = design_valve(read_artefact(content, ValveModel, os.fspath(arguments.valve)), options)
     if arguments.output is not None:
         write_file(Path(arguments.output), to_json_bytes(compensator), SCHEMA)
     return compensator

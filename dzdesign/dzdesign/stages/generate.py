@@ -113,8 +113,8 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
     form = form_named(arguments.calibration)
     settings_of(target, chosen_of_outputs(arguments))
     vectors: int = read_options(arguments, ["vectors"])["vectors"]
-    made, content, designed = _compensator(arguments, target)
-    firmware = generate_project(made, target if designed else arguments.target, content, form, vectors)
+    made, designed = _compensator(arguments, target)
+    firmware = generate_project(made, target if designed else arguments.target, form, vectors)
     if arguments.output is None:
         return firmware
     return write_firmware(firmware, Path(arguments.output), over_another=arguments.replace)
@@ -129,8 +129,8 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
     of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
     given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
     settings = settings_of(target, given)
-    made, content, _ = _compensator(arguments, DEFAULT_TARGET)
-    output = generate_output(made, target, settings, content)
+    made, _ = _compensator(arguments, DEFAULT_TARGET)
+    output = generate_output(made, target, settings)
     if arguments.output is None:
         return output
     return write_output(output, Path(arguments.output), over_another=arguments.replace)
@@ -157,8 +157,8 @@ def _plant_text(path: Path) -> str:
     return json.dumps({name: float(value) for name, value in asdict(read_plant(path, say)).items()})
 
 
-def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bytes | None, bool]":
-    """Return the compensator, its file, None without one, and whether it was designed here."""
+def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bool]":
+    """Return the compensator, and whether it was designed here."""
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import Compensator
@@ -170,16 +170,16 @@ def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensato
     given = arguments.compensator
     if isinstance(given, Compensator):
         _refuse_other_choices(given, "the compensator", arguments)
-        return given, None, False
+        return given, False
     source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
     document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
     if document["schema"] == VALVE_SCHEMA:
         valve = read_artefact(content, ValveModel, source)
-        return design_valve(valve, design_options(arguments, target), content), None, True
+        return design_valve(valve, design_options(arguments, target)), True
     compensator = read_artefact(content, Compensator, source)
     refuse_without_options(compensator, source)
     _refuse_other_choices(compensator, f"'{source}'", arguments)
-    return compensator, content, False
+    return compensator, False
 
 
 def _refuse_other_choices(compensator: "Compensator", source: str, choices: DesignChoices) -> None:

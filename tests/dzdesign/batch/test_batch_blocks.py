@@ -89,7 +89,7 @@ def test_one_firmware_and_a_block_a_valve(made):
         block = unpack(octets)
         assert octets == octets_in_file(folder / "calibration.hex") and text_of(block.serial) == f"{name}-S"
         content = (folder / "compensator.json").read_bytes()
-        alone = generate(compensator_of(folder), "host", content, "block")
+        alone = generate(compensator_of(folder), "host", "block")
         assert replace(unpack(alone.block), serial=block.serial, crc32=block.crc32) == block
         found = json.loads((folder / "calibration_check.json").read_bytes())
         assert found["holds"] and found["made_from"][0]["sha256"] == sha256_of(content)

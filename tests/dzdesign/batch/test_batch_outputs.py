@@ -26,7 +26,7 @@ from dzdesign.report.lot.summary import LotSummary, ValveManifest, ValveOutput
 from dzdesign.report.lot.table import ValveFolder, read_manifest
 from dzdesign.stages import verify as verify_stage
 from dzdesign.verify.output_evidence import TriedInputs
-from dzdesign.verify.requirements import FILES
+from dzdesign.verify.requirements import REPRODUCED
 from tests.dzdesign.batch.test_batch import NOTHING, tree
 from tests.support.many_valves import write_lot
 from tests.support.paths import GOLDENS
@@ -100,7 +100,7 @@ def found_with(monkeypatch, of_valve, holds, text="7 wrong"):
     """Make an output that `verify` finds to be so."""
     evidence = SimpleNamespace(
         inputs=(TriedInputs(name="all", inputs=5, wrong=0), TriedInputs(name="more", inputs=6, wrong=0)),
-        checks=(FILES.check(holds=True, text=""), FILES.check(holds=holds, text=text)),
+        checks=(REPRODUCED.check(holds=True, text=""), REPRODUCED.check(holds=holds, text=text)),
     )
     monkeypatch.setattr(verify_stage, "verify_output_folder", lambda *_: SimpleNamespace(evidence=evidence))
     return make_output(PLC, replace(of_valve, verify=True))
@@ -212,15 +212,16 @@ def test_the_report_of_the_lot_lists_them_and_sees_another_manifest(made, tmp_pa
     out = shutil.copytree(made / "out", tmp_path / "out")
     html = report_of_lot(out).html
     assert '<section id="outputs">' in html and "valves/NAME/plc" in html and "iec61131 not made" in html
-    assert read_lot(out).faults == ()
     block = out / "valves" / "V0001" / "plc" / "FB_DeadZone.st"
     text = block.read_bytes()
     block.write_bytes(text.replace(b"drive := ", b"drive := 1 + "))
-    assert "V0001/plc: changed or missing: FB_DeadZone.st" in read_lot(out).faults[0]
+    with pytest.raises(InputError, match=r"V0001/plc: changed or missing: FB_DeadZone\.st"):
+        read_lot(out)
     block.write_bytes(text)
     path = out / "valves" / "V0000" / "plc" / MANIFEST_NAME
     path.write_bytes(path.read_bytes() + b" ")
-    assert "V0000/plc/manifest.json" in read_lot(out).faults[0]
+    with pytest.raises(InputError, match=r"V0000/plc/manifest\.json"):
+        read_lot(out)
 
 
 @pytest.mark.slow
@@ -240,10 +241,9 @@ def test_each_valve_has_the_parameters_of_its_amplifier(made, tmp_path, monkeypa
     assert (out / "valves" / "V0000" / "amplifier_evidence" / "evidence.json").is_file()
     html = report_of_lot(out).html
     assert '<td class="text">amplifier</td><td class="text">device west</td>' in html
-    before = set(read_lot(out).faults)  # the evidence of the firmware, which was not verified
     (out / "valves" / "V0001" / "amplifier" / "west.txt").write_bytes(files[0])
-    [fault] = set(read_lot(out).faults) - before
-    assert "V0001/amplifier: changed or missing: west.txt" in fault
+    with pytest.raises(InputError, match=r"V0001/amplifier: changed or missing: west\.txt"):
+        read_lot(out)
 
 
 def held(arguments, **_):
@@ -255,7 +255,7 @@ def held(arguments, **_):
 @pytest.mark.slow
 def test_an_output_that_does_not_hold_is_the_valves_reason(made, monkeypatch):
     """With the firmware's verification taken as held."""
-    evidence = SimpleNamespace(inputs=(), checks=(FILES.check(holds=False, text="7 wrong"),))
+    evidence = SimpleNamespace(inputs=(), checks=(REPRODUCED.check(holds=False, text="7 wrong"),))
     monkeypatch.setattr(verify_stage, "verify_firmware", held)
     monkeypatch.setattr(verify_stage, "verify_output_folder", lambda *_: SimpleNamespace(evidence=evidence))
     recordings = [(path.name, path.read_bytes()) for path in sorted((made / "V0000").glob("*.csv"))]
@@ -265,7 +265,7 @@ def test_an_output_that_does_not_hold_is_the_valves_reason(made, monkeypatch):
     task = replace(task, identify=replace(task.identify, meter_lag="0.1 s"))
     outcome = calibrate(task)
     assert outcome.manifest.status == "does not hold"
-    assert outcome.manifest.reason == f"output iec61131: {FILES.title}: 7 wrong"
+    assert outcome.manifest.reason == f"output iec61131: {REPRODUCED.title}: 7 wrong"
     assert outcome.manifest.outputs[0].verdict == "does not hold" and outcome.manifest.inputs_sha256 == task.digest
     assert "plc/FB_DeadZone.st" in outcome.files and "evidence/report.html" in outcome.files
 

@@ -317,7 +317,7 @@ def test_the_api_takes_the_result_of_the_stage_before(written, unproven):
 def test_the_firmware_holds_the_same_block(written, unproven):
     content = (written / "compensator.json").read_bytes()
     compensator = read_artefact(content, Compensator, "compensator.json")
-    firmware = generate(compensator, "f28335", content, "block")
+    firmware = generate(compensator, "f28335", "block")
     assert firmware.contents["calibration.bin"] == api.calibration(written / "compensator.json").content
 
 

@@ -333,7 +333,7 @@ def test_flow_begins_where_the_page_says(reproduced, tmp_path):
         assert 100 * band == pytest.approx(0.46, abs=0.005)
         content = each.files[f"{place}/valve.json"].encode()
         as_in_the_paper = DesignOptions(transition=Fraction(0), above="hold")
-        bare = design(read_artefact(content, ValveModel, "valve.json"), as_in_the_paper, content)
+        bare = design(read_artefact(content, ValveModel, "valve.json"), as_in_the_paper)
         firmware = generate(bare, "host")
         folder = tmp_path / place
         write_folder(folder, firmware.files, firmware.manifest)

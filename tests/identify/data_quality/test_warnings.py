@@ -12,7 +12,7 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of, to_json
+from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
@@ -27,6 +27,7 @@ from dzdesign.report.artefacts import Chain
 from dzdesign.report.summary import headline
 from dzdesign.report.valve_report import make_report
 from tests.conftest import default_options
+from tests.support.attacked_firmware import sealed
 from tests.support.paths import ROOT
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
@@ -104,13 +105,14 @@ class TestSimulated:
         assert document["valve"]["simulated"] is True
         if not whole:
             document["valve"]["warnings"] = []
-        document["valve_sha256"] = sha256_of(to_json(document["valve"]).encode())
+        sealed(document["valve"])
         path = tmp_path / "compensator.json"
         path.write_text(to_json(document))
         assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == (0 if whole else 2)
         if not whole:
             wording("valve: simulated without its warning", capsys.readouterr().err)
         document["valve"] |= {"simulated": False, "warnings": as_document(compensator.valve)["warnings"]}
+        sealed(document["valve"])
         path.write_text(to_json(document))
         assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == 2
         wording("valve: a warning of simulation without one", capsys.readouterr().err)

@@ -23,6 +23,7 @@ from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.side import identify_side
 from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
+from tests.support.attacked_firmware import sealed
 from tests.support.repeatable_valves import REPEATABLE, identify
 from tests.support.synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 
@@ -206,7 +207,7 @@ def document():
 
 class TestFile:
     def read(self, document):
-        return read_artefact(json.dumps(document).encode(), ValveModel, "valve.json")
+        return read_artefact(json.dumps(sealed(document)).encode(), ValveModel, "valve.json")
 
     def test_it_is_read_as_it_was_written(self, document):
         assert json.loads(to_json_bytes(self.read(document))) == document
@@ -290,7 +291,7 @@ def test_verify_holds_the_core_against_the_bounds_of_its_own_guard(tmp_path, mon
     document["sides"]["positive"]["certificate"]["guard"] = "mean"
     content = json.dumps(document).encode()
     Path("compensator.json").write_bytes(content)
-    firmware = generate(read_artefact(content, Compensator, "compensator.json"), "f28335", content)
+    firmware = generate(read_artefact(content, Compensator, "compensator.json"), "f28335")
     write_folder(Path("wrong"), firmware.files, firmware.manifest)
     assert main(["verify", "wrong"]) == 1
     out = capsys.readouterr().out

@@ -7,7 +7,6 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
@@ -33,7 +32,7 @@ QUICK = RampSequence(rest=0.5, ramp=10.0, top=0.5)
 def scenes(valve, texts, folder, plant=None, edit=lambda text: text):
     """The scenes at the lowest and the highest pressure drop."""
     compensator = design(valve, options_of(texts, target_named("cortex-m4").inputs()))
-    firmware = generate(compensator, "cortex-m4", to_json_bytes(compensator))
+    firmware = generate(compensator, "cortex-m4")
     write_folder(folder, firmware.files, firmware.manifest)
     if (source := folder / "core" / "dz_current.c").is_file():
         source.write_text(edit(source.read_text()))

@@ -7,7 +7,6 @@ import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
@@ -32,7 +31,7 @@ def answers_at_zero(prepared):
 def test_the_drawn_bound_is_that_of_the_check(example_tests, tmp_path, monkeypatch, premise, lowered_V):
     valve = identify(example_tests, IdentifyOptions(curve=premise))
     compensator = design(valve, default_options())
-    firmware = generate(compensator, "f28335", to_json_bytes(compensator))
+    firmware = generate(compensator, "f28335")
     write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     bounds = guarded_bounds(compensator, 1)
     assert bounds.premise == premise

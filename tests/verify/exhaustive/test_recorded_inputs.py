@@ -14,8 +14,7 @@ from dzdesign.design.options import options_of
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.recorded_drop import DropColumns
-from dzdesign.verify.exhaustive.recorded_inputs import recorded_inputs_follow
-from dzdesign.verify.exhaustive.stored_vectors import exact_answers
+from dzdesign.verify.exhaustive.recorded_inputs import exact_answers, recorded_inputs_follow
 from dzdesign.verify.toolchain.compiled_core import core_answers
 from tests.support.golden_firmware import FULL
 from tests.support.synthetic import needs_compiler

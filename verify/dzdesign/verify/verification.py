@@ -25,14 +25,16 @@ from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.exhaustive.lot_check import lot_checked
-from dzdesign.verify.exhaustive.stored_vectors import vectors_follow
-from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
-from dzdesign.verify.firmware.compilation import board_compiles, changed_board_files, check_include, compiles_strictly
+from dzdesign.verify.firmware.compilation import BoardCompiled, board_compiles, check_include, compiles_strictly
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
-from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.own_block import own_block_accepted
-from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
-from dzdesign.verify.firmware.unchanged_files import differing_files, files_unchanged, user_files
+from dzdesign.verify.firmware.reproduced import (
+    Regenerated,
+    changed_board_files,
+    differing_files,
+    reproduced,
+    user_files,
+)
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EXACT_LAW, Check
 from dzdesign.verify.toolchain.host_compiler import host_compiler
@@ -81,6 +83,7 @@ def verify(
     tolerances: Tolerances | None = None,
     backs_MPa: Sequence[float] | None = None,
     include: Sequence[Path] = (),
+    again: Regenerated | None = None,
     code: Path | None = None,
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
@@ -94,9 +97,10 @@ def verify(
     `sequence` is the command over time, by default 0-10 V in 100 s and back. `backs_MPa` are the pressures downstream
     of the edge. `include` lists folders with headers of the user's board files.
 
-    The code to compile and run is taken from `code`, by default the folder itself. For a folder that is not trusted,
-    pass one with the same code. `say` is called before each stage. `watch` receives the pieces of a long stage and
-    their number, and yields each piece when it is done.
+    `again` is the firmware as it is generated now; without it the folder is not compared. Of a folder that differs
+    nothing else is tried. The code to compile and run is taken from `code`, by default the folder itself. `say` is
+    called before each stage. `watch` receives the pieces of a long stage and their number, and yields each piece when
+    it is done.
 
     Raises
     ------
@@ -106,32 +110,22 @@ def verify(
     manifest, compensator = _read(folder, plant, tolerances, include)
     host_compiler()
     code = code or folder
-    say("compiling the core with every warning an error")
-    given = (plant, sequence or RampSequence(), tolerances, backs_MPa)
-    run = _run_core(code, manifest, compensator, given, say, watch)
+    same = None if again is None else reproduced(folder, again)
+    run, block, board = _Run(), tuple[Check, ...](), BoardCompiled()
+    if again is None or same is None or (again.files and same.holds is not False):
+        say("compiling the core with every warning an error")
+        given = (plant, sequence or RampSequence(), tolerances, backs_MPa)
+        run = _run_core(code, manifest, compensator, given, say, watch)
+        block, board = own_block_accepted(code, manifest), board_compiles(folder, manifest, include)
     core, current, loop = run.core, run.current, run.loop
-    board, law = board_compiles(folder, manifest, include), law_follows(compensator)
-    checks = (
-        files_unchanged(folder, manifest),
-        manifest_follows(folder, manifest, compensator),
-        *own_block_accepted(code, manifest),
-        *vectors_follow(folder, manifest, compensator),
-        *core.checks,
-        *current.checks,
-        *loop.checks,
-        *run.of_plant,
-        certificate_follows(compensator),
-        bounds_follow(compensator),
-        law,
-        valve_follows(folder, compensator),
-        *board.checks,
-    )
+    of_text = (same,) if same else ()
+    checks = (*of_text, *block, *core.checks, *current.checks, *loop.checks, *run.of_plant, *board.checks)
     evidence = Evidence(
         tool=THIS_TOOL,
         made_from=(_manifest_source(folder),),
         target=manifest.target,
-        changed_board_files=tuple(changed_board_files(folder, manifest)),
-        user_files=tuple(user_files(folder, manifest)),
+        changed_board_files=changed_board_files(folder, manifest),
+        user_files=user_files(folder, manifest.files),
         differing_files=differing_files(folder, manifest),
         board_not_compiled=board.not_compiled,
         checks=checks,
@@ -148,7 +142,7 @@ def verify(
         evidence=evidence,
         curves={**loop_curves(loop.loops), **core.curves},
         loops=loop.loops,
-        derived=compensator if law.holds else None,
+        derived=compensator if same and same.holds else None,
     )
 
 
@@ -176,7 +170,7 @@ def _manifest_source(folder: Path) -> SourceFile:
 class _Core:
     """What trying the core showed; of one that does not compile nothing more."""
 
-    checks: tuple[Check, ...]
+    checks: tuple[Check, ...] = ()
     inputs: tuple[InputCheck, ...] = ()
     curves: Mapping[str, Curves] = field(default_factory=dict)
 
@@ -185,9 +179,9 @@ class _Core:
 class _Run:
     """What the compiled core did: by itself, with its current controller, in the closed loop and beside CasADi."""
 
-    core: _Core
-    current: CurrentChecks
-    loop: FirmwareLoop
+    core: _Core = field(default_factory=_Core)
+    current: CurrentChecks = field(default_factory=CurrentChecks)
+    loop: FirmwareLoop = field(default_factory=FirmwareLoop)
     compared: tuple[PlantComparison, ...] = ()
     of_plant: tuple[Check, ...] = ()
 
@@ -206,7 +200,7 @@ def _run_core(
     building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
     core = _try_core(folder, manifest, compensator, say)
     if not core.inputs:
-        return _Run(core=core, current=CurrentChecks(), loop=FirmwareLoop())
+        return _Run(core=core)
     current, scenes = current_checks(folder, compensator, say), building.result()
     loop = close_the_loop(scenes, compensator, plant, sequence, tolerances, say, watch)
     compared, native_plant = compare_with_cvodes(scenes, say)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_files import sha256_of, sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
 from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of, bound_files
@@ -104,7 +104,7 @@ class CompiledCore:
             arguments = [str(stored(prepared)), *(["sample"] if sample else []), *blocks]
         program = machine.link(objects, f"the core {self.name} ({machine.name})")
         printed = machine.run(program, arguments, f"the core {self.name}")
-        return findings_of(printed, sha256_of(core.read_bytes()), f"the core {self.name} on the {machine.name}")
+        return findings_of(printed, sha256_of_octets(core.read_bytes()), f"the core {self.name} on the {machine.name}")
 
     def _adapter(self, machine: Machine, names: Sequence[str], held: bool) -> Path:
         """Return the object that binds the core's functions of a side to a block."""

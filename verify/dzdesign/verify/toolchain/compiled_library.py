@@ -30,6 +30,8 @@ BUFFERS = ("in", "out", "both")
 LIBRARY_FLAGS = ("-shared", *(() if sys.platform == "win32" else ("-fPIC", "-fno-semantic-interposition")))
 #: On Windows a function is exported by a word to the linker, which GCC's, LLVM's and Microsoft's take from an object.
 EXPORTED = '__asm__(".section .drectve,\\"yn\\"\\n\\t.ascii \\" -export:{}\\"");\n'
+#: What a pipe is asked to hold where that can be said: the arrays of a run have megabytes.
+PIPE_OCTETS = 1 << 20
 #: Characters of a complaint that a sentence has.
 LONGEST = 200
 #: What a function may be given.
@@ -130,8 +132,18 @@ class CompiledLibrary:
             )  # fmt: skip
             stack.enter_context(ended_with_this_process(process.pid))
             stack.callback(_end, process)
+            _widen(process)
             self._ends = weakref.finalize(self, stack.pop_all().close)
         return process
+
+
+def _widen(process: "subprocess.Popen[bytes]") -> None:
+    if sys.platform == "linux":
+        import fcntl
+
+        for pipe in (process.stdin, process.stdout):
+            with contextlib.suppress(OSError):  # what a user's pipes may hold together is limited
+                fcntl.fcntl(pipe or -1, fcntl.F_SETPIPE_SZ, PIPE_OCTETS)
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:

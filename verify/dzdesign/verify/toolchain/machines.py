@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
-from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_files import sha256_of_octets
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.programs import find_program
 from dzdesign.verify.toolchain.child_process import numbers_in, run_child
@@ -99,7 +99,7 @@ class Machine:
 
 def stored(content: bytes) -> Path:
     """Return a file of that content, written once."""
-    file = build_folder() / f"{sha256_of(content)[:32]}.bin"
+    file = build_folder() / f"{sha256_of_octets(content)[:32]}.bin"
     with alone(file):
         if not file.exists():
             file.write_bytes(content)
@@ -109,7 +109,7 @@ def stored(content: bytes) -> Path:
 def discard(*contents: bytes) -> None:
     """Remove files of such contents: what one valve of a lot needs, no other does."""
     for content in contents:
-        file = build_folder() / f"{sha256_of(content)[:32]}.bin"
+        file = build_folder() / f"{sha256_of_octets(content)[:32]}.bin"
         with alone(file):
             file.unlink(missing_ok=True)
 
