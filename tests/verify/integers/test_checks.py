@@ -191,9 +191,6 @@ def test_the_command_refuses_what_makes_no_sense(folder, tmp_path, capsys, wordi
     for line in (["--mutate"], ["--plant", "plant.toml"], ["--back-pressure", "1 MPa"]):
         assert main(["verify", str(block), *line, "-o", str(tmp_path / "evidence")]) == 2
         wording.of_test(capsys.readouterr().err)
-    edited(block / "manifest.json", '"interface": "codes"', '"interface": "bar"')
-    assert main(["verify", str(block), "-o", str(tmp_path / "evidence")]) == 2
-    wording.of_test(capsys.readouterr().err)
     edited(block / "manifest.json", '"iec61131"', '"iec"')
     assert main(["verify", str(block), "-o", str(tmp_path / "evidence")]) == 2
     wording.of_test(capsys.readouterr().err)
