@@ -9,7 +9,8 @@ from dzdesign.derivation.presentation.formulas import to_python, to_text
 
 #: What is no plain text in a sentence: a reference with its words, code, symbols and formulas, a statement's number.
 PARTS = re.compile(
-    r"\[\[(?P<to>[^|]+)\|(?P<words>.+?)\]\]|`(?P<code>[^`]+)`|\$(?P<formula>[^$]+)\$"
+    r"\[\[(?P<to>[^|]+)\|(?P<words>.+?)\]\]|`(?P<code>[^`]+)`"
+    r"|(?P<before>\(?)\$(?P<formula>[^$]+)\$(?P<behind>[,.;:)]*)"
     r"|(?P<number>\(\d+[a-z]?\)|\b[TL]\d+[a-z]?\b)"
 )
 

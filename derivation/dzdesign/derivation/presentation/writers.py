@@ -98,8 +98,6 @@ def _labelled(text: object, label: str, indent: str) -> str:
 
 # --- a page for a browser -----------------------------------------------------------------------------------
 
-#: A browser would break the line between a formula and the punctuation beside it.
-_TIED = re.compile(r"\(?<math(?:(?!</math>).)*</math>[,.;:)]*")
 #: A formula in a sentence that is shorter than this is not broken.
 _LONG = 28
 #: Stands beside each verdict, so that its colour is not the only carrier; the word does the rest.
@@ -138,7 +136,7 @@ class HtmlWriter:
 
     def words(self, words: Words | Formula | str) -> "Markup":
         text = f"${words}$" if isinstance(words, Formula) else words.text if isinstance(words, Words) else words
-        return _markup(_TIED.sub(r'<span class="tied">\g<0></span>', self._sentence(text)))
+        return _markup(self._sentence(text))
 
     def _sentence(self, text: str) -> str:
         parts, end = [], 0
@@ -155,7 +153,8 @@ class HtmlWriter:
         if found["code"]:
             return f"<code>{escape(found['code'])}</code>"
         if found["formula"]:
-            symbols = _symbols(found["formula"])
+            # A browser would break the line between a formula and the punctuation beside it.
+            symbols = f"{found['before']}{_symbols(found['formula'])}{found['behind']}"
             return f'<span class="tied">{symbols}</span>' if len(found["formula"]) < _LONG else symbols
         number = found["to"] or found["number"]
         words = self._sentence(found["words"]) if found["words"] else number
