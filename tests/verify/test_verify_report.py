@@ -40,4 +40,4 @@ def test_verify_reads_every_artefact_once(copied, tmp_path, monkeypatch):
         lambda document, kind, **how: read.update([kind.__name__]) or convert(document, kind, **how),
     )
     assert main(["verify", str(copied / "firmware"), "-o", str(tmp_path / "evidence")]) == 0
-    assert read["ValveModel"] == 1 and read["Compensator"] == 1 and read["Evidence"] == 1
+    assert read["Compensator"] == 1 and read["ValveModel"] == read["Evidence"] == 0  # one holds it, one is a value

@@ -24,6 +24,7 @@ from dzdesign.design.side_law import SideLaw
 from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
 from dzdesign.verify.closed_loop.evidence_curves import Curves, read_curves
 from dzdesign.verify.evidence import Evidence
+from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.firmware.reproduced import added_files
 from dzdesign.verify.output_evidence import OutputEvidence
 
@@ -159,7 +160,9 @@ class _Reading:
             beside, stated = (folder, *beside), firmware.origin.compensator_json
         valve_json = _first(ValveModel, beside)
         if compensator_json := _first(Compensator, beside):
-            compensator = self._read("compensator", Compensator, compensator_json, stated, of)
+            digest = _check(compensator_json, stated, of)
+            compensator = read_compensator(compensator_json.parent)  # as `verify` has read it
+            self.take("compensator", compensator, Place(self._name(compensator_json), digest))
             self._take_valve(compensator, valve_json)
         elif valve_json:
             self._read("valve", ValveModel, valve_json)
