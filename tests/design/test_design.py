@@ -14,7 +14,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
 from dzdesign.design.machine.allowance import allowance_of
-from dzdesign.design.offset_ceiling import offset_ceiling
+from dzdesign.design.offset.offset_ceiling import offset_ceiling
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.options import IdentifyOptions

@@ -11,8 +11,6 @@ from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.dither import Dither, DrivenDither
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
-from dzdesign.design import above_tests
-from dzdesign.design.above_tests import AboveChoice
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import colder_coil
@@ -20,7 +18,9 @@ from dzdesign.design.designing import design
 from dzdesign.design.lot_margins import lot_margins, prove_lot
 from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.machine.allowance import check_bench_current, dither_reserve, recorded_full_A
-from dzdesign.design.offset_ceiling import offset_ceiling
+from dzdesign.design.offset import above_tests
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.offset_ceiling import offset_ceiling
 from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_certificates, prove_derived
 from tests.support.machine_oracle import worst_margin_mV

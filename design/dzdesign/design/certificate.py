@@ -12,11 +12,11 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import in_units
-from dzdesign.design.above_tests import AboveChoice
-from dzdesign.design.beta_table import STEP_CODES, TableMargins
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.accounting import budget_of
-from dzdesign.design.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.beta_table import STEP_CODES, TableMargins
+from dzdesign.design.offset.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
 from dzdesign.design.side_law import Certificate
 from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard

@@ -9,10 +9,10 @@ from dzdesign.core.worded import errors_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
-from dzdesign.design.beta_table import STEP_CODES
 from dzdesign.design.compensator import Compensator, sha256_of_valve
 from dzdesign.design.costs import costs_of
 from dzdesign.design.machine.allowance import allowance_of, check_bench_current, dither_reserve
+from dzdesign.design.offset.beta_table import STEP_CODES
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
 from dzdesign.design.pressure_inputs import ACCEPTED, refuse_hidden_failures, with_negative_drop

@@ -13,12 +13,12 @@ from itertools import pairwise
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
-from dzdesign.design.above_tests import AboveChoice
-from dzdesign.design.beta_table import STEP_CODES
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import falling_corners, remaining_dead_zone
 from dzdesign.design.machine.budget import Component
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.beta_table import STEP_CODES
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.certified_bound import BoundPiece
 from dzdesign.identify.valve.ramp_result import TestResult

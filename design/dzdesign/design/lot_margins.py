@@ -7,9 +7,9 @@ from math import ceil, floor
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, and_more
-from dzdesign.design.beta_table import between_nodes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.allowance import Allowance
+from dzdesign.design.offset.beta_table import between_nodes
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 

@@ -17,17 +17,17 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
-from dzdesign.design.above_tests import AboveChoice
-from dzdesign.design.beta_table import STEP_CODES, choose_beta_table
 from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import design, prove_monotone
-from dzdesign.design.exact_row import ExactRow, least_of
 from dzdesign.design.lot_margins import LotMargin, prove_lot
 from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.machine.accounting import budget_of
-from dzdesign.design.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.beta_table import STEP_CODES, choose_beta_table
+from dzdesign.design.offset.exact_row import ExactRow, least_of
+from dzdesign.design.offset.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling
 from dzdesign.design.options import options_of
 from dzdesign.design.side_design import finest_units, left_by_machine, offset_at_reference, over, travel
 from dzdesign.design.side_law import Certificate, SideLaw, Sides

@@ -7,13 +7,13 @@ from math import gcd
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
-from dzdesign.design.above_tests import AboveChoice
-from dzdesign.design.beta_table import STEP_CODES, choose_beta_table
 from dzdesign.design.certificate import certify, guarded_curve, hold_below
-from dzdesign.design.exact_row import ExactRow
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.machine.allowance import Allowance
-from dzdesign.design.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.beta_table import STEP_CODES, choose_beta_table
+from dzdesign.design.offset.exact_row import ExactRow
+from dzdesign.design.offset.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.side_law import SideLaw
 from dzdesign.design.signals import Signals

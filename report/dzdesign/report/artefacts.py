@@ -57,9 +57,9 @@ class Place:
 class Chain:
     """What a report is of; an artefact that was not found is None.
 
-    Evidence has its firmware, a firmware its compensator, and that its valve. `root` is the folder around them,
-    `places` where each was found, by its role; `curves` are the numbers of the evidence by the files' names. `missing`
-    names what is not there, and which command makes it.
+    A firmware has its compensator, and that its valve. `root` is the folder around them, `places` where each was found,
+    by its role; `curves` are the numbers of the evidence by the files' names. `missing` names what is not there, and
+    which command makes it.
     """
 
     root: Path | None = None
@@ -91,6 +91,8 @@ def read_chain(folder: Path, firmware: Path | None = None) -> Chain:
     place = folder if (folder / Evidence.FILE_NAME).is_file() else root / EVIDENCE
     reading = _Reading(root)
     evidence = reading.evidence(place) if (place / Evidence.FILE_NAME).is_file() else None
+    if firmware and not _is_firmware(firmware):
+        raise InputError(f"--firmware '{firmware}' is not a firmware folder, which `dzdesign codegen` writes")
     if evidence:
         firmware = firmware or root / Path(evidence.made_from[0].source).parent.name
     else:
@@ -148,15 +150,13 @@ class _Reading:
 
     def follow(self, evidence: Evidence | None, folder: Path, beside: tuple[Path, ...]) -> Chain:
         """Read the firmware in a folder, what it was made from, and the other artefacts `beside` it."""
-        manifest, stated, of = manifest_of(folder), None, "the firmware was made from another one"
-        if manifest and family_of(manifest["schema"]) == family_of(schema_of(FirmwareManifest)):
+        stated, of = None, "the firmware was made from another one"
+        if _is_firmware(folder):
             verified = evidence.made_from[0].sha256 if evidence else None
             path = folder / MANIFEST_NAME
             firmware = self._read("firmware", FirmwareManifest, path, verified, "the evidence is of another one")
             _refuse_changes(folder, firmware, evidence)
             beside, stated = (folder, *beside), firmware.origin.compensator_json
-        elif evidence:
-            raise InputError(f"'{folder}' is not the firmware that the evidence is of; give its folder with --firmware")
         valve_json = _first(ValveModel, beside)
         if compensator_json := _first(Compensator, beside):
             compensator = self._read("compensator", Compensator, compensator_json, stated, of)
@@ -207,6 +207,11 @@ class _Reading:
     def _name(self, path: Path) -> str:
         place = path.resolve()
         return place.name if place.parent == self.root else f"{place.parent.name}/{place.name}"
+
+
+def _is_firmware(folder: Path) -> bool:
+    manifest = manifest_of(folder)
+    return manifest is not None and family_of(manifest["schema"]) == family_of(schema_of(FirmwareManifest))
 
 
 def _check(path: Path, stated: str | None, otherwise: str) -> str:

@@ -235,15 +235,9 @@ def _svg_of(figure: "Figure", name: str, description: str, kind: str = "drawing"
     drawing.attrib = {"class": kind, "role": "img", "aria-label": description, "viewBox": box, **size}
     for part in [each for each in drawing if each.tag.endswith("metadata")]:
         drawing.remove(part)
-    for part in drawing.iter():
-        if part.tag.endswith("}g"):
-            part.attrib.pop("id", None)  # Matplotlib numbers its groups alike in every figure
-        if "style" in part.attrib:
-            part.attrib["style"] = _in_page_colours(part.attrib["style"])
-    return ElementTree.tostring(drawing, encoding="unicode")
-
-
-def _in_page_colours(style: str) -> str:
+    for group in drawing.iter("{http://www.w3.org/2000/svg}g"):
+        group.attrib.pop("id", None)  # Matplotlib numbers its groups alike in every figure
+    text = ElementTree.tostring(drawing, encoding="unicode")
     for variable, (light, _) in PALETTE.items():
-        style = style.replace(light, f"var(--fig-{variable})")
-    return style
+        text = text.replace(light, f"var(--fig-{variable})")
+    return text

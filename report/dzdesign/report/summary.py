@@ -67,7 +67,8 @@ def _verdict(chain: Chain) -> Headline:
     judged = _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
     if judged.kind != "good":
         return judged
-    return replace(judged, text="; ".join(filter(None, [judged.text, evidence.reservation])))
+    absent = "" if chain.firmware else "the firmware that was verified is not here"
+    return replace(judged, text="; ".join(filter(None, [judged.text, evidence.reservation, absent])))
 
 
 def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headline:

@@ -9,6 +9,7 @@ from dzdesign.codegen.integers.form import Form, truncated
 from dzdesign.codegen.integers.law import block_form, function_form
 from dzdesign.codegen.integers.limbs import RADIX, Limbs
 from dzdesign.core.errors import DzdesignError, InputError
+from tests.codegen.test_codegen import random_compensators
 from tests.support.octave import compensator_of
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 
@@ -95,3 +96,21 @@ def test_the_values_of_the_law_lie_within_their_ranges(root):
         for line in form.lines:
             data = values[line.name]
             assert data.dtype == bool if line.boolean else line.low <= data.min() <= data.max() <= line.high, line.name
+
+
+def test_random_designs_give_the_exact_law_in_both_words():
+    """Laws, tables, zero bands and transitions as they come: words of 64 bits, and limbs of 15."""
+    made, random = compensator_of(GOLDENS), np.random.default_rng(11)
+    for compensator in random_compensators(made, 30, seed=5):
+        u = np.array([0, 1, 4094, 4095, *random.integers(0, 4096, 12), *random.integers(0, 300, 12)])
+        drop = np.array([-31, -30, 0, 63, 64, 3325, 3326, *random.integers(-40, 3327, 21)])
+        a, b = np.maximum(688 + drop, 688), np.maximum(688 - drop, 688)
+        expected = [compensator.compare(int(command), int(code)) for command, code in zip(u, drop, strict=True)]
+        found = function_form(compensator, 1).evaluate({"u": u, "p_a": a, "p_b": b})["compare"]
+        assert found.tolist() == expected
+        given = {"command": u, "pressure_a": a, "pressure_b": b, "at_rest": np.zeros(u.size, dtype=bool)}
+        in_limbs = block_form(compensator, "codes").evaluate(given)["output_a"]
+        band = compensator.zero_band_codes
+        resting = [compensator.compare(0 if command <= band else int(command), int(code))
+                   for command, code in zip(u, drop, strict=True)]  # fmt: skip
+        assert in_limbs.tolist() == resting

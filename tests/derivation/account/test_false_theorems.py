@@ -290,7 +290,7 @@ def test_the_three_false_theorems_fall_one_after_another(verdicts):
     assert "its ground (2)" in judged["K"].words
     # The numbers speak for themselves: not only because the one before fell.
     for one in (judged["D"], judged["false"]):
-        believed = replace(one, outcome=Outcome.FOLLOWS, objection="")
+        believed = replace(one, outcome=Outcome.FOLLOWS)
         assert "does not hold in its scope" in hear(believed, book)
 
 

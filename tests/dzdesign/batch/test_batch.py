@@ -30,7 +30,7 @@ from dzdesign.core.folder_swap import UNPLACED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.lot_setting import lot_setting
-from dzdesign.design.offset_ceiling import DECIMALS
+from dzdesign.design.offset.offset_ceiling import DECIMALS
 from dzdesign.report.artefacts import read_chain
 from dzdesign.report.lot.table import read_manifest
 from dzdesign.stages.identify import IdentifyChoices

@@ -148,7 +148,7 @@ class SignalConstants:
         data = ("beta_step_codes",)
         found = [
             Define(symbol="STEP_CODES", value=step, equation="width of a segment of beta, codes of sensor A",
-                     engineering=width, data=data, generator="design/dzdesign/design/table/linear_programme.py"),
+                     engineering=width, data=data, generator="design/dzdesign/design/offset/beta_table.py"),
             Define(symbol="STEP_SHIFT", value=step.bit_length() - 1, equation="from codes to segments",
                      engineering=f"1/{step} segment a code", data=data, rounding="the segment is rounded down",
                      generator=HERE),

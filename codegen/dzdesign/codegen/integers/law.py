@@ -33,7 +33,6 @@ Evaluation = Callable[[Mapping[str, np.ndarray]], dict[str, np.ndarray]]
 MOST_DROPPED = 44
 #: And at least, so that what is left fits a word.
 LEAST_DROPPED = 32
-BETA_OF = "beta of Eq. (7), so many to 1:"
 
 
 def forms_of(compensator: Compensator, manifest: OutputManifest) -> dict[str, Evaluation]:
@@ -165,34 +164,27 @@ class _Law:
             starts = {sign: place * count for place, sign in enumerate(self.signs)}
             first = self.each("FIRST_ROW", starts, "where a side's nodes begin")
         nodes = {name: self._nodes(name, each[:1] if alike else each, count) for name, each in tables.items()}
-        least = {
-            name: self.each(
-                f"{name.upper()}_LEAST",
-                {sign: table[-1] * step for sign, table in zip(self.signs, each, strict=True)},
-                "the smallest, for pressures that can't be right",
-            )
-            for name, each in tables.items()
-        }
+        least = {}
+        for name, each in tables.items():
+            values = {sign: table[-1] * step for sign, table in zip(self.signs, each, strict=True)}
+            told = "the smallest, for pressures that can't be right"
+            least[name] = self.each(f"{name.upper()}_LEAST", values, told)
         found: dict[str, list[Node]] = {name: [] for name in tables}
         for suffix, code, told in self._codes(dp):
             code = self.form.let(f"code{suffix}", code.least(last), told)
             row = code >> step.bit_length() - 1 if self.form.bits == 64 else code.quotient(step)
             row = self.form.let(f"row{suffix}", row if first is None else row + first, "node of beta")
             rest = code - (code >> step.bit_length() - 1) * step if self.form.bits == 64 else code.remainder(step)
-            past = self.form.let(f"past{suffix}", self._within(rest, step), "codes past the node")
+            # What a division leaves is below its divisor, whatever its operands are by themselves.
+            past = self.form.let(f"past{suffix}", replace(rest, low=0, high=step - 1), "codes past the node")
             for name, table in nodes.items():
                 found[name].append(table.interpolated(row, past, step))
         betas = []
-        for name, values in found.items():
-            value = values[0] if len(values) == 1 else values[0].least(values[1])
+        for name, read in found.items():
+            value = read[0] if len(read) == 1 else read[0].least(read[1])
             told = "beta of the law" if name == "law" else "beta of the certified offset at zero command"
             betas.append(self.form.let(f"{name}_beta", failed.choose(least[name], value), told))
         return betas
-
-    @staticmethod
-    def _within(past: Node, step: int) -> Node:
-        """Return what is left of a division by `step`: 0 to one less, whatever its operands are by themselves."""
-        return replace(past, low=0, high=step - 1)
 
     def _zero_table(self, sign: int) -> tuple[int, ...]:
         """Return the nodes of the certified beta, then twice the smallest, as the law's."""
@@ -200,8 +192,10 @@ class _Law:
         return tuple(scale * node for node in (*nodes, *(min(nodes),) * 2))
 
     def _nodes(self, name: str, tables: list[tuple[int, ...]], count: int) -> Node:
-        unit = self.numbers[self.signs[0]].scale_beta * self.compensator.beta_denominator
-        text = f"{BETA_OF} {unit}" if name == "law" else "the same of the certified offset at zero command"
+        units = [str(self.numbers[sign].scale_beta * self.compensator.beta_denominator) for sign in self.signs]
+        text = "the same of the certified offset at zero command"
+        if name == "law":
+            text = f"beta of Eq. (7), so many to 1: {' and '.join(dict.fromkeys(units))}"
         rows = [(*table[:-2], *(table[-3],) * (count + 2 - len(table))) for table in tables]
         return self.form.constant(f"{name.upper()}_NODES", tuple(node for row in rows for node in row), text)
 
@@ -218,9 +212,8 @@ class _Law:
         units = self.one("UNITS", ratio.denominator, "so many units of the inputs")
         upper = ((dp + reach) * codes + (units - 1)).quotient(units)
         found = [("", upper, "code at the upper end of what the pressure drop stands for")]
-        tables = [
-            table for sign in self.signs for table in (self.numbers[sign].table[:-2], self._zero_table(sign)[:-2])
-        ]
+        tables = [self.numbers[sign].table[:-2] for sign in self.signs]
+        tables += [self._zero_table(sign)[:-2] for sign in self.signs]
         if any(list(table) != sorted(table, reverse=True) for table in tables):
             lower = ((dp - reach).most(0) * codes).quotient(units)
             found.append(("_low", lower, "code at the lower end"))

@@ -1,12 +1,11 @@
 """`output_files`: a compensator in; dz_comp.m, the script for Simulink's C Caller block and its C, out."""
 
 from collections.abc import Mapping
-from fractions import Fraction
 
 from dzdesign.codegen.banner import banner_of
 from dzdesign.codegen.core.certificate_text import certificate_lines, zero_command
 from dzdesign.codegen.core.files import CORE_SOURCES
-from dzdesign.codegen.core.law_constants import KAPPA_ROUNDING, U_MIN0_ROUNDING, equation_of
+from dzdesign.codegen.core.law_constants import equation_of
 from dzdesign.codegen.integers.law import FUNCTIONS, function_form
 from dzdesign.codegen.integers.plc import left_out_of
 from dzdesign.codegen.integers.text import matlab_body, matlab_constants
@@ -59,7 +58,7 @@ def law_function(compensator: Compensator, digest: str, sign: int) -> str:
 
 def _values(compensator: Compensator, sign: int) -> dict[str, object]:
     """Return what the template prints."""
-    signals, side, form = compensator.signals, compensator.side(sign), function_form(compensator, sign)
+    signals, form = compensator.signals, function_form(compensator, sign)
     command, chosen = signals.command, law(compensator.law)
     bipolar = len(signals.signs) == 2
     return {
@@ -73,8 +72,6 @@ def _values(compensator: Compensator, sign: int) -> dict[str, object]:
         "certificate": certificate_lines(compensator, sign),
         "law_equation": equation_of(chosen),
         "law_text": str(chosen.output).replace("**", "^"),
-        "kappa_text": f"{_rational(side.drive_range_over_u_max)}, {KAPPA_ROUNDING}",
-        "u_min0_text": f"{_rational(side.u_min0_over_u_max)}, {U_MIN0_ROUNDING}",
         "step_codes": compensator.beta_step_codes,
         "step_text": compensator.valve.recorded_units.text(
             float(signals.dp_MPa(compensator.beta_step_codes)), ".4f MPa"
@@ -100,7 +97,3 @@ def _setup(compensator: Compensator, digest: str) -> str:
             sources=[CORE_SOURCES[sign] for sign in signs],
         )
     )
-
-
-def _rational(value: Fraction) -> str:
-    return f"{value.numerator}/{value.denominator} = {float(value):.6f}"

@@ -56,8 +56,6 @@ class Verdict:
     inherited: tuple[str, ...] = ()
     #: What is wrong with its units; empty where they are right.
     unit_error: str = ""
-    #: What numbers say against it, which no proof can outweigh; empty where they agree.
-    objection: str = ""
 
     @property
     def number(self) -> str:
@@ -128,7 +126,7 @@ def overrule(verdict: Verdict, objection: str) -> Verdict:
     if not objection:
         return verdict
     words = f"does not follow: {objection}"
-    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False, objection=objection)
+    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False)
 
 
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:

@@ -5,7 +5,7 @@ from sympy import Eq, sqrt
 
 from dzdesign.derivation.account.equations import ORIFICE, beyond
 from dzdesign.derivation.account.published import SIMULATION
-from dzdesign.derivation.account.scope import BARE, EVERYWHERE, PLANT, scope
+from dzdesign.derivation.account.scope import BARE, PLANT
 from dzdesign.derivation.account.statement import Ground, Kind, Statement
 from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
 from dzdesign.derivation.symbols import *
@@ -26,9 +26,9 @@ _TITLES = {
 def _premise(number: str) -> Statement:
     title, note = _TITLES[number]
     equation = PLANT_EQUATIONS[number]
+    stated = Kind.PREMISE(number, title).says(equation.lhs, equation.rhs).remark(note)
     # Beyond the simulation model a valve has a dead zone, which (24) has not.
-    where, see = (scope(PLANT), ("T6d",)) if number == "(24)" else (EVERYWHERE, ())
-    return Kind.PREMISE(number, title).says(equation.lhs, equation.rhs).within(where).qualified_by(*see).remark(note)
+    return stated.within(PLANT).qualified_by("T6d") if number == "(24)" else stated
 
 
 def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
@@ -57,7 +57,7 @@ LAPLACE = (
 )
 
 
-def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
+def laplace(number: str) -> Ground:
     """Return a plant equation, of Eqs. (19)-(24), as a ground, transformed term by term.
 
     One that is not linear and homogeneous in the signals is refused: its transform is another one.

@@ -16,13 +16,13 @@ from dzdesign.derivation.account.units import print_unit
 from dzdesign.derivation.presentation.content import Derivation, DerivationReport, Entry, Figure, Line, Premise, Term
 from dzdesign.derivation.presentation.formulas import to_python, to_text
 from dzdesign.derivation.presentation.prose import Formula, Words, inline
-from dzdesign.derivation.presentation.writers import HtmlWriter, TextWriter, write
+from dzdesign.derivation.presentation.writers import write_html, write_text
 from dzdesign.derivation.symbols import QUANTITIES
 
 _FORMATS: dict[str, Callable[[DerivationReport], str]] = {
-    "text": lambda report: write(TextWriter, report),
+    "text": write_text,
     "json": lambda report: to_json_bytes(report).decode(),
-    "html": lambda report: write(HtmlWriter, report),
+    "html": write_html,
 }
 FORMATS = tuple(_FORMATS)
 #: What is known of the sign of a symbol, as SymPy calls it and as the report does; the first that holds.

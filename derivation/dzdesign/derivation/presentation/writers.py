@@ -5,15 +5,15 @@ Each fills the template that holds the structure of its document.
 
 import re
 import textwrap
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import sympy
 
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.account.statement import Outcome
-from dzdesign.derivation.presentation.content import DerivationReport, Entry, Figure, Line
+from dzdesign.derivation.presentation.content import DerivationReport, Entry, Line
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text
 from dzdesign.derivation.presentation.prose import PARTS, Formula, Words
 from dzdesign.derivation.symbols import QUANTITIES
@@ -22,11 +22,10 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 
-def write(writer: "type[TextWriter | HtmlWriter]", report: DerivationReport) -> str:
-    """Return a whole document in a notation."""
-    environment = strict_templates("dzdesign.derivation.presentation", lstrip_blocks=True, **writer.SYNTAX)
-    environment.filters.update(writer({entry.number for entry in report.statements}).filters())
-    return str(environment.get_template(writer.TEMPLATE).render(content=report))
+def _render(template: str, filters: Mapping[str, Callable[..., Any]], report: DerivationReport, **syntax: Any) -> str:
+    environment = strict_templates("dzdesign.derivation.presentation", lstrip_blocks=True, **syntax)
+    environment.filters.update(filters)
+    return str(environment.get_template(template).render(content=report))
 
 
 def anchor(number: str) -> str:
@@ -44,71 +43,45 @@ def anchor(number: str) -> str:
 # --- plain text ---------------------------------------------------------------------------------------------
 
 _WIDTH = 100  # columns
-#: Stands for a blank at which a line may not be broken.
-_FIXED = "\0"
 
 
-class TextWriter:
-    """Plain text; a formula in it may be broken before a sign only, and a short one not at all."""
-
-    TEMPLATE = "derivation.txt.jinja"
-    SYNTAX: ClassVar[Mapping[str, Any]] = {}
-
-    def __init__(self, linked: Collection[str] = ()) -> None:
-        """Nothing can be pointed to in a plain text."""
-
-    def words(self, words: Words | str) -> str:
-        text = words.text if isinstance(words, Words) else words
-        return str(Words(re.sub(r"\$([^$]+)\$", lambda found: _fixed(found[1]), text)))
-
-    def display(self, formula: Formula, indent: str = "") -> str:
-        """Return a formula on a line of its own; a chain has one member a line."""
-        first, *members = map(to_text, formula.sides)
-        if not members:
-            return wrap(_fixed(first), indent, indent)
-        left, rows = f"{indent}{first} = ", []
-        for member in members:
-            for row in member.split("\n"):
-                rows.append(wrap(_fixed(row), left, " " * len(left)))
-                left = " " * len(left)
-            left = " " * (len(left) - 2) + "= "
-        return "\n".join(rows)
-
-    def filters(self) -> dict[str, Callable[..., Any]]:
-        """Return what the template may apply."""
-        return {
-            "words": self.words, "display": self.display, "line": self.line, "figures": self.figures, "wrap": wrap,
-            "head": _head, "labelled": _labelled,
-        }  # fmt: skip
-
-    def line(self, line: Line, indent: str) -> str:
-        """Return a sentence, and below it the formula that it leads to."""
-        words = wrap(self.words(line.words), indent)
-        return words if line.formula is None else f"{words}\n{self.display(line.formula, 2 * indent)}"
-
-    def figures(self, figures: Sequence[Figure], indent: str) -> str:
-        """Return our numbers beside the paper's, each with its remark below."""
-        rows = [("number", "ours", "paper")] + [(str(one.label), one.ours, one.paper or "-") for one in figures]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        remarks = ["", *(self.words(one.remark) for one in figures)]
-        lines = []
-        for row, remark in zip(rows, remarks, strict=True):
-            lines.append(f"{indent}{'  '.join(map(str.ljust, row, widths))}".rstrip())
-            lines += [wrap(remark, 2 * indent)] if remark else []
-        return "\n".join(lines)
+def write_text(report: DerivationReport) -> str:
+    """Return the whole document as plain text."""
+    filters: dict[str, Callable[..., Any]] = {"display": _display, "line": _line, "wrap": wrap}
+    return _render("derivation.txt.jinja", {**filters, "head": _head, "labelled": _labelled}, report)
 
 
-def wrap(text: str, first: str = "", others: str | None = None) -> str:
+def _display(formula: Formula, indent: str = "") -> str:
+    """Return a formula on a line of its own; a chain has one member a line."""
+    first, *members = map(to_text, formula.sides)
+    if not members:
+        return wrap(first, indent)
+    left, rows = f"{indent}{first} = ", []
+    for member in members:
+        for row in member.split("\n"):
+            rows.append(wrap(row, left, " " * len(left)))
+            left = " " * len(left)
+        left = " " * (len(left) - 2) + "= "
+    return "\n".join(rows)
+
+
+def _line(line: Line, indent: str) -> str:
+    """Return a sentence, and below it the formula that it leads to."""
+    words = wrap(line.words, indent)
+    return words if line.formula is None else f"{words}\n{_display(line.formula, 2 * indent)}"
+
+
+def wrap(text: object, first: str = "", others: str | None = None) -> str:
     """Break a text into lines; `first` begins the first one and, unless `others` is given, the others too."""
     lines = textwrap.wrap(
-        text,
+        str(text),
         _WIDTH,
         initial_indent=first,
         subsequent_indent=first if others is None else others,
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return "\n".join(lines).replace(_FIXED, " ")
+    return "\n".join(lines)
 
 
 def _head(entry: Entry, indent: str = "") -> str:
@@ -118,15 +91,9 @@ def _head(entry: Entry, indent: str = "") -> str:
     return line if len(line) <= _WIDTH else wrap(line, "", 2 * indent)
 
 
-def _labelled(text: str, label: str, indent: str) -> str:
+def _labelled(text: object, label: str, indent: str) -> str:
     """Return a text behind a label."""
     return wrap(text, f"{indent}{label}: ", " " * len(f"{indent}{label}: "))
-
-
-def _fixed(formula: str) -> str:
-    if len(formula) < _WIDTH // 3:
-        return formula.replace(" ", _FIXED)
-    return re.sub(r" ([-+<>=]+) ", rf" \1{_FIXED}", formula)
 
 
 # --- a page for a browser -----------------------------------------------------------------------------------
@@ -150,14 +117,21 @@ _NAME = re.compile(r"(?P<base>[A-Za-z]\w*'?)(?:\((?:s|0|dP)\))?")
 _BY_NAME, _FUNCTIONS = {str(name): name for name in QUANTITIES}, {"sqrt": "√", "log": "ln "}
 
 
+def write_html(report: DerivationReport) -> str:
+    """Return the whole document as one page."""
+    writer = HtmlWriter({entry.number for entry in report.statements})
+    filters: dict[str, Callable[..., Any]] = {
+        "words": writer.words, "display": writer.display, "name": writer.name, "anchor": anchor,
+        "css": lambda outcome: outcome.replace(" ", "-"), "sign": lambda outcome: _SIGNS[Outcome(outcome)],
+    }  # fmt: skip
+    return _render("derivation.html.jinja", filters, report, autoescape=True)
+
+
 class HtmlWriter:
     """HTML with MathML; its words are markup that a template does not escape again.
 
     `linked` are the numbers of the statements in the document: those that can be pointed to.
     """
-
-    TEMPLATE = "derivation.html.jinja"
-    SYNTAX: ClassVar[Mapping[str, Any]] = {"autoescape": True}
 
     def __init__(self, linked: Collection[str] = ()) -> None:
         self.linked = linked
@@ -193,13 +167,6 @@ class HtmlWriter:
         rows = [["" if n else first, "<mo>=</mo>", member] for n, member in enumerate(members)] or [[first]]
         table = "".join(f"<mtr>{''.join(f'<mtd>{cell}</mtd>' for cell in row)}</mtr>" for row in rows)
         return _markup(f'<math display="block"><mtable class="chain" displaystyle="true">{table}</mtable></math>')
-
-    def filters(self) -> dict[str, Callable[..., Any]]:
-        """Return what the template may apply."""
-        return {
-            "words": self.words, "display": self.display, "name": self.name, "anchor": anchor,
-            "css": lambda outcome: outcome.replace(" ", "-"), "sign": lambda outcome: _SIGNS[Outcome(outcome)],
-        }  # fmt: skip
 
 
 def _markup(html: str) -> "Markup":

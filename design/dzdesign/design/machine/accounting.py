@@ -11,7 +11,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.allowance import Allowance
 from dzdesign.design.machine.budget import Budget, BudgetLine, Component, DIGITS_mV, Origin
 from dzdesign.design.machine.machine import Machine
-from dzdesign.design.offset_ceiling import OffsetCurve, certified_V
+from dzdesign.design.offset.offset_ceiling import OffsetCurve, certified_V
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.side_model import SideModel
 

@@ -28,8 +28,10 @@ OTHER_SIGN = 8.0
 def inputs_section(chain: Chain) -> Section:
     """Return the section on the check of every input."""
     compensator = chain.compensator
-    if chain.evidence is None or compensator is None:
+    if chain.evidence is None:
         return Section(missing="No evidence is here: `dzdesign verify` tries every input of the C code.")
+    if compensator is None:
+        return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
     figures: list[ReportFigure] = []
     lines, missing = [], ""
     for each in chain.evidence.inputs:

@@ -169,7 +169,7 @@ def native_plant_check(found: Sequence[PlantComparison]) -> Check:
     text = (
         f"over {sum(each.seconds for each in found):.2g} s of ramp, steps and load steps, spool and flow differ from "
         f"CasADi's CVODES by at most {position:.1e} of the stroke and {flow:.1e} of the largest flow; allowed: "
-        f"{MOST_APART:.0e}; the spool met its stops {sum(each.impacts for each in found)} times"
+        f"{MOST_APART:.0e}; stops met: {sum(each.impacts for each in found)}"
     )
     within = position <= MOST_APART and flow <= MOST_APART
     shut = [each for each in found if each.q_largest_L_min <= 0]

@@ -162,7 +162,9 @@ def input_results(fmu: Unpacked, compensator: Compensator) -> tuple[list[Check],
         prepared = PreparedInputs(ExactLaw(compensator, sign))
         core = FmuCore(fmu, sign, fmu.binary.read_bytes() if fmu.binary else b"")
         try:
-            inputs = input_check(prepared, core.sha256, core.check(prepared.everything(), FMU_HOST))
+            # The object that was run is the FMU's binary; that of the check around it has a path of this machine in it.
+            answers = replace(core.check(prepared.everything(), FMU_HOST), object_sha256=core.sha256)
+            inputs = input_check(prepared, core.sha256, answers)
         except RequirementError as error:
             found.append(requirements.EXACT_LAW.check(holds=False, text=str(error), name=fmu.name))
             continue

@@ -154,7 +154,8 @@ class EveryPair:
         random = np.random.default_rng(SEED)
         commands = np.arange(self.exact.commands[0], self.exact.commands[1] + 1, STRIDE)
         sample = random.integers(low, high + 1, (2, SAMPLE))
-        return [reduce(Tried.and_then, found), *(self._swept(program, law, commands, *sample) for law in self.laws)]
+        at_zero = replace(reduce(Tried.and_then, found), pairs=found[0].pairs)
+        return [at_zero, *(self._swept(program, law, commands, *sample) for law in self.laws)]
 
     def _at_zero_command(self, program: Program, b: np.ndarray, state: State, a: np.ndarray) -> Tried:
         return self._judged(program, np.array(self.exact.command_zero), a, b, state)

@@ -13,7 +13,7 @@
 
 /* A stop or the edge is met where the spool is as close to it as this share of the stroke. */
 #define CLOSE 1e-14
-#define HALVINGS 60
+#define MOST_TRIES 60
 /* Steps that end early in one phase; more are chatter at a stop. */
 #define EVENTS 16
 #define NEAR 4
@@ -103,11 +103,11 @@ static double shorten(const struct plant *plant, enum flight flight, double h, d
                                             : CLOSE * (after - before);
     int last = 0;
 
-    for (int32_t half = 0; (half < HALVINGS) && (after > close); half++) {
+    for (int32_t tried = 0; (tried < MOST_TRIES) && (after > close); tried++) {
         double at_s = before_s + (after_s - before_s) * before / (before - after);
         double at;
 
-        if (!((before < 0.0) && (at_s > before_s) && (at_s < after_s)) || (half % 4 == 3)) {
+        if (!((before < 0.0) && (at_s > before_s) && (at_s < after_s)) || (tried % 4 == 3)) {
             at_s = 0.5 * (before_s + after_s);
         }
         if ((at_s <= before_s) || (at_s >= after_s)) {

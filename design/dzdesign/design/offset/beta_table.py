@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.above_tests import AboveChoice
-from dzdesign.design.exact_row import ExactRow
-from dzdesign.design.offset_ceiling import OffsetCeiling
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.exact_row import ExactRow
+from dzdesign.design.offset.offset_ceiling import OffsetCeiling
 
 if TYPE_CHECKING:
     import cvxpy as cp

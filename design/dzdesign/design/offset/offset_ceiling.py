@@ -12,9 +12,9 @@ from math import ceil, floor, lcm
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
-from dzdesign.design.above_tests import OffsetAbove
-from dzdesign.design.exact_row import ExactRow
 from dzdesign.design.machine.allowance import Allowance
+from dzdesign.design.offset.above_tests import OffsetAbove
+from dzdesign.design.offset.exact_row import ExactRow
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 
