@@ -11,7 +11,7 @@ from tests.support.paths import ROOT
 
 #: Of a room: lines of Python, files of Python, lines of templates, C programs, headers and tables.
 ROOM_SIZES = {
-    "core": (3456, 29, 0),
+    "core": (3500, 29, 0),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
 TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 55500, 23500, 10000

@@ -144,8 +144,7 @@ def _verify_firmware(
 
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
-    with stage_progress("designing and generating again"):
-        again = regenerated(folder)
+    again = regenerated(folder)
     with again.written() as code:
         return _verify_code(folder, again, code, arguments, plant_source, identified)
 
