@@ -10,7 +10,7 @@ RAMPS = Path(__file__).parents[2] / "examples" / "paper_valve" / "ramps"
 ONCE, ONCE_MORE = (tuple(f"ramps/ramp_dP{dp}_{number}.csv.gz" for dp in (1, 5)) for number in (1, 2))
 #: What `codegen` writes, and the options without which it would not.
 TARGETS: dict[str, tuple[str, ...]] = {
-    "host": (), "f28335": (), "f280049c": (), "cortex-m4": (), "avr": (), "iec61131": (),
+    "host": (), "f28335": (), "f280049c": (), "cortex-m4": (), "iec61131": (),
     "fmu": ("--plant", "plant.toml"), "matlab": (), "amplifier": ("--device", "west"),
 }  # fmt: skip
 #: Folders that `demo` writes.

@@ -23,7 +23,7 @@ FOLLOWS = LAW.check(holds=True, text="")
 
 
 def of_valve(serial: str) -> Compensator:
-    compensator = variant("default", "wide")
+    compensator = variant("default")
     return replace(compensator, valve=replace(compensator.valve, record={"Serial": serial} if serial else {}))
 
 

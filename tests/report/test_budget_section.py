@@ -79,7 +79,7 @@ def test_the_words_name_the_sum_and_its_largest_component(machine):
     assert "the valve as recorded and the declared machine" in reach_of_certificate(machine)
 
 
-@pytest.mark.parametrize("target", ["f28335", "f280049c", "cortex-m4", "avr", "host"])
+@pytest.mark.parametrize("target", ["f28335", "f280049c", "cortex-m4", "host"])
 def test_c_and_readme_say_what_is_certified(example_valve, machine, target):
     bare, declared = designed(example_valve, {}, target), designed(example_valve, DECLARED, target)
     for compensator, of, said in (

@@ -8,7 +8,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.current.exact_controller import NO_OFFSET, OPEN, OVER, SENSOR, SHORT, ExactController
@@ -22,7 +21,7 @@ from dzdesign.verify.current.state_check import (
 )
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
 from tests.codegen.core.test_misra import CPPCHECK, FINDING, justified, symbol_of
-from tests.support.current_loops import LOOPS, PLAIN, SUPPLY
+from tests.support.current_loops import LOOPS, PLAIN, SUPPLY, current_texts
 from tests.support.synthetic import needs_compiler
 
 STATES = 300_000

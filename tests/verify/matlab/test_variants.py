@@ -25,7 +25,7 @@ def some(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DESIGNS)
 def test_no_operation_leaves_its_class_and_the_text_is_the_exact_law(name, some):
-    made = variant(name, "wide")
+    made = variant(name)
     files = output_of(made).files
     for sign in made.signals.signs:
         function = read_functions(files[f"{NAMES[sign]}.m"].decode(), f"{NAMES[sign]}.m")[0]
@@ -38,7 +38,7 @@ def test_no_operation_leaves_its_class_and_the_text_is_the_exact_law(name, some)
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "sign"), [("live zero", 1), ("bipolar, all options", -1)])
 def test_it_is_the_exact_law_in_octave_on_a_sample(name, sign, tmp_path):
-    made = variant(name, "wide")
+    made = variant(name)
     folder = written(made, tmp_path / "matlab")
     with sampled_codes(folder, made, sign) as asked:
         found = judged_in_octave(OCTAVE, NAMES[sign], (folder / f"{NAMES[sign]}.m").read_bytes(), asked)

@@ -1,13 +1,11 @@
 """The constants of dz_comp.m: those of the C, each with the same comment, as integers of MATLAB."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from textwrap import wrap
 
-from dzdesign.codegen.core.constants import Define
 from dzdesign.codegen.core.integer_form import IntegerForm
-from dzdesign.codegen.core.law_constants import LawConstants
-from dzdesign.codegen.core.signal_constants import SignalConstants
+from dzdesign.codegen.matlab.law_constants import LawConstants, Named
+from dzdesign.codegen.matlab.signal_constants import SignalConstants
 from dzdesign.core.errors import DzdesignError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import SIDE_NAMES
@@ -18,37 +16,26 @@ COLUMNS = 112
 TABLE_COLUMNS = 8
 #: Whole numbers beyond this are not exact where MATLAB reads them, as doubles.
 EXACT_DOUBLE = 2**53
-#: Of masks in place of branches, which an array language does not need.
-OF_MASKS = ("WORD_TOP", "DIFFERENCE_PLACE", "TRANSITION_SHIFT")
 #: Second operands of a shift: doubles.
 SHIFTS = ("STEP_SHIFT", "WEIGHT_SHIFT", "SUM_SHIFT", "RECIPROCAL_SHIFT", "BETA_SHIFT")
 
 
-def signal_constants(compensator: Compensator, sign: int) -> list[Define]:
+def signal_constants(compensator: Compensator, sign: int) -> list[Named]:
     """Return what a code of command and pressures stands for."""
-    found = SignalConstants(compensator=compensator, sign=sign, word_bits=32).signals()
-    return [each for each in found if each.symbol not in OF_MASKS]
+    return SignalConstants(compensator=compensator, sign=sign).signals()
 
 
-def step_constants(compensator: Compensator, sign: int) -> list[Define]:
+def step_constants(compensator: Compensator, sign: int) -> list[Named]:
     """Return what finds a node, and the transition's length."""
-    found = SignalConstants(compensator=compensator, sign=sign, word_bits=32).steps()
-    return [each for each in found if each.symbol not in OF_MASKS]
+    return SignalConstants(compensator=compensator, sign=sign).steps()
 
 
-def law_constants(compensator: Compensator, form: IntegerForm, sign: int) -> list[Define]:
-    """Return the law's integers; the command's own term as one number, which the C has in two."""
-    found: list[Define] = []
-    for each in LawConstants(compensator=compensator, form=form, sign=sign, narrow=False).arithmetic():
-        if each.symbol in ("COMMAND_HIGH_WORD", "COMMAND_TERM"):
-            equation = each.equation.rpartition(", over 2^")[0]
-            each = replace(each, symbol="COMMAND_TERM", value=form.linear << form.linear_shift, equation=equation)
-        if each.symbol != "COMMAND_SHIFT":
-            found.append(each)
-    return found
+def law_constants(compensator: Compensator, form: IntegerForm, sign: int) -> list[Named]:
+    """Return the law's integers."""
+    return LawConstants(compensator=compensator, form=form, sign=sign).arithmetic()
 
 
-def constant_lines(constants: Sequence[Define], kind: str) -> list[str]:
+def constant_lines(constants: Sequence[Named], kind: str) -> list[str]:
     """Return constants with their comments; `kind` is the class of those that shift nothing."""
     return [line for each in constants for line in (*_comment(each), _assignment(each, kind))]
 
@@ -81,13 +68,13 @@ def matlab_integer(value: int, kind: str) -> str:
     return f"{kind}({odd}) * {kind}(2^{shift})"
 
 
-def _comment(each: Define) -> list[str]:
+def _comment(each: Named) -> list[str]:
     text = f"{each.equation}: {each.engineering} ({each.rounding})."
     lines = wrap(text[0].upper() + text[1:], COLUMNS - 2, break_long_words=False, break_on_hyphens=False)
     return [f"% {line}" for line in lines]
 
 
-def _assignment(each: Define, kind: str) -> str:
+def _assignment(each: Named, kind: str) -> str:
     number = str(each.value) if each.symbol in SHIFTS else matlab_integer(each.value, kind)
     return f"{each.symbol} = {number};"
 

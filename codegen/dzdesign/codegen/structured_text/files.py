@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from textwrap import wrap
 
 from dzdesign.codegen.banner import banner_of, lot_in_words
-from dzdesign.codegen.core.law_constants import equation_of
+from dzdesign.codegen.core.certificate_text import equation_of
 from dzdesign.codegen.structured_text.constants import Constants, constants_of
 from dzdesign.codegen.structured_text.interface import Interface, interface_named
 from dzdesign.codegen.structured_text.law_form import LIFT, LawForm, law_form

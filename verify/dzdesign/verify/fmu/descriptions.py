@@ -53,8 +53,7 @@ def _expected_files(fmu: FmuFile, compensator: Compensator) -> set[str]:
     """Return the paths that an FMU has: what else a tool finds in it, it would load or compile too."""
     sources = {"dz_fmu.c", "fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"}
     if fmu.name.startswith("dz_compensator"):
-        sources |= {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h"}
-        sources |= {"dz_comp_negative.c"} if len(compensator.signals.signs) == 2 else set()
+        sources |= {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h", "dz_calibration.h", "dz_valve.h"}
         data = Compensator.FILE_NAME
     else:
         data = "plant.json"

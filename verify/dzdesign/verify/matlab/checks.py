@@ -19,7 +19,7 @@ from dzdesign.verify.matlab.operations import operations_check
 from dzdesign.verify.matlab.subset import ReadFunction, read_functions
 from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
 from dzdesign.verify.requirements import EXACT_LAW, MATLAB_INPUTS, MATLAB_SUBSET, Check
-from dzdesign.verify.toolchain.compiled_core import SOURCES, CompiledCore, Findings
+from dzdesign.verify.toolchain.compiled_core import SOURCE, CompiledCore, Findings
 
 Say = Callable[[str], None]
 NAMES = {1: "dz_comp", -1: "dz_comp_negative"}
@@ -62,7 +62,8 @@ def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say
 def _unchanged(folder: Path, manifest: OutputManifest, compensator: Compensator) -> tuple[dict[str, bytes], list[str]]:
     """Return the files that are run or compiled, and the names of those that are not as the manifest has them."""
     signs = compensator.signals.signs
-    names = [*(f"{NAMES[sign]}.m" for sign in signs), SETUP, HEADER, *(f"core/{SOURCES[sign][0]}" for sign in signs)]
+    core = (f"core/{name}" for name in (SOURCE, "dz_calibration.h", "dz_valve.h"))
+    names = [*(f"{NAMES[sign]}.m" for sign in signs), SETUP, HEADER, *core]
     others, texts = [], {}
     for name in names:
         path = folder / name

@@ -8,7 +8,7 @@
 #include "tick.h"
 #endif
 
-#ifdef DZ_CALIBRATION_H
+#ifdef DZ_CALIBRATION_WORDS
 #include "bound.h"
 #endif
 
