@@ -87,7 +87,7 @@ def test_c_and_readme_say_what_is_certified(example_valve, machine, target):
         (declared, "Certificate of the valve as recorded and the declared machine: ", "supply (default)"),
     ):
         files = generate(compensator, target, to_json_bytes(compensator)).files
-        header = " ".join(files["core/dz_comp.h"].replace("\n *", " ").split())
+        header = " ".join(files["core/dz_valve.h"].replace("\n *", " ").split())
         assert of in header and said in header
         readme = next(text for path, text in files.items() if path.endswith("README.md"))
         assert f"The certificate covers {compensator.certified_of}:" in readme

@@ -72,7 +72,8 @@ VALVE_HEADER = "dz_valve.h"
 
 def block_core_files(built: BuiltFor) -> dict[str, CoreFile]:
     """Return every file of the core in block form, by its name: they depend on no valve."""
-    return {"dz_calibration.c": _check_file(built), **_files(built)}
+    header, *others = _files(built).items()
+    return dict([header, ("dz_calibration.c", _check_file(built)), *others])
 
 
 def fixed_core_files(compensator: Compensator) -> dict[str, CoreFile]:

@@ -240,7 +240,7 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
     at_rest = rest(block, drive->at_rest, away, gone);
     past = past_band(block, at_rest, away);
     drive->at_rest = (uint16_t)at_rest;
-    if (at_rest != 0u) {
+    if ((block->play_codes != 0u) && (at_rest != 0u)) {
         reset_play(block, drive);
     }
     held = held_pressures(block, drive, status);

@@ -256,7 +256,7 @@ void dz_drive_sample(const struct dz_calibration *block, struct dz_drive *drive,
     at_rest = rest(block, drive->at_rest, away, gone);
     past = past_band(block, at_rest, away);
     drive->at_rest = (uint16_t)at_rest;
-    if ((at_rest != 0u) || (drive->side != driven)) {
+    if ((block->play_codes != 0u) && ((at_rest != 0u) || (drive->side != driven))) {
         reset_play(block, drive);
     }
     if (drive->side < 0) {
