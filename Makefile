@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 DOCS   := docs/derivation
 SITE   := docs/_build/html
 
-.PHONY: demo test quick coverage lint docs dist goldens lock clean fuzz bench bench-batch bench-c2000ware bench-faults bench-identify bench-isr bench-loading bench-outputs bench-paper bench-verify
+.PHONY: demo test quick coverage lint docs dist goldens lock clean fuzz bench bench-c2000ware bench-identify bench-isr bench-outputs bench-paper bench-verify
 
 demo: $(STAMP)
 	$(BIN)/dzdesign demo demo
@@ -58,18 +58,6 @@ bench-verify: $(STAMP)
 # FMUs and, most of an hour, wrong function blocks and MATLAB functions; `make bench-outputs BENCH=--quick` tries some.
 bench-outputs: $(VENV)/.bench
 	$(BIN)/python benchmarks/outputs/run.py $(BENCH)
-
-# Loading calibration blocks, 10 000 faulty exchanges: some minutes.
-bench-loading: $(STAMP)
-	$(BIN)/python benchmarks/loading/run.py $(BENCH)
-
-# 1000 valves: a quarter of an hour of two cores; `make bench-batch BENCH=--quick` tries 60.
-bench-batch: $(STAMP)
-	$(BIN)/python benchmarks/batch/run.py $(BENCH)
-
-# Power cuts in every command that writes a folder: half an hour, and only for root on Linux (loop devices).
-bench-faults: $(STAMP)
-	$(BIN)/python benchmarks/faults/run.py $(BENCH)
 
 # Every wrong statement about the paper, and its reproduction twice: minutes. CI tries a drawn part.
 bench-paper: $(STAMP)

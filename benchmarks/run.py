@@ -14,10 +14,7 @@ from scoreboard import Row, kept_rows, markdown, say
 
 FOLDER = Path(__file__).parent
 #: Benchmark to whether it can be had `--quick`.
-BENCHMARKS = {
-    "identify": True, "isr": False, "verify": True, "outputs": True, "batch": True, "paper": True, "loading": True,
-    "blocks": True,
-}  # fmt: skip
+BENCHMARKS = {"identify": True, "isr": False, "verify": True, "outputs": True, "paper": True, "blocks": True}
 NO_ROWS = "ended without rows"
 
 

@@ -10,6 +10,7 @@ from dzdesign.codegen.calibration.layout import SHAPE_BITS, Member, members
 from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command, command_module, usage_of
 from dzdesign.commands.schema import SCHEMAS, schema_document
+from dzdesign.core.options import field_docstrings
 from dzdesign.identify.data_quality.catalogue import catalogue
 
 #: What a caller of the rooms needs.
@@ -38,7 +39,7 @@ API = (
     ("dzdesign.stages.calibration", ("CalibrationImage", "ReadCalibration")),
     ("dzdesign.stages.export", ("AmplifierExport",)),
     ("dzdesign.codegen.amplifier.setting", ("AmplifierSetting",)),
-    ("dzdesign.design.fixed.dead_zones", ("FixedDeadZone",)),
+    ("dzdesign.design.fixed_offset", ("FixedDeadZone",)),
     ("dzdesign.codegen.calibration.reading", ("CalibrationReading", "SideReading", "NodeReading", "DriveReading")),
     ("dzdesign.verify.closed_loop.plant", ("Plant", "read_plant")),
     ("dzdesign.verify.verification", ("verify", "Verification")),
@@ -189,14 +190,15 @@ def warnings() -> str:
 
 
 def key_lines(artefact: type) -> list[str]:
-    """Return a field of reStructuredText for each key of an artefact, which its annotation describes."""
+    """Return a field of reStructuredText for each key of an artefact that is described."""
     try:
         hints = get_type_hints(artefact, include_extras=True)
     except NameError:  # arguments of a stage, some of whose types only a type checker imports: no artefact
         return []
-    lines = []
+    lines, below = [], field_docstrings(artefact)
     for field in fields(artefact):
         described = [each.description for each in getattr(hints[field.name], "__metadata__", ()) if each.description]
+        described += [below[field.name]] if field.name in below else []
         lines += [f":ivar {field.name}: {described[-1]}"] if described else []
     return lines
 

@@ -30,8 +30,6 @@ SPDX = {
     "Python Software Foundation License": "PSF-2.0",
     "Mozilla Public License 2.0 (MPL 2.0)": "MPL-2.0",
 }
-#: What of others is in the wheel itself: name, version, licence.
-BUNDLED = (("fmi2-headers", "2.0.4", "BSD-2-Clause"),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +120,7 @@ def bill_of_materials(name: str, version: str, packages: list[Package], direct: 
     licences = LicenseFactory()
     product = Component(
         name=name, version=version, type=ComponentType.APPLICATION, bom_ref=f"{name}@{version}",
-        licenses=[licences.make_from_string("Apache-2.0 AND BSD-2-Clause")],
+        licenses=[licences.make_from_string("Apache-2.0")],
     )  # fmt: skip
     parts = {
         package.key: Component(
@@ -133,20 +131,13 @@ def bill_of_materials(name: str, version: str, packages: list[Package], direct: 
         )
         for package in packages
     }  # fmt: skip
-    bundled = [
-        Component(
-            name=each, version=edition, type=ComponentType.LIBRARY, bom_ref=f"{each}@{edition}",
-            licenses=[licences.make_from_string(licence)],
-        )
-        for each, edition, licence in BUNDLED
-    ]  # fmt: skip
-    bom = Bom(components=[*parts.values(), *bundled])
+    bom = Bom(components=parts.values())
     bom.metadata.component = product
     bom.metadata.timestamp = datetime.fromisoformat(released).replace(tzinfo=UTC)
     pairs = zip(packages, parts.values(), strict=True)
     listing = "\n".join(f"{part.purl} {package.licence}" for package, part in pairs)
     bom.serial_number = uuid5(NAMESPACE_URL, f"{product.bom_ref}\n{released}\n{listing}")
-    bom.register_dependency(product, [*(parts[each] for each in sorted(direct)), *bundled])
+    bom.register_dependency(product, [parts[each] for each in sorted(direct)])
     for package in packages:
         bom.register_dependency(parts[package.key], [parts[each] for each in package.needs if each in parts])
     text = make_outputter(bom, OutputFormat.JSON, EDITION).output_as_string(indent=2)

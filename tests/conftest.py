@@ -28,24 +28,24 @@ def page_of_a_file(monkeypatch):
 
 @pytest.fixture(scope="session", autouse=True)
 def short_windows_beside_casadi():
-    """Compare the plant with CasADi's integrator over 0.3 s, not 2 s: a third of what `verify` costs a test.
+    """Compare the plant with CasADi's CVODES over 0.3 s, not 1 s: much of what `verify` costs a test.
 
     They are whole in another process, which takes nothing of this patch: where a test runs the program, as the pages of
     docs/ do, and of `batch --verify` with two or more `--jobs`. In this process, `batch --jobs 1` too, they are whole
     where a test asks for `whole_windows`.
     """
-    from dzdesign.verify.integrator import windows
+    from dzdesign.verify.closed_loop import against_cvodes
 
-    whole_s = windows.WINDOWS_S
+    whole_s = against_cvodes.WINDOW_S
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(windows, "WINDOWS_S", 0.3)
+        patch.setattr(against_cvodes, "WINDOW_S", 0.3)
         yield whole_s
 
 
 @pytest.fixture
 def whole_windows(short_windows_beside_casadi, monkeypatch):
-    """Compare the plant with CasADi's integrator over all of what `verify` does."""
-    monkeypatch.setattr("dzdesign.verify.integrator.windows.WINDOWS_S", short_windows_beside_casadi)
+    """Compare the plant with CasADi's CVODES over all of what `verify` does."""
+    monkeypatch.setattr("dzdesign.verify.closed_loop.against_cvodes.WINDOW_S", short_windows_beside_casadi)
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def example_valve(example_tests):
 def default_options():
     """What `design` takes where no option is given."""
     from dzdesign.codegen.project import DEFAULT_TARGET, target_named
-    from dzdesign.design.option_texts import options_of
+    from dzdesign.design.options import options_of
 
     return options_of({}, target_named(DEFAULT_TARGET).inputs())
 
@@ -100,9 +100,8 @@ def example_compensator(example_valve):
 @pytest.fixture(scope="session")
 def example_firmware(example_compensator):
     from dzdesign.codegen.project import generate
-    from dzdesign.core.artefact_types import to_json_bytes
 
-    return generate(example_compensator, "f28335", to_json_bytes(example_compensator))
+    return generate(example_compensator, "f28335")
 
 
 @pytest.fixture
@@ -121,18 +120,18 @@ def reported_demo(example_valve, tmp_path_factory):
     from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.loop import RampSequence
-    from dzdesign.verify.verification import evidence_files, evidence_manifest, verify
+    from dzdesign.verify.verification import evidence_manifest, verify
 
     folder = tmp_path_factory.mktemp("reported")
     valve_json = to_json_bytes(example_valve)
-    compensator = design(example_valve, default_options(), valve_json)
+    compensator = design(example_valve, default_options())
     compensator_json = to_json_bytes(compensator).decode()
     (folder / "valve.json").write_bytes(valve_json)
     (folder / "compensator.json").write_text(compensator_json, encoding="utf-8", newline="")
-    firmware = generate(compensator, "f28335", compensator_json.encode())
+    firmware = generate(compensator, "f28335")
     write_folder(folder / "firmware", firmware.files, firmware.manifest)
-    evidence = verify(folder / "firmware", sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
-    evidence = evidence.with_checks(regenerated(folder / "firmware"))
-    files = with_report(evidence_files(evidence), folder / "firmware", folder / "evidence")
+    again = regenerated(folder / "firmware")
+    evidence = verify(folder / "firmware", again=again, sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
+    files = with_report(evidence, folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", files, evidence_manifest(evidence.evidence))
     return folder

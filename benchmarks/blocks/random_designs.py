@@ -7,7 +7,7 @@ from dzdesign.codegen.project import target_named
 from dzdesign.core.errors import DzdesignError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
 
 TARGETS = ("f28335", "f280049c", "cortex-m4", "host")

@@ -19,7 +19,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.dither import Dither
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.example import example_folder
 from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_files import read_ramp_file

@@ -1,11 +1,9 @@
-"""Readers of `verify` for outputs: Structured Text, XML for PLC tools, MATLAB, FMUs, files for amplifiers."""
+"""Readers of `verify` for outputs: Structured Text, XML for PLC tools, MATLAB, files for amplifiers."""
 
-import struct
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from unittest.mock import patch
 
 import numpy as np
 from target import Target
@@ -13,38 +11,21 @@ from target import Target
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES, device_named
 from dzdesign.codegen.amplifier.files import amplifier_file, is_file_of
 from dzdesign.codegen.amplifier.setting import amplifier_setting
-from dzdesign.codegen.fmu import binaries
-from dzdesign.codegen.fmu.archive import archive
-from dzdesign.codegen.fmu.files import made_by_another_compiler
 from dzdesign.codegen.other_targets import Output, generate_output
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.fixed.dead_zones import dead_zones
+from dzdesign.design.fixed_offset import dead_zones
 from dzdesign.verify.amplifier.checks import checks as amplifier_checks
 from dzdesign.verify.amplifier.readers import READERS
-from dzdesign.verify.fmu.described_model import compensator_faults
-from dzdesign.verify.fmu.descriptions import file_faults, library_faults
-from dzdesign.verify.fmu.fmu_archive import unpacked
-from dzdesign.verify.fmu.fmu_file import read_fmu
-from dzdesign.verify.fmu.needed_libraries import machine_of, needed_libraries
-from dzdesign.verify.matlab.operations import evaluated
-from dzdesign.verify.matlab.subset import read_functions
-from dzdesign.verify.structured_text.checks import NAME
-from dzdesign.verify.structured_text.evaluator import Evaluator
-from dzdesign.verify.structured_text.imported_files import plcopen_faults, read_xml, tcpou_faults
-from dzdesign.verify.structured_text.parser import parse
-from dzdesign.verify.structured_text.syntax import FunctionBlock
-from dzdesign.verify.structured_text.to_c import block_in_c
-from dzdesign.verify.structured_text.type_check import check_types
+from dzdesign.verify.integers.text_values import TextValues
 
 TESTS = Path(__file__).parents[2] / "tests"
 #: Codes that a function in MATLAB is tried with, and numbers that a function block is.
 CODES = np.array([[0, 0, 0], [2048, 900, 600], [4095, 4095, 0], [65535, 1, 65535]])
-NUMBERS = np.array([0, 1, -1, 5000, -(2**31), 2**31 - 1])
-#: Between the description and the manifest of an FMU in one input.
-BETWEEN = b"\0manifest\0"
+NUMBERS = np.array([0, 1, -1, 5000, -(2**31), 2**31 - 1], dtype=np.int32)
+REFUSALS = (RequirementError, ValueError)
 BLOCK_SETTINGS = {"interface": "plc", "dialect": "twincat"}
 
 
@@ -57,11 +38,8 @@ def compensator(folder: str = "goldens") -> Compensator:
 
 @cache
 def _made(target: str) -> Output:
-    """Return an output; FMUs are without binaries, which take seconds to compile."""
     of = compensator()
-    settings = {"iec61131": BLOCK_SETTINGS, "fmu": {"plant": ""}}.get(target, {})
-    with patch.object(binaries, "PLATFORMS", ()):
-        return generate_output(of, target, settings, to_json_bytes(of))
+    return generate_output(of, target, {"iec61131": BLOCK_SETTINGS}.get(target, {}))
 
 
 def _output(target: str) -> Mapping[str, bytes]:
@@ -74,90 +52,13 @@ def output_manifest() -> bytes:
 
 
 def _structured_text(data: bytes) -> None:
-    try:
-        text = data.decode("ascii")
-    except UnicodeDecodeError:
-        return
-    block = parse(text, f"{NAME}.st")
-    kinds = check_types(block, f"{NAME}.st")
-    block_in_c(block, kinds)
-    given = {each.name.lower(): NUMBERS for each in block.of_section("VAR_INPUT") if each.kind == "DINT"}
-    Evaluator(block, kinds, len(NUMBERS)).run(given)
-
-
-def _plc_file(data: bytes) -> None:
-    path = _place("block.xml")
-    path.write_bytes(data)
-    block, text = _block()
-    document = read_xml(path)
-    for faults in (plcopen_faults, tcpou_faults):
-        _read_all(faults(document, block, text))
-
-
-@cache
-def _block() -> tuple[FunctionBlock, str]:
-    text = _output("iec61131")[f"{NAME}.st"].decode("ascii")
-    return parse(text, f"{NAME}.st"), text
+    given = dict.fromkeys(("command", "pressure_a", "pressure_b"), NUMBERS)
+    TextValues(data.decode("ascii", "replace"), "st", "FB_DeadZone.st").run(given | {"at_rest": np.array(True)})
 
 
 def _matlab(data: bytes) -> None:
-    function, *_ = read_functions(data.decode("ascii", "replace"), "dz_comp.m")
-    evaluated(function, CODES)
-
-
-def _fmu(data: bytes) -> None:
-    made_by_another_compiler({"dz_compensator.fmu": data})
-    path = _place("given.fmu")
-    path.write_bytes(data)
-    _look_into(path)
-
-
-def _described(data: bytes) -> None:
-    description, between, manifest = data.partition(BETWEEN)
-    files = dict(_fmu_files())
-    files["modelDescription.xml"] = description
-    if between:
-        files["extra/dzdesign/manifest.json"] = manifest
-    _fmu(archive(files))
-
-
-def _look_into(path: Path) -> None:
-    fmu, made = read_fmu(path), compensator()
-    for faults in (compensator_faults(fmu, made), file_faults(fmu, made, "0" * 64), library_faults(fmu)):
-        _read_all(faults)
-    fmu.binary_here()
-
-
-@cache
-def _fmu_files() -> dict[str, bytes]:
-    return unpacked(_fmus()[0], "the seed")
-
-
-def _fmus() -> list[bytes]:
-    return [content for name, content in _output("fmu").items() if name.endswith(".fmu")]
-
-
-def _described_seeds() -> Iterator[bytes]:
-    for content in _fmus():
-        files = unpacked(content, "the seed")
-        yield files["modelDescription.xml"]
-        yield files["modelDescription.xml"] + BETWEEN + files["extra/dzdesign/manifest.json"]
-
-
-def _binary(data: bytes) -> None:
-    machine_of(data)
-    needed_libraries(data)
-
-
-def _binary_seeds() -> Iterator[bytes]:
-    """Yield headers of each form, with one library in them."""
-    dynamic = struct.pack("<qQqQqQ", 1, 1, 5, 176, 0, 0)
-    elf = b"\x7fELF\x02\x01".ljust(18, b"\0") + struct.pack("<HIQQQIHHH", 62, 1, 0, 64, 0, 0, 64, 56, 2)
-    load = struct.pack("<IIQQQQQQ", 1, 5, 0, 0, 0, 240, 240, 1) + struct.pack("<IIQQQQQQ", 2, 5, 176, 0, 0, 48, 48, 1)
-    yield elf.ljust(64, b"\0") + load + dynamic + b"\0libc.so\0"
-    library = struct.pack("<IIIIII", 0xC, 40, 24, 0, 0, 0) + b"libSystem.B.dyl\0"
-    yield struct.pack("<IIIIIIII", 0xFEEDFACF, 0x1000007, 0, 6, 1, 40, 0, 0) + library
-    yield b"MZ".ljust(60, b"\0") + struct.pack("<I4sHH12xHH", 64, b"PE", 0x8664, 1, 160, 0) + bytes(300)
+    function = TextValues(data.decode("ascii", "replace"), "m", "dz_comp.m")
+    function.run(dict(zip(("u", "p_a", "p_b"), CODES.T, strict=True)))
 
 
 def _amplifier(data: bytes) -> None:
@@ -198,11 +99,7 @@ def _of_output(target: str, *names: str) -> Callable[[], list[bytes]]:
 
 
 TARGETS = {
-    "structured-text": Target(run=_structured_text, seeds=_of_output("iec61131", f"{NAME}.st")),
-    "plc-file": Target(run=_plc_file, seeds=_of_output("iec61131", f"{NAME}.xml", f"{NAME}.TcPOU")),
-    "matlab": Target(run=_matlab, seeds=_of_output("matlab", "dz_comp.m")),
-    "fmu": Target(run=_fmu, seeds=lambda: [archive({"modelDescription.xml": b"<a/>"}), *_fmus()]),
-    "fmu-description": Target(run=_described, seeds=lambda: list(_described_seeds())),
-    "binary": Target(run=_binary, seeds=lambda: list(_binary_seeds()), refusals=(ValueError,)),
+    "structured-text": Target(run=_structured_text, seeds=_of_output("iec61131", "FB_DeadZone.st"), refusals=REFUSALS),
+    "matlab": Target(run=_matlab, seeds=_of_output("matlab", "dz_comp.m"), refusals=REFUSALS),
     "amplifier": Target(run=_amplifier, seeds=lambda: list(_amplifier_seeds())),
 }

@@ -20,8 +20,8 @@ from pathlib import Path
 SLOWEST_S, LONGEST, MEMORY_MB = 5, 65536, 2048
 NAMES = (
     "text", "recording", "low-flow", "valve", "compensator", "artefacts", "lot-table", "curves",
-    "options", "plant", "tolerances", "words", "structured-text", "plc-file", "matlab", "fmu", "fmu-description",
-    "binary", "amplifier", "telemetry", "loading-frames", "loading", "calibration-file", "calibration-block",
+    "options", "plant", "tolerances", "words", "structured-text", "matlab",
+    "amplifier", "telemetry", "loading-frames", "loading", "calibration-file", "calibration-block",
 )  # fmt: skip
 #: How libFuzzer says how many inputs it tried.
 EXECUTED = re.compile(r"stat::number_of_executed_units:\s*(\d+)")

@@ -28,8 +28,8 @@ from dzdesign.identify.reading.low_flow_table import read_low_flow
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.report.lot.summary import ValveManifest
 from dzdesign.report.lot.table import TABLE, read_table
-from dzdesign.report.lot.valve_folder import ValveManifest
 from dzdesign.verify.closed_loop.evidence_curves import read_curves
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.tolerances import read_tolerances
@@ -88,13 +88,11 @@ def _curves(data: bytes) -> None:
 
 
 def _lot_seed() -> bytes:
-    from dzdesign.report.lot.table import SideFigures, TableRow, table_files
+    from dzdesign.report.lot.table import frame_of, table_files
 
-    figures = {"": SideFigures(dp0_MPa=1.0, offset_V=4.9, trend="decreasing")}
-    rows = [
-        TableRow(name=name, status="ok", reason="", sides=figures, record={"serial": name}) for name in ("a", "=1+1")
-    ]
-    return table_files(rows)[TABLE]
+    figures = {"dp0_MPa": 1.0, "offset_V": 4.9, "trend": "decreasing"}
+    rows = [{"name": name, "status": "ok", **figures, "record.serial": name} for name in ("a", "=1+1")]
+    return table_files(frame_of(rows))[TABLE]
 
 
 def _artefact_seeds() -> list[bytes]:

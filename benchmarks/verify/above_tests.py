@@ -18,10 +18,9 @@ from scoreboard import Row, print_rows, say
 
 from dzdesign.codegen.project import DEFAULT_TARGET, generate, target_named
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 
@@ -65,7 +64,7 @@ class Core:
 
     def __init__(self, compensator: Compensator, folder: Path) -> None:
         self.compensator = compensator
-        firmware = generate(compensator, "host", to_json_bytes(compensator))
+        firmware = generate(compensator, "host")
         write_folder(folder, firmware.files, firmware.manifest)
         library = folder.parent / f"{folder.name}.so"
         source = folder / "core" / "dz_comp.c"

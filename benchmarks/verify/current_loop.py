@@ -16,8 +16,7 @@ from dzdesign.design.current.choosing import (
     worst_step,
 )
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
-from dzdesign.design.current.margins import worst_margins
-from dzdesign.design.current.step_response import step_responses
+from dzdesign.design.current.responses import step_responses, worst_margins
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.coil_simulation import CoilLoop, CoilSimulation
 from dzdesign.verify.current.corner_runs import HELD_S, fault_runs, run_corner

@@ -12,15 +12,14 @@ from stand_in_flow import RECORDINGS, ROOT
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_files import read_ramp_file
+from dzdesign.verify.closed_loop.drive_corners import MOST_MOVED, valve_at_corners
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.plant import Plant, read_plant
-from dzdesign.verify.closed_loop.valve_at_corners import MOST_MOVED, valve_at_corners
 
 CONTROLLED = {
     "drive": "current",
@@ -65,7 +64,7 @@ def _rows(name: str, compensator: Compensator, plant: Plant | None) -> list[Row]
         raise ValueError("the drive is by duty")
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "firmware"
-        firmware = generate(compensator, TARGET, to_json_bytes(compensator))
+        firmware = generate(compensator, TARGET)
         write_folder(folder, firmware.files, firmware.manifest)
         found = [valve_at_corners(scene, drive.circuit) for scene in scenes_of(folder, compensator, plant)]
     moved = max(found, key=lambda each: each.opening_largest - each.opening_least)

@@ -19,7 +19,7 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.dither import read_dithered
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import read_ramp_file

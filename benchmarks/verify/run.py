@@ -20,7 +20,6 @@ from current_valve import print_current_valve  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from native_plant import print_native_plant  # noqa: E402
-from plant import print_plant  # noqa: E402
 from population import print_population  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 from stand_in_flow import print_stand_in  # noqa: E402
@@ -28,7 +27,6 @@ from verify_time import print_verify_time  # noqa: E402
 
 PARTS = {
     "inputs": (print_inputs, 101),
-    "plant": (print_plant, 303),
     "native-plant": (print_native_plant, 1),
     "verify-time": (print_verify_time, 0),
     "population": (print_population, 1),

@@ -8,7 +8,7 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
@@ -82,9 +82,11 @@ def right_and_wrong(
     Components that are not drawn stand at their worst ends; with none named all are drawn.
     """
     compensator = designed(valve, folder / "true", **true)
-    designed(change(valve), folder / "wrong", **(true | wrong))
-    right, short = (
-        run_population(scenes_of(folder / name, compensator, None), machines, SEED, drawn=drawn or COMPONENTS)
-        for name in ("true", "wrong")
+    short = designed(change(valve), folder / "wrong", **(true | wrong))
+    # What is drawn, and what the thresholds are bounded by, is that of the true budget.
+    laws = {"true": compensator, "wrong": replace(short, machine=compensator.machine, valve=compensator.valve)}
+    right, short_of_it = (
+        run_population(scenes_of(folder / name, law, None), machines, SEED, drawn=drawn or COMPONENTS)
+        for name, law in laws.items()
     )
-    return right, short
+    return right, short_of_it

@@ -15,6 +15,7 @@ from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile
 from dzdesign.core.errors import InputError, RequirementError, quoted
+from dzdesign.stages.given_compensator import refuse_underived
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock
@@ -81,8 +82,6 @@ def blocks_checked(folder: Path, given: Iterable[GivenBlock], code: Path | None 
 
 def _checked(firmware: "BlockFirmware", target: str, given: GivenBlock) -> "Check":
     from dzdesign.codegen.calibration.packing import text_of, unpack
-    from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows
-    from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
     from dzdesign.verify.requirements import CALIBRATION_BLOCK
 
     path, octets, (compensator, digest) = given.path, given.octets, _compensator(given)
@@ -93,8 +92,10 @@ def _checked(firmware: "BlockFirmware", target: str, given: GivenBlock) -> "Chec
         return CALIBRATION_BLOCK.check(holds=False, name=name, text=str(error))
     check = found.requirement(str(path), compensator)
     faults = [] if check.holds else [check.text]
-    follows = (certificate_follows(compensator), bounds_follow(compensator), law_follows(compensator))
-    faults += [f"{each.name}: {each.text}" for each in follows if not each.holds]
+    try:
+        refuse_underived(compensator, f"'{given.compensator_json.name}'", of_file=True)
+    except InputError as error:
+        faults.append(str(error))
     block = unpack(octets, f"'{path}'")
     serial = text_of(block.serial)
     faults += filter(None, (

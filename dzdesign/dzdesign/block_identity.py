@@ -44,7 +44,7 @@ def beside_another(path: Path, octets: bytes) -> str:
     the folder is none of a batch.
     """
     from dzdesign.design.firmware_manifest import BLOCK_FILE
-    from dzdesign.report.lot.valve_folder import read_manifest
+    from dzdesign.report.lot.table import read_manifest
 
     folder = path.absolute().parent
     if not (folder / MANIFEST_NAME).is_file():

@@ -10,8 +10,10 @@ from dzdesign.codegen.project import generate, write_firmware
 from dzdesign.command_line.cli import main
 from dzdesign.core import artefact_files
 from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.design.compensator import Compensator
 from tests.support.paths import GOLDENS_FULL
 from tests.support.synthetic import with_side
 
@@ -87,8 +89,8 @@ def test_the_same_design_is_written_again_also_of_another_version_and_for_anothe
     write_firmware(firmware, tmp_path / "firmware")
     older = json.loads(to_json_bytes(example_compensator))
     older["tool"]["version"] = "0.0.9"
-    content = to_json(older).encode()
-    write_firmware(generate(example_compensator, "host", content), tmp_path / "older")
+    older = read_artefact(to_json(older).encode(), Compensator, "compensator.json")
+    write_firmware(generate(older, "host"), tmp_path / "older")
     write_firmware(firmware, tmp_path / "older")
     note = write_firmware(generate(example_compensator, "cortex-m4"), tmp_path / "older").note
     assert "was replaced by this one for cortex-m4" in note

@@ -9,9 +9,6 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import to_json_bytes
 from tests.support.paths import GOLDENS
 
-#: Without the proof of the compensator's numbers, which takes a second.
-UNPROVEN = ("dzdesign.design.redesign_check.prove_derived", lambda compensator: None)
-
 
 @pytest.fixture(scope="module")
 def compensator():
@@ -21,7 +18,6 @@ def compensator():
 @pytest.fixture
 def run(tmp_path, monkeypatch, compensator):
     """Return what runs `codegen` in a folder with a function block in plc."""
-    monkeypatch.setattr(*UNPROVEN)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "compensator.json").write_bytes(to_json_bytes(compensator))
     write_output(generate_output(compensator, "iec61131", settings_of("iec61131", {})), tmp_path / "plc")

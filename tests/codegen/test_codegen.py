@@ -11,11 +11,10 @@ import pytest
 from dzdesign.codegen.core.integer_form import integer_form
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.quantise import finest_units
+from dzdesign.design.side_design import finest_units
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import CommandSignal
 from dzdesign.verify.toolchain.host_compiler import STRICT, check_strictly, find_compilers
@@ -113,7 +112,7 @@ def test_reciprocal_is_exact_for_every_quotient_that_can_occur(example_compensat
 
 
 def test_same_input_same_bytes(example_compensator, example_firmware):
-    again = generate(example_compensator, "f28335", to_json_bytes(example_compensator))
+    again = generate(example_compensator, "f28335")
     assert dict(again.files) == dict(example_firmware.files)
 
 

@@ -13,7 +13,7 @@ from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 from tests.support.example_coil import COIL, SENSORS, example_loop
 from tests.support.synthetic import needs_compiler

@@ -10,13 +10,10 @@ import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
-from dzdesign.design.certificate import guarded_curve, prove_certificates
+from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.designing import design
-from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.table.linear_programme import STEP_CODES
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.exhaustive.above_tests import check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
@@ -55,7 +52,7 @@ def core_of(tmp_path_factory):
 
     def call(compensator):
         folder = tmp_path_factory.mktemp("core") / "fw"
-        firmware = generate(compensator, "host", to_json_bytes(compensator))
+        firmware = generate(compensator, "host")
         write_folder(folder, firmware.files, firmware.manifest)
         library = folder.parent / "core.so"
         subprocess.run(["cc", "-shared", "-fPIC", "-o", library, folder / "core" / "dz_comp.c"], check=True)
@@ -155,15 +152,6 @@ def lowered():
     ramps = [synthetic_ramp(dp, Truth(knee_rising=threshold_V(dp), slope=4 * dp**0.5, noise=0.02)) for dp in TESTED]
     valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="smooth", curvature=M * 1e-12))
     return design(valve, DesignOptions(transition=Fraction(0)))
-
-
-def test_the_doubles_agree_with_the_exact_offset_above_the_tests(lowered):
-    side, above = lowered.valve.positive, AboveChoice(choice="lower", step_codes=STEP_CODES)
-    curve = guarded_curve(side, "closing", "hold", above)
-    places = [Fraction(number, 64) for number in range(320, 1400)]
-    exact = [min(value for value in (curve.at(dp), curve.bound(dp)) if value is not None) for dp in places]
-    found = curve.in_doubles(np.array([float(dp) for dp in places]))
-    np.testing.assert_allclose(found, [float(value) for value in exact], atol=1e-9)
 
 
 class TestFaults:

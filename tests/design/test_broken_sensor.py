@@ -8,10 +8,9 @@ import pytest
 
 from dzdesign.codegen.project import target_named, targets
 from dzdesign.core.errors import InputError
-from dzdesign.design.broken_sensor import hidden_failure
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.options import DesignOptions, options_of
+from dzdesign.design.pressure_inputs import hidden_failure
 from dzdesign.design.signal_text import command_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter

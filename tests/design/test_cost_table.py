@@ -11,10 +11,8 @@ from dzdesign.core.recorded_units import FlowUnit, PressureUnit, RecordedUnits
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.designing import design
-from dzdesign.design.fixed.characteristic import Characteristic
-from dzdesign.design.fixed.dead_zones import dead_zones
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.fixed_offset import Characteristic, dead_zones
+from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.terminal.tables import print_compensator
 
 BAR = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0), flow=FlowUnit(unit="mL/s", factor=1000 / 60))

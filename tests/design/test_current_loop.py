@@ -21,10 +21,20 @@ from dzdesign.design.current.choosing import (
 )
 from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
 from dzdesign.design.current.drive import CurrentRequest, design_current_drive
-from dzdesign.design.current.margins import Gains, impulse_response, loop_transfer, margins, worst_margins
-from dzdesign.design.current.step_response import Coils, StepResponse, released_overshoot_A, run_loop, step_responses
+from dzdesign.design.current.responses import (
+    Coils,
+    Gains,
+    StepResponse,
+    impulse_response,
+    loop_transfer,
+    margins,
+    released_overshoot_A,
+    run_loop,
+    step_responses,
+    worst_margins,
+)
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.verify.exhaustive.zero_command import counted_dither
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
 

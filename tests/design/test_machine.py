@@ -11,18 +11,17 @@ from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.dither import Dither, DrivenDither
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
-from dzdesign.design.ceiling.offset_ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.costs import colder_coil
 from dzdesign.design.designing import design
-from dzdesign.design.lot.margins import lot_margins, prove_lot
-from dzdesign.design.lot.setting import lot_setting
-from dzdesign.design.machine.allowance import dither_reserve
-from dzdesign.design.machine.bench_current import check_bench_current, recorded_full_A
-from dzdesign.design.machine.colder_coil import colder_coil
+from dzdesign.design.lot_margins import lot_margins, prove_lot
+from dzdesign.design.lot_setting import lot_setting
+from dzdesign.design.machine.allowance import check_bench_current, dither_reserve, recorded_full_A
 from dzdesign.design.offset import above_tests
 from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.offset.offset_ceiling import offset_ceiling
+from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_certificates, prove_derived
 from tests.support.machine_oracle import worst_margin_mV
 

@@ -7,10 +7,10 @@ from fractions import Fraction
 import pytest
 
 from dzdesign.codegen.project import target_named
+from dzdesign.design.costs import machine_costs
 from dzdesign.design.costs_at_tests import last_opening
 from dzdesign.design.designing import design
-from dzdesign.design.machine.costs import machine_costs
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.terminal.tables import print_compensator
 
 TARGET = target_named("f28335").inputs()

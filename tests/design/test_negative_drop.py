@@ -8,8 +8,8 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.pressure_inputs.negative_drop import wiring_in_words
+from dzdesign.design.options import options_of
+from dzdesign.design.pressure_inputs import wiring_in_words
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.recorded_drop import DropColumns, RecordedDrop
 from tests.support.golden_firmware import FULL

@@ -78,7 +78,7 @@ def test_a_reading_lies_beyond_the_onset_and_grows_with_the_flow(example_compens
 def test_design_says_what_the_closed_loop_reads(example_valve, tmp_path, transition):
     """Two ways: the law turned round at the recorded threshold, and the generated C driving the recorded flow."""
     from dzdesign.codegen.project import generate, target_named
-    from dzdesign.design.option_texts import options_of
+    from dzdesign.design.options import options_of
 
     options = options_of({"transition": transition, "reading_flow": "0.8 L/min"}, target_named("f28335").inputs())
     compensator = design(example_valve, options)

@@ -13,8 +13,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.regeneration import regenerated
 from dzdesign.verify.closed_loop.loop import RampSequence
 from tests.support.paths import ROOT

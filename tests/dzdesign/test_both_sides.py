@@ -12,8 +12,8 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.pressure_inputs.not_covered import not_covered
+from dzdesign.design.options import options_of
+from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.requirements import ALWAYS, OPTIONAL

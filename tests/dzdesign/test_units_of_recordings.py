@@ -18,10 +18,10 @@ from dzdesign.identify.plots.valve_plots import draw_figures
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.units_of_columns import units_of
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.chain import Chain
-from dzdesign.report.characteristic.curves import characteristic_curves
-from dzdesign.report.characteristic.quantities import characteristic_quantities
-from dzdesign.report.figures.figure import figure_style
+from dzdesign.report.artefacts import Chain
+from dzdesign.report.figure import figure_style
+from dzdesign.report.sections.curves import characteristic_curves
+from dzdesign.report.sections.quantities import characteristic_quantities
 from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import key_figures
 from tests.support.synthetic import needs_compiler

@@ -1,4 +1,4 @@
-"""What the product ships loads no library of a file's; programs are found and started where that is done with care."""
+"""Only a child process loads a library of a file's; programs are found and started where that is done with care."""
 
 import ast
 from pathlib import Path
@@ -8,14 +8,18 @@ import pytest
 from tests.house.test_no_code_from_data import dotted, shipped
 from tests.support.paths import ROOT
 
-#: Calls of the system's own library.
-LOADS = {"core/dzdesign/core/folder_swap.py", "dzdesign/dzdesign/batch/parent_watch.py"}
-#: What starts programs: by their full path, and within limits or with a time to end.
+#: Calls of the system's own library; and what is run as a process of its own.
+LOADS = {
+    "core/dzdesign/core/folder_swap.py",
+    "dzdesign/dzdesign/batch/parent_watch.py",
+    "verify/dzdesign/verify/toolchain/library_server.py",
+}
+#: What starts programs: by their full path, and with a time to end.
 STARTS = {
     "core/dzdesign/core/processes/running.py",
     "identify/dzdesign/identify/reading/binary/reader_process.py",
-    "verify/dzdesign/verify/toolchain/confinement.py",
-    "verify/dzdesign/verify/toolchain/served_process.py",
+    "verify/dzdesign/verify/integers/octave.py",
+    "verify/dzdesign/verify/toolchain/compiled_library.py",
 }
 STARTING = {f"subprocess.{name}" for name in ("Popen", "run", "call", "check_call", "check_output")}
 LOADING = {"ctypes", "cffi", "_ctypes"}

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.report.sections.current_loop import current_tables
+from dzdesign.report.sections.closed_loop import current_tables
 from dzdesign.verify.current.results import (
     ControllerStates,
     CurrentCorner,

@@ -11,20 +11,15 @@ from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.chain import Chain
-from dzdesign.report.characteristic.curves import characteristic_curves
-from dzdesign.report.characteristic.quantities import characteristic_quantities
-from dzdesign.report.compensator_sides import standing_warnings
-from dzdesign.report.figures.figure import figure_style
-from dzdesign.report.sections.acceptance import acceptance_section
+from dzdesign.report.artefacts import Chain, standing_warnings
+from dzdesign.report.sections.closed_loop import scenarios_table
 from dzdesign.report.sections.conditions import RECORDED, conditions_section
-from dzdesign.report.sections.evidence import scenarios_table
+from dzdesign.report.sections.curves import characteristic_curves
 from dzdesign.report.sections.provenance import warnings_section
-from dzdesign.report.sections.valve import valve_sections
-from dzdesign.report.summary import key_figures
-from dzdesign.report.valve_name import valve_name
+from dzdesign.report.sections.quantities import characteristic_quantities
+from dzdesign.report.summary import key_figures, valve_name
 from dzdesign.report.valve_report import report_of_folder
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
 from dzdesign.verify.loop_results import ScenarioResult
@@ -87,22 +82,6 @@ def test_a_small_margin_says_where_the_reserve_is(example_valve, example_compens
     assert "lower bound; the statistical reserve is in the bound" in card("Certificate", loops, machine, inputs).note
 
 
-@needs_compiler
-def test_an_empty_acceptance_stands_nowhere(reported_demo):
-    page = report_of_folder(reported_demo).html
-    assert acceptance_section(None, None) is None
-    assert 'href="#loop"' in page and "#acceptance" not in page and 'id="acceptance"' not in page
-
-
-def test_repeats_are_recordings_of_one_ramp_test(both_sides, example_valve):
-    tests = sum(len(side.tests) for side in both_sides.sides.values())
-    for recordings, said in ((tests, f"{tests} ramp tests;"), (3 * tests, f"{tests} ramp tests from {3 * tests} rec")):
-        source = example_valve.made_from[0]
-        valve = replace(both_sides, made_from=(source,) * recordings)
-        with figure_style():
-            assert valve_sections(valve, None)["data"].lines[0].startswith(said)
-
-
 def test_the_flow_at_zero_that_was_recorded_stands_before_the_simulated_one(example_valve):
     """Seeded: a dash stood for the meter's noise level, or the leak, of a valve recorded at zero command."""
     leaks = replace(example_valve.sides["positive"].tests[0], leak_L_min=0.2)
@@ -132,14 +111,6 @@ def test_rows_of_one_scenario_say_which_runs_they_are_of():
         "positive commands, at 2.00, 4.00 MPa; negative commands, at 4.00 MPa",
         "",
     ]
-
-
-@needs_compiler
-def test_a_legend_fits_its_figure(reported_demo):
-    """No text begins left of the drawing: a legend that is wider than its figure would."""
-    drawings = re.findall(r'<svg class="drawing".*?</svg>', report_of_folder(reported_demo).html, re.DOTALL)
-    starts = [float(x) for each in drawings for x in re.findall(r"text-anchor: start[^>]* x=\"(-?[\d.]+)\"", each)]
-    assert len(starts) > 30 and min(starts) > 0
 
 
 @needs_compiler

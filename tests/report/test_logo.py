@@ -9,12 +9,9 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.identification import identify
-from dzdesign.report.logo import LARGEST, logo_uri
-from dzdesign.report.lot.report import report_of_lot
-from dzdesign.report.lot.table import SideFigures, TableRow
+from dzdesign.report.page import LARGEST_LOGO, logo_uri
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.synthetic import Truth, synthetic_ramp
-from tests.support.synthetic_lots import write_lot_folder
 
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
@@ -48,20 +45,12 @@ def test_a_report_with_a_logo_needs_nothing_from_outside(valve_folder, capsys):
     capsys.readouterr()
 
 
-def test_a_lot_has_a_logo_too(tmp_path):
-    (tmp_path / "logo.png").write_bytes(PNG)
-    rows = [TableRow(name="V1", status="failed", reason="no recording", sides={"": SideFigures()})]
-    html = report_of_lot(write_lot_folder(tmp_path / "lot", rows), logo_uri(tmp_path / "logo.png")).html
-    (image,) = Page(html).of("img")
-    assert base64.b64decode(image["src"].removeprefix("data:image/png;base64,")) == PNG
-
-
 @pytest.mark.parametrize(
     ("name", "content"),
     [
         ("logo.svg", b"<svg xmlns='http://www.w3.org/2000/svg' onload='alert(1)'/>"),
         ("logo.png", b"<script>alert(1)</script>"),
-        ("large.png", PNG + bytes(LARGEST)),
+        ("large.png", PNG + bytes(LARGEST_LOGO)),
         ("empty.png", b""),
     ],
     ids=["SVG", "no image", "too large", "empty"],

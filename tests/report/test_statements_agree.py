@@ -13,16 +13,15 @@ from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.costs import lines_of_tests
 from dzdesign.design.costs_at_tests import costs_at_tests
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.report.characteristic.curves import characteristic_curves
-from dzdesign.report.characteristic.quantities import characteristic_quantities
-from dzdesign.report.figures.characteristic import characteristic_figure
-from dzdesign.report.figures.figure import figure_style
-from dzdesign.report.measured_figures import measured_figures, with_span
+from dzdesign.report.figure import figure_style
 from dzdesign.report.page import Headline, Page, _cell, _finding, _tied, render
-from dzdesign.report.sections.characteristic import characteristic_section
-from dzdesign.report.sections.remaining import other_costs, remaining_section
+from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
+from dzdesign.report.sections.curves import characteristic_curves
+from dzdesign.report.sections.provenance import other_costs, remaining_section
+from dzdesign.report.sections.quantities import characteristic_quantities
+from dzdesign.report.summary import measured_figures, with_span
 from tests.support.bench_recordings import AFTER, BEFORE, L_MIN, record
 
 
@@ -140,6 +139,10 @@ def test_options_are_not_broken_and_commands_in_a_cell_are_commands():
     assert "breaks" in _cell("x" * 19) and "breaks" in _cell("ramp_dP1_1.csv.gz_and_more")
 
 
+def ids(svg):
+    return set(re.findall(r' id="([^"]+)"', svg))
+
+
 def label_places(svg):
     """Return where the pressure drops stand: x of each text ``4.00``, and of the tick ``−100``."""
     texts = re.findall(r'<text[^>]*?(?:x="(-?[\d.]+)"|translate\((-?[\d.]+)[^>]*)[^>]*>([^<]*)<', svg)
@@ -155,4 +158,4 @@ def test_the_pressure_drops_of_negative_commands_stand_outside_the_curves(two_si
         end = next(x for x, text in places if text == "−100")
         labels = [x for x, text in places if text == "4.00"]
         assert len(labels) == 2 and min(labels) < end < max(labels)
-    assert figure.narrow_svg.count("characteristic-narrow-") > 10 and "characteristic-narrow" not in figure.svg
+    assert figure.narrow_svg.count("<path") > 10 and not ids(figure.svg) & ids(figure.narrow_svg)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from dzdesign.core.recorded_units import AS_COMPUTED
-from dzdesign.report.unrequired_flow import unrequired_flow
+from dzdesign.report.summary import unrequired_flow
 from dzdesign.report.valve_report import report_of_folder
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW

@@ -21,7 +21,7 @@ def given(number, symbol, value):
     return Statement(number=number, title="", kind=Kind.PREMISE, symbol=symbol, members=(sympy.sympify(value),))
 
 
-def claim(symbol, member, *numbers, **more):
+def claim(symbol, member, *numbers, eliminate=(), **more):
     grounds = tuple(Ground(number=number) for number in numbers)
     return Statement(
         number="claim",
@@ -30,6 +30,7 @@ def claim(symbol, member, *numbers, **more):
         symbol=symbol,
         members=(sympy.sympify(member),),
         grounds=grounds,
+        eliminate=eliminate,
         **more,
     )
 

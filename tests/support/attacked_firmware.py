@@ -1,21 +1,14 @@
-"""Edits of a firmware folder by hand, and `dzdesign verify` with all that takes long taken as held.
-
-What runs the C (every input, the drive, the closed loop) can only add to what does not hold; an attack must be seen
-without it. The untouched firmware goes the same way and holds.
-"""
+"""Edits of a firmware folder by hand, and `dzdesign verify` with all that takes long taken as held."""
 
 import json
 from functools import cache
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, to_json
+from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.report import valve_report
 from dzdesign.verify import verification
 from dzdesign.verify.firmware.compilation import BoardCompiled
-from dzdesign.verify.requirements import ALWAYS, CERTIFICATE, FILES, LAW, MANIFEST, REGENERATED, VALVE
-
-#: What is tried in earnest; all others of the list are taken as held.
-TRIED = (FILES, MANIFEST, CERTIFICATE, LAW, VALVE, REGENERATED)
+from dzdesign.verify.requirements import ALWAYS, REPRODUCED
 
 
 def edit(folder, name, old, new):
@@ -39,28 +32,21 @@ def change_json(path, change):
     path.write_bytes(to_json(document).encode())
 
 
-def seal(folder, change=lambda manifest: None):
-    """Make the manifest's hashes those of the files as they are."""
-
-    def with_hashes(manifest):
-        change(manifest)
-        manifest["files"] = {
-            name: digest if name in manifest["board"] else sha256_of((folder / name).read_bytes())
-            for name, digest in manifest["files"].items()
-        }
-
-    change_json(folder / MANIFEST_NAME, with_hashes)
+def sealed(valve):
+    """Give an edited document of a valve the hash of its content, as `identify` would write it."""
+    content = {key: value for key, value in valve.items() if key != "content_sha256"}
+    valve["content_sha256"] = sha256_of(to_json(content).encode())
+    return valve
 
 
 def take_the_rest_as_held(monkeypatch):
-    """Let `verify` try files, manifest, compensator and generating again, and nothing that compiles or runs C."""
-    held = tuple(each.check(holds=True, text="taken as held") for each in ALWAYS if each not in TRIED)
-    monkeypatch.setattr(verification, "_try_core", lambda *_: verification._Core(checks=held))
-    monkeypatch.setattr(verification, "scenes_of", lambda *_: None)
+    """Let `verify` design, generate and compare, and try nothing that compiles or runs C."""
+    held = tuple(each.check(holds=True, text="taken as held") for each in ALWAYS if each is not REPRODUCED)
+    run = verification._Run(core=verification._Core(checks=held))
+    monkeypatch.setattr(verification, "_run_core", lambda *_: run)
+    monkeypatch.setattr(verification, "own_block_accepted", lambda *_: ())
     monkeypatch.setattr(verification, "board_compiles", lambda *_: BoardCompiled())
-    monkeypatch.setattr(valve_report, "with_report", lambda files, *_: files)
-    for name in ("law_follows", "certificate_follows"):
-        monkeypatch.setattr(verification, name, _once(getattr(verification, name)))
+    monkeypatch.setattr(valve_report, "with_report", lambda found, *_: verification.evidence_files(found))
 
 
 @cache
@@ -71,7 +57,7 @@ def _runs():
 def run_each_core_once(monkeypatch):
     """Let `verify` run a core once of those that are equal, with equal compensators, plants and ramps.
 
-    For tests of what stands around that: the manifest, the files of the target, recordings, report and command.
+    For tests of what stands around that: the files of the target, recordings, report and command.
     """
     run = verification._run_core
 
@@ -83,17 +69,3 @@ def run_each_core_once(monkeypatch):
         return _runs()[key]
 
     monkeypatch.setattr(verification, "_run_core", once)
-
-
-@cache
-def _once(check):
-    """Check equal compensators once: designing one again takes a second."""
-    found = {}
-
-    def checked(compensator):
-        key = to_json_bytes(compensator)
-        if key not in found:
-            found[key] = check(compensator)
-        return found[key]
-
-    return checked

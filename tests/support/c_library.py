@@ -1,4 +1,4 @@
-"""C of our own, loaded into the tests: dzdesign itself loads none (toolchain/confined_library.py)."""
+"""C of our own, loaded into the tests: dzdesign itself loads none (toolchain/compiled_library.py)."""
 
 import ctypes
 import sys

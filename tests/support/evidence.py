@@ -10,7 +10,7 @@ from dzdesign.verify.loop_results import ClosedLoopResult, PressureResult
 from dzdesign.verify.requirements import ALWAYS
 
 LOOP = ClosedLoopResult(
-    plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=(), against_integrator=()
+    plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=(), against_cvodes=()
 )
 EVIDENCE = Evidence(
     tool=THIS_TOOL, made_from=(), target="f28335", changed_board_files=(), user_files=(), differing_files={},

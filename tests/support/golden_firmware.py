@@ -77,7 +77,7 @@ def golden_compensator(target_name: str, root: Path = GOLDENS) -> Compensator:
 def golden_files(target_name: str, root: Path = GOLDENS) -> dict[str, str]:
     """Generate a target's files from the fixed compensator."""
     compensator = golden_compensator(target_name, root)
-    files = dict(generate(compensator, target_name, to_json_bytes(compensator)).files)
+    files = dict(generate(compensator, target_name).files)
     del files[INPUT]
     return files
 
@@ -85,7 +85,7 @@ def golden_files(target_name: str, root: Path = GOLDENS) -> dict[str, str]:
 def golden_block_files() -> dict[str, str]:
     """Generate the f28335's firmware in block form from the second set's compensator; the block as C is among them."""
     compensator = golden_compensator("f28335", FULL)
-    files = dict(generate(compensator, "f28335", to_json_bytes(compensator), "block").files)
+    files = dict(generate(compensator, "f28335", "block").files)
     del files[INPUT]
     return files
 
@@ -119,7 +119,7 @@ def update() -> None:
     every = tuple(target.name for target in targets())
     for root, names, options in ((GOLDENS, every, None), (FULL, FULL_TARGETS, full_options())):
         content = (root / "valve.json").read_bytes()
-        compensator = design(read_artefact(content, ValveModel, "valve.json"), options, content)
+        compensator = design(read_artefact(content, ValveModel, "valve.json"), options)
         (root / INPUT).write_bytes(to_json_bytes(compensator))
         for folder in root.iterdir():
             if folder.is_dir() and folder.name != "schemas":

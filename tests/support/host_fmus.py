@@ -1,18 +1,19 @@
 """FMUs of the goldens' compensator with everything switched on, with this machine's binaries alone; and wrong ones."""
 
 import json
-import sys
-from collections.abc import Mapping
+import shutil
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
-from dzdesign.codegen.fmu import binaries
+import fmpy
+
+from dzdesign.codegen.fmu import files
+from dzdesign.codegen.fmu.files import archive
 from dzdesign.codegen.other_targets import Output, generate_output
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.fmu.fmu_file import HERE, FmuFile
+from dzdesign.verify.fmu.checks import Unpacked
 from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
 from tests.support.golden_firmware import FULL, golden_compensator
 
@@ -24,10 +25,9 @@ def full_compensator() -> Compensator:
     return golden_compensator("f28335", FULL)
 
 
-def host_platforms() -> tuple[binaries.Platform, ...]:
+def host_platforms() -> tuple[files.Platform, ...]:
     """Return the platform of this machine, of those that FMUs have."""
-    folder, _ = next(value for (system, _), value in HERE.items() if sys.platform == system)
-    return tuple(each for each in binaries.PLATFORMS if each.folder == folder)
+    return tuple(each for each in files.PLATFORMS if each.folder in (fmpy.platform, fmpy.platform_tuple))[-1:]
 
 
 def plant_setting(plant: Plant = PLANT) -> str:
@@ -36,9 +36,9 @@ def plant_setting(plant: Plant = PLANT) -> str:
 
 
 def fmus_of(compensator: Compensator, plant: Plant | None = PLANT) -> Output:
-    """Return the FMUs, with the binaries of the platforms that `binaries.PLATFORMS` has now."""
+    """Return the FMUs, with the binaries of the platforms that `files.PLATFORMS` has now."""
     settings = {"plant": plant_setting(plant) if plant else ""}
-    return generate_output(compensator, "fmu", settings, to_json_bytes(compensator))
+    return generate_output(compensator, "fmu", settings)
 
 
 def written(output: Output, folder: Path) -> Path:
@@ -48,21 +48,30 @@ def written(output: Output, folder: Path) -> Path:
     return folder
 
 
-def edited(fmu: FmuFile, name: str, old: str, new: str, *flags: str) -> bytes:
-    """Return this machine's binary of an FMU with other text in one of its sources."""
-    sources = {path.removeprefix("sources/"): content for path, content in fmu.files.items() if "sources/" in path}
+def edited(fmu: Unpacked, place: Path, name: str, old: str, new: str) -> Unpacked:
+    """Return an FMU whose binary for this machine is compiled from other text in one of its sources."""
+    sources = {path.name: path.read_bytes() for path in (fmu.folder / "sources").iterdir()}
     text = sources[name].decode()
     assert old in text, old
     sources[name] = text.replace(old, new, 1).encode()
-    command = [*words_of(host_compiler()), "-std=c99", "-O1", "-shared", "-fPIC", "-I.", *flags, "dz_fmu.c"]
-    return built("edited.so", command, sources, "an edited FMU").read_bytes()
+    command = [*words_of(host_compiler()), "-std=c99", "-O1", "-shared", "-fPIC", "-I.", "dz_fmu.c"]
+    return with_binary(fmu, place, built("edited.so", command, sources, "an edited FMU").read_bytes())
 
 
-def with_binary(fmu: FmuFile, content: bytes) -> FmuFile:
-    """Return an FMU with another binary for this machine."""
-    return with_files(fmu, {path: content for path in fmu.files if path.startswith("binaries/")})
+def with_binary(fmu: Unpacked, place: Path, content: bytes) -> Unpacked:
+    """Return a copy of an FMU with another binary for this machine."""
+    folder = place / fmu.folder.name
+    shutil.copytree(fmu.folder, folder)
+    binary = folder / fmu.binary.relative_to(fmu.folder)
+    binary.write_bytes(content)
+    return replace(fmu, folder=folder, binary=binary)
 
 
-def with_files(fmu: FmuFile, files: Mapping[str, bytes], manifest: Mapping[str, Any] | None = None) -> FmuFile:
-    """Return an FMU with other files, and where one is given another manifest of them."""
-    return replace(fmu, files={**fmu.files, **files}, manifest=manifest or fmu.manifest)
+def repacked(path: Path, change: Callable[[dict[str, bytes]], None]) -> None:
+    """Change the files in an FMU."""
+    from zipfile import ZipFile
+
+    with ZipFile(path) as packed:
+        found = {name: packed.read(name) for name in packed.namelist()}
+    change(found)
+    path.write_bytes(archive(found))

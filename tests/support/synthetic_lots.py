@@ -1,7 +1,6 @@
 """Folders of batches on paper: a table of so many valves and the batch.json that belongs to it, nothing calibrated."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from dzdesign.batch.results import Results
 from dzdesign.batch.summary import summary_of
 from dzdesign.core.artefact_files import sha256_of
-from dzdesign.report.lot.table import HASHED, SideFigures, TableRow, table_files
+from dzdesign.report.lot.table import HASHED, SIDE_COLUMNS, Cell, column_of, frame_of, table_files
 
 REASONS = (
     "'ramp_dP1.csv' row {place}, column 'u_V': 'overload' is not a number; correct it, or leave the cell blank",
@@ -17,58 +16,60 @@ REASONS = (
 )
 
 
-def side_figures(rng: np.random.Generator) -> SideFigures:
+def side_figures(rng: np.random.Generator) -> dict[str, Cell]:
     """Return the columns of one side of a valve that scatters about one design."""
     opening = rng.normal(5.45, 0.12)
-    return SideFigures(
-        dp0_MPa=1.0,
-        knee_opening_V=round(opening, 7),
-        knee_closing_V=round(opening - 0.12 + rng.normal(0, 0.01), 7),
-        knee_se_V=0.002,
-        bound_V=round(opening - 0.13, 7),
-        offset_V=round(opening - 0.21, 7),
-        trend="decreasing",
-        highest_dp_MPa=5.0,
-        beta_at_highest_dp=round(rng.normal(0.974, 0.004), 7),
-        k_x_max_over_u_max=round(rng.normal(0.459, 0.01), 7),
-        dead_zone_opening_percent=round(rng.normal(5.3, 0.7), 5),
-        dead_zone_closing_percent=round(rng.normal(2.8, 0.4), 5),
-    )
+    return {
+        "dp0_MPa": 1.0,
+        "knee_opening_V": round(opening, 7),
+        "knee_closing_V": round(opening - 0.12 + rng.normal(0, 0.01), 7),
+        "knee_se_V": 0.002,
+        "bound_V": round(opening - 0.13, 7),
+        "offset_V": round(opening - 0.21, 7),
+        "trend": "decreasing",
+        "highest_dp_MPa": 5.0,
+        "beta_at_highest_dp": round(rng.normal(0.974, 0.004), 7),
+        "k_x_max_over_u_max": round(rng.normal(0.459, 0.01), 7),
+        "dead_zone_opening_percent": round(rng.normal(5.3, 0.7), 5),
+        "dead_zone_closing_percent": round(rng.normal(2.8, 0.4), 5),
+    }
 
 
-def lot_rows(count: int, *, failed: Sequence[int] = (), bipolar: bool = False, seed: int = 3) -> list[TableRow]:
+def lot_rows(
+    count: int, *, failed: Sequence[int] = (), bipolar: bool = False, seed: int = 3
+) -> list[dict[str, Cell]]:
     """Return a table: valves by number, some of which are not calibrated."""
-    sides = ("positive", "negative") if bipolar else ("",)
     rows = []
     for number in range(count):
         rng, name = np.random.default_rng([seed, number]), f"V{number:04d}"
         bad = number in failed
-        hashes = {} if bad else {column: sha256_of(f"{name} {column}".encode()) for column in HASHED}
-        rows.append(
-            TableRow(
-                name=name,
-                status="failed" if bad else "ok",
-                reason=REASONS[number % 2].format(name=name, place=number) if bad else "",
-                sides={side: SideFigures() if bad else side_figures(rng) for side in sides},
-                warnings=() if bad else ("no-saturation",),
-                hashes={"inputs_sha256": sha256_of(name.encode()), **hashes},
-            )
-        )
+        row: dict[str, Cell] = {
+            "name": name,
+            "status": "failed" if bad else "ok",
+            "reason": REASONS[number % 2].format(name=name, place=number) if bad else "",
+            "warnings": "" if bad else "no-saturation",
+            "inputs_sha256": sha256_of(name.encode()),
+        }
+        for side in ("positive", "negative") if bipolar else ("",):
+            row |= dict.fromkeys(column_of(side, column) for column in SIDE_COLUMNS)
+            row = row if bad else with_figures(row, side, **side_figures(rng))
+        rows.append(row if bad else row | {column: sha256_of(f"{name} {column}".encode()) for column in HASHED})
     return rows
 
 
-def with_figures(row: TableRow, side: str = "", **figures: float) -> TableRow:
+def with_figures(row: Mapping[str, Cell], side: str = "", **figures: Cell) -> dict[str, Cell]:
     """Return a row with other numbers on one side."""
-    return replace(row, sides={**row.sides, side: replace(row.sides[side], **figures)})
+    return {**row, **{column_of(side, column): value for column, value in figures.items()}}
 
 
-def write_lot_folder(folder: Path, rows: Sequence[TableRow], *, verified: bool = False) -> Path:
+def write_lot_folder(folder: Path, rows: Sequence[Mapping[str, Cell]], *, verified: bool = False) -> Path:
     """Write the table and batch.json as a finished batch does; the folders of the valves are elsewhere."""
     results = Results(folder)
-    files = table_files(rows)
+    frame = frame_of(rows)
+    files = table_files(frame)
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    summary = summary_of(rows, files=files, verified=verified, why_no_setting="made on paper", made_from={})
+    summary = summary_of(frame, files=files, verified=verified, why_no_setting="made on paper", made_from={})
     results.write_summary(summary)
     (folder / "valves").rmdir()
     return folder

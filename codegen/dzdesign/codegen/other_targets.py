@@ -12,7 +12,7 @@ from pathlib import Path
 
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES
 from dzdesign.codegen.earlier_firmware import refuse_another_design
-from dzdesign.codegen.project import TARGET_NAMES, target_named
+from dzdesign.codegen.project import TARGET_NAMES, TEXT_AS_IT_IS, target_named
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, schema_of, to_json_bytes
 from dzdesign.core.documents import family_of
@@ -51,7 +51,7 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         OtherTarget(
             name="iec61131",
             description="Structured Text of IEC 61131-3: a function block for a PLC, and PLCopen XML",
-            module="dzdesign.codegen.structured_text.files",
+            module="dzdesign.codegen.integers.plc",
             options={"dialect": ("codesys", "twincat"), "interface": ("plc", "codes")},
             folder="plc",
         ),
@@ -64,7 +64,7 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         OtherTarget(
             name="matlab",
             description="a function of MATLAB and Octave in integer arithmetic, and C for Simulink's C Caller block",
-            module="dzdesign.codegen.matlab.files",
+            module="dzdesign.codegen.integers.matlab",
         ),
         OtherTarget(
             name="amplifier",
@@ -145,16 +145,14 @@ def generate_output(
     compensator: Compensator,
     target: str,
     settings: Mapping[str, str],
-    compensator_bytes: bytes | None = None,
 ) -> Output:
     """Generate an output of a compensator, one of `OTHER_TARGETS`, with settings as `settings_of` gives them.
 
-    `compensator_bytes` is the file that the compensator was read from; without it the document as it would be written.
     A compensator that this kind of output can't hold is an `InputError`.
     """
     if designed_for := compensator.target:
         target_named(designed_for.name).check_designed_for(designed_for)
-    document = compensator_bytes or to_json_bytes(compensator)
+    document = to_json_bytes(compensator)
     digest = sha256_of(document)
     origin = FirmwareOrigin(
         compensator_json=digest,
@@ -164,7 +162,7 @@ def generate_output(
     module = import_module(OTHER_TARGETS[target].module)
     made: Mapping[str, bytes] = module.output_files(compensator, origin, settings)
     note = module.note_of(compensator, settings) if hasattr(module, "note_of") else ""
-    files = {**made, Compensator.FILE_NAME: document}
+    files = {**made, **{name: text.encode() for name, text in TEXT_AS_IT_IS.items()}, Compensator.FILE_NAME: document}
     manifest = OutputManifest(
         tool=THIS_TOOL,
         made_from=(SourceFile(source=Compensator.FILE_NAME, sha256=digest),),

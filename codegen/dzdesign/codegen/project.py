@@ -37,7 +37,7 @@ from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import BLOCK_FILE, VECTORS_NAME, Calibration, FirmwareManifest, FirmwareOrigin
-from dzdesign.design.machine.words import reach_of_certificate
+from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.design.target_inputs import Converter
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 PACKAGE = "dzdesign.codegen"
 #: Width of a paragraph in a README.
 README_COLUMNS = 120
+#: Keeps git from rewriting line endings in a folder that is compared and compiled.
+TEXT_AS_IT_IS = {".gitattributes": "* -text\n"}
 #: Where neither the compensator nor anybody else says which.
 DEFAULT_TARGET = "f28335"
 
@@ -120,7 +122,6 @@ def targets() -> tuple[Target, ...]:
 def generate(
     compensator: Compensator,
     target_name: str | None = None,
-    compensator_bytes: bytes | None = None,
     calibration: Calibration = "fixed",
     vectors: int = 0,
 ) -> Firmware:
@@ -132,8 +133,6 @@ def generate(
         The design.
     target_name : str, optional
         Name of the target; None selects that of the design.
-    compensator_bytes : bytes, optional
-        Content of the file from which the compensator was read. None: the file as it would be written.
     calibration : {"fixed", "block"}, optional
         Place of the valve's numbers: constants in the core, or a block of data beside it.
     vectors : int, optional
@@ -151,7 +150,7 @@ def generate(
         target_named(designed_for.name).check_designed_for(designed_for)
     target.check_signals(compensator.signals)
     note = target.check_designed_for(designed_for) if designed_for else ""
-    document = compensator_bytes or to_json_bytes(compensator)
+    document = to_json_bytes(compensator)
     digest = sha256_of(document)
     if (drive := compensator.current_drive) is not None:
         target.check_current_control(drive.sampling)
@@ -166,7 +165,7 @@ def generate(
     files = {
         path: _render(PACKAGE, file.template, first_lines(file.template), file.values) for path, file in core.items()
     }
-    files |= {**target_files(compensator, target, banner, block), "compensator.json": document.decode()}
+    files |= target_files(compensator, target, banner, block) | TEXT_AS_IT_IS | {"compensator.json": document.decode()}
     octets = pack(block) if block else b""
     if vectors:
         files[VECTORS_NAME] = vectors_text(compensator, vectors)

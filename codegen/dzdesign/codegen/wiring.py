@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from dzdesign.core.errors import one_line
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.pressure_inputs.negative_drop import input_columns, negative_drop_in_words
+from dzdesign.design.pressure_inputs import input_columns, negative_drop_in_words
 from dzdesign.design.signals import CommandSignal, PressureSignal
 from dzdesign.design.target_inputs import Converter
 

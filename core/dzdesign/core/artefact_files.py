@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.disk_sync import make_folder, sync_file, sync_folder, sync_tree
-from dzdesign.core.documents import family_of, parse_document, sha256_of, sha256_of_file, to_json
+from dzdesign.core.documents import family_of, parse_document, sha256_of, sha256_of_file, sha256_of_octets, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_contents import (
     MANIFEST_NAME,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = [
     "MANIFEST_NAME", "TOOL", "check_file_may_be_written", "check_folder_may_be_written", "check_inside",
     "check_place_of_files", "note_written", "open_bytes", "parse_document", "read_bytes", "sha256_of", "sha256_of_file",
-    "to_json", "write_file", "write_files", "write_folder",
+    "sha256_of_octets", "to_json", "write_file", "write_files", "write_folder",
 ]  # fmt: skip
 
 TOOL = {"name": "dzdesign", "version": __version__}

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from dzdesign.core.artefact_types import Artefact, JsonText, schema_of
+from dzdesign.core.options import field_docstrings
 
 #: Node of a JSON Schema.
 Node = dict[str, Any]
@@ -36,6 +37,8 @@ def json_schema(kind: type[Artefact]) -> Node:
     definitions: dict[str, Node] = {name: _tidy(node) for name, node in components.items()}
     for found in _dataclasses(msgspec.inspect.type_info(kind)):
         node, names = definitions[found.__name__], [field.name for field in fields(found)]
+        for name, sentence in field_docstrings(found).items():
+            node["properties"][name] = {"description": "", **node["properties"][name]} | {"description": sentence}
         # In the order of the file, and each of them: a default is for who makes one in Python. A field that may be
         # unset stands in the file only where it says something.
         required = [field.name for field in fields(found) if field.default is not msgspec.UNSET]

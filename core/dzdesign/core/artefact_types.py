@@ -1,7 +1,8 @@
 """Artefacts as types: one frozen dataclass is read from JSON, written as JSON and described as JSON Schema by itself.
 
-An artefact is declared once. The annotation of a field says its type, unit, bounds and meaning; ``__post_init__`` holds
-the rules between fields. `dzdesign.core.artefact_reading` reads it, `dzdesign.core.artefact_schema` describes it.
+An artefact is declared once. The annotation of a field says its type, unit and bounds, the docstring below the field
+its meaning (or a ``description`` in the annotation); ``__post_init__`` holds the rules between fields.
+`dzdesign.core.artefact_reading` reads it, `dzdesign.core.artefact_schema` describes it.
 
 Examples
 --------

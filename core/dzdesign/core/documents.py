@@ -1,9 +1,11 @@
 """Artefacts as documents: JSON back and forth, hash, schema."""
 
+import contextlib
 import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping
+from io import BytesIO
 from typing import Any, BinaryIO
 
 from dzdesign.core.errors import QUOTED, InputError
@@ -13,6 +15,10 @@ from dzdesign.core.errors import QUOTED, InputError
 DEEPEST = 32
 #: Bytes of a file that are hashed at a time.
 PIECE = 1 << 20
+#: Largest JSON of which the content is hashed, as large as an artefact may be.
+MOST_JSON = 1 << 24
+#: Git takes a file for binary that has a zero in so many octets at its beginning.
+TEXT_SHOWS = 8000
 #: Digits of a whole number; a part of a fraction has some sixty.
 MOST_DIGITS = 1000
 #: What writes the artefacts that are given to another command, by the schema's name without its version.
@@ -25,18 +31,52 @@ WRITTEN_BY = {
 
 
 def sha256_of(content: bytes) -> str:
-    """Return the SHA-256 of `content` in hex."""
+    """Return the SHA-256 of what a file says, in hex: the same after a checkout that rewrites line endings.
+
+    JSON counts without its spacing and the order of its keys, other text with line feeds alone, and what git takes for
+    binary as it is.
+
+    Examples
+    --------
+    >>> sha256_of(b"a\\r\\nb\\n") == sha256_of(b"a\\nb\\n"), sha256_of(b'{"a": 1.0}') == sha256_of(b'{ "a": 1 }\\r\\n')
+    (True, True)
+    """
+    if content.lstrip()[:1] == b"{" and len(content) <= MOST_JSON:
+        with contextlib.suppress(ValueError, RecursionError):
+            document = json.loads(content.decode("utf-8"), parse_float=_shortest)
+            return sha256_of_octets(json.dumps(document, sort_keys=True, separators=(",", ":")).encode())
+    return _sha256_of_pieces(BytesIO(content))
+
+
+def sha256_of_octets(content: bytes) -> str:
+    """Return the SHA-256 of octets as they are, in hex: of what is built here, and not kept."""
     return hashlib.sha256(content).hexdigest()
 
 
 def sha256_of_file(file: BinaryIO) -> str:
-    """Return the SHA-256 of a whole file in hex, read piece by piece; the file is at its beginning again then."""
+    """Return what `sha256_of` returns of a file of any size; the file is at its beginning again then."""
     file.seek(0)
-    digest = hashlib.sha256()
-    while piece := file.read(PIECE):
-        digest.update(piece)
+    content = file.read(MOST_JSON + 1) if file.read(PIECE).lstrip()[:1] == b"{" and not file.seek(0) else b""
     file.seek(0)
+    digest = sha256_of(content) if 0 < len(content) <= MOST_JSON else _sha256_of_pieces(file)
+    file.seek(0)
+    return digest
+
+
+def _sha256_of_pieces(file: BinaryIO) -> str:
+    digest, piece = hashlib.sha256(), file.read(PIECE)
+    is_text = b"\0" not in piece[:TEXT_SHOWS]
+    while piece:
+        while piece.endswith(b"\r") and (more := file.read(1)):  # a line's end is not taken apart
+            piece += more
+        digest.update(piece.replace(b"\r\n", b"\n") if is_text else piece)
+        piece = file.read(PIECE)
     return digest.hexdigest()
+
+
+def _shortest(text: str) -> float | int:
+    value = float(text)
+    return int(value) if value.is_integer() else value
 
 
 def to_json(document: Mapping[str, Any]) -> str:

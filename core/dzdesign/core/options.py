@@ -136,7 +136,7 @@ def flag_of(name: str) -> str:
 @cache
 def arguments_of(declaration: type) -> tuple[Argument, ...]:
     """Return what a dataclass of arguments declares, those by position first."""
-    found, helps = [], _helps_of(declaration)
+    found, helps = [], field_docstrings(declaration)
     for field in fields(declaration):
         annotation, option = get_args(field.type)[:2]
         result_class = ""
@@ -158,7 +158,7 @@ def arguments_of(declaration: type) -> tuple[Argument, ...]:
     return tuple(sorted(found, key=lambda argument: not argument.by_position))
 
 
-def _helps_of(declaration: type) -> dict[str, str]:
+def field_docstrings(declaration: type) -> dict[str, str]:
     """Return the docstring that stands below each field of a class and of its bases; in the field's source alone."""
     helps: dict[str, str] = {}
     for each in reversed(declaration.__mro__):

@@ -11,7 +11,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanTrue
 
 from dzdesign.core.errors import InputError, nearest
-from dzdesign.derivation.account.scope import scope, under_law
+from dzdesign.derivation.account.scope import under_law
 from dzdesign.derivation.account.statement import Kind, Statement
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.lowering import lower
@@ -50,16 +50,8 @@ class Law:
         for complaint in self._complaints():
             raise ValueError(f"law {self.name}: {complaint}")
         if not self.statements:
-            title = f"the law `{self.name}`"
-            stated = Statement(
-                number=self.name,
-                title=title,
-                kind=Kind.CHOICE,
-                symbol=u_O,
-                members=(self.output,),
-                scope=scope(under_law(self.name), sympy.Eq(dP, dP1)),
-                note=self.note,
-            )
+            stated = Kind.CHOICE(self.name, f"the law `{self.name}`").says(u_O, self.output)
+            stated = stated.within(under_law(self.name), sympy.Eq(dP, dP1)).remark(self.note)
             object.__setattr__(self, "statements", (stated,))
         object.__setattr__(self, "stated_as", self.stated_as or self.statements[-1].number)
 

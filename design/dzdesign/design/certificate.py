@@ -12,16 +12,13 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import in_units
-from dzdesign.design.ceiling.curve_row import offset_row
-from dzdesign.design.ceiling.offset_ceiling import OffsetCeiling, offset_ceiling
-from dzdesign.design.ceiling.offset_curve import OffsetCurve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.accounting import budget_of
 from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.beta_table import STEP_CODES, TableMargins
+from dzdesign.design.offset.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
 from dzdesign.design.side_law import Certificate
 from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.design.table.linear_programme import STEP_CODES
-from dzdesign.design.table.table_margins import TableMargins
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
 from dzdesign.identify.valve.side_model import SideModel
 

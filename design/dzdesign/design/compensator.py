@@ -3,30 +3,79 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
+from math import lcm
+from threading import local
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
+from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of, to_json_bytes
 from dzdesign.core.documents import sha256_of, to_json
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
-from dzdesign.derivation.scaling import drive
+from dzdesign.derivation.scaling import drive, evaluate_line
 from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
 from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
-from dzdesign.design.line_in_beta import line_in_beta
-from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
 from dzdesign.design.machine.machine import Machine
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.design.valve_hash import sha256_of_valve
 from dzdesign.design.zero_band import CommandError
 from dzdesign.identify.valve.model import ValveModel
+
+#: The last valve and its hash: a design makes several compensators of one valve, each of which states the hash.
+LAST = local()
+
+
+def sha256_of_valve(valve: ValveModel) -> str:
+    """Return the SHA-256 of the valve.json of a valve; known again by its identity, for a valve never changes."""
+    if getattr(LAST, "valve", None) is not valve:
+        LAST.sha256, LAST.valve = sha256_of(to_json_bytes(valve)), valve
+    digest: str = LAST.sha256
+    return digest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineInBeta:
+    """Counts at a command: ``(start + code * slope) / unit``, each a number at beta 0 and what a beta of 1 adds."""
+
+    start: tuple[int, int]
+    slope: tuple[int, int]
+    unit: int
+
+    def counts(self, code: int | Fraction, beta: Fraction) -> Fraction:
+        """Return the counts of the law at codes of command, from zero, and a beta."""
+        codes, parts = code.numerator, code.denominator
+        none, more = (start * parts + codes * slope for start, slope in zip(self.start, self.slope, strict=True))
+        up = none * beta.denominator + more * beta.numerator
+        return Fraction(up, self.unit * parts * beta.denominator)
+
+
+@lru_cache(maxsize=64)
+def line_in_beta(name: str, kappa: Fraction, u_min0_over_u_max: Fraction, n_adc: int, n_full: int) -> LineInBeta:
+    """Return the law of a name as such a line, from the law itself at three betas.
+
+    The arguments are those of `evaluate_line`; a law that is not straight in beta is a `RequirementError`.
+    """
+    at = [
+        evaluate_line(
+            law(name), beta=beta, kappa=kappa, u_min0_over_u_max=u_min0_over_u_max, n_adc=n_adc, n_full=n_full
+        )
+        for beta in (0, 1, 2)
+    ]
+    if any(2 * one != none + two for none, one, two in zip(*at, strict=True)):
+        raise RequirementError(f"the law '{name}' is not straight in beta")
+    parts = [part for line in at[:2] for part in (line.start, line.slope)]
+    unit = lcm(*(part.denominator for part in parts))
+    start, slope, start_one, slope_one = (part.numerator * (unit // part.denominator) for part in parts)
+    return LineInBeta(start=(start, start_one - start), slope=(slope, slope_one - slope), unit=unit)
+
 
 Codes = Annotated[int, Meta(ge=0, le=65535)]
 
@@ -37,86 +86,56 @@ class Compensator(ShownInNotebooks, Artefact):
 
     FILE_NAME: ClassVar[str] = "compensator.json"
     REMEDY: ClassVar[str] = "make it again with `dzdesign design`, a lot's with `dzdesign batch`"
-    schema: Annotated[Literal["dzdesign.compensator/1"], Meta(description="Name and version of this schema.")] = (
-        "dzdesign.compensator/1"
-    )
-    target: Annotated[TargetInputs | None, Meta(description="Target of the design; null if it was not recorded.")]
-    options: Annotated[
-        Mapping[str, str] | None,
-        Meta(description="Options of `design` as entered, defaults included; null if they were not recorded."),
-    ]
-    law: Annotated[str, Meta(description="Compensation law: paper (Eq. 18) or target (meets Eq. 16).")]
-    below_dp0: Annotated[
-        BelowDp0,
-        Meta(description="Behaviour at dP <= dP0. hold: beta stays at 1. Otherwise beta follows the tests there."),
-    ] = "hold"
-    above: Annotated[
-        Above,
-        Meta(
-            description="Behaviour above the last test. The offset is held, lowered with the continued bound of "
-            "valve.json, or released. With a single test, `hold` replaces `lower`."
-        ),
-    ] = "lower"
-    u_max_V: Annotated[Fraction, quantity("V", "Full command.")]
-    signals: Annotated[Signals, Meta(description="Scalings of the command, the pressures and the compare value.")]
-    beta_denominator: Annotated[
-        int, Meta(description="Denominator of the nodes of beta, a power of two.", ge=1, le=2**30)
-    ]
-    beta_step_codes: Annotated[
-        int, Meta(description="Pressure codes between two nodes of beta, a power of two.", ge=1, le=65535)
-    ]
-    reverse_codes: Annotated[
-        Codes,
-        Meta(
-            description="Largest negative difference of pressure codes, as a magnitude, that is accepted. Beyond it a "
-            "sensor is taken as failed and the smallest beta is used."
-        ),
-    ]
-    transition_codes: Annotated[
-        Codes,
-        Meta(
-            description="Command codes of the transition from the closing to the opening threshold, which starts at "
-            "the end of the zero band. A power of two, or 0 for none."
-        ),
-    ] = 0
-    reading_flow_L_min: Annotated[
-        float,
-        quantity(
-            "L/min", "Reading flow: the flow at which dead zones are read, in addition to the onset.", gt=0, le=1e6
-        ),
-    ]
-    zero_band_codes: Annotated[
-        Codes,
-        Meta(description="Largest command code that the law treats as zero; always 0 without a transition."),
-    ] = 0
-    command_error: Annotated[CommandError, Meta(description="Declared error of the command's code at zero.")]
-    sides: Annotated[Sides, Meta(description="Law for each sign of the command.")]
-    drive_functions: Annotated[
-        DriveFunctions, Meta(description="Functions around the law, such as ramps and dither.")
-    ] = field(default_factory=DriveFunctions)
-    current_drive: Annotated[
-        CurrentDrive | None,
-        Meta(description="Current control of the drive; null if the law's output is the duty of the PWM."),
-    ] = None
-    machine: Annotated[
-        Machine | None,
-        Meta(
-            description="Declared differences between machine and bench. Null: the certificate covers the valve as "
-            "recorded, without coil, supply, sensors, converter, oil or ageing."
-        ),
-    ] = None
-    costs: Annotated[tuple[str, ...], Meta(description="Cost of each safe choice, in words.")]
-    valve_sha256: Annotated[
-        str, Meta(description="SHA-256 of `valve` as `identify` writes it, which reveals a change.")
-    ] = field(init=False)
-    valve: Annotated[ValveModel, Meta(description="Identified valve from which the compensator was designed.")]
-    lot_sha256: Annotated[
-        str | None, Meta(description="SHA-256 of `lot` as stored here; null for the setting of a single valve.")
-    ] = field(init=False)
-    lot: Annotated[
-        tuple[LotValve, ...],
-        Meta(description="Valves of the lot that shares this setting, with their bounds; empty for a single valve."),
-    ] = ()
+    schema: Literal["dzdesign.compensator/1"] = "dzdesign.compensator/1"
+    """Name and version of this schema."""
+    target: TargetInputs | None
+    """Target of the design; null if it was not recorded."""
+    options: Mapping[str, str] | None
+    """Options of `design` as entered, defaults included; null if they were not recorded."""
+    law: str
+    """Compensation law: paper (Eq. 18) or target (meets Eq. 16)."""
+    below_dp0: BelowDp0 = "hold"
+    """Behaviour at dP <= dP0. hold: beta stays at 1. Otherwise beta follows the tests there."""
+    above: Above = "lower"
+    """Behaviour above the last test. The offset is held, lowered with the continued bound of valve.json, or released.
+    With a single test, `hold` replaces `lower`."""
+    u_max_V: Annotated[Fraction, quantity("V")]
+    """Full command."""
+    signals: Signals
+    """Scalings of the command, the pressures and the compare value."""
+    beta_denominator: Annotated[int, Meta(ge=1, le=2**30)]
+    """Denominator of the nodes of beta, a power of two."""
+    beta_step_codes: Annotated[int, Meta(ge=1, le=65535)]
+    """Pressure codes between two nodes of beta, a power of two."""
+    reverse_codes: Codes
+    """Largest negative difference of pressure codes, as a magnitude, that is accepted. Beyond it a sensor is taken as
+    failed and the smallest beta is used."""
+    transition_codes: Codes = 0
+    """Command codes of the transition from the closing to the opening threshold, which starts at the end of the zero
+    band. A power of two, or 0 for none."""
+    reading_flow_L_min: Annotated[float, quantity("L/min", gt=0, le=1000000.0)]
+    """Reading flow: the flow at which dead zones are read, in addition to the onset."""
+    zero_band_codes: Codes = 0
+    """Largest command code that the law treats as zero; always 0 without a transition."""
+    command_error: CommandError
+    """Declared error of the command's code at zero."""
+    sides: Sides
+    """Law for each sign of the command."""
+    drive_functions: DriveFunctions = field(default_factory=DriveFunctions)
+    """Functions around the law, such as ramps and dither."""
+    current_drive: CurrentDrive | None = None
+    """Current control of the drive; null if the law's output is the duty of the PWM."""
+    machine: Machine | None = None
+    """Declared differences between machine and bench. Null: the certificate covers the valve as recorded, without coil,
+    supply, sensors, converter, oil or ageing."""
+    costs: tuple[str, ...]
+    """Cost of each safe choice, in words."""
+    valve: ValveModel
+    """Identified valve from which the compensator was designed."""
+    lot_sha256: str | None = field(init=False)
+    """SHA-256 of `lot` as stored here; null for the setting of a single valve."""
+    lot: tuple[LotValve, ...] = ()
+    """Valves of the lot that shares this setting, with their bounds; empty for a single valve."""
 
     def __post_init__(self) -> None:
         law(self.law)
@@ -136,7 +155,6 @@ class Compensator(ShownInNotebooks, Artefact):
         for sign in self.signals.signs:
             self._check_side(sign)
         lot_json = to_json({"lot": [as_document(valve) for valve in self.lot]}).encode()
-        object.__setattr__(self, "valve_sha256", sha256_of_valve(self.valve))
         object.__setattr__(self, "lot_sha256", sha256_of(lot_json) if self.lot else None)
 
     def _check_codes(self) -> None:

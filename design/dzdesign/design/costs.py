@@ -1,17 +1,128 @@
-"""Costs of a design in words: remaining dead zone, flow at the transition, drive at full command."""
+"""Costs of a design in words: remaining dead zone, flow at the transition, drive at full command, the machine."""
 
+from dataclasses import dataclass
 from fractions import Fraction
 
-from dzdesign.design.broken_sensor import ACCEPTED, hidden_failure
+import numpy as np
+
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import costs_at_tests
+from dzdesign.design.costs_at_tests import corners_of, costs_at_tests, last_opening
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.machine.costs import machine_costs
+from dzdesign.design.machine.allowance import premise_of_bench_current
+from dzdesign.design.machine.machine import COPPER_PER_K, REFERENCE_C
 from dzdesign.design.offset.above_tests import above_in_words, below_in_words
-from dzdesign.design.signal_descriptions import unseen_failures
+from dzdesign.design.pressure_inputs import ACCEPTED, hidden_failure, unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.reading_flow import default_reading_flow
 from dzdesign.identify.valve.side_model import SideModel
+
+#: By how much colder, K, than a bench's coil at `REFERENCE_C`.
+COLDER_K = 40
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ColderCoil:
+    """At the tested pressure drop at which most would flow at zero command, the duty going straight to the coil."""
+
+    dp_MPa: float
+    #: By how much the guarded threshold falls.
+    lowered_V: float
+    #: Flow at zero command by the recorded characteristic, on closing where that was recorded.
+    flow_L_min: float
+    #: Whether the recording shows that flow, or it lies below the noise level.
+    seen: bool
+
+
+def colder_coil(compensator: Compensator, sign: int) -> ColderCoil:
+    """Return what a coil 40 K colder than on the bench does at zero command, at the worst tested pressure drop."""
+    factor = float(1 - COPPER_PER_K * COLDER_K)
+    side, u_max_V = compensator.valve.sides[SIDE_NAMES[sign]], float(compensator.u_max_V)
+    thresholds = side.certified[compensator.side(sign).certificate.guard].u_threshold_V
+    found = []
+    for test, threshold_V in zip(side.tests, thresholds, strict=True):
+        dp_code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
+        # The coil has the current that the bench's coil had at a command higher by the ratio of the resistances.
+        reached_V = corners_of(compensator, dp_code, sign).offset * u_max_V / factor
+        branch = test.recorded.closing
+        found.append(
+            ColderCoil(
+                dp_MPa=test.dp_MPa or 0.0,
+                lowered_V=(1 - factor) * threshold_V,
+                flow_L_min=float(branch.flow_at(np.array([reached_V]))[0]),
+                seen=reached_V >= branch.u_seen_V,
+            )
+        )
+    return max(found, key=lambda each: each.flow_L_min)
+
+
+def colder_coil_in_words(compensator: Compensator, sign: int) -> str:
+    """Return it as a line for a person."""
+    found, units = colder_coil(compensator, sign), compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    lowered = units.text(1e3 * found.lowered_V, ".0f mV")
+    flow = units.text(found.flow_L_min, ".2f L/min") if found.seen else "less than the recordings show"
+    return (
+        "the certificate covers only the valve as recorded: no machine is declared. Without current control, a coil at "
+        f"{REFERENCE_C - COLDER_K} degC instead of {REFERENCE_C} degC lowers the threshold by {lowered}. At zero "
+        f"command the valve then passes {flow} at {units.text(found.dp_MPa, '.2f MPa')}. Declare one of: "
+        "--coil-temperature with --supply; --amplifier; --drive current"
+    )
+
+
+def machine_costs(compensator: Compensator, sign: int) -> list[str]:
+    """Return the lines of one side; the premises of the machine stand with positive commands."""
+    machine, budget = compensator.machine, compensator.side(sign).budget
+    if machine is None or budget is None:
+        return [colder_coil_in_words(compensator, sign)]
+    units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
+    taken = [
+        threshold - ceiling for threshold, ceiling in zip(budget.threshold_V, budget.ceiling_V, strict=True)
+    ]
+    lines = [
+        f"the budget takes {units.text(1e3 * max(taken), '.0f mV')} from the threshold at most "
+        f"({max(taken) / float(compensator.u_max_V):.2%} of command); the largest part: {budget.largest.component}, "
+        f"{budget.largest.price:.2%}"
+    ]
+    lines += _other_end(compensator, sign)
+    lines += _jump(compensator, sign)
+    drive = compensator.current_drive
+    if drive is not None and sign > 0:
+        premise = premise_of_bench_current(compensator.valve, drive.circuit.rated_A, machine.bench_full_A)
+        lines += [premise] if premise else []
+    return lines
+
+
+def _other_end(compensator: Compensator, sign: int) -> list[str]:
+    """Say how long the dead zone is on the machine that opens last, which the transition does not reach."""
+    if compensator.machine is None:
+        return []
+    factor = float(compensator.machine.largest_factor)
+    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    found = [share for test in tests if (share := last_opening(compensator, test, sign)) is not None]
+    if not found:
+        return []
+    words = f"at the other end of the machine the threshold is {factor:.3f} times the bench's: "
+    if max(found) > 1:
+        words += "the valve does not open at any command; control the current, or declare narrower ranges"
+    else:
+        words += f"the dead zone on opening is there up to {max(found):.2%} of command"
+    return [words]
+
+
+def _jump(compensator: Compensator, sign: int) -> list[str]:
+    """Say what the transition's end passes on the machine that opens earliest; nothing without a transition."""
+    if compensator.machine is None or not compensator.transition_codes:
+        return []
+    factor, found = float(compensator.machine.least_factor), []
+    for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+        dp_code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
+        at_end_V = corners_of(compensator, dp_code, sign).at_end * float(compensator.u_max_V)
+        found.append(float(test.recorded.opening.flow_at(np.array([at_end_V / factor]))[0]))
+    share = compensator.transition_end / compensator.signals.command.span(sign)
+    flow = compensator.valve.recorded_units.text(max(found), ".2f L/min")
+    return [
+        f"the transition ends at the bench's opening threshold: on the machine that opens earliest ({factor:.3f} times "
+        f"the bench's threshold) a command of {share:.2%} passes up to {flow}; --transition off does without that jump"
+    ]
 
 
 def costs_of(compensator: Compensator) -> tuple[str, ...]:

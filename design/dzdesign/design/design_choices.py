@@ -7,10 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
-from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, Option, Text, arguments_of
+from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, MACHINE, Option, Text, arguments_of
 from dzdesign.derivation.laws import LAW_NAMES
-from dzdesign.design.current.choices import CurrentChoices
-from dzdesign.design.machine.choices import MachineChoices
 
 if TYPE_CHECKING:
     from dzdesign.design.target_inputs import TargetInputs
@@ -26,12 +24,58 @@ NegativeDp = Literal["recorded", "same", "swapped", "wired"]
 NEGATIVE_DP: tuple[NegativeDp, ...] = get_args(NegativeDp)
 HYSTERESIS = ("keep", "play")
 ON_OFF = ("on", "off")
+DRIVES = ("duty", "current")
 
 
 @dataclass(frozen=True, kw_only=True)
-class DesignChoices(MachineChoices, CurrentChoices):
+class DesignChoices:
     """Options of `design`, as written; None takes the default, so that `codegen` can tell what was given."""
 
+    drive: Annotated[Text, Option("D", DRIVE, "duty", choices=DRIVES)] = None
+    """Output of the law. duty: the PWM's share of the supply voltage. current: the set point of a current loop in the
+    firmware, for one solenoid, with the rated current as full drive."""
+    coil: Annotated[Text, Option("C", DRIVE, example="3.5 ohm 40 mH")] = None
+    """Coil for --drive current, such as "3.5 ohm 40 mH". The form "3.5 + 0.5 ohm x 0.75..1.35, 40 mH x 0.5..1.5" adds
+    the resistance of switch and shunt and the ranges, here with their defaults."""
+    rated_current: Annotated[Text, Option("I", DRIVE, example="1 A")] = None
+    """Current at full drive, for --drive current."""
+    current_signal: Annotated[Text, Option("S", DRIVE, example="0..1.2 A on 2 ohm + 0.15 V")] = None
+    """Signal of the current sensor at the converter, for --drive current, such as "0..1.2 A on 2 ohm + 0.15 V". The
+    resistance is that of the shunt times its amplifier's gain, and the voltage is the one without current."""
+    supply_signal: Annotated[Text, Option("S", DRIVE, example="0..36 V x 0.075")] = None
+    """Signal of the supply voltage at the converter, for --drive current, such as "0..36 V x 0.075" (default: not
+    measured). Measuring it makes the current loop faster."""
+    coil_temperature: Annotated[Text, Option("T", MACHINE, example="-20..80 degC")] = None
+    """Lowest and highest coil temperature of the machine, such as "-20..80 degC". Together with --supply it declares a
+    machine whose coil is driven by the duty directly."""
+    bench_coil: Annotated[Text, Option("T", MACHINE, example="20 degC")] = None
+    """Coil temperature during the recording of the ramps (default: 20 degC)."""
+    supply: Annotated[Text, Option("V", MACHINE, example="18..32 V")] = None
+    """Lowest and highest supply voltage of the coil."""
+    bench_supply: Annotated[Text, Option("V", MACHINE, example="24 V")] = None
+    """Supply voltage during the recording of the ramps (default: 12, 24 or 48 V, the one within --supply)."""
+    amplifier: Annotated[Text, Option("E", MACHINE, example="1 %")] = None
+    """Accuracy of a current-controlling amplifier between PWM and coil, such as "1 %" (default: none, the duty drives
+    the coil). It is the deviation from the bench over coil temperature and supply, relative to the value and not to
+    full scale."""
+    current_error: Annotated[Text, Option("E", MACHINE, example="1 %")] = None
+    """Accuracy of the current under --drive current, relative to its value (default: 1 % and the gain error of the
+    target's converter). It includes the shunt, its amplifier and the converter's gain."""
+    bench_current: Annotated[Text, Option("I", MACHINE, example="1 A +- 1 %")] = None
+    """Coil current at full command on the bench, with its accuracy, for --drive current, such as "1 A +- 1 %" (default:
+    the rated current, to 1 %)."""
+    pressure_error: Annotated[Text, Option("E", MACHINE, example="0.1 %")] = None
+    """Error of the pressure sensors, offset and gain together (default: 0.1 %). It is a share of the span or a
+    pressure, such as "0.1 %" or "0.02 MPa", or "0.1 % / 0.5 %" for A and B."""
+    bench_pressure_error: Annotated[Text, Option("E", MACHINE, example="0.02 MPa")] = None
+    """Error of the recorded pressure drop, as a pressure or as a share of the span (default: two sensors of 0.1 %)."""
+    pressure_converter: Annotated[Text, Option("E", MACHINE, example="15 + 30 + 4 codes")] = None
+    """Offset, gain error at the top of the range and peak noise of the converter on each pressure channel, such as
+    "15 + 30 + 4 codes" (default: the target's data sheet)."""
+    oil: Annotated[Text, Option("E", MACHINE, example="0.2 %")] = None
+    """Change of the threshold with the oil temperature, relative to its value (default: 0.2 %)."""
+    ageing: Annotated[Text, Option("E", MACHINE, example="0.5 %")] = None
+    """Change of the threshold by ageing, relative to its value (default: 0.5 %)."""
     law: Annotated[Text, Option("LAW", LAW, "paper", choices=LAW_NAMES)] = None
     """Law of the compensator. `dzdesign derive` states each law."""
     guard: Annotated[Text, Option("G", LAW, "closing", choices="dzdesign.design.options:GUARDS")] = None

@@ -2,45 +2,36 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
 
-from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import errors_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
-from dzdesign.design.broken_sensor import ACCEPTED, refuse_hidden_failures
-from dzdesign.design.ceiling.exact_row import ExactRow
-from dzdesign.design.ceiling.offset_ceiling import OffsetCeiling, offset_ceiling
-from dzdesign.design.certificate import certify, guarded_curve
-from dzdesign.design.compensator import Compensator
+from dzdesign.design.compensator import Compensator, sha256_of_valve
 from dzdesign.design.costs import costs_of
-from dzdesign.design.machine.accounting import budget_of
-from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
-from dzdesign.design.machine.bench_current import check_bench_current
-from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.offset.opening import opening_ceiling, opening_offset
-from dzdesign.design.offset.refusals import refuse_crossed_branches, refuse_two_signs
+from dzdesign.design.machine.allowance import allowance_of, check_bench_current, dither_reserve
+from dzdesign.design.offset.beta_table import STEP_CODES
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.play import with_play
-from dzdesign.design.pressure_inputs.negative_drop import with_negative_drop
-from dzdesign.design.quantise import Units, finest_units, fits
-from dzdesign.design.side_law import SideLaw, Sides
-from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.design.table.beta_table import choose_beta_table
-from dzdesign.design.table.linear_programme import STEP_CODES
-from dzdesign.design.valve_hash import sha256_of_valve
+from dzdesign.design.pressure_inputs import ACCEPTED, refuse_hidden_failures, with_negative_drop
+from dzdesign.design.side_design import (
+    finest_units,
+    fits,
+    refuse_two_signs,
+    side_law,
+)
+from dzdesign.design.side_law import Sides
+from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.reading_flow import default_reading_flow
-from dzdesign.identify.valve.side_model import SideModel
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
 
 
-def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes: bytes | None = None) -> Compensator:
+def design(valve: ValveModel, options: DesignOptions | None = None) -> Compensator:
     """Design the compensator of a valve with rational coefficients, and prove the certificate on them.
 
     Parameters
@@ -49,8 +40,6 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         From `dzdesign.identify.identify` or valve.json.
     options : DesignOptions, optional
         Choices of the engineer.
-    valve_bytes : bytes, optional
-        The file that the valve was read from, for its hash; without it the hash is of what `identify` would write.
 
     Raises
     ------
@@ -60,10 +49,10 @@ def design(valve: ValveModel, options: DesignOptions | None = None, valve_bytes:
         If a proof fails.
     """
     with errors_in(valve.recorded_units):
-        return _designed(valve, options or DesignOptions(), valve_bytes)
+        return _designed(valve, options or DesignOptions())
 
 
-def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | None) -> Compensator:
+def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
     law(options.law)
     if len(options.signals.signs) == 2:
         refuse_two_signs(valve, options.guard)
@@ -82,12 +71,11 @@ def _designed(valve: ValveModel, options: DesignOptions, valve_bytes: bytes | No
     for sign in signals.signs:
         side = valve.positive if sign > 0 else valve.sides["negative"]
         allowance = allowance_of(signals, options.machine, sign=sign, dither_counts=reserve)
-        laws[sign] = _side_law(side, options, u_max, units, transition_codes, allowance)
-    digest = sha256_of_valve(valve) if valve_bytes is None else sha256_of(valve_bytes)
+        laws[sign] = side_law(side, options, u_max, units, transition_codes, allowance)
     request = options.request
     compensator = Compensator(
         tool=THIS_TOOL,
-        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=digest),),
+        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=sha256_of_valve(valve)),),
         target=request.target if request else None,
         options=request.options if request else None,
         law=options.law,
@@ -149,108 +137,6 @@ def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:
     while options.transition is None and codes > options.error.least_transition and not fits(options.signals, codes):
         codes //= 2
     return codes
-
-
-def _side_law(
-    side: SideModel,
-    options: DesignOptions,
-    u_max: Fraction,
-    units: Units,
-    transition_codes: int,
-    allowance: Allowance,
-) -> SideLaw:
-    """Choose the coefficients and tables of one side, and prove its certificate."""
-    signals = options.signals
-    if "branch-order" not in options.accept:
-        refuse_crossed_branches(side)
-    above = AboveChoice.on(options.machine, options.above, STEP_CODES)
-    certified = guarded_curve(side, options.guard, options.below_dp0, above)
-    opening = opening_offset(side, options) if transition_codes else None
-    reference = Fraction(repr(side.reference.dp_MPa))
-    ceiling = offset_ceiling(certified, u_max, allowance)
-    tested, goes_on = ceiling.certified, certified.above is not None
-    _refuse_no_offset(ceiling.limit[: tested.stop] if goes_on else ceiling.limit, options)
-    top = (opening or certified).at(reference)
-    if opening is None and options.machine:
-        top = left_by_machine(top, ceiling, signals, reference, u_max)
-    u_min0 = _offset_at_reference(top / u_max, signals, units)
-    above_one = side.trend == "increasing" or options.below_dp0 == "extend"
-    table = partial(choose_beta_table, u_min0=u_min0, trend=side.trend, denominator=units.beta, above_one=above_one)
-    beta = table(ceiling, above=above if goes_on else None)
-    transition_beta = None
-    if opening is not None:
-        released_from = above.released_from(tested) if goes_on else None
-        under = opening_ceiling(
-            opening, certified, tested, released_from=released_from, signals=signals, u_max=u_max, sign=allowance.sign
-        )
-        upper = table(under, above=AboveChoice(choice="lower", step_codes=STEP_CODES) if goes_on else None)
-        transition_beta = tuple(map(max, upper, beta))
-    return SideLaw(
-        drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),
-        u_min0_over_u_max=u_min0,
-        beta=beta,
-        transition_beta=transition_beta,
-        certificate=certify(
-            side,
-            certified,
-            ceiling,
-            guard=options.guard,
-            signals=signals,
-            u_max_V=u_max,
-            u_min0=u_min0,
-            table=beta,
-            denominator=units.beta,
-        ),
-        budget=budget_of(side, certified, u_max, allowance, options.guard, options.machine),
-    )
-
-
-def _refuse_no_offset(limits: ExactRow, options: DesignOptions) -> None:
-    """Refuse limits of the offset, over u_max, that leave none at some pressure drop."""
-    if limits.least() > 0:
-        return
-    raise InputError(
-        "dither and declared machine leave no offset under the certified one; make the dither smaller, declare "
-        "narrower ranges, or control the current"
-        if options.machine
-        else "the dither's peak leaves no offset under the certified one; make it smaller"
-    )
-
-
-def _offset_at_reference(top: Fraction, signals: Signals, units: Units) -> Fraction:
-    """Return u_min0 over u_max: half a count below, for the offset's compare value may be rounded up."""
-    u_min0 = over(top - Fraction(1, 2 * signals.compare_max), "down", units.coefficient)
-    if u_min0 <= 0:
-        raise InputError(f"u_min0 is {float(top):.2%} of full command, less than one count of the PWM: no dead zone")
-    return u_min0
-
-
-def travel(side: SideModel, u_max: Fraction, offset_V: Fraction) -> Fraction:
-    """Return k x_max/u_max for a law whose offset is u_min0: from there to the command of full flow on opening.
-
-    Identification gives k x_max from the knee on. The law starts lower, at the guarded offset; without the difference
-    full command would not reach full flow (u_O(u_max) = u_max exactly if k x_max = u_max - u_min0).
-    """
-    reference = min(side.tests, key=lambda test: abs((test.dp_MPa or 0.0) - (side.reference.dp_MPa or 0.0)))
-    knee = reference.u_knee_rising_V if reference.u_knee_rising_V is not None else reference.u_knee_falling_V
-    below_knee = max(Fraction(repr(knee)) - offset_V, Fraction(0))
-    travel = Fraction(repr(side.k_x_max_over_u_max)) + below_knee / u_max
-    return min(travel, 1 - offset_V / u_max)  # beyond full drive there is nothing
-
-
-def left_by_machine(
-    top_V: Fraction, ceiling: OffsetCeiling, signals: Signals, dp0_MPa: Fraction, u_max_V: Fraction
-) -> Fraction:
-    """Return the offset at dP0 that a declared machine leaves, V: a beta of 1 without a transition."""
-    limit = ceiling.limit[round(signals.dp_code(dp0_MPa))]
-    return min(top_V, (limit + Fraction(1, 2 * signals.compare_max)) * u_max_V)
-
-
-def over(value: Fraction, rounding: str, unit: int) -> Fraction:
-    """Return `value` as an integer over `unit`, rounded to nearest or down."""
-    scaled = value * unit
-    numerator = scaled.numerator // scaled.denominator if rounding == "down" else round(scaled)
-    return Fraction(numerator, unit)
 
 
 def prove_monotone(compensator: Compensator, sign: int) -> None:

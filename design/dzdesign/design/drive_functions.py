@@ -26,99 +26,41 @@ Counts = Annotated[int, Meta(ge=0, le=65535)]
 class DriveFunctions:
     """Functions of the drive around the law, as the integers of the firmware."""
 
-    leave_zero_codes: Annotated[
-        int,
-        Meta(
-            description="Command codes that the command must exceed to leave zero, if the law has a zero band. It must "
-            "also pass zero by as much before the drive switches to the other solenoid. Until then the last "
-            "solenoid stays at its offset, so that noise around zero does not move the spool. 0: no such "
-            "threshold.",
-            ge=0,
-            le=32767,
-        ),
-    ] = 0
-    ramp_up: Annotated[
-        tuple[Step, Step],
-        Meta(
-            description="Largest change of the command per sample away from zero, for positive and negative commands. "
-            "In 1/65536 of a code; 0 for no limit."
-        ),
-    ] = (0, 0)
-    ramp_down: Annotated[
-        tuple[Step, Step],
-        Meta(
-            description="Largest change of the command per sample towards zero, for positive and negative commands. In "
-            "1/65536 of a code; 0 for no limit."
-        ),
-    ] = (0, 0)
-    dither_counts: Annotated[
-        int,
-        Meta(
-            description="Amplitude of the square wave on the compare value, which the certificate counts as offset. 0: "
-            "no dither.",
-            ge=0,
-            le=65535,
-        ),
-    ] = 0
-    dither_ticks: Annotated[int, Meta(description="PWM periods in half a period of the dither.", ge=1, le=32767)] = 1
-    play_counts: Annotated[
-        tuple[tuple[Counts, ...], tuple[Counts, ...]],
-        Meta(
-            description="Compensation of hysteresis: counts by which the drive is lower at a falling than at a rising "
-            "command. For positive and negative commands, with linear interpolation between nodes at every "
-            "`play_step_codes` codes of command from zero. Empty: no compensation."
-        ),
-    ] = ((), ())
-    play_step_codes: Annotated[
-        int, Meta(description="Command codes between two nodes of play_counts, a power of two.", ge=1, le=4096)
-    ] = 256
-    play_codes: Annotated[
-        int,
-        Meta(
-            description="Command travel over which the drive changes from one branch to the other, in codes. A power "
-            "of two.",
-            ge=1,
-            le=32,
-        ),
-    ] = 8
-    play_noise_codes: Annotated[
-        int,
-        Meta(
-            description="Largest fluctuation of the command, in codes, that does not count as a reversal.",
-            ge=0,
-            le=4095,
-        ),
-    ] = 0
-    compare_limit: Annotated[int, Meta(description="Largest compare value.", ge=0, le=65535)] = 60000
-    fault_samples: Annotated[
-        int,
-        Meta(
-            description="Consecutive valid samples that end a fault. From the first faulty sample until then, an "
-            "invalid command de-energises the valve, and an invalid pressure selects the smallest beta.",
-            ge=1,
-            le=MOST_FAULT_SAMPLES,
-        ),
-    ] = 1
-    fault_latch: Annotated[
-        bool,
-        Meta(
-            description="Whether a fault is latched until the drive is initialised again. The latch sets after "
-            "`fault_samples` faulty samples, if fewer consecutive valid samples lie between them."
-        ),
-    ] = False
-    interlock_codes: (
-        Annotated[
-            int,
-            Meta(
-                description="Largest command code that counts as zero for the interlock. After a reset or an invalid "
-                "command the drive must see zero for `fault_samples` consecutive samples before it follows. "
-                "Null: no interlock.",
-                ge=0,
-                le=32767,
-            ),
-        ]
-        | None
-    ) = None
+    leave_zero_codes: Annotated[int, Meta(ge=0, le=32767)] = 0
+    """Command codes that the command must exceed to leave zero, if the law has a zero band. It must also pass zero by
+    as much before the drive switches to the other solenoid. Until then the last solenoid stays at its offset, so that
+    noise around zero does not move the spool. 0: no such threshold."""
+    ramp_up: tuple[Step, Step] = (0, 0)
+    """Largest change of the command per sample away from zero, for positive and negative commands. In 1/65536 of a
+    code; 0 for no limit."""
+    ramp_down: tuple[Step, Step] = (0, 0)
+    """Largest change of the command per sample towards zero, for positive and negative commands. In 1/65536 of a code;
+    0 for no limit."""
+    dither_counts: Annotated[int, Meta(ge=0, le=65535)] = 0
+    """Amplitude of the square wave on the compare value, which the certificate counts as offset. 0: no dither."""
+    dither_ticks: Annotated[int, Meta(ge=1, le=32767)] = 1
+    """PWM periods in half a period of the dither."""
+    play_counts: tuple[tuple[Counts, ...], tuple[Counts, ...]] = ((), ())
+    """Compensation of hysteresis: counts by which the drive is lower at a falling than at a rising command. For
+    positive and negative commands, with linear interpolation between nodes at every `play_step_codes` codes of command
+    from zero. Empty: no compensation."""
+    play_step_codes: Annotated[int, Meta(ge=1, le=4096)] = 256
+    """Command codes between two nodes of play_counts, a power of two."""
+    play_codes: Annotated[int, Meta(ge=1, le=32)] = 8
+    """Command travel over which the drive changes from one branch to the other, in codes. A power of two."""
+    play_noise_codes: Annotated[int, Meta(ge=0, le=4095)] = 0
+    """Largest fluctuation of the command, in codes, that does not count as a reversal."""
+    compare_limit: Annotated[int, Meta(ge=0, le=65535)] = 60000
+    """Largest compare value."""
+    fault_samples: Annotated[int, Meta(ge=1, le=MOST_FAULT_SAMPLES)] = 1
+    """Consecutive valid samples that end a fault. From the first faulty sample until then, an invalid command
+    de-energises the valve, and an invalid pressure selects the smallest beta."""
+    fault_latch: bool = False
+    """Whether a fault is latched until the drive is initialised again. The latch sets after `fault_samples` faulty
+    samples, if fewer consecutive valid samples lie between them."""
+    interlock_codes: Annotated[int, Meta(ge=0, le=32767)] | None = None
+    """Largest command code that counts as zero for the interlock. After a reset or an invalid command the drive must
+    see zero for `fault_samples` consecutive samples before it follows. Null: no interlock."""
 
     def __post_init__(self) -> None:
         for name, value, limit in (

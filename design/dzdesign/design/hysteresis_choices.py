@@ -1,17 +1,16 @@
 """Remaining dead zone and hysteresis of each treatment of hysteresis: the table and advice of `dzdesign design`."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import between_tests, read_dead_zone, remaining_dead_zone
+from dzdesign.design.costs_at_tests import between_tests, corners_of, read_dead_zone, remaining_dead_zone
 from dzdesign.design.designing import design
-from dzdesign.design.law_corners import corners_of
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.design.play import LEVELS
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -77,16 +76,7 @@ def hysteresis_choices(compensator: Compensator) -> tuple[HysteresisChoice, ...]
         if other.left < best.left - WORTH:
             best = other
     return tuple(
-        HysteresisChoice(
-            given=each.given,
-            onset=each.onset,
-            reading=each.reading,
-            hysteresis=each.hysteresis,
-            largest=each.largest,
-            refused=each.refused,
-            recommended=each is best and each.onset is not None,
-        )
-        for each in found
+        replace(each, recommended=each is best and each.onset is not None) for each in found
     )
 
 

@@ -1,19 +1,35 @@
-"""The engineer's choices for `design`."""
+"""The engineer's choices for `design`: read from their texts, with the bounds that hold between them."""
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import ceil, floor
+from typing import cast
 
-from dzdesign.core.dither import HIGHEST_HZ, LARGEST_PEAK, LOWEST_HZ
+from dzdesign.core.dither import HIGHEST_HZ, LARGEST_PEAK, LOWEST_HZ, parted
 from dzdesign.core.errors import InputError, nearest
+from dzdesign.core.options import arguments_of, flag_of
+from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.drive import CurrentDrive, CurrentRequest, design_current_drive
-from dzdesign.design.design_choices import ABOVE, BELOW_DP0, Above, BelowDp0, DesignRequest, NegativeDp
+from dzdesign.design.current.texts import current_request
+from dzdesign.design.design_choices import DEFAULTS, Above, BelowDp0, DesignChoices, DesignRequest, NegativeDp
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES, RAMP_UNIT, DriveFunctions
 from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine.texts import machine_of
+from dzdesign.design.signal_text import (
+    command_signal,
+    full_command_V,
+    live_zero_signal,
+    parse_signal,
+    pressure_signal,
+)
 from dzdesign.design.signals import Signals
-from dzdesign.design.target_inputs import Converter
+from dzdesign.design.target_inputs import Converter, TargetInputs
 from dzdesign.design.zero_band import LEAST_TRANSITION, LEAST_TRANSITION_NOISE, CommandError, command_error_of
+from dzdesign.identify.constants import L_MIN
 from dzdesign.identify.valve.guard_curve import GUARDS, Guard
+from dzdesign.identify.valve.model import DECIMALS
 
 #: The transition where nothing is said; largest transition and dither, of full command or drive.
 TRANSITION = Fraction(1, 100)
@@ -32,97 +48,49 @@ ACCEPTABLE = ("branch-order", "broken-sensor")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignOptions:
-    """Options of the design.
-
-    Attributes
-    ----------
-    law : str
-        ``paper`` (Eq. 18) or ``target`` (meets Eq. 16).
-    signals : Signals
-        Scalings of the converter and the PWM.
-    negative_dp : {"recorded", "same", "swapped", "wired"} or None
-        Pressure drop at negative commands. None: as `signals` states it.
-    guard : {"closing", "mean", "opening"}
-        Threshold that the certificate must protect. Zero command comes after closing. A valve without a recorded
-        falling branch is therefore refused, unless the guard is "opening".
-    below_dp0 : {"hold", "extend"}
-        Beta at dP <= dP0: held at 1 as in the paper (Eq. 7), or following the tests there, with beta above 1.
-    above : {"hold", "lower", "release"}
-        Offset above the highest tested pressure drop: held, lowered with the continued bound, or released.
-    transition : Fraction or None
-        Share of full command, after the zero band, over which the drive runs from the closing to the opening threshold.
-        0: no transition and no zero band. None: `TRANSITION`, or as many codes as the noise requires.
-    command_error : CommandError or None
-        Error of the command's code at zero, which sets the zero band. None: that of the F28335's converter.
-    ramp_up_s, ramp_down_s : tuple of float
-        Time of the command from zero to full and back, s, for positive and negative commands. 0: no limit.
-    dither_Hz, dither_peak : float, Fraction
-        Frequency of the square-wave dither in Hz, and its peak (half its height) over full drive. 0: no dither.
-    play : bool
-        Whether a falling command is driven lower than a rising one, by the valve's hysteresis.
-    output_max : Fraction
-        Largest drive over full drive.
-    fault_samples : int
-        Consecutive valid samples that end a fault.
-    fault_latch : bool
-        Whether a fault of that many samples lasts until a reset.
-    interlock : bool
-        Whether the drive waits for zero command after a reset or an invalid command.
-    reading_flow_L_min : float or None
-        Flow at which dead zones are read, in addition to the onset. None selects the meter's floor, or the noise level
-        of a meter without one.
-    full_command_V : Fraction or None
-        Full command that the signal states, V.
-    accept : tuple of str
-        Codes of `ACCEPTABLE` that do not lead to a refusal.
-    current : CurrentRequest or None
-        Coil, supply and sensor of a current-controlled drive. None: the law's output is the PWM's duty.
-    machine : Machine or None
-        Declared differences between machine and bench. None: the certificate covers only the valve as recorded.
-    request : DesignRequest or None
-        Target and option texts from which these options were read, to be kept in compensator.json.
-    """
+    """Options of the design, as values; `DesignChoices` says what each means."""
 
     law: str = "paper"
     signals: Signals = field(default_factory=Signals)
+    #: None: as `signals` states it.
     negative_dp: NegativeDp | None = None
     guard: Guard = "closing"
     below_dp0: BelowDp0 = "hold"
     above: Above = "lower"
+    #: Share of full command. 0: no transition and no zero band. None: `TRANSITION`, or what the noise requires.
     transition: Fraction | None = None
+    #: None: that of the F28335's converter.
     command_error: CommandError | None = None
+    #: Of positive and negative commands; 0: no limit.
     ramp_up_s: tuple[float, float] = (0.0, 0.0)
     ramp_down_s: tuple[float, float] = (0.0, 0.0)
+    #: 0: no dither. The peak is half the wave's height over full drive.
     dither_Hz: float = 0.0
     dither_peak: Fraction = Fraction(0)
+    #: Whether a falling command is driven lower than a rising one, by the valve's hysteresis.
     play: bool = False
     output_max: Fraction = Fraction(1)
     fault_samples: int = FAULT_SAMPLES
     fault_latch: bool = False
     interlock: bool = True
+    #: None: the meter's floor, or the noise level of a meter without one.
     reading_flow_L_min: float | None = None
+    #: Full command that the signal states, V.
     full_command_V: Fraction | None = None
+    #: Of `ACCEPTABLE`.
     accept: tuple[str, ...] = ()
+    #: None: the law's output is the PWM's duty.
     current: CurrentRequest | None = None
+    #: None: the certificate covers only the valve as recorded.
     machine: Machine | None = None
+    #: Target and texts from which these options were read, to be kept in compensator.json.
     request: DesignRequest | None = None
 
     def __post_init__(self) -> None:
-        for what, given, known in (
-            ("guard", self.guard, GUARDS),
-            ("choice below dP0", self.below_dp0, BELOW_DP0),
-            ("choice above the tests", self.above, ABOVE),
-        ):
-            if given not in known:
-                raise InputError(
-                    f"the {what} is '{given}'{nearest(given, known)}, expected {', '.join(known[:-1])} or {known[-1]}"
-                )
-        for code in self.accept:
-            if code not in ACCEPTABLE:
-                raise InputError(
-                    f"what to accept is '{code}'{nearest(code, ACCEPTABLE)}, expected {' or '.join(ACCEPTABLE)}: "
-                    "nothing else can be accepted"
-                )
+        for name in ("guard", "below_dp0", "above"):
+            _check_word(name, getattr(self, name))
+        for word in self.accept:
+            _check_word("accept", word)
         for what, share, limit in (
             ("transition", self.transition or Fraction(0), LARGEST_TRANSITION),
             ("dither", self.dither_peak, LARGEST_DITHER),
@@ -250,3 +218,120 @@ class DesignOptions:
             for time, span in zip(seconds, spans, strict=True)
         )
         return positive, negative
+
+#: Words that an option takes where its declaration names a place to import them from.
+PLACED = {"guard": GUARDS, "accept": ACCEPTABLE}
+#: Words that an option takes, by its name.
+WORDS: Mapping[str, tuple[str, ...]] = {
+    argument.name: words
+    for argument in arguments_of(DesignChoices)
+    if isinstance(words := PLACED.get(argument.name, argument.option.choices), tuple)
+}
+
+
+def _check_word(name: str, word: str) -> None:
+    if word not in (known := WORDS[name]):
+        *most, last = known
+        raise InputError(
+            f"{flag_of(name)} is '{word}'{nearest(word, known)}, expected {', '.join(most)} or {last}"
+        )
+
+
+def options_of(texts: Mapping[str, str], target: TargetInputs) -> DesignOptions:
+    """Return the engineer's choices, each from its text; the default stands for one that is missing or empty."""
+    text = {name: texts.get(name) or default for name, default in DEFAULTS.items()}
+    for name in ("negative_dp", "polarity", "hysteresis", "fault_latch", "interlock", "drive"):
+        _check_word(name, text[name])
+    converter = target.converter
+    full_V = float(converter.full_V)
+    text["command_signal"] = text["command_signal"] or f"0..10 V x {full_V / 10:.12g}"
+    for name in ("pressure_a", "pressure_b"):
+        text[name] = text[name] or live_zero_signal(converter)
+    span = Fraction(round(parse_quantity(text["pressure_span"], "pressure", "--pressure-span")), 10**6)
+    if span <= 0:
+        raise InputError(f"--pressure-span is '{text['pressure_span']}', expected more than zero")
+    sensors = {
+        name: pressure_signal(parse_signal(text[name], flag_of(name)), converter, span)
+        for name in ("pressure_a", "pressure_b")
+    }
+    signal = parse_signal(text["command_signal"], "--command-signal")
+    command = command_signal(signal, converter, inverted=text["polarity"] == "inverted")
+    dither_Hz, dither_peak = _dither(text["dither"])
+    signals = Signals(
+        code_max=converter.code_max,
+        compare_max=target.compare_max,
+        sample_Hz=target.sample_Hz,
+        tick_Hz=target.tick_Hz,
+        command=command,
+        pressure_a=sensors["pressure_a"],
+        pressure_b=sensors["pressure_b"],
+    )
+    current = current_request(text, target)
+    return DesignOptions(
+        law=text["law"],
+        signals=signals,
+        negative_dp=cast(NegativeDp, text["negative_dp"]),
+        guard=cast(Guard, text["guard"]),
+        below_dp0=cast(BelowDp0, text["below_dp0"]),
+        above=cast(Above, text["above"]),
+        transition=_transition(text["transition"]),
+        command_error=command_error_of(text["command_error"], converter, command),
+        ramp_up_s=_seconds(text["ramp_up"], "--ramp-up"),
+        ramp_down_s=_seconds(text["ramp_down"], "--ramp-down"),
+        dither_Hz=dither_Hz,
+        dither_peak=dither_peak,
+        play=text["hysteresis"] == "play",
+        output_max=_share(text["output_max"], "--output-max"),
+        fault_samples=_samples(text["fault_debounce"], target.sample_Hz),
+        fault_latch=text["fault_latch"] == "on",
+        interlock=text["interlock"] == "on",
+        reading_flow_L_min=_flow_L_min(text["reading_flow"], "--reading-flow") if text["reading_flow"] else None,
+        full_command_V=full_command_V(signal),
+        accept=tuple(text["accept"].replace(",", " ").split()),
+        current=current,
+        machine=machine_of(text, target, signals, current),
+        request=DesignRequest(target=target, options=text),
+    )
+
+
+def _transition(text: str) -> Fraction | None:
+    """Read ``auto`` (None), ``off`` (0) or a share."""
+    if text == "auto":
+        return None
+    return Fraction(0) if text == "off" else _share(text, "--transition")
+
+
+def _share(text: str, option: str) -> Fraction:
+    value = parse_quantity(text, "ratio", option)
+    return Fraction(round(value * 10**9), 10**9)
+
+
+def _flow_L_min(text: str, option: str) -> float:
+    return round(parse_quantity(text, "flow", option) / L_MIN, DECIMALS)
+
+
+def _seconds(text: str, option: str) -> tuple[float, float]:
+    """Read one time, or two with a slash between: of positive and of negative commands."""
+    parts = [parse_quantity(part.strip(), "time", option) for part in text.split("/")]
+    if len(parts) > 2:
+        raise InputError(f"{option} is '{text}', expected a time, or two such as '0.5 s / 0.8 s'")
+    return parts[0], parts[-1]
+
+
+def _samples(text: str, sample_Hz: int) -> int:
+    """Read a number of samples, or a time as the samples that it needs."""
+    if match := re.fullmatch(r"(\d{1,9}) ?samples?", text.strip()):
+        return int(match[1])
+    try:
+        seconds = parse_quantity(text, "time", "--fault-debounce")
+    except InputError as error:
+        raise InputError(f"--fault-debounce is '{text}', expected '5 samples' or a time such as '4 ms'") from error
+    return ceil(Fraction(repr(seconds)) * sample_Hz)
+
+
+def _dither(text: str) -> tuple[float, Fraction]:
+    """Read ``off`` or a frequency and the peak of the wave."""
+    if text == "off":
+        return 0.0, Fraction(0)
+    frequency_Hz, peak = parted(text, "--dither", "'off', or ")
+    return frequency_Hz, _share(peak, "--dither")

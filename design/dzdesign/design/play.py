@@ -15,7 +15,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.law_corners import corners_of
+from dzdesign.design.costs_at_tests import corners_of
 from dzdesign.design.signals import SIDE_NAMES
 
 #: Codes of travel over which the drive goes over to the other branch, behind those that noise may make.

@@ -9,12 +9,12 @@ from dzdesign.core.value_differences import differences
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot.margins import prove_lot
-from dzdesign.design.lot.valves import LotSide
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.lot_margins import prove_lot
+from dzdesign.design.lot_valves import LotSide
+from dzdesign.design.options import options_of
 from dzdesign.design.signals import SIDE_NAMES
 
-#: Coarsest unit of the law's coefficients, see `dzdesign.design.quantise`.
+#: Coarsest unit of the law's coefficients, see `dzdesign.design.side_design`.
 COARSEST = Fraction(1, 2**12)
 #: Characters before the first difference of two texts that a message shows.
 CONTEXT = 12
@@ -32,13 +32,9 @@ def refuse_without_options(compensator: Compensator, source: str) -> None:
 def prove_derived(compensator: Compensator) -> None:
     """Design the compensator again from the valve and the options in it; refuse the first key that does not follow.
 
-    A file that does not say what was asked for, as all from before that was kept, has its certificates proved alone.
+    Of a lot's setting the sides are not those of the one valve in the file: their certificates are proved, and that the
+    setting over-compensates no valve. Of a file that does not say what was asked for nothing can be told.
     """
-    prove_certificates(compensator)
-    try:
-        prove_lot(compensator)
-    except RequirementError as error:
-        raise InputError(f"{error}; make it again with `dzdesign batch`") from error
     if compensator.target is None or compensator.options is None:
         return
     try:
@@ -46,10 +42,14 @@ def prove_derived(compensator: Compensator) -> None:
     except InputError as error:
         raise InputError(f"its valve can't be designed with its options: {error}; {Compensator.REMEDY}") from error
     if compensator.lot:
+        prove_certificates(compensator)
+        try:
+            prove_lot(compensator)
+        except RequirementError as error:
+            raise InputError(f"{error}; make it again with `dzdesign batch`") from error
         _prove_lot_setting(compensator, redesigned)
         redesigned = replace(redesigned, sides=compensator.sides, lot=compensator.lot, costs=compensator.costs)
-    # The hash of valve.json counts its spacing, which is not kept.
-    redesigned = replace(redesigned, tool=compensator.tool, made_from=compensator.made_from)
+    redesigned = replace(redesigned, tool=compensator.tool)
     for found in differences(compensator, redesigned):
         stated, follows = _from_where_they_differ(found.stated, found.follows)
         raise InputError(

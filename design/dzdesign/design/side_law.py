@@ -17,106 +17,52 @@ Node = Annotated[int, Meta(ge=1, le=2**31)]
 class Certificate:
     """Proved statements about the offset of one side, on the integers, at every pressure code of the interval."""
 
-    confidence: Annotated[
-        float, quantity("1", "Joint confidence level of the threshold's lower bounds.", ge=0.5, le=1)
-    ]
-    guard: Annotated[Guard, Meta(description="Threshold that the bounds protect.")]
-    level_L_min: Annotated[
-        float,
-        quantity(
-            "L/min",
-            "Smallest flow at the bounds that the meter, or readings by hand, would have shown.",
-            ge=0,
-            le=1e6,
-        ),
-    ]
-    zero_flow_L_min: Annotated[
-        float,
-        quantity(
-            "L/min",
-            "Flow at zero command, leak included, that the bounds allow: the declared zero flow, or the sum "
-            "of leak and noise level. Null: none was declared, and no flow above `level_L_min` is allowed.",
-            ge=0,
-            le=1e6,
-        ),
-    ] | None
-    dp_MPa: Annotated[
-        tuple[Fraction, Fraction], quantity("MPa", "Interval of the pressure drop that the certificate covers.")
-    ]
-    holds_to_MPa: Annotated[
-        Fraction,
-        quantity(
-            "MPa",
-            "Pressure drop up to which the certificate also holds if the curve's premise holds above the "
-            "tests. It is the end of `dp_MPa` if nothing is certified above.",
-        ),
-    ]
-    released_from_MPa: Annotated[
-        Fraction | None,
-        quantity(
-            "MPa",
-            "Pressure drop from which the offset is released. Beta is one unit of the table there, so the "
-            "dead zone returns. Null: nowhere in the sensors' range.",
-        ),
-    ]
-    smallest_margin_V: Annotated[
-        Fraction, quantity("V", "Smallest margin of the offset below the lower bound, over all codes of the interval.")
-    ]
-    mean_loss_V: Annotated[
-        float,
-        quantity(
-            "V",
-            "Mean distance of the table's offset below the certified curve. It comes from the few nodes, "
-            "the rounding of pressures and drive, and the dither.",
-            ge=-1e6,
-            le=1e6,
-        ),
-    ]
-    largest_loss_V: Annotated[
-        float, quantity("V", "Largest distance of the table's offset below the certified curve.", ge=-1e6, le=1e6)
-    ]
+    confidence: Annotated[float, quantity("1", ge=0.5, le=1)]
+    """Joint confidence level of the threshold's lower bounds."""
+    guard: Guard
+    """Threshold that the bounds protect."""
+    level_L_min: Annotated[float, quantity("L/min", ge=0, le=1000000.0)]
+    """Smallest flow at the bounds that the meter, or readings by hand, would have shown."""
+    zero_flow_L_min: Annotated[float, quantity("L/min", ge=0, le=1000000.0)] | None
+    """Flow at zero command, leak included, that the bounds allow: the declared zero flow, or the sum of leak and noise
+    level. Null: none was declared, and no flow above `level_L_min` is allowed."""
+    dp_MPa: Annotated[tuple[Fraction, Fraction], quantity("MPa")]
+    """Interval of the pressure drop that the certificate covers."""
+    holds_to_MPa: Annotated[Fraction, quantity("MPa")]
+    """Pressure drop up to which the certificate also holds if the curve's premise holds above the tests. It is the end
+    of `dp_MPa` if nothing is certified above."""
+    released_from_MPa: Annotated[Fraction | None, quantity("MPa")]
+    """Pressure drop from which the offset is released. Beta is one unit of the table there, so the dead zone returns.
+    Null: nowhere in the sensors' range."""
+    smallest_margin_V: Annotated[Fraction, quantity("V")]
+    """Smallest margin of the offset below the lower bound, over all codes of the interval."""
+    mean_loss_V: Annotated[float, quantity("V", ge=-1000000.0, le=1000000.0)]
+    """Mean distance of the table's offset below the certified curve. It comes from the few nodes, the rounding of
+    pressures and drive, and the dither."""
+    largest_loss_V: Annotated[float, quantity("V", ge=-1000000.0, le=1000000.0)]
+    """Largest distance of the table's offset below the certified curve."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideLaw:
     """The law for one sign of the command."""
 
-    drive_range_over_u_max: Annotated[
-        Fraction,
-        quantity(
-            "1",
-            "Ratio k x_max / u_max of the law: command range from its u_min0 to full output, over full "
-            "command. In valve.json the range starts at the knee.",
-        ),
-    ]
-    u_min0_over_u_max: Annotated[
-        Fraction,
-        quantity(
-            "1",
-            "Threshold u_min0 of the law at dP0, over full command. It is the offset. With a transition it "
-            "is the opening threshold plus three standard errors: the law's line, extended to zero command.",
-        ),
-    ]
-    beta: Annotated[
-        tuple[Node, ...],
-        Meta(
-            description="Certified nodes of beta at zero command, as numerators over `beta_denominator`. They lie at "
-            "pressure codes 0, `beta_step_codes`, 2 `beta_step_codes` and so on, with linear interpolation "
-            "between them."
-        ),
-    ]
-    transition_beta: Annotated[
-        tuple[Node, ...] | None,
-        Meta(
-            description="Nodes of the opening threshold's beta, which the law follows after the transition. None lies "
-            "below the certified node. Empty without a transition."
-        ),
-    ] = None
-    certificate: Annotated[Certificate, Meta(description="Certificate of the offset.")]
-    budget: Annotated[
-        Budget | None,
-        Meta(description="Uncertainty budget: the components that keep the offset below the identified threshold."),
-    ] = None
+    drive_range_over_u_max: Annotated[Fraction, quantity("1")]
+    """Ratio k x_max / u_max of the law: command range from its u_min0 to full output, over full command. In valve.json
+    the range starts at the knee."""
+    u_min0_over_u_max: Annotated[Fraction, quantity("1")]
+    """Threshold u_min0 of the law at dP0, over full command. It is the offset. With a transition it is the opening
+    threshold plus three standard errors: the law's line, extended to zero command."""
+    beta: tuple[Node, ...]
+    """Certified nodes of beta at zero command, as numerators over `beta_denominator`. They lie at pressure codes 0,
+    `beta_step_codes`, 2 `beta_step_codes` and so on, with linear interpolation between them."""
+    transition_beta: tuple[Node, ...] | None = None
+    """Nodes of the opening threshold's beta, which the law follows after the transition. None lies below the certified
+    node. Empty without a transition."""
+    certificate: Certificate
+    """Certificate of the offset."""
+    budget: Budget | None = None
+    """Uncertainty budget: the components that keep the offset below the identified threshold."""
 
     @property
     def start(self) -> str:
@@ -148,7 +94,7 @@ class SideLaw:
 class Sides:
     """The law of each sign of command."""
 
-    positive: Annotated[SideLaw, Meta(description="Law for positive commands.")]
-    negative: Annotated[
-        SideLaw | None, Meta(description="Law for negative commands; null for a valve with one solenoid.")
-    ] = None
+    positive: SideLaw
+    """Law for positive commands."""
+    negative: SideLaw | None = None
+    """Law for negative commands; null for a valve with one solenoid."""

@@ -33,20 +33,14 @@ Code = Annotated[int, Meta(ge=0, le=CODE_LIMIT)]
 class CommandSignal:
     """Converter codes of the command (Eq. (29) with its 0-3 V taken as the attenuated 0-10 V)."""
 
-    zero_code: Annotated[Code, Meta(description="Code at zero command.")] = 0
-    full_code: Annotated[
-        Code, Meta(description="Code at full positive command; below zero_code if the signal is reversed.")
-    ] = 4095
-    negative_full_code: Annotated[
-        Code | None,
-        Meta(
-            description="Code at full negative command, on the other side of zero_code; null for a command of one sign."
-        ),
-    ] = None
-    valid_codes: Annotated[
-        tuple[Code, Code],
-        Meta(description="First and last code of a valid signal. A code outside de-energises the valve."),
-    ] = (0, 4095)
+    zero_code: Code = 0
+    """Code at zero command."""
+    full_code: Code = 4095
+    """Code at full positive command; below zero_code if the signal is reversed."""
+    negative_full_code: Code | None = None
+    """Code at full negative command, on the other side of zero_code; null for a command of one sign."""
+    valid_codes: tuple[Code, Code] = (0, 4095)
+    """First and last code of a valid signal. A code outside de-energises the valve."""
 
     def __post_init__(self) -> None:
         if self.full_code == self.zero_code:
@@ -86,21 +80,18 @@ class CommandSignal:
 class PressureSignal:
     """Converter codes of one pressure sensor."""
 
-    span_MPa: Annotated[Fraction, quantity("MPa", "Pressure at full_code; zero_code stands for zero pressure.")] = (
-        field(default_factory=lambda: Fraction(20))
+    span_MPa: Annotated[Fraction, quantity("MPa")] = field(default_factory=lambda: Fraction(20))
+    """Pressure at full_code; zero_code stands for zero pressure."""
+    zero_code: Code = LIVE_ZERO_CODES[0]
+    """Code at zero pressure."""
+    full_code: Code = LIVE_ZERO_CODES[1]
+    """Code at full pressure."""
+    valid_codes: tuple[Code, Code] = LIVE_ZERO_VALID
+    """First and last code of a valid signal. A code outside selects the smallest beta."""
+    error_MPa: Annotated[tuple[Fraction, Fraction], quantity("MPa")] = field(
+        default_factory=lambda: LIVE_ZERO_ERROR_MPA
     )
-    zero_code: Annotated[Code, Meta(description="Code at zero pressure.")] = LIVE_ZERO_CODES[0]
-    full_code: Annotated[Code, Meta(description="Code at full pressure.")] = LIVE_ZERO_CODES[1]
-    valid_codes: Annotated[
-        tuple[Code, Code],
-        Meta(description="First and last code of a valid signal. A code outside selects the smallest beta."),
-    ] = LIVE_ZERO_VALID
-    error_MPa: Annotated[
-        tuple[Fraction, Fraction],
-        quantity(
-            "MPa", "Least and largest difference between the pressure that a code stands for and the actual pressure."
-        ),
-    ] = field(default_factory=lambda: LIVE_ZERO_ERROR_MPA)
+    """Least and largest difference between the pressure that a code stands for and the actual pressure."""
 
     def __post_init__(self) -> None:
         if self.span_MPa <= 0:
@@ -124,20 +115,22 @@ class PressureSignal:
 class Signals:
     """Exact scalings of a compensator's inputs and output."""
 
-    code_max: Annotated[Count, Meta(description="Largest code of the converter.")] = 4095
-    compare_max: Annotated[Count, Meta(description="PWM compare value at full drive, u_O = u_max.")] = 60000
-    sample_Hz: Annotated[Count, quantity("Hz", "Sampling rate.")] = 1250
-    tick_Hz: Annotated[Count, quantity("Hz", "PWM frequency.")] = 2500
-    command: Annotated[CommandSignal, Meta(description="Scaling of the command.")] = field(
-        default_factory=CommandSignal
-    )
-    pressure_a: Annotated[
-        PressureSignal, Meta(description="Scaling of the sensor upstream of the metering edge, for positive command.")
-    ] = field(default_factory=PressureSignal)
-    pressure_b: Annotated[
-        PressureSignal, Meta(description="Scaling of the sensor downstream of the metering edge, for positive command.")
-    ] = field(default_factory=PressureSignal)
-    swapped: Annotated[bool, Meta(description="Whether the pressure drop at negative commands is B minus A.")] = False
+    code_max: Count = 4095
+    """Largest code of the converter."""
+    compare_max: Count = 60000
+    """PWM compare value at full drive, u_O = u_max."""
+    sample_Hz: Annotated[Count, quantity("Hz")] = 1250
+    """Sampling rate."""
+    tick_Hz: Annotated[Count, quantity("Hz")] = 2500
+    """PWM frequency."""
+    command: CommandSignal = field(default_factory=CommandSignal)
+    """Scaling of the command."""
+    pressure_a: PressureSignal = field(default_factory=PressureSignal)
+    """Scaling of the sensor upstream of the metering edge, for positive command."""
+    pressure_b: PressureSignal = field(default_factory=PressureSignal)
+    """Scaling of the sensor downstream of the metering edge, for positive command."""
+    swapped: bool = False
+    """Whether the pressure drop at negative commands is B minus A."""
 
     def __post_init__(self) -> None:
         for name in ("code_max", "compare_max", "sample_Hz", "tick_Hz"):

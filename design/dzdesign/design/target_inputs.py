@@ -36,15 +36,16 @@ F28335_OFFSET, F28335_GAIN, F28335_NOISE = 15, 30, peak_noise_codes(68.0, 4096)
 class Converter:
     """An analogue-digital converter: code = floor(levels V / full_V), limited to levels - 1."""
 
-    full_V: Annotated[Fraction, quantity("V", "Voltage at the pin that corresponds to the code `levels`.")] = field(
-        default_factory=lambda: Fraction(3)
-    )
-    levels: Annotated[int, Meta(description="Number of codes.", ge=2, le=65536)] = 4096
-    offset_codes: Annotated[Error, Meta(description="Largest offset error, in codes.")] = F28335_OFFSET
-    gain_codes: Annotated[Error, Meta(description="Largest gain error at the top of the range, in codes.")] = (
-        F28335_GAIN
-    )
-    noise_codes: Annotated[Error, Meta(description="Peak noise of a reading, in codes.")] = F28335_NOISE
+    full_V: Annotated[Fraction, quantity("V")] = field(default_factory=lambda: Fraction(3))
+    """Voltage at the pin that corresponds to the code `levels`."""
+    levels: Annotated[int, Meta(ge=2, le=65536)] = 4096
+    """Number of codes."""
+    offset_codes: Error = F28335_OFFSET
+    """Largest offset error, in codes."""
+    gain_codes: Error = F28335_GAIN
+    """Largest gain error at the top of the range, in codes."""
+    noise_codes: Error = F28335_NOISE
+    """Peak noise of a reading, in codes."""
 
     def __post_init__(self) -> None:
         if self.full_V <= 0:
@@ -69,21 +70,18 @@ class Converter:
 class TargetInputs:
     """The target's converter and timer, which the law's integers are for."""
 
-    name: Annotated[
-        str,
-        Meta(
-            description="Microcontroller, as listed by `codegen --list-targets`.",
-            pattern="^[a-z][a-z0-9]*(-[a-z0-9]+)*$",
-            max_length=60,
-        ),
-    ]
-    converter: Annotated[Converter, Meta(description="Analogue-to-digital converter of the target.")]
-    compare_max: Annotated[Count, Meta(description="Compare value at full drive, in counts.")]
-    sample_Hz: Annotated[Count, quantity("Hz", "Sampling rate.")]
-    tick_Hz: Annotated[Count, quantity("Hz", "PWM frequency.")]
-    current_sampling: Annotated[
-        CurrentSampling | None, Meta(description="Sampling times of the solenoid's current; null if it is not sampled.")
-    ] = None
+    name: Annotated[str, Meta(pattern="^[a-z][a-z0-9]*(-[a-z0-9]+)*$", max_length=60)]
+    """Microcontroller, as listed by `codegen --list-targets`."""
+    converter: Converter
+    """Analogue-to-digital converter of the target."""
+    compare_max: Count
+    """Compare value at full drive, in counts."""
+    sample_Hz: Annotated[Count, quantity("Hz")]
+    """Sampling rate."""
+    tick_Hz: Annotated[Count, quantity("Hz")]
+    """PWM frequency."""
+    current_sampling: CurrentSampling | None = None
+    """Sampling times of the solenoid's current; null if it is not sampled."""
 
     def __post_init__(self) -> None:
         if self.current_sampling and self.current_sampling.tick_Hz != self.tick_Hz:

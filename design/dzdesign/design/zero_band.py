@@ -25,8 +25,10 @@ EXPECTED = "expected the offset and the noise's peak, such as '15 + 4 codes' or 
 class CommandError:
     """Error of the command's code at zero: a lasting one, and one that changes from sample to sample."""
 
-    offset_codes: Annotated[int, Meta(description="Largest static error at zero command.", ge=0, le=LARGEST_ERROR)]
-    noise_codes: Annotated[int, Meta(description="Peak noise on top of the static error.", ge=1, le=LARGEST_ERROR)]
+    offset_codes: Annotated[int, Meta(ge=0, le=LARGEST_ERROR)]
+    """Largest static error at zero command."""
+    noise_codes: Annotated[int, Meta(ge=1, le=LARGEST_ERROR)]
+    """Peak noise on top of the static error."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.offset_codes <= LARGEST_ERROR or not 1 <= self.noise_codes <= LARGEST_ERROR:

@@ -7,8 +7,8 @@ from pathlib import Path
 from dzdesign.batch.valves import Valve
 from dzdesign.codegen.calibration.block import entry_of_record
 from dzdesign.core.errors import InputError, and_more, quoted
-from dzdesign.report.lot.valve_folder import VALVES, ValveFolder
-from dzdesign.report.lot.valve_names import by_name
+from dzdesign.report.lot.summary import VALVES
+from dzdesign.report.lot.table import ValveFolder, by_name
 
 #: Names in a sentence.
 NAMED = 5

@@ -15,9 +15,16 @@ from dzdesign.core.errors import DzdesignError, one_line
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.firmware_manifest import Calibration
-from dzdesign.report.lot.output_types import NOT_MADE, ValveOutput
-from dzdesign.report.lot.summary import DOES_NOT_HOLD, FAILED, OK, Status
-from dzdesign.report.lot.valve_folder import FIRMWARE, ValveManifest
+from dzdesign.report.lot.summary import (
+    DOES_NOT_HOLD,
+    FAILED,
+    FIRMWARE,
+    NOT_MADE,
+    OK,
+    Status,
+    ValveManifest,
+    ValveOutput,
+)
 from dzdesign.stages.identify import IdentifyChoices
 from dzdesign.terminal.progress import reporting
 

@@ -17,6 +17,7 @@ from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
 from dzdesign.batch.summary import (
     SETTING_NAME,
+    lot_budget,
     lot_setting_of,
     setting_files,
     setting_summary,
@@ -31,12 +32,9 @@ from dzdesign.core.input_files import read_recording
 from dzdesign.core.options import arguments_of, paths_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.design.firmware_manifest import form_named
-from dzdesign.report.lot.budget import lot_budget
 from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.summary import LotSummary
-from dzdesign.report.lot.table import table_files
-from dzdesign.report.lot.table_rows import table_rows
-from dzdesign.report.lot.valve_folder import ValveFolder
+from dzdesign.report.lot.table import ValveFolder, table_files, table_of_valves
 from dzdesign.report.valve_report import REPORT_NAME
 from dzdesign.stages.design import design_options
 from dzdesign.stages.identify import IdentifyChoices, identify_options, record_of
@@ -120,13 +118,13 @@ def _finished(
         found = _with_one_firmware(results, found)
     designed = {each.name: each.compensator for each in found if each.compensator is not None}
     setting, why_not = lot_setting_of(designed)
-    rows = table_rows(
+    frame = table_of_valves(
         found, setting.compensator if setting else None, {valve.name: _record(valve, args) for valve in valves}
     )
-    table = table_files(rows)
+    table = table_files(frame)
     firmware = write_lot_firmware(output, designed, setting.compensator if setting else None) if in_blocks else None
     summary = summary_of(
-        rows,
+        frame,
         files=table,
         verified=args.verify,
         setting=setting_summary(setting, designed) if setting else None,

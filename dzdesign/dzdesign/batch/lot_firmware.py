@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dzdesign.batch.blocks import BLOCK_IMAGE
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.firmware_manifest import BLOCK_FILE
-from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware
-from dzdesign.report.lot.valve_folder import FIRMWARE, ValveFolder
-from dzdesign.report.lot.valve_names import by_name
+from dzdesign.report.lot.summary import FIRMWARE, LOT_SETTING, LotFirmware
+from dzdesign.report.lot.table import ValveFolder, by_name
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.built_for import BuiltFor
@@ -84,7 +82,7 @@ def write_lot_firmware(
     fits = setting is not None and project_of(setting) == project
     compensator = setting if setting is not None and fits else designed[first]
     folder = output / LOT / FIRMWARE
-    firmware = generate(compensator, project.target, to_json_bytes(compensator), "block")
+    firmware = generate(compensator, project.target, "block")
     write_firmware(firmware, folder, over_another=True)
     return LotFirmware(
         folder=f"{LOT}/{FIRMWARE}",

@@ -9,7 +9,7 @@ from dzdesign.batch.arguments import BatchArguments
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.options import flag_of
-from dzdesign.report.lot.output_types import (
+from dzdesign.report.lot.summary import (
     DOES_NOT_HOLD,
     HOLDS,
     NOT_MADE,
@@ -18,7 +18,7 @@ from dzdesign.report.lot.output_types import (
     OutputVerdict,
     ValveOutput,
 )
-from dzdesign.report.lot.valve_folder import ValveFolder
+from dzdesign.report.lot.table import ValveFolder
 from dzdesign.stages.generate import chosen_of_outputs
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def make_output(wanted: WantedOutput, of: ForOutputs) -> ValveOutput:
 
     verdict: OutputVerdict = NOT_MADE
     try:
-        output = generate_output(of.compensator, wanted.target, wanted.settings, of.document)
+        output = generate_output(of.compensator, wanted.target, wanted.settings)
         write_folder(of.place / wanted.folder, output.contents, output.manifest)
         verdict = NOT_VERIFIED
         return _verified(wanted, of) if of.verify else _found(wanted, verdict)

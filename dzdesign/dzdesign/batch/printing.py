@@ -5,14 +5,13 @@ from pathlib import Path
 
 from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.report.lot.budget import lot_budget_lines
-from dzdesign.report.lot.outputs import output_lines
-from dzdesign.report.lot.setting_text import checked_line, cost_lines, span, untested_lines
-from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware, LotSummary
+from dzdesign.design.output_manifest import setting_words
+from dzdesign.report.lot.summary import LOT_SETTING, VALVES, LotFirmware, LotSummary
+from dzdesign.report.lot.words import checked_line, cost_lines, lot_budget_lines, span, untested_lines
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
 
-#: Valves of one warning that are named, and of those that hold the lot setting down.
-NAMED, BINDING_NAMED = 3, 5
+#: Valves that are named of one warning, of those that hold the lot setting down, and of an output.
+NAMED, BINDING_NAMED, OUTPUTS_NAMED = 3, 5, 20
 
 
 def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
@@ -27,7 +26,7 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
     put_table(console, table)
     for line in (*lot_budget_lines(summary.budget), *_setting_lines(summary)):
         put_line(console, line)
-    for line in output_lines(summary):
+    for line in _output_lines(summary):
         put_line(console, line)
     if summary.firmware:
         put_line(console, _firmware_line(summary.firmware, folder))
@@ -81,3 +80,19 @@ def _setting_lines(summary: LotSummary) -> list[str]:
         *untested_lines(setting, summary.recorded_units),
         *cost_lines(summary),
     ]
+
+
+def _output_lines(summary: LotSummary) -> list[str]:
+    """Return one sentence for each output, for the terminal."""
+    lines = []
+    for target, output in summary.outputs.items():
+        words = [f"made for {output.made} of {summary.valves} valves"]
+        words += [f"verified, and holds for {len(output.holds)}"] if summary.verified else ["not verified"]
+        words += [f"does not hold for {and_more(output.does_not_hold, OUTPUTS_NAMED)}"] if output.does_not_hold else []
+        words += [f"NOT VERIFIED for {and_more(output.not_verified, OUTPUTS_NAMED)}"] * bool(
+            summary.verified and output.not_verified
+        )
+        words += [f"not made for {and_more(output.not_made, OUTPUTS_NAMED)}"] if output.not_made else []
+        settings = "".join(f", {word}" for word in setting_words(output.settings))
+        lines.append(f"output {target}{settings}: {'; '.join(words)}; in {VALVES}/NAME/{output.folder}")
+    return lines

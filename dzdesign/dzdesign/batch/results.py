@@ -13,15 +13,16 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.folder import is_lot
-from dzdesign.report.lot.summary import FAILED, SUMMARY_NAME, LotSummary, UnfinishedLot
-from dzdesign.report.lot.valve_folder import (
+from dzdesign.report.lot.summary import (
+    FAILED,
     FIRMWARE,
+    SUMMARY_NAME,
     VALVES,
-    ValveFolder,
+    LotSummary,
+    UnfinishedLot,
     ValveManifest,
-    read_manifest,
-    read_valve_folder,
 )
+from dzdesign.report.lot.table import ValveFolder, read_manifest, read_valve_folder
 
 
 class Results:

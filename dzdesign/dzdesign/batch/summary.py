@@ -1,6 +1,7 @@
 """Content of batch.json: the result of a lot, from its table and its lot setting."""
 
 from collections.abc import Mapping, Sequence
+from statistics import median
 from typing import TYPE_CHECKING
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
@@ -9,32 +10,38 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits, common_units
 from dzdesign.core.worded import in_units
 from dzdesign.design.compensator import Compensator
-from dzdesign.report.compensator_sides import SIGNS
-from dzdesign.report.lot.budget import LotBudget
-from dzdesign.report.lot.output_types import LotOutput
+from dzdesign.identify.valve.model import SIDES
+from dzdesign.report.artefacts import laws_of
 from dzdesign.report.lot.spread import quantiles, spreads_of
 from dzdesign.report.lot.summary import (
+    OK,
+    VALVES,
     FailedValve,
+    LotBudget,
+    LotBudgetLine,
     LotFirmware,
+    LotOutput,
     LotSettingSummary,
     LotSummary,
     SettingOfOthers,
     SmallestMargin,
     UntestedPressures,
 )
-from dzdesign.report.lot.table import TableRow, column_of
-from dzdesign.report.lot.table_rows import extra_dead_zone
-from dzdesign.report.lot.valve_folder import VALVES
+from dzdesign.report.lot.table import column_of, extra_dead_zone
 
 if TYPE_CHECKING:
-    from dzdesign.design.lot.setting import LotSetting
+    from polars import DataFrame
+
+    from dzdesign.design.lot_setting import LotSetting
 
 SETTING_NAME = "lot_compensator.json"
+#: Of a number in mV and of a price in percent: finer than any error here.
+DIGITS = 5
 
 
 def lot_setting_of(designed: "Mapping[str, Compensator]") -> "tuple[LotSetting | None, str | None]":
     """Return the lot setting of the calibrated valves, by name; or why there is none."""
-    from dzdesign.design.lot.setting import lot_setting
+    from dzdesign.design.lot_setting import lot_setting
 
     try:
         return lot_setting(designed), None
@@ -48,7 +55,7 @@ def setting_files(setting: "LotSetting") -> dict[str, bytes]:
 
 
 def summary_of(
-    rows: Sequence[TableRow],
+    table: "DataFrame",
     *,
     files: Mapping[str, bytes],
     verified: bool,
@@ -67,24 +74,26 @@ def summary_of(
     setting and reason why there is none exactly one is given.
     """
     warnings: dict[str, list[str]] = {}
-    for row in rows:
-        for code in row.warnings:
-            warnings.setdefault(code, []).append(row.name)
+    for name, codes in table.select("name", "warnings").iter_rows():
+        for code in codes.split():
+            warnings.setdefault(code, []).append(name)
     return LotSummary(
         tool=THIS_TOOL,
         made_from=tuple(
             SourceFile(source=f"{VALVES}/{name}/{MANIFEST_NAME}", sha256=sha256_of(content))
             for name, content in made_from.items()
         ),
-        valves=len(rows),
+        valves=len(table),
         failed=tuple(
-            FailedValve(name=row.name, status=row.status, reason=row.reason) for row in rows if row.status != "ok"
+            FailedValve(name=name, status=status, reason=reason)
+            for name, status, reason in table.select("name", "status", "reason").iter_rows()
+            if status != OK
         ),
         verified=verified,
         warnings={code: tuple(names) for code, names in sorted(warnings.items())},
         anomalies=tuple(anomalies),
         files={name: sha256_of(content) for name, content in files.items()},
-        quantiles={spread.column: spread.at for spread in spreads_of(rows)},
+        quantiles={spread.column: spread.at for spread in spreads_of(table)},
         lot_setting=setting,
         why_no_lot_setting=why_no_setting,
         budget=budget,
@@ -108,7 +117,7 @@ def units_of_lot(designed: "Mapping[str, Compensator]") -> RecordedUnits:
 
 def setting_summary(setting: "LotSetting", designed: "Mapping[str, Compensator]") -> LotSettingSummary:
     """Return what batch.json says of the lot setting of these calibrated valves."""
-    from dzdesign.design.lot.pressures import lacking_in, without_narrow
+    from dzdesign.design.lot_valves import lacking_in, without_narrow
 
     lot = setting.compensator.lot
     lacking = lacking_in(lot)
@@ -161,7 +170,7 @@ def _without_binding(setting: "LotSetting", designed: "Mapping[str, Compensator]
     other, why_not = lot_setting_of(rest)
     if other is None:
         return SettingOfOthers(left_out=setting.binding, quantiles={}, why_not=why_not)
-    sides = {"": 1} if setting.compensator.negative is None else SIGNS
+    sides = {"": 1} if setting.compensator.negative is None else SIDES
     return SettingOfOthers(
         left_out=setting.binding,
         quantiles={
@@ -170,4 +179,31 @@ def _without_binding(setting: "LotSetting", designed: "Mapping[str, Compensator]
             )
             for side, sign in sides.items()
         },
+    )
+
+
+def lot_budget(designed: Mapping[str, Compensator]) -> LotBudget | None:
+    """Return the budgets of calibrated valves as one; None without a valve."""
+    if not designed:
+        return None
+    found: dict[tuple[str, str], list[tuple[str, float, float]]] = {}
+    for compensator in designed.values():
+        for name, law in laws_of(compensator).items():
+            for line in law.budget.lines if law.budget else ():
+                entry = (line.origin, max(line.contribution_mV), 100 * line.price)
+                found.setdefault((name, line.component), []).append(entry)
+    return LotBudget(
+        certified_of=tuple(sorted({each.certified_of for each in designed.values()})),
+        lines=tuple(
+            LotBudgetLine(
+                side=side,
+                component=component,
+                origin=tuple(dict.fromkeys(origin for origin, _, _ in entries)),
+                contribution_mV=round(max(mV for _, mV, _ in entries), DIGITS),
+                price_percent=tuple(  # type: ignore[arg-type]
+                    round(of([price for _, _, price in entries]), DIGITS) for of in (min, median, max)
+                ),
+            )
+            for (side, component), entries in found.items()
+        ),
     )

@@ -11,8 +11,7 @@ from pathlib import Path
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.identify.valve.test_record import checked_record
-from dzdesign.report.lot.table import RECORD
-from dzdesign.report.lot.valve_names import NAME, by_name
+from dzdesign.report.lot.table import NAME, RECORD, by_name
 from dzdesign.stages.recordings import expand
 
 #: What recordings are called in a valve's folder where no --pattern says so; notes and photographs may lie beside them.

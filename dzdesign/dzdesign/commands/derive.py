@@ -30,7 +30,7 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Re-derive the paper's equations; 1 if one of those printed is not found as a correct account finds it."""
     from dzdesign.derivation.account.account import STATEMENTS, verify_statements
-    from dzdesign.derivation.account.published import find_number_faults
+    from dzdesign.derivation.account.published import find_misprints
     from dzdesign.derivation.presentation.report import check_format, closure, render
 
     check_format(arguments.format)
@@ -39,7 +39,7 @@ def run(arguments: Arguments, json: bool) -> int:
     chosen = closure(STATEMENTS, texts_of(arguments.equation)) if arguments.equation else None
     with stage_progress("re-deriving the paper's equations"):
         verdicts = verify_statements()
-        misprints = find_number_faults(STATEMENTS, _text_of(arguments.paper))
+        misprints = find_misprints(_text_of(arguments.paper)) if arguments.paper else []
     text = render(verdicts, "json" if json else arguments.format, chosen, misprints)
     if arguments.output:
         write_file(Path(arguments.output), text)
@@ -49,9 +49,7 @@ def run(arguments: Arguments, json: bool) -> int:
     return 1 if misprints or any(chosen is None or verdict.number in chosen for verdict in wrong) else 0
 
 
-def _text_of(paper: AnyPath | None) -> str | None:
-    if paper is None:
-        return None
+def _text_of(paper: AnyPath) -> str:
     try:
         return read_bytes(Path(paper), "the paper").decode()
     except UnicodeDecodeError as error:

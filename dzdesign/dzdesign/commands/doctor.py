@@ -135,13 +135,13 @@ def _version(package: str) -> str | None:
 
 def _compiles() -> tuple[bool, str]:
     """Compile a tiny program and have it answer; return whether that works, and with what or why not."""
-    from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+    from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
     from dzdesign.verify.toolchain.host_compiler import host_compiler
 
     tripled = Function("dz_tiny", ("int32_t",), "int32_t")
     try:
         compiler = host_compiler()
-        answer = ConfinedLibrary({"tiny.c": TINY}, [tripled], "a tiny program").call(tripled.name, 14)
+        answer = CompiledLibrary({"tiny.c": TINY}, [tripled], "a tiny program").call(tripled.name, 14)
     except (DzdesignError, OSError) as error:
         return False, str(error)
     return (True, compiler) if answer == 42 else (False, f"{compiler}: its program counts 3 * 14 = {answer}")

@@ -10,21 +10,23 @@ from dzdesign.terminal.page import print_json
 from dzdesign.terminal.progress import say
 
 Arguments = ReportArguments
-EXAMPLES = ("dzdesign report demo", "dzdesign report evidence -o for_review.html")
+EXAMPLES = (
+    "dzdesign report evidence",
+    "dzdesign report evidence --firmware firmware -o for_review.html",
+    "dzdesign report calibrated",
+)
 
 
 def run(arguments: Arguments, json: bool) -> int:
-    """Make report.html; 1 if a requirement does not hold or was not checked, or the files do not belong together."""
+    """Make report.html; 1 if a requirement does not hold or was not checked."""
     output = arguments.output or _beside_evidence(Path(arguments.folder))
     made = report(replace(arguments, output=output))
     for line in made.missing:
         say(f"missing: {line}")
-    for line in made.faults:
-        say(f"does not fit: {line}")
     if json:
         verdict = {"holds": made.holds, "verdict": made.verdict}
         outputs = {"outputs": [asdict(each) for each in made.outputs.listed], "other_outputs": made.outputs.others}
-        print_json({"report": str(output), **verdict, "faults": made.faults, "missing": made.missing, **outputs})
+        print_json({"report": str(output), **verdict, "missing": made.missing, **outputs})
     else:
         print(made.verdict)
         print_outputs(made.outputs)
@@ -35,15 +37,15 @@ def run(arguments: Arguments, json: bool) -> int:
 def _beside_evidence(folder: Path) -> Path:
     """Return where `verify` leaves its report, or a place in the folder where there is no evidence.
 
-    Of an output it is a place beside it: a file that its manifest does not name would be taken for a change of it.
+    Of firmware and another output it is a place beside it: what its manifest does not name would be a change of it.
     """
-    from dzdesign.report.artefact_folder import VERIFICATION_NAME
+    from dzdesign.report.artefacts import EVIDENCE, root_of
     from dzdesign.report.valve_report import REPORT_NAME
-    from dzdesign.verify.outputs.folder import holds_output
+    from dzdesign.verify.evidence import Evidence
 
     if not folder.is_dir():
         raise InputError(f"'{folder}' is not a folder, expected one with artefacts of dzdesign; check the name")
-    for place in (folder, folder / "evidence"):
-        if (place / VERIFICATION_NAME).is_file():
+    for place in (folder, folder / EVIDENCE):
+        if (place / Evidence.FILE_NAME).is_file():
             return place / REPORT_NAME
-    return (folder.resolve().parent if holds_output(folder) else folder) / REPORT_NAME
+    return root_of(folder.resolve()) / REPORT_NAME

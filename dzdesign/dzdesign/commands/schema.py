@@ -22,7 +22,7 @@ SCHEMAS = {
     ),
     "assessment": ("dzdesign.assess.assessment:Assessment", "assessment.json", "assess"),
     "batch": ("dzdesign.report.lot.summary:LotSummary", "batch.json", "batch"),
-    "reproduction": ("dzdesign.report.reproduction:Reproduction", "reproduction.json", "reproduce"),
+    "reproduction": ("dzdesign.reproduce.artefact:Reproduction", "reproduction.json", "reproduce"),
     "derivation": (
         "dzdesign.derivation.presentation.content:DerivationReport", "derivation.json", "derive --format json"
     ),

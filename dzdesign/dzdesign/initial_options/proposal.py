@@ -136,7 +136,7 @@ def propose(
 
 def _negative_drop(valve: "ValveModel | None") -> dict[str, str]:
     """Return what the recordings show of the pressure drop at negative commands; nothing of one side."""
-    from dzdesign.design.pressure_inputs.negative_drop import shown_direction
+    from dzdesign.design.pressure_inputs import shown_direction
 
     if valve is None or len(valve.sides) < 2:
         return {}

@@ -2,8 +2,7 @@
 
 from typing import NamedTuple
 
-from dzdesign.derivation.account.published import DP0_MPA, LOAD_DP_MPA
-from dzdesign.derivation.account.readings import DROP_ASSUMED
+from dzdesign.derivation.account.published import DP0_MPA, DROP_ASSUMED, LOAD_DP_MPA
 
 #: Distance between the commands at which the valve opens and closes, V: that of the default plant, 1.5 % of full
 #: command. The paper shows opening branches only.

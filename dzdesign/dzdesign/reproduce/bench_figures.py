@@ -15,7 +15,7 @@ from dzdesign.derivation.account.published import (
     U_MAX_V,
 )
 from dzdesign.identify.plots.frame import finish
-from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.assumptions import OILS
 from dzdesign.reproduce.figure_parts import (
     BLACK,

@@ -12,7 +12,7 @@ from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes, read_ramp_file
-from dzdesign.report.reproduction import Hashes, ReproducedValve
+from dzdesign.reproduce.artefact import Hashes, ReproducedValve
 from dzdesign.reproduce.load_and_oil import LoadAndOil, run_load_and_oil
 from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.reproduce.valve_runs import PRESSURES_MPA, ValveRuns, run_valve
@@ -58,9 +58,9 @@ def run_chain(valve: RecoveredValve, say: Callable[[str], None] = lambda _: None
         )
         identified = identify(tests, options)
         valve_json = to_json_bytes(identified)
-        compensator = design(identified, valve_bytes=valve_json)
+        compensator = design(identified)
         compensator_json = to_json_bytes(compensator).decode()
-        firmware = generate(compensator, "host", compensator_json.encode())
+        firmware = generate(compensator, "host")
         write_folder(scratch / "firmware", firmware.contents, firmware.manifest)
         say(f"{name}: closed loop")
         loop = ClosedLoop(valve.plant, scratch / "firmware", compensator)

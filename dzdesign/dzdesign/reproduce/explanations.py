@@ -8,19 +8,20 @@ from dzdesign.derivation.account.published import (
     ABOUT_LARGEST_L_MIN,
     DP0_MPA,
     DP1_MPA,
+    DROP_ASSUMED,
     DUTY_COMMAND_V,
     DUTY_WITH_PERCENT,
     FIRST,
     LARGEST_CODE,
     LOAD_DP_MPA,
+    METER_ACCURACY_L_MIN,
     METER_FLOOR_L_MIN,
     SIMULATION,
     TEMPERATURE_CHANGE_PER_MILLE,
     U_MAX_V,
     PublishedValve,
 )
-from dzdesign.derivation.account.readings import DROP_ASSUMED, METER_ACCURACY_L_MIN
-from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.assumptions import OILS
 from dzdesign.reproduce.displacement_readings import DISPLACEMENT, half_digits_off
 from dzdesign.reproduce.offset_reading import offset_percent

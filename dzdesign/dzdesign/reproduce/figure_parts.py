@@ -7,7 +7,7 @@ import numpy as np
 
 from dzdesign.derivation.account.published import DP0_MPA, U_MAX_V
 from dzdesign.identify.plots.frame import finish, new_figure
-from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.recovered_valves import printed_at
 from dzdesign.reproduce.rows import Subject
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, PRODUCT, Drive, ValveRuns

@@ -9,13 +9,13 @@ from dzdesign.derivation.account.published import (
     DUTY_WITHOUT_PERCENT,
     LOAD_COMMANDS_V,
     LOAD_DP_MPA,
+    METER_ACCURACY_L_MIN,
     PWM_AMPLITUDE_V,
     PWM_KHZ,
     TEMPERATURE_CHANGE_PER_MILLE,
 )
-from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
-from dzdesign.report.reproduction import Driver, PaperNumber
 from dzdesign.reproduce import explanations
+from dzdesign.reproduce.artefact import Driver, PaperNumber
 from dzdesign.reproduce.load_and_oil import LoadAndOil
 from dzdesign.reproduce.rows import ONE_RECORD_PERCENT, Subject, around, row
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, ValveRuns, paper_duty_percent

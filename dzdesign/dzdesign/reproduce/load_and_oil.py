@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dzdesign.derivation.account.published import LOAD_COMMANDS_V, LOAD_DP_MPA, METER_FLOOR_L_MIN, RAMP_S, U_MAX_V
-from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.assumptions import LOADS_MPA, OILS
 from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, paper_drive, resting

@@ -9,9 +9,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product as combinations
 
-from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, U_MAX_V
-from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
-from dzdesign.report.reproduction import Driver, PaperNumber
+from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, METER_ACCURACY_L_MIN, U_MAX_V
+from dzdesign.reproduce.artefact import Driver, PaperNumber
 from dzdesign.reproduce.recovered_valves import RecoveredValve, at_rest, half_digit
 from dzdesign.reproduce.rows import OF_THE_LOOP, Reason, Subject, command_around, flow_around, row
 from dzdesign.reproduce.valve_runs import PAPER, PRESSURES_MPA, ValveRuns

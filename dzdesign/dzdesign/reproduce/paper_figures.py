@@ -9,7 +9,7 @@ from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, SATURATED_FR
 from dzdesign.derivation.law import law
 from dzdesign.identify.plots.frame import finish, saved
 from dzdesign.identify.plots.style import plot_style
-from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.bench_figures import effect_of_load, effect_of_oil, pulse
 from dzdesign.reproduce.figure_parts import (
     BLACK,

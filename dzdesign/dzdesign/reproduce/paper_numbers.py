@@ -6,13 +6,13 @@ from functools import partial
 from dzdesign.derivation.account.published import (
     ABOUT_LARGEST_L_MIN,
     DP0_MPA,
+    METER_ACCURACY_L_MIN,
     SATURATED_FROM_V,
     SECOND,
     U_MAX_V,
 )
-from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
-from dzdesign.report.reproduction import Driver, PaperNumber
 from dzdesign.reproduce import explanations
+from dzdesign.reproduce.artefact import Driver, PaperNumber
 from dzdesign.reproduce.displacement_readings import DISPLACEMENT, DISPLACEMENT_DEAD_ZONE
 from dzdesign.reproduce.first_valve_numbers import duty_cycles, of_section_4_3, of_the_pulse
 from dzdesign.reproduce.offset_reading import of_the_offset

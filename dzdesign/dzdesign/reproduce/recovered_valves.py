@@ -26,7 +26,7 @@ from dzdesign.derivation.account.published import (
     U_MAX_V,
     PublishedValve,
 )
-from dzdesign.report.reproduction import FittedFigure, Parameter
+from dzdesign.reproduce.artefact import FittedFigure, Parameter
 from dzdesign.verify.closed_loop.plant import L_MIN, MPA, Plant
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from dzdesign.core.artefact_files import TOOL, check_folder_may_be_written, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, schema_of, to_json_bytes
-from dzdesign.report.reproduction import Reproduction
+from dzdesign.reproduce.artefact import Reproduction
 from dzdesign.reproduce.assumptions import ASSUMPTIONS, HYSTERESIS_V
 from dzdesign.reproduce.chain import Chain, run_chain
 from dzdesign.reproduce.paper_figures import figure_files

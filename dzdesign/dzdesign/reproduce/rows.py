@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from dzdesign.derivation.account.published import U_MAX_V
-from dzdesign.derivation.account.readings import METER_ACCURACY_L_MIN
-from dzdesign.report.reproduction import Driver, Kind, Outcome, PaperNumber
+from dzdesign.derivation.account.published import METER_ACCURACY_L_MIN, U_MAX_V
+from dzdesign.reproduce.artefact import Driver, Kind, Outcome, PaperNumber
 from dzdesign.reproduce.load_and_oil import LoadAndOil
 from dzdesign.reproduce.recovered_valves import RecoveredValve, at_rest, half_digit
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRESSURES_MPA, PRODUCT, Drive, ValveRuns

@@ -9,7 +9,7 @@ import numpy as np
 from dzdesign.derivation.account.published import DP0_MPA, DP1_MPA, DUTY_COMMAND_V, RAMP_S, U_MAX_V, PublishedValve
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
-from dzdesign.report.reproduction import Driver
+from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, LoopRun, RampSequence

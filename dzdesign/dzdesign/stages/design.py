@@ -43,7 +43,7 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
         If an option can't be read, or concerns negative commands of a valve that has none.
     """
     from dzdesign.codegen.project import target_named
-    from dzdesign.design.option_texts import options_of
+    from dzdesign.design.options import options_of
 
     options = options_of({name: getattr(choices, name) or "" for name in DEFAULTS}, target_named(target).inputs())
     if options.signals.command.negative_full_code is not None:
@@ -98,7 +98,7 @@ def design(arguments: DesignArguments) -> "Compensator":
         compensator = design_valve(arguments.valve, options)
     else:
         content = read_bytes(Path(arguments.valve), "valve file")
-        compensator = design_valve(read_artefact(content, ValveModel, os.fspath(arguments.valve)), options, content)
+        compensator = design_valve(read_artefact(content, ValveModel, os.fspath(arguments.valve)), options)
     if arguments.output is not None:
         write_file(Path(arguments.output), to_json_bytes(compensator), SCHEMA)
     return compensator

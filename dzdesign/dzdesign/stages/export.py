@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dzdesign.codegen.amplifier.device import Device
     from dzdesign.codegen.amplifier.setting import AmplifierSetting
     from dzdesign.design.compensator import Compensator
-    from dzdesign.design.fixed.dead_zones import FixedDeadZone
+    from dzdesign.design.fixed_offset import FixedDeadZone
     from dzdesign.verify.requirements import Check
 
 
@@ -80,7 +80,7 @@ def export(arguments: ExportArguments) -> AmplifierExport:
     from dzdesign.codegen.amplifier.given import given_dp_MPa, given_threshold
     from dzdesign.codegen.amplifier.notes import notes_of
     from dzdesign.codegen.amplifier.setting import amplifier_setting
-    from dzdesign.design.fixed.dead_zones import dead_zones
+    from dzdesign.design.fixed_offset import dead_zones
 
     device = device_named(arguments.to)
     output = None if arguments.output is None else Path(arguments.output)

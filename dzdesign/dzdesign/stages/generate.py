@@ -113,8 +113,8 @@ def _firmware(arguments: GenerateArguments, target: str) -> "Firmware":
     form = form_named(arguments.calibration)
     settings_of(target, chosen_of_outputs(arguments))
     vectors: int = read_options(arguments, ["vectors"])["vectors"]
-    made, content, designed = _compensator(arguments, target)
-    firmware = generate_project(made, target if designed else arguments.target, content, form, vectors)
+    made, designed = _compensator(arguments, target)
+    firmware = generate_project(made, target if designed else arguments.target, form, vectors)
     if arguments.output is None:
         return firmware
     return write_firmware(firmware, Path(arguments.output), over_another=arguments.replace)
@@ -129,8 +129,8 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
     of_firmware = {name: getattr(arguments, name) for name in OF_FIRMWARE}
     given |= {name: str(value) for name, value in of_firmware.items() if value not in (None, 0, "0")}
     settings = settings_of(target, given)
-    made, content, _ = _compensator(arguments, DEFAULT_TARGET)
-    output = generate_output(made, target, settings, content)
+    made, _ = _compensator(arguments, DEFAULT_TARGET)
+    output = generate_output(made, target, settings)
     if arguments.output is None:
         return output
     return write_output(output, Path(arguments.output), over_another=arguments.replace)
@@ -157,8 +157,8 @@ def _plant_text(path: Path) -> str:
     return json.dumps({name: float(value) for name, value in asdict(read_plant(path, say)).items()})
 
 
-def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bytes | None, bool]":
-    """Return the compensator whose numbers follow, its file, None without one, and whether it was designed here."""
+def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensator, bool]":
+    """Return the compensator, and whether it was designed here."""
     from dzdesign.core.artefact_reading import read_artefact
     from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import Compensator
@@ -169,24 +169,24 @@ def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensato
 
     given = arguments.compensator
     if isinstance(given, Compensator):
-        return _proven(given, "the compensator", arguments), None, False
+        _refuse_other_choices(given, "the compensator", arguments)
+        return given, False
     source, content = os.fspath(given), read_bytes(Path(given), "compensator file")
     document = parse_document(content, source, (COMPENSATOR_SCHEMA, VALVE_SCHEMA))
     if document["schema"] == VALVE_SCHEMA:
         valve = read_artefact(content, ValveModel, source)
-        return design_valve(valve, design_options(arguments, target), content), None, True
+        return design_valve(valve, design_options(arguments, target)), True
     compensator = read_artefact(content, Compensator, source)
     refuse_without_options(compensator, source)
-    return _proven(compensator, f"'{source}'", arguments), content, False
+    _refuse_other_choices(compensator, f"'{source}'", arguments)
+    return compensator, False
 
 
-def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> "Compensator":
-    """Return a compensator whose numbers follow from its valve and options; refuse options that it was not given.
+def _refuse_other_choices(compensator: "Compensator", source: str, choices: DesignChoices) -> None:
+    """Refuse options that a compensator was not designed with.
 
     Its own may be given again, as by the options file of all commands.
     """
-    from dzdesign.design.redesign_check import prove_derived
-
     designed = compensator.options or {}
     for name in DEFAULTS:
         given = getattr(choices, name)
@@ -196,8 +196,3 @@ def _proven(compensator: "Compensator", source: str, choices: DesignChoices) -> 
                 f"{flag_of(name)} is {quoted(given)}, but {source} was designed {own}; leave the option out, or run "
                 "`dzdesign design` again"
             )
-    try:
-        prove_derived(compensator)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
-    return compensator

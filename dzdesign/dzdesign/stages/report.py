@@ -18,8 +18,10 @@ class ReportArguments:
     """Arguments of `report`."""
 
     folder: Annotated[AnyPath, Option("DIR")]
-    """Folder of demo, verify, codegen or batch, or a folder with valve.json or compensator.json."""
+    """Folder of verify, demo or batch, or a folder with valve.json or compensator.json."""
     _: KW_ONLY
+    firmware: Annotated[AnyPath | None, Option("DIR")] = None
+    """Firmware that the evidence is of (default: the folder beside the evidence, of the name that this states)."""
     output: Annotated[AnyPath | None, Option("FILE", short="-o")] = None
     """File to write (default of the command: report.html with the evidence, or in the folder)."""
     logo: Annotated[AnyPath | None, Option("IMAGE")] = None
@@ -37,11 +39,12 @@ def report(arguments: ReportArguments) -> "Report":
     Raises
     ------
     InputError
-        If there is nothing to report, or a file is not an artefact. A requirement that does not hold is not an error.
+        If there is nothing to report, a file is not an artefact, or one was changed. A requirement that does not hold
+        is not an error.
     """
-    from dzdesign.report.logo import logo_uri
     from dzdesign.report.lot.folder import is_lot, refuse_uncalibrated
     from dzdesign.report.lot.report import report_of_lot
+    from dzdesign.report.page import logo_uri
     from dzdesign.report.valve_report import report_of_folder
 
     folder = Path(arguments.folder)
@@ -50,7 +53,8 @@ def report(arguments: ReportArguments) -> "Report":
         made = report_of_lot(folder, logo)
     else:
         refuse_uncalibrated(folder)
-        made = report_of_folder(folder, logo)
+        firmware = None if arguments.firmware is None else Path(arguments.firmware)
+        made = report_of_folder(folder, logo, firmware)
     if arguments.output is not None:
         _write_report(Path(arguments.output), made.html)
     return made

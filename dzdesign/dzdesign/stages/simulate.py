@@ -79,7 +79,7 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     >>> list(ramps.files), ramps.manifest.simulated
     (['ramp_dP1.csv.gz'], True)
     """
-    from dzdesign.changed_code import code_of_firmware
+    from dzdesign.regeneration import generated_code
     from dzdesign.verify.closed_loop.plant import Plant, read_plant
     from dzdesign.verify.closed_loop.simulated_recordings import Bench, Series, simulated_files
 
@@ -95,7 +95,7 @@ def simulate(arguments: SimulateArguments) -> SimulatedRamps:
     firmware = Path(arguments.firmware) if arguments.firmware is not None else None
     dither = read["dither"] and read["dither"].of(AS_COMPUTED, plant.u_max_V)
     with (
-        nullcontext() if firmware is None else code_of_firmware(firmware, otherwise="") as code,
+        nullcontext() if firmware is None else generated_code(firmware) as code,
         stage_progress() as stage,
     ):
         files, manifest = simulated_files(

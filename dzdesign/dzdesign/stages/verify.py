@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dzdesign.codegen.project import Firmware
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.evidence import MutationScore
+    from dzdesign.verify.firmware.reproduced import Regenerated
     from dzdesign.verify.outputs.dispatch import OutputVerification
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
@@ -63,12 +64,9 @@ class VerifyArguments:
     mutate: Annotated[bool, Option(group=CHECKS)] = False
     """Insert a fault at every place of the C code, one at a time, and count the faults that are detected."""
     machine_code: Annotated[bool, Option(group=CHECKS)] = False
-    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr. FMUs run every
-    input in Wine and in QEMU."""
+    """Check machine code too. The Cortex-M4 runs every input in QEMU, and the AVR a sample in simavr."""
     proof: Annotated[bool, Option(group=CHECKS)] = False
     """Prove with Frama-C that nothing overflows a 16-bit int."""
-    run_changed: Annotated[bool, Option(group=CHECKS)] = False
-    """Compile and run changed code too. Give this option only for a folder that you trust."""
 
 
 def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
@@ -85,9 +83,7 @@ def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
     ------
     InputError
         If a file can't be read, or there is no C compiler. A requirement that does not hold is not an error: see
-        ``holds``.
-    RequirementError
-        If the folder's code differs from what this version generates from its compensator.json. It is then not run.
+        ``holds``. Code that was edited by hand is not run.
     """
     from dzdesign.verify.outputs.folder import holds_output
 
@@ -109,25 +105,26 @@ def verify_output_folder(
     folder: Path, arguments: VerifyArguments, identified: "ValveModel | None" = None
 ) -> "OutputVerification":
     """Verify an output other than a C firmware; `identified` is as in `verify_firmware`."""
-    from dzdesign.changed_code import code_of_output
-    from dzdesign.regeneration import output_again, output_regenerated
+    from dzdesign.codegen.integers.law import forms_of
+    from dzdesign.regeneration import regenerated
     from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.outputs.dispatch import SCHEMA, kind_for, output_evidence_files, verify_output
+    from dzdesign.verify.outputs.folder import read_output_manifest
     from dzdesign.verify.verification import evidence_manifest
 
     given = [flag_of(name) for name in OF_FIRMWARE if getattr(arguments, name)]
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
     recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
-    again = None
-    if kind_for(folder, given).runs:
-        with stage_progress("generating the output again"):
-            again = output_again(folder)
-    with code_of_output(folder, again, run_changed=arguments.run_changed) as code, stage_progress() as stage:
-        verification = verify_output(folder, given, stage, code)
-    added = [output_regenerated(folder, again)]
-    if recordings:
+    kind_for(folder, given)
+    with stage_progress("designing and generating again"):
+        again = regenerated(folder)
+    with again.written() as code, stage_progress() as stage:
+        forms = forms_of(read_compensator(folder), read_output_manifest(folder)) if again.files else {}
+        verification = verify_output(folder, given, stage, again, code, forms)
+    added: list[Check] = []
+    if recordings and verification.evidence.inputs:
         with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
             compensator = read_compensator(folder)
             added += [identified_again(compensator, recordings, identified), *inputs_again(compensator, recordings)]
@@ -141,30 +138,37 @@ def verify_output_folder(
 def _verify_firmware(
     folder: Path, arguments: VerifyArguments, plant_source: str = "", identified: "ValveModel | None" = None
 ) -> "Verification":
-    """Verify a C firmware, if its code may be run."""
-    from dzdesign.changed_code import code_of_firmware
+    """Verify a C firmware: what is compiled and run is the text that is generated here and now."""
+    from dzdesign.regeneration import regenerated
     from dzdesign.verify.verification import SCHEMA
 
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
-    with code_of_firmware(folder, run_changed=arguments.run_changed) as code:
-        return _verify_code(folder, code, arguments, plant_source, identified)
+    with stage_progress("designing and generating again"):
+        again = regenerated(folder)
+    with again.written() as code:
+        return _verify_code(folder, again, code, arguments, plant_source, identified)
 
 
 def _verify_code(
-    folder: Path, code: Path, arguments: VerifyArguments, plant_source: str, identified: "ValveModel | None"
+    folder: Path,
+    again: "Regenerated",
+    code: Path,
+    arguments: VerifyArguments,
+    plant_source: str,
+    identified: "ValveModel | None",
 ) -> "Verification":
     """Verify a C firmware whose code is compiled and run from a folder of its own."""
     from dzdesign.block_checks import blocks_checked, given_blocks
-    from dzdesign.regeneration import regenerated
     from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.tolerances import read_tolerances
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
     from dzdesign.verify.firmware.folder import read_compensator
+    from dzdesign.verify.requirements import REPRODUCED
     from dzdesign.verify.toolchain.compiled_core import core_answers
-    from dzdesign.verify.verification import evidence_files, evidence_manifest
+    from dzdesign.verify.verification import evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
     plant, digest = None, None
@@ -183,26 +187,26 @@ def _verify_code(
     with stage_progress() as stage:
         verification = verify_folder(
             folder, plant, plant_source, digest, tolerances=tolerances, backs_MPa=backs_MPa,
-            include=include, code=code, say=stage, watch=stage.each,
+            include=include, again=again, code=code, say=stage, watch=stage.each,
         )  # fmt: skip
-    if recordings:
+    tried = any(check.id != REPRODUCED.id for check in verification.evidence.checks)
+    if recordings and tried:
         with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
             compensator = read_compensator(folder)
             added.append(identified_again(compensator, recordings, identified))
             if verification.evidence.inputs:  # the core compiles and runs
                 added += inputs_again(compensator, recordings, partial(core_answers, code))
-    if blocks:
+    if blocks and tried:
         with stage_progress("comparing every input with each of the calibration blocks"):
             added += blocks_checked(folder, blocks, code)
-    more, mutants = _further_checks(arguments, code, verification)
-    verification = verification.with_checks(regenerated(folder), *added, *more)
+    more, mutants = _further_checks(arguments, code, verification) if tried else ([], None)
+    verification = verification.with_checks(*added, *more)
     if mutants:
         verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
     if arguments.output is not None:
         output = Path(arguments.output)
         manifest = evidence_manifest(verification.evidence)
-        files = with_report(evidence_files(verification), folder, output, verification.derived)
-        write_folder(output, files, manifest)
+        write_folder(output, with_report(verification, folder, output), manifest)
     return verification
 
 

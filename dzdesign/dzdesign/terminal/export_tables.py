@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from dzdesign.core.recorded_units import RecordedUnits
-    from dzdesign.design.fixed.dead_zones import FixedDeadZone
-    from dzdesign.design.fixed.fixed_offset import FixedOffset
+    from dzdesign.design.fixed_offset import FixedDeadZone, FixedOffset
     from dzdesign.stages.export import AmplifierExport
 
 BRANCHES = ("opening", "closing")

@@ -7,7 +7,7 @@ from dzdesign.terminal.page import new_console, put_line, put_rows
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from dzdesign.report.outputs.made_output import MadeOutputs
+    from dzdesign.report.page import MadeOutputs
 
 #: Digits of a hash that tell two outputs apart.
 SHORT = 12
@@ -24,7 +24,7 @@ def print_outputs(made: "MadeOutputs", console: "Console | None" = None) -> None
             {
                 "output": lambda each: each.kind,
                 "settings": lambda each: each.settings or "-",
-                "folder or file": lambda each: each.place,
+                "folder": lambda each: each.place,
                 "SHA-256": lambda each: each.sha256[:SHORT],
                 "check": lambda each: each.verdict,
                 "inputs": lambda each: str(each.inputs or "-"),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
 
 if TYPE_CHECKING:
-    from dzdesign.report.reproduction import PaperNumber, Reproduction
+    from dzdesign.reproduce.artefact import PaperNumber, Reproduction
 
 
 AGREES, MISSED, UNEXPLAINED = "agrees", "MISSED", "MISSED, NOBODY KNOWS WHY"

@@ -230,7 +230,7 @@ def print_compensator(compensator: "Compensator", console: "Console | None" = No
     """Print the law, the certificate, what the choices cost and where it ends."""
     from dzdesign.derivation.law import law
     from dzdesign.design.costs import design_warnings, lines_of_tests
-    from dzdesign.design.signal_descriptions import signals_in_words
+    from dzdesign.design.pressure_inputs import signals_in_words
     from dzdesign.design.signals import SIDE_NAMES
     from dzdesign.terminal.budget_table import print_budgets
     from dzdesign.terminal.cost_table import print_costs_at_tests

@@ -5,21 +5,22 @@ engine; only figures and formulas, made here, are markup.
 """
 
 import re
+from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dzdesign.core.artefact_files import TOOL
+from dzdesign.core.artefact_files import TOOL, read_bytes
+from dzdesign.core.errors import InputError
 from dzdesign.core.strict_templates import strict_templates
+from dzdesign.core.verdicts import verdict_words
 from dzdesign.derivation.presentation.writers import anchor
-from dzdesign.report.figures.figure import PALETTE, ReportFigure, data_uri
-from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
-from dzdesign.report.sections.cells import Table
+from dzdesign.report.cells import Table
+from dzdesign.report.figure import PALETTE, ReportFigure, data_uri
 
 if TYPE_CHECKING:
     import markupsafe
-
-    from dzdesign.report.sections.law import LawAccount
 
 #: Characters of an English word; what is longer is a name or a hash.
 LONGEST_WORD = 18
@@ -27,6 +28,11 @@ LONGEST_WORD = 18
 OPTION, COMMAND = r"(?<![\w-])--[a-z][\w-]*", r"`([^`<>\s][^`<>]*)`"
 #: Kind of a verdict -> the sign before it.
 SIGNS = {"good": "✓", "bad": "✗", "open": "?"}
+#: First bytes of a format -> its media type. SVG is none of them: it can hold scripts and addresses.
+SIGNATURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"GIF87a": "image/gif",
+              b"GIF89a": "image/gif"}  # fmt: skip
+#: Bytes of a logo: a page is sent by mail.
+LARGEST_LOGO = 512 * 1024
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,11 +61,6 @@ class Headline:
     def holds(self) -> bool | None:
         """None where something was not checked, or is not there."""
         return False if self.some_failed else {"good": True, "bad": False}.get(self.kind)
-
-
-def misfit(faults: tuple[str, ...]) -> Headline:
-    """Return the verdict on files of which some are not what the others were made from."""
-    return Headline(kind="bad", text="THE FILES DO NOT BELONG TOGETHER. No verdict stands.", reasons=faults)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +110,7 @@ class Page:
     template: str
     sections: Mapping[str, Section]
     missing: Sequence[str] = ()
-    law: "LawAccount | None" = None
+    law: object | None = None
     record: Sequence[tuple[str, str]] = ()
     lot: Sequence[Figure] = ()
     carrier: str = ""
@@ -117,6 +118,50 @@ class Page:
     subtitle: str = ""
     lead: ReportFigure | None = None
     logo: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MadeOutput:
+    """One output of the compensator that a report is of."""
+
+    #: "C firmware", or the target of another output.
+    kind: str
+    #: What was chosen of it, in words; empty if nothing is to be chosen.
+    settings: str
+    #: Folder, below the folder of the report.
+    place: str
+    #: SHA-256 of its manifest.json.
+    sha256: str
+    #: What evidence about these bytes says; None without such evidence, or where a requirement was not checked.
+    holds: bool | None = None
+    #: How many inputs were compared with the exact law.
+    inputs: int = 0
+    #: Where that evidence stands; empty without one.
+    evidence: str = ""
+    #: Which requirement does not hold, or was not checked.
+    fault: str = ""
+    #: What differs from the manifest: the files are no longer those that were generated.
+    changed: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """In words, as the terminal prints it."""
+        if self.changed:
+            return "CHANGED"
+        return verdict_words(self.holds) if self.evidence or self.holds is not None else "NOT VERIFIED"
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether nobody should use it: it was changed, or its evidence says that it does not hold."""
+        return bool(self.changed) or self.holds is False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MadeOutputs:
+    """The outputs of one compensator in a folder; `others` are sentences on those that were not listed."""
+
+    listed: tuple[MadeOutput, ...] = ()
+    others: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,8 +178,8 @@ class Report:
         Verdict; None if something was not checked, or is missing.
     verdict : str
         Verdict in words.
-    faults, missing : tuple of str
-        What is inconsistent, and what is missing.
+    missing : tuple of str
+        What is missing, and which command makes it.
     outputs : MadeOutputs
         For the report of a valve: the outputs made from its compensator.
     """
@@ -143,17 +188,15 @@ class Report:
     kind: str
     holds: bool | None
     verdict: str
-    faults: tuple[str, ...]
     missing: tuple[str, ...]
-    outputs: MadeOutputs = NO_OUTPUTS
+    outputs: MadeOutputs = MadeOutputs()
 
 
-def report_of(page: Page, faults: tuple[str, ...]) -> Report:
-    """Return the finished report of a page; `faults` name the files that do not fit."""
+def report_of(page: Page) -> Report:
+    """Return the finished report of a page."""
     verdict = page.verdict
     return Report(
-        html=render(page), kind=verdict.kind, holds=verdict.holds, verdict=verdict.text, faults=faults,
-        missing=tuple(page.missing),
+        html=render(page), kind=verdict.kind, holds=verdict.holds, verdict=verdict.text, missing=tuple(page.missing)
     )  # fmt: skip
 
 
@@ -211,3 +254,22 @@ def _cell(text: str) -> "markupsafe.Markup":
         Markup('<span class="breaks">{}</span>').format(broken(word)) if len(word) > LONGEST_WORD else escape(word)
         for word in re.split(r"(\s+)", text)
     )
+
+
+def logo_uri(path: Path) -> str:
+    """Return a logo as a data: address.
+
+    Raises
+    ------
+    InputError
+        If it can't be read, is too large, or is no PNG, JPEG or GIF.
+    """
+    content = read_bytes(path, "logo")
+    if len(content) > LARGEST_LOGO:
+        raise InputError(f"--logo '{path}' has {len(content)} bytes, expected at most {LARGEST_LOGO}; scale it down")
+    kind = next((kind for start, kind in SIGNATURES.items() if content.startswith(start)), None)
+    if kind is None:
+        raise InputError(
+            f"--logo '{path}' is no PNG, JPEG or GIF, expected one of these; SVG can hold scripts: save it as PNG"
+        )
+    return f"data:{kind};base64,{b64encode(content).decode()}"

@@ -1,32 +1,34 @@
 """What the report leads with: the verdict, and the few numbers that matter."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.limits import LIMITED
+from dzdesign.assess.options import Set
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED, verdict_words
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.words import reach_of_certificate
+from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.chain import Chain
-from dzdesign.report.characteristic.curves import BRANCHES, ORIGIN_WORDS
-from dzdesign.report.characteristic.quantities import CharacteristicQuantities
-from dzdesign.report.compensator_sides import laws_of
-from dzdesign.report.measured_figures import measured_figures, with_span
-from dzdesign.report.page import Figure, Headline, misfit
-from dzdesign.report.sections.cells import counted, whole
-from dzdesign.report.unrequired_flow import unrequired_flow
+from dzdesign.report.artefacts import Chain, laws_of
+from dzdesign.report.cells import counted, whole
+from dzdesign.report.page import Figure, Headline
+from dzdesign.report.sections.curves import BRANCHES, ORIGIN_WORDS, origin_of
+from dzdesign.report.sections.quantities import CharacteristicQuantities
+from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
+from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
+from dzdesign.verify.closed_loop.loop_checks import in_which_runs
 from dzdesign.verify.evidence import Evidence, InputCheck
-from dzdesign.verify.loop_results import PressureResult
+from dzdesign.verify.loop_results import PressureResult, ScenarioResult
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.untried import not_tried
 
 
 def headline(chain: Chain) -> Headline:
     """Return the verdict on a chain: good only if every requirement was checked and holds, and every file fits."""
-    evidence, judged = None if chain.faults else chain.evidence, _verdict(chain)
+    evidence, judged = chain.evidence, _verdict(chain)
     # Under a verdict that is bad nobody takes all for harmless, and what is missed needs the place.
     return replace(
         judged,
@@ -53,8 +55,6 @@ def _cautions(chain: Chain) -> Iterator[str]:
 
 def _verdict(chain: Chain) -> Headline:
     evidence = chain.evidence
-    if chain.faults:
-        return misfit(chain.faults)
     if evidence is None:
         if missed := [check for check in _limits(chain) if check.holds is not True]:
             count = len(_limits(chain))
@@ -67,8 +67,7 @@ def _verdict(chain: Chain) -> Headline:
     judged = _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
     if judged.kind != "good":
         return judged
-    absent = "" if chain.firmware else "the firmware that was verified is not here"
-    return replace(judged, text="; ".join(filter(None, [judged.text, evidence.reservation, absent])))
+    return replace(judged, text="; ".join(filter(None, [judged.text, evidence.reservation])))
 
 
 def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headline:
@@ -274,3 +273,129 @@ def _inputs(evidence: Evidence) -> Figure:
         )
     note = f"{pairs}; on each, the C code gives what the law does"
     return Figure(label="Inputs checked", value=whole(every), note=note)
+
+
+def measured_figures(assessment: Assessment | None) -> tuple[Figure, ...]:
+    """Return the measured numbers that matter; none without recordings of the compensated valve."""
+    after = [item for item in assessment.pressures if item.after] if assessment else []
+    if not after or assessment is None:
+        return ()
+    of = "measured" if origin_of(assessment) == "recorded" else "simulated recordings"
+    found = [_measured_dead_zone(after, branch, of) for branch in BRANCHES]
+    return (*(each for each in found if each), *_measured_at_zero(after, assessment, of))
+
+
+def with_span(driven: Sequence[float]) -> str:
+    """Return from where to where the values with the compensator run, where the ends read differently; %."""
+    ends = dict.fromkeys(f"{end:.1f}" for end in (min(driven), max(driven)))
+    return f". With: {' to '.join(ends)} %" if len(ends) > 1 else ""
+
+
+def _measured_dead_zone(items: Sequence[PressureAssessment], branch: str, of: str) -> Figure | None:
+    """Return the dead zone before and after: at the onset where the meter shows it, else at the reading flow."""
+    for key, where in ((f"onset_{branch}", "at the onset of flow"), (f"dead_zone_{branch}", "at the reading flow")):
+        driven = _values(items, key, "after")
+        if len(driven) == len(items):
+            bare = _values(items, key, "before")
+            both = f"{max(bare):.1f} % → {max(driven):.1f} %" if bare else f"{max(driven):.1f} %"
+            sets = "without → with" if bare else "with the compensator"
+            return Figure(
+                label=f"Dead zone on {branch}, {of}",
+                value=both,
+                note=f"of command {where}, {sets}; the worst of {_places(items)}{with_span(driven)}",
+            )
+    return None
+
+
+def _measured_at_zero(items: Sequence[PressureAssessment], assessment: Assessment, of: str) -> Sequence[Figure]:
+    """Return the largest flow at zero command, or its bound where the meter shows none."""
+    found = [reading for item in items if (reading := item.readings("after").get("flow_at_zero"))]
+    flows = [each.value for each in found if each.value is not None]
+    bounds = [each.at_most for each in found if each.value is None and each.at_most is not None]
+    if not flows and not bounds:
+        return ()
+    units, worst, unseen = assessment.recorded_units, max(flows, key=abs, default=0.0), max(bounds, default=0.0)
+    hidden = unseen > abs(worst)
+    limited = [limit for limit in assessment.limits if limit.quantity == "flow_at_zero"]
+    return (
+        Figure(
+            label=f"Flow at zero command, {of}",
+            value=f"≤ {units.text(unseen, '.2f L/min')}" if hidden else units.text(worst, ".2g L/min"),
+            note=("with the compensator, after closing: the meter shows none, and nothing below that" if hidden
+                  else "with the compensator, after closing") + f"; the largest of {_places(items)}",
+            kind="bad" if any(limit.holds is False for limit in limited) else "text",
+        ),
+    )
+
+
+def _places(items: Sequence[PressureAssessment]) -> str:
+    counts = Counter(item.side for item in items)
+    if len(counts) > 1 and len(set(counts.values())) == 1:
+        return f"{counted(len(items) // len(counts), 'pressure drop')} on each side"
+    return counted(len(items), "pressure drop") + (" and sides" if len(counts) > 1 else "")
+
+
+def _values(items: Sequence[PressureAssessment], key: str, name: Set) -> list[float]:
+    found = [item.readings(name).get(key) for item in items]
+    return [each.value for each in found if each is not None and each.value is not None]
+
+
+#: What a scenario measures whose flow is that of a command that was never taken away.
+OF_A_COMMAND = "flow_after_zero_command_L_min"
+#: What a machine is declared by; the caution beside it says that none was.
+DECLARE = "Declare the machine to `design`: `--coil-temperature` with `--supply`, `--amplifier` or `--drive current`."
+
+
+def unrequired_flow(evidence: Evidence, units: RecordedUnits) -> str:
+    """Say how much passes at zero command at most, in the scenarios in which no flow is not required; empty if none.
+
+    A flow that the recordings do not show is none here: the card of the flow at zero command has its bound.
+    """
+    passing = [each for each in evidence.scenarios if not each.must_shut and _is_seen(each)]
+    if not passing:
+        return ""
+    most = max(passing, key=lambda one: one.q_zero_L_min)
+    flow = units.text(most.q_zero_L_min, ".3g L/min")
+    remedy = DECLARE if most.not_required == NOT_DECLARED else f"Reason: {most.not_required}."
+    return (
+        f"Not required, and not harmless: up to {flow} at zero command "
+        f"({most.name}{in_which_runs(most, passing, units)}). {remedy}"
+    )
+
+
+def _is_seen(scenario: ScenarioResult) -> bool:
+    """Return whether flow passes at zero command, beyond what may and what the recordings hide."""
+    shown = scenario.q_zero_L_min >= (scenario.unseen_below_L_min or 0.0)
+    return shown and scenario.q_beyond_L_min > NO_FLOW_L_MIN and OF_A_COMMAND not in scenario.figures
+
+
+#: How a record may name them, in the words of those who keep one; case, dashes and blanks do not count.
+SERIAL = (
+    "serial", "serial number", "serial no", "serial no.", "s/n", "sn", "seriennummer", "serien nr", "serien nr.",
+    "fabrik nr", "fabrik nr.",
+)  # fmt: skip
+TYPE = (
+    "type", "valve type", "valve", "model", "part number", "part no", "part no.", "typ", "ventiltyp", "ventil",
+    "type code", "typschluessel", "typschlüssel",
+)  # fmt: skip
+
+
+def valve_name(record: Mapping[str, str]) -> str:
+    """Return the valve's type and serial number, as far as the record has them; empty if it has neither.
+
+    Examples
+    --------
+    >>> valve_name({"Serial-No": "4711", "type": "4WRA 10"}), valve_name({"oil": "HLP 46"})
+    ('4WRA 10, serial number 4711', '')
+    >>> valve_name({"S/N": "4711"}), valve_name({"valve": "bench example"})
+    ('Valve, serial number 4711', 'Valve: bench example')
+    """
+    serial, kind = (_first(record, names) for names in (SERIAL, TYPE))
+    if serial:
+        return f"{kind or 'Valve'}, serial number {serial}"
+    return f"Valve: {kind}" if kind else ""
+
+
+def _first(record: Mapping[str, str], names: tuple[str, ...]) -> str:
+    known = {" ".join(name.lower().replace("-", " ").replace("_", " ").split()): text for name, text in record.items()}
+    return next((known[name] for name in names if name in known), "")

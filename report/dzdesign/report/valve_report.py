@@ -1,82 +1,53 @@
 """report.html: one page, from the verdict to the hashes, of whatever artefacts there are."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.artefact_types import schema_of
-from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.words import not_counted
-from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.artefact_chain import chain_of
-from dzdesign.report.artefact_folder import asked_prefixes, is_of, read_artefact_folder
-from dzdesign.report.chain import Chain
-from dzdesign.report.characteristic.curves import characteristic_curves
-from dzdesign.report.characteristic.quantities import characteristic_quantities
-from dzdesign.report.figures.characteristic import characteristic_figure
-from dzdesign.report.figures.figure import figure_style
-from dzdesign.report.outputs.folder_outputs import outputs_of_folder
-from dzdesign.report.outputs.made_output import NO_OUTPUTS, MadeOutputs
-from dzdesign.report.outputs.section import outputs_sections, with_outputs
-from dzdesign.report.page import Page, Report, Section, report_of
-from dzdesign.report.sections.acceptance import acceptance_section
+from dzdesign.design.machine.accounting import not_counted
+from dzdesign.report.artefacts import Chain, chain_of_evidence, read_chain
+from dzdesign.report.figure import figure_style
+from dzdesign.report.outputs import outputs_in, outputs_sections, with_outputs
+from dzdesign.report.page import MadeOutputs, Page, Report, Section, report_of
 from dzdesign.report.sections.budget import budget_section
-from dzdesign.report.sections.characteristic import characteristic_section
-from dzdesign.report.sections.compensator import integers_section, law_section
+from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
+from dzdesign.report.sections.closed_loop import loop_section
 from dzdesign.report.sections.conditions import conditions_section
-from dzdesign.report.sections.evidence import checks_section, inputs_section, loop_section
-from dzdesign.report.sections.law import account_of
+from dzdesign.report.sections.curves import characteristic_curves
+from dzdesign.report.sections.inputs import inputs_section
+from dzdesign.report.sections.law import account_of, integers_section, law_section
 from dzdesign.report.sections.lot_setting import carrier_of, lot_figures, lot_section
-from dzdesign.report.sections.provenance import provenance_section, warnings_section
-from dzdesign.report.sections.remaining import remaining_section
+from dzdesign.report.sections.provenance import (
+    checks_section,
+    provenance_section,
+    remaining_section,
+    warnings_section,
+)
+from dzdesign.report.sections.quantities import characteristic_quantities
 from dzdesign.report.sections.valve import valve_sections
-from dzdesign.report.summary import headline, key_figures
-from dzdesign.report.valve_name import valve_name
+from dzdesign.report.summary import headline, key_figures, valve_name
+from dzdesign.verify.verification import Verification, evidence_files
 
 REPORT_NAME = "report.html"
+NO_OUTPUTS = MadeOutputs()
 #: Of a lot setting, these are of the one valve that its file holds.
 OF_A_VALVE = ("characteristic", "conditions", "data", "thresholds", "beta", "remaining", "budget", "loop")
 
 
-def report_of_folder(folder: Path, logo: str = "") -> Report:
-    """Make the report of an artefact folder: of demo, evidence or firmware, or with valve.json or compensator.json.
+def report_of_folder(folder: Path, logo: str = "", firmware: Path | None = None) -> Report:
+    """Make the report of an artefact folder: of evidence, of demo, or with valve.json or compensator.json.
 
-    `logo` is a data: address.
+    `logo` is a data: address, `firmware` the folder that the evidence is of where that does not lie beside it.
     """
-    chain = chain_of(read_artefact_folder(folder), asked=asked_prefixes(folder))
+    chain = read_chain(Path(folder), firmware)
     made_of = chain.places.get("compensator")
-    outputs = outputs_of_folder(folder, made_of.sha256) if made_of else NO_OUTPUTS
+    outputs = outputs_in(chain.root, made_of.sha256) if chain.root and made_of else NO_OUTPUTS
     return make_report(chain, outputs, logo)
 
 
-def with_report(
-    files: Mapping[str, str | bytes], firmware: Path, output: Path, derived: Compensator | None = None
-) -> dict[str, str | bytes]:
-    """Return the files of an evidence folder, not written yet, with the report of what `verify` used alone.
-
-    Its verdict is the evidence's own. Files that lie about, an assessment or a stranger's valve.json, have no part in
-    it; `dzdesign report` looks at them. The valve.json that the firmware was made from is looked for around it. The
-    firmware's compensator that `verify` has read and `derived` again is not read again.
-    """
-    name, place = Path(output).resolve().name, Path(firmware).resolve().name
-    if name == place:  # in two folders of one name
-        name = f"{name} (evidence)"
-    new = {
-        f"{name}/{file}": content.encode(errors="replace") if isinstance(content, str) else content
-        for file, content in files.items()
-    }
-    around = read_artefact_folder(firmware)
-    compensator = around.get(f"{place}/compensator.json")
-    used = {
-        file: content
-        for file, content in around.items()
-        if not file.startswith(f"{name}/")
-        and (file.startswith(f"{place}/") or content == compensator or is_of(content, schema_of(ValveModel)))
-    }
-    known = {sha256_of(compensator): derived} if compensator and derived else {}
-    chain = chain_of(new | used, asked=(f"{name}/", f"{place}/"), sealed=False, known=known)
-    return {**files, REPORT_NAME: make_report(chain).html}
+def with_report(verification: Verification, firmware: Path, output: Path) -> dict[str, bytes]:
+    """Return the files of an evidence folder, to be written into `output`, with the report of what was verified."""
+    chain = chain_of_evidence(verification.evidence, verification.curves, output, firmware)
+    return {**evidence_files(verification), REPORT_NAME: make_report(chain).html.encode()}
 
 
 def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "") -> Report:
@@ -118,7 +89,7 @@ def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "")
         not_counted=not_counted(compensator),
         law=account_of(compensator.law) if compensator else None,
     )
-    return replace(report_of(page, chain.faults), outputs=outputs)
+    return replace(report_of(page), outputs=outputs)
 
 
 def _sections(chain: Chain) -> dict[str, Section]:
@@ -135,8 +106,6 @@ def _sections(chain: Chain) -> dict[str, Section]:
         "warnings": warnings_section(chain.valve, compensator),
         "provenance": provenance_section(chain),
     }
-    if acceptance := acceptance_section(chain.assessment, chain.reproduction):
-        sections["acceptance"] = acceptance
     if compensator:
         sections["remaining"] = remaining_section(compensator)
     if compensator and compensator.lot:

@@ -15,7 +15,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.fixed.dead_zones import dead_zones
+from dzdesign.design.fixed_offset import dead_zones
 from tests.support.amplifier_readers import StatedBound, dead_zone, over_compensated, read_file
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 

@@ -16,8 +16,6 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 
-#: Without the proof of the compensator's numbers, which takes a second.
-UNPROVEN = ("dzdesign.design.redesign_check.prove_derived", lambda compensator: None)
 BESIDE = {"dead_zones.csv", "compensator.json"}
 
 
@@ -29,7 +27,6 @@ def compensator():
 @pytest.fixture
 def here(tmp_path, monkeypatch, compensator):
     """A folder with a compensator.json."""
-    monkeypatch.setattr(*UNPROVEN)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "compensator.json").write_bytes(to_json_bytes(compensator))
     return tmp_path

@@ -9,7 +9,6 @@ import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from tests.support.golden_firmware import FULL, golden_compensator
 from tests.support.synthetic import needs_compiler
 
@@ -19,7 +18,7 @@ MEMBERS = re.compile(r"^    (u?int\d+_t) (\w+);", re.MULTILINE)
 
 def firmware(target, form, folder):
     compensator = golden_compensator(target, FULL)
-    made = generate(compensator, target, to_json_bytes(compensator), form)
+    made = generate(compensator, target, form)
     write_folder(folder, made.contents, made.manifest)
     return folder
 

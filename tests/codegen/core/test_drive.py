@@ -126,7 +126,7 @@ SETS = (
 @cache
 def compensator_named(name: str) -> Compensator:
     content = (FULL / "valve.json").read_bytes()
-    return design(read_artefact(content, ValveModel, "valve.json"), options_named(name), content)
+    return design(read_artefact(content, ValveModel, "valve.json"), options_named(name))
 
 
 def first_difference(firmware, model: DriveModel, samples: list[tuple[int, int, int]]) -> str:

@@ -11,8 +11,7 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.exhaustive.exact_drive import DriveModel
 from dzdesign.verify.exhaustive.fault_model import memories, tried_commands, tried_pressures

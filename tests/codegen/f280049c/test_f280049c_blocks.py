@@ -16,7 +16,6 @@ from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.f280049c.target import TARGET
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_reading import read_artefact
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.signals import Signals
@@ -64,7 +63,7 @@ class Firmware:
     """The generated firmware of a form, all of it compiled with the model; in block form with its block."""
 
     def __init__(self, folder: Path, made: Compensator, calibration: str, edit: tuple[str, str, str] = ("", "", "")):
-        firmware = generate(made, "f280049c", to_json_bytes(made), calibration)
+        firmware = generate(made, "f280049c", calibration)
         self.linked, self._folder = firmware.block, folder
         folder.mkdir()
         for path, text in firmware.files.items():

@@ -8,8 +8,9 @@ from zipfile import ZipFile
 
 import pytest
 
-from dzdesign.codegen.fmu import binaries, files
-from dzdesign.codegen.fmu.archive import archive
+from dzdesign.codegen.fmu import files
+from dzdesign.codegen.fmu.description import UNITS
+from dzdesign.codegen.fmu.files import archive
 from dzdesign.codegen.fmu.plant import PARAMETERS
 from dzdesign.codegen.other_targets import generate_output
 from dzdesign.core.errors import InputError
@@ -22,7 +23,7 @@ from tests.support.host_fmus import PLANT, fmus_of, full_compensator, host_platf
 @pytest.fixture
 def one_binary(monkeypatch):
     """Make FMUs with this machine's binary alone."""
-    monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
+    monkeypatch.setattr(files, "PLATFORMS", host_platforms())
 
 
 @pytest.fixture
@@ -181,29 +182,29 @@ def test_a_plant_behind_a_current_controller_is_refused(no_binary, monkeypatch):
 
 
 def test_without_ziglang_it_is_said_how_to_install_it(monkeypatch):
-    monkeypatch.setattr(binaries, "find_spec", lambda name: None)
-    binaries._version.cache_clear()
+    monkeypatch.setattr(files, "find_spec", lambda name: None)
+    files.made_with.cache_clear()
     try:
         with pytest.raises(InputError, match="pip install"):
             fmus_of(full_compensator(), None)
     finally:
-        binaries._version.cache_clear()
+        files.made_with.cache_clear()
 
 
 def test_a_ziglang_that_is_too_old_is_refused(monkeypatch):
-    monkeypatch.setattr(binaries, "version", lambda name: "0.13.0")
-    binaries._version.cache_clear()
+    monkeypatch.setattr(files, "version", lambda name: "0.13.0")
+    files.made_with.cache_clear()
     try:
         with pytest.raises(InputError, match=r"0\.13\.0 .* expected 0\.17"):
             fmus_of(full_compensator(), None)
     finally:
-        binaries._version.cache_clear()
+        files.made_with.cache_clear()
 
 
 def test_c_that_does_not_compile_is_named_with_the_platform(monkeypatch):
-    monkeypatch.setattr(binaries, "PLATFORMS", host_platforms())
+    monkeypatch.setattr(files, "PLATFORMS", host_platforms())
     with pytest.raises(InputError, match="can't compile"):
-        binaries.binaries_of("dz_wrong", {"dz_fmu.c": b"int x = ;"})
+        files.binaries_of("dz_wrong", {"dz_fmu.c": b"int x = ;"})
 
 
 def test_a_plant_is_of_the_target_fmu_alone(example_compensator, example_folder, tmp_path):
@@ -215,15 +216,31 @@ def test_a_plant_is_of_the_target_fmu_alone(example_compensator, example_folder,
     assert not (tmp_path / "made").exists()
 
 
-@pytest.mark.slow
-def test_binaries_of_every_platform_need_no_library(tmp_path):
-    from dzdesign.verify.fmu.descriptions import file_faults, library_faults
-    from dzdesign.verify.fmu.fmu_file import read_fmu
+def test_a_name_that_nothing_defines_is_refused(monkeypatch):
+    """So no binary needs a library."""
+    monkeypatch.setattr(files, "PLATFORMS", [each for each in files.PLATFORMS if each.folder in ("linux64", "win64")])
+    with pytest.raises(InputError, match="sin"):
+        files.binaries_of("dz_wrong", {"dz_fmu.c": b"double sin(double); double x(double y) { return sin(y); }"})
 
-    compensator = golden_compensator("host")
-    output = fmus_of(compensator, None)
-    path = tmp_path / "dz_compensator.fmu"
-    path.write_bytes(output.files[path.name])
-    fmu = read_fmu(path)
-    assert not list(library_faults(fmu))
-    assert not list(file_faults(fmu, compensator, output.manifest.origin.compensator_json))
+
+@pytest.mark.slow
+def test_binaries_of_every_platform_are_valid_for_fmpy(tmp_path):
+    from fmpy.validation import validate_fmu
+
+    made = fmus_of(golden_compensator("host"))
+    for name in ("dz_compensator.fmu", "dz_plant.fmu"):
+        (tmp_path / name).write_bytes(made.files[name])
+        assert validate_fmu(str(tmp_path / name)) == []
+        binaries = {path.split("/")[1] for path in opened(made.files[name]) if path.startswith("binaries/")}
+        assert binaries == {"linux64", "win64", "darwin64", "aarch64-linux", "aarch64-darwin"}
+
+
+def test_units_are_those_of_pint():
+    from pint import UnitRegistry
+
+    base = {"kilogram": "kg", "meter": "m", "second": "s", "ampere": "A"}
+    for name, (factor, exponents) in UNITS.items():
+        text = name.replace("m3", "m**3").replace("^", "**").replace(" ", "*")
+        whole = UnitRegistry()(f"1.0 * {text}").to_base_units()
+        assert whole.magnitude == pytest.approx(factor, rel=1e-12), name
+        assert {base[unit]: power for unit, power in whole.unit_items()} == dict(exponents), name

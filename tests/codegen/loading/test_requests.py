@@ -25,9 +25,8 @@ def test_rule(bench, check):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILER, reason="no C compiler (cc, gcc or clang) on the path")
-@pytest.mark.parametrize("fault", FAULTS[::12], ids=lambda fault: fault.file)
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.file)
 def test_a_seeded_fault_is_found(fault, tmp_path):
-    """Every twelfth; `benchmarks/loading` tries all."""
     assert is_found(fault, tmp_path, exchanges=3)
 
 

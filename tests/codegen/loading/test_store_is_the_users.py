@@ -2,13 +2,11 @@
 
 from dzdesign.codegen.loading.files import LOAD_FILES, STORE
 from dzdesign.codegen.project import generate, write_firmware
-from dzdesign.core.artefact_types import to_json_bytes
 from tests.support.loading.files import compensator
 
 
 def test_only_the_store_is_a_board_file_and_stays_as_it_was_changed(tmp_path):
-    document = to_json_bytes(compensator())
-    firmware = generate(compensator(), "f28335", document, "block")
+    firmware = generate(compensator(), "f28335", "block")
     board = {path for path in firmware.manifest.board if path != "f28335/dzdesign.projectspec"}
     assert board == {f"f28335/{name}" for name in STORE}
     write_firmware(firmware, tmp_path / "fw")
@@ -21,7 +19,6 @@ def test_only_the_store_is_a_board_file_and_stays_as_it_was_changed(tmp_path):
 
 
 def test_the_fixed_form_and_targets_without_a_line_have_none_of_it():
-    document = to_json_bytes(compensator())
     for target, form in (("f28335", "fixed"), ("host", "block")):
-        files = generate(compensator(), target, document, form).files
+        files = generate(compensator(), target, form).files
         assert not {path for path in files if path.rpartition("/")[2] in LOAD_FILES}

@@ -8,7 +8,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from many_valves import write_lot
 
 from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.lot_firmware import firmware_left
@@ -23,10 +22,11 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
-from dzdesign.report.lot.valve_folder import read_valve_folder
+from dzdesign.report.lot.table import read_valve_folder
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
 from tests.dzdesign.batch.test_batch import tree
+from tests.support.many_valves import write_lot
 from tests.support.synthetic import needs_compiler
 
 pytestmark = [pytest.mark.slow, needs_compiler]
@@ -89,7 +89,7 @@ def test_one_firmware_and_a_block_a_valve(made):
         block = unpack(octets)
         assert octets == octets_in_file(folder / "calibration.hex") and text_of(block.serial) == f"{name}-S"
         content = (folder / "compensator.json").read_bytes()
-        alone = generate(compensator_of(folder), "host", content, "block")
+        alone = generate(compensator_of(folder), "host", "block")
         assert replace(unpack(alone.block), serial=block.serial, crc32=block.crc32) == block
         found = json.loads((folder / "calibration_check.json").read_bytes())
         assert found["holds"] and found["made_from"][0]["sha256"] == sha256_of(content)

@@ -17,7 +17,6 @@ from types import SimpleNamespace
 import pytest
 from distributed import Client
 from distributed.client import ClosedClientError
-from many_valves import write_lot
 
 from dzdesign.batch.calibration import Task
 from dzdesign.batch.runners import _check_workers, _scheduler_lost, run_on_cluster
@@ -28,6 +27,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.identify import IdentifyChoices
 from tests.support.crashing_work import die_over_bad
+from tests.support.many_valves import write_lot
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from many_valves import write_lot
 
 from dzdesign.batch import outputs as outputs_module
 from dzdesign.batch.arguments import BatchArguments
@@ -22,14 +21,14 @@ from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.folder import read_lot
-from dzdesign.report.lot.output_types import ValveOutput
 from dzdesign.report.lot.report import report_of_lot
-from dzdesign.report.lot.summary import LotSummary
-from dzdesign.report.lot.valve_folder import ValveFolder, ValveManifest, read_manifest
+from dzdesign.report.lot.summary import LotSummary, ValveManifest, ValveOutput
+from dzdesign.report.lot.table import ValveFolder, read_manifest
 from dzdesign.stages import verify as verify_stage
 from dzdesign.verify.output_evidence import TriedInputs
-from dzdesign.verify.requirements import FILES
+from dzdesign.verify.requirements import REPRODUCED
 from tests.dzdesign.batch.test_batch import NOTHING, tree
+from tests.support.many_valves import write_lot
 from tests.support.paths import GOLDENS
 
 PLC = WantedOutput(target="iec61131", settings={"dialect": "codesys", "interface": "plc"}, folder="plc")
@@ -101,7 +100,7 @@ def found_with(monkeypatch, of_valve, holds, text="7 wrong"):
     """Make an output that `verify` finds to be so."""
     evidence = SimpleNamespace(
         inputs=(TriedInputs(name="all", inputs=5, wrong=0), TriedInputs(name="more", inputs=6, wrong=0)),
-        checks=(FILES.check(holds=True, text=""), FILES.check(holds=holds, text=text)),
+        checks=(REPRODUCED.check(holds=True, text=""), REPRODUCED.check(holds=holds, text=text)),
     )
     monkeypatch.setattr(verify_stage, "verify_output_folder", lambda *_: SimpleNamespace(evidence=evidence))
     return make_output(PLC, replace(of_valve, verify=True))
@@ -256,7 +255,7 @@ def held(arguments, **_):
 @pytest.mark.slow
 def test_an_output_that_does_not_hold_is_the_valves_reason(made, monkeypatch):
     """With the firmware's verification taken as held."""
-    evidence = SimpleNamespace(inputs=(), checks=(FILES.check(holds=False, text="7 wrong"),))
+    evidence = SimpleNamespace(inputs=(), checks=(REPRODUCED.check(holds=False, text="7 wrong"),))
     monkeypatch.setattr(verify_stage, "verify_firmware", held)
     monkeypatch.setattr(verify_stage, "verify_output_folder", lambda *_: SimpleNamespace(evidence=evidence))
     recordings = [(path.name, path.read_bytes()) for path in sorted((made / "V0000").glob("*.csv"))]
@@ -266,7 +265,7 @@ def test_an_output_that_does_not_hold_is_the_valves_reason(made, monkeypatch):
     task = replace(task, identify=replace(task.identify, meter_lag="0.1 s"))
     outcome = calibrate(task)
     assert outcome.manifest.status == "does not hold"
-    assert outcome.manifest.reason == f"output iec61131: {FILES.title}: 7 wrong"
+    assert outcome.manifest.reason == f"output iec61131: {REPRODUCED.title}: 7 wrong"
     assert outcome.manifest.outputs[0].verdict == "does not hold" and outcome.manifest.inputs_sha256 == task.digest
     assert "plc/FB_DeadZone.st" in outcome.files and "evidence/report.html" in outcome.files
 

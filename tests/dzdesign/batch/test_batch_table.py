@@ -4,19 +4,17 @@ import csv
 import io
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import polars
 import pytest
-from many_valves import write_lot
 
 from dzdesign.batch.valves import valves_of
 from dzdesign.command_line.cli import main
 from dzdesign.report.lot.report import report_of_lot
-from dzdesign.report.lot.table import read_table, safe_cell, table_files
-from dzdesign.report.lot.valve_names import by_name
+from dzdesign.report.lot.table import by_name, frame_of, read_table, safe, table_files
 from tests.support.html_pages import Page
+from tests.support.many_valves import write_lot
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
 
 pytestmark = pytest.mark.slow
@@ -75,15 +73,15 @@ def test_all_that_batch_writes_is_in_that_order_and_has_the_records(counted):
 
 
 def test_no_cell_is_a_formula_and_every_text_comes_back(tmp_path):
-    record = {text: text for text in HOSTILE}
-    rows = [replace(row, record=record) for row in lot_rows(4, failed=[2])]
-    rows[0] = replace(rows[0], record={**record, "serial": HOSTILE[0]})
-    rows[2] = replace(rows[2], reason="--meter-lag is '0.3 V'")
-    content = table_files(rows)["valves.csv"]
+    rows = [{**row, **{f"record.{text}": text for text in HOSTILE}} for row in lot_rows(4, failed=[2])]
+    rows[0]["record.serial"] = HOSTILE[0]
+    rows[2]["reason"] = "--meter-lag is '0.3 V'"
+    frame = frame_of(rows)
+    content = table_files(frame)["valves.csv"]
     for line in csv.reader(io.StringIO(content.decode())):
         assert not any(cell.startswith(("=", "+", "-", "@")) for cell in line)
-    assert read_table(content, "valves.csv") == rows
-    assert safe_cell("-1") == "'-1" and safe_cell("'-1") == "''-1" and safe_cell("'a") == "'a"
+    assert read_table(content, "valves.csv").equals(frame)
+    assert safe("-1") == "'-1" and safe("'-1") == "''-1" and safe("'a") == "'a"
     html = report_of_lot(write_lot_folder(tmp_path / "out", rows)).html
     assert "=cmd|" in html and "<b>x</b>" not in html
 

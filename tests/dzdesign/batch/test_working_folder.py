@@ -8,12 +8,12 @@ import time
 from pathlib import Path
 
 import pytest
-from many_valves import recordings
 
 from dzdesign.batch.parent_watch import end_with
 from dzdesign.batch.runners import _in_processes
 from dzdesign.core.errors import InputError
 from dzdesign.core.input_files import MOST_DOCUMENT, read_recording
+from tests.support.many_valves import recordings
 
 #: What a start of Python, NumPy, joblib or CasADi imports.
 MODULES = ("json", "socket", "numpy", "joblib", "casadi", "msgspec", "sitecustomize", "encodings", "pickle", "typing")

@@ -611,40 +611,6 @@ def test_a_folder_that_is_no_firmware(refusal, bench, name, content, words):
 
 @pytest.mark.slow
 @needs_compiler
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"int (\n", "DOES NOT HOLD  compiles without warnings"),
-        (b"", "DOES NOT HOLD"),
-        (b"typedef int nothing;\n", "DOES NOT HOLD"),
-        (b"/* \xe9 */\n", "DOES NOT HOLD"),
-        (None, "DOES NOT HOLD  compiles without warnings"),
-    ],
-)
-def test_a_core_that_is_none_does_not_hold(bench, capsys, content, words):
-    core = bench / "firmware" / "core" / "dz_comp.c"
-    core.unlink()
-    if content is not None:
-        core.write_bytes(content)
-    assert main(["verify", "firmware", "--run-changed"]) == 1
-    out = capsys.readouterr().out
-    assert "DOES NOT HOLD  the generated files are unchanged: changed or missing: core/dz_comp.c" in out
-    assert words in out
-
-
-@pytest.mark.slow
-@needs_compiler
-def test_a_core_that_somebody_edited_does_not_hold(bench, capsys):
-    core = bench / "firmware" / "core" / "dz_comp.c"
-    core.write_text(core.read_text() + "/* tuned on the bench */\n")
-    assert main(["verify", "firmware", "--run-changed"]) == 1
-    out = capsys.readouterr().out
-    assert "DOES NOT HOLD  the generated files are unchanged: changed or missing: core/dz_comp.c" in out
-    assert "HOLDS  equals the exactly rounded law" in out
-
-
-@pytest.mark.slow
-@needs_compiler
 def test_a_plant_that_stays_shut_is_no_evidence(bench, capsys):
     """The spring holds it shut: no flow at zero command means nothing."""
     (bench / "plant.toml").write_text("preload_N = 1e6")

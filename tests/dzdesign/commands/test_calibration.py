@@ -21,7 +21,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of
 from dzdesign.core.recorded_units import CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot.valves import LotValve
+from dzdesign.design.lot_valves import LotValve
 from tests.support.block_reader import hex_memory, members_of
 from tests.support.core_variants import variant
 from tests.support.paths import ROOT
@@ -317,7 +317,7 @@ def test_the_api_takes_the_result_of_the_stage_before(written, unproven):
 def test_the_firmware_holds_the_same_block(written, unproven):
     content = (written / "compensator.json").read_bytes()
     compensator = read_artefact(content, Compensator, "compensator.json")
-    firmware = generate(compensator, "f28335", content, "block")
+    firmware = generate(compensator, "f28335", "block")
     assert firmware.contents["calibration.bin"] == api.calibration(written / "compensator.json").content
 
 

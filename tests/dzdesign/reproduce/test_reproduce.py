@@ -22,8 +22,8 @@ from dzdesign.design.options import DesignOptions
 from dzdesign.identify.plots.frame import saved
 from dzdesign.identify.plots.style import plot_style
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.report.reproduction import Outcome, PaperNumber, Reproduction
 from dzdesign.reproduce import chain, paper_figures, paper_numbers, recovered_valves, reproduction, rows
+from dzdesign.reproduce.artefact import Outcome, PaperNumber, Reproduction
 from dzdesign.reproduce.assumptions import HYSTERESIS_V
 from dzdesign.reproduce.recovered_valves import recover_stopped, recover_valves
 from dzdesign.reproduce.reproduction import subject_of
@@ -333,7 +333,7 @@ def test_flow_begins_where_the_page_says(reproduced, tmp_path):
         assert 100 * band == pytest.approx(0.46, abs=0.005)
         content = each.files[f"{place}/valve.json"].encode()
         as_in_the_paper = DesignOptions(transition=Fraction(0), above="hold")
-        bare = design(read_artefact(content, ValveModel, "valve.json"), as_in_the_paper, content)
+        bare = design(read_artefact(content, ValveModel, "valve.json"), as_in_the_paper)
         firmware = generate(bare, "host")
         folder = tmp_path / place
         write_folder(folder, firmware.files, firmware.manifest)

@@ -12,22 +12,22 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import sha256_of, to_json
+from dzdesign.core.artefact_files import to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.design.machine.words import reach_of_certificate
-from dzdesign.design.option_texts import options_of
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.machine.accounting import reach_of_certificate
+from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.identify.data_quality import knee_errors
 from dzdesign.identify.data_quality.catalogue import catalogue, most_serious_first, warn
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.valve.model import Warning_
-from dzdesign.report.artefact_chain import chain_of
+from dzdesign.report.artefacts import Chain
 from dzdesign.report.summary import headline
 from dzdesign.report.valve_report import make_report
 from tests.conftest import default_options
+from tests.support.attacked_firmware import sealed
 from tests.support.paths import ROOT
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, MPA, Truth, synthetic_ramp
@@ -90,14 +90,11 @@ class TestSimulated:
             firmware = generate(compensator, "host")
             for name, text in firmware.files.items():
                 assert ("SIMULATED" in text) is simulated or name == "compensator.json", name
-            shelf = {
-                "valve.json": to_json_bytes(valve),
-                "compensator.json": to_json_bytes(compensator),
-            }
-            of_recording, *others = headline(chain_of(shelf)).cautions
+            shelf = Chain(valve=valve, compensator=compensator)
+            of_recording, *others = headline(shelf).cautions
             assert of_recording == reach_of_certificate(compensator)
             assert [text.startswith("SIMULATED") for text in others] == [True] * simulated
-            html = make_report(chain_of(shelf)).html
+            html = make_report(shelf).html
             assert ("SIMULATED recordings" in html[: html.index('<section id="data">')]) is simulated
 
     @pytest.mark.parametrize("whole", [True, False])
@@ -108,13 +105,14 @@ class TestSimulated:
         assert document["valve"]["simulated"] is True
         if not whole:
             document["valve"]["warnings"] = []
-        document["valve_sha256"] = sha256_of(to_json(document["valve"]).encode())
+        sealed(document["valve"])
         path = tmp_path / "compensator.json"
         path.write_text(to_json(document))
         assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == (0 if whole else 2)
         if not whole:
             wording("valve: simulated without its warning", capsys.readouterr().err)
         document["valve"] |= {"simulated": False, "warnings": as_document(compensator.valve)["warnings"]}
+        sealed(document["valve"])
         path.write_text(to_json(document))
         assert main(["codegen", str(path), "-o", str(tmp_path / "fw")]) == 2
         wording("valve: a warning of simulation without one", capsys.readouterr().err)
@@ -145,12 +143,9 @@ class TestBranchOrder:
         """The warning was written before anybody accepted it."""
         options = options_of({"accept": "branch-order"}, target_named("f28335").inputs())
         for valve, accepted in ((crossed, True), (identify([valve_at(dp) for dp in PRESSURES]), False)):
-            shelf = {
-                "valve.json": to_json_bytes(valve),
-                "compensator.json": to_json_bytes(design(valve, options)),
-            }
-            said = [line for line in headline(chain_of(shelf)).cautions if line.startswith("ACCEPTED warning, branch-")]
-            html = make_report(chain_of(shelf)).html
+            shelf = Chain(valve=valve, compensator=design(valve, options))
+            said = [line for line in headline(shelf).cautions if line.startswith("ACCEPTED warning, branch-")]
+            html = make_report(shelf).html
             words = re.sub("<[^>]*>|`", "", html)
             assert bool(said) is accepted
             assert ("ACCEPTED warning, branch-order" in html[: html.index('<section id="data">')]) is accepted
@@ -195,11 +190,8 @@ def test_a_side_that_the_firmware_leaves_out_is_said_from_identify_to_the_report
     assert not warned(one, "two-sides")
     wording.of_test(warning.text)
     for valve, said in ((both, True), (one, False)):
-        shelf = {
-            "valve.json": to_json_bytes(valve),
-            "compensator.json": to_json_bytes(design(valve)),
-        }
-        assert any("negative side" in text for text in headline(chain_of(shelf)).cautions) is said
+        shelf = Chain(valve=valve, compensator=design(valve))
+        assert any("negative side" in text for text in headline(shelf).cautions) is said
 
 
 class TestKneeErrors:

@@ -12,7 +12,6 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.low_flow_table import LowFlowTable
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.low_flow import LowFlow
-from dzdesign.verify.firmware.stated_basis import about_basis
 
 L_MIN, MPA = 1e-3 / 60, 1e6
 PRESSURES = (1.0, 3.0, 5.0)
@@ -64,7 +63,6 @@ def identified(valve, rows=(), **options):
     tables = [LowFlowTable(source="low.csv", sha256="a" * 64, rows=tuple(rows))] if rows else []
     chosen = IdentifyOptions(meter_floor=FLOOR * L_MIN, meter_lag=0.0, meter_lag_tolerance=0.0, **options)
     model = identify_sides(RAMPS[valve], chosen, None, tables).model
-    assert not list(about_basis(model.positive))  # as verify computes the level
     return model
 
 

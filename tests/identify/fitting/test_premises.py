@@ -10,7 +10,7 @@ from curve_premises import failures
 from scipy.special import ndtr
 
 from dzdesign.core.errors import InputError
-from dzdesign.design.lot.valves import LotSide
+from dzdesign.design.lot_valves import LotSide
 from dzdesign.identify.constants import REFUSED
 from dzdesign.identify.fitting.offsets import PARTS, POINTS, fit_offset_under
 from dzdesign.identify.fitting.premises import (

@@ -372,7 +372,7 @@ def test_plots_of_identify_assess_and_the_report_share_one_style():
     import matplotlib as mpl
 
     from dzdesign.identify.plots.style import STYLE, plot_style
-    from dzdesign.report.figures.figure import figure_style
+    from dzdesign.report.figure import figure_style
 
     with plot_style():
         in_files = dict(mpl.rcParams)

@@ -17,6 +17,7 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.test_record import LONGEST_NAME, LONGEST_TEXT, MOST_ENTRIES, checked_record
 from dzdesign.stages.identify import record_of
+from tests.support.attacked_firmware import sealed
 from tests.support.html_pages import Page
 from tests.support.schema_checks import problems
 from tests.support.synthetic import Truth, synthetic_ramp
@@ -61,6 +62,7 @@ def test_no_number_hangs_on_it(here):
     test = synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)
     with_record, without = as_document(identify([test], record=HOSTILE)), as_document(identify([test]))
     assert with_record.pop("record") == HOSTILE and without.pop("record") == {}
+    assert with_record.pop("content_sha256") != without.pop("content_sha256")
     assert with_record == without
 
 
@@ -179,5 +181,5 @@ def test_the_report_shows_it_under_the_verdict_and_as_text(here):
     assert len(head.of("dt")) == len(head.of("dd")) == len(HOSTILE)
     assert not Page(html).of("script") and not Page(html).of("img")
     assert [word for word in ("Tested by", "Checked by", "Date") if f"<p>{word}</p>" not in html] == []
-    Path("lone/valve.json").write_text(to_json({**as_document(valve), "record": {}}))
+    Path("lone/valve.json").write_text(to_json(sealed({**as_document(valve), "record": {}})))
     assert 'class="record"' not in report_of_folder(Path("lone")).html

@@ -10,6 +10,7 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import DECIMALS, ValveModel
+from tests.support.attacked_firmware import sealed
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -29,7 +30,7 @@ def smooth():
 
 
 def read(document):
-    return read_artefact(json.dumps(document).encode(), ValveModel, "valve.json")
+    return read_artefact(json.dumps(sealed(document)).encode(), ValveModel, "valve.json")
 
 
 def side_of(document):

@@ -13,9 +13,8 @@ from dzdesign.codegen.amplifier.setting import amplifier_setting
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.fixed.dead_zones import dead_zones
-from dzdesign.design.fixed.fixed_offset import fixed_offset
-from dzdesign.design.lot.valves import LotSide, LotValve
+from dzdesign.design.fixed_offset import dead_zones, fixed_offset
+from dzdesign.design.lot_valves import LotSide, LotValve
 from dzdesign.verify.amplifier.checks import DEAD_ZONES, READ_BACK, SAFE, checks
 from dzdesign.verify.amplifier.readers import READERS
 from tests.support.paths import GOLDENS, GOLDENS_FULL

@@ -7,16 +7,15 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.example import example_folder
+from dzdesign.verify.closed_loop.drive_corners import valve_at_corners, valve_at_corners_check
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.closed_loop.valve_at_corners import valve_at_corners, valve_at_corners_check
 from tests.codegen.test_current_control import MEASURED, TEXTS
 from tests.support.example_coil import COIL
 from tests.support.synthetic import needs_compiler
@@ -33,7 +32,7 @@ QUICK = RampSequence(rest=0.5, ramp=10.0, top=0.5)
 def scenes(valve, texts, folder, plant=None, edit=lambda text: text):
     """The scenes at the lowest and the highest pressure drop."""
     compensator = design(valve, options_of(texts, target_named("cortex-m4").inputs()))
-    firmware = generate(compensator, "cortex-m4", to_json_bytes(compensator))
+    firmware = generate(compensator, "cortex-m4")
     write_folder(folder, firmware.files, firmware.manifest)
     if (source := folder / "core" / "dz_current.c").is_file():
         source.write_text(edit(source.read_text()))

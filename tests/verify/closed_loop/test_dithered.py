@@ -16,7 +16,7 @@ from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.hysteresis_choices import hysteresis_choices, hysteresis_left
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.design.play import LEVELS
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import ClosedLoop

@@ -11,13 +11,12 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.machine.machine import Machine
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, drive_corners, resistance_ratio
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import ClosedLoop, ReadingErrors
 from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.closed_loop.scenarios import readings_off, run_scenarios
-from dzdesign.verify.closed_loop.sensor_failures import sensor_failures
+from dzdesign.verify.closed_loop.scenarios import readings_off, run_scenarios, sensor_failures
 from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from tests.support.synthetic import needs_compiler
 

@@ -39,13 +39,18 @@ def test_the_upper_limit_is_where_so_few_or_fewer_have_a_chance_of_5_percent(flo
     assert binom.cdf(flowing, machines, upper_limit(flowing, machines)) == pytest.approx(0.05, rel=1e-6)
 
 
+def seeded(seed):
+    return np.random.default_rng(seed)
+
+
 def test_components_are_drawn_evenly_and_the_first_of_more_are_the_same():
     worst = np.full(len(COMPONENTS), 0.25)
-    many = draw(20_000, 3, worst)
-    assert np.array_equal(many[:7], draw(7, 3, worst)) and not np.array_equal(many[:7], draw(7, 4, worst))
+    many = draw(20_000, seeded(3), worst)
+    assert np.array_equal(many[:7], draw(7, seeded(3), worst))
+    assert not np.array_equal(many[:7], draw(7, seeded(4), worst))
     assert np.abs(many).max() <= 1 and np.abs(many.mean(axis=0)).max() < 0.02
     assert many.std(axis=0) == pytest.approx(np.full(len(COMPONENTS), 3**-0.5), rel=0.02)
-    alone = draw(100, 3, worst, {"supply"})
+    alone = draw(100, seeded(3), worst, {"supply"})
     kept = [name != "supply" for name in COMPONENTS]
     assert np.all(alone[:, kept] == 0.25) and np.ptp(alone[:, COMPONENTS.index("supply")]) > 1.5
 
@@ -90,13 +95,13 @@ def test_the_corner_that_is_called_worst_is(duty):
 
 def test_no_machine_of_the_right_budget_flows_not_even_where_all_is_at_its_worst(duty, wording):
     found = run_population(duty, 150, 1)
-    assert (found.flowing, found.never_open, found.pressures) == (0, 0, 11)
+    assert (found.flowing, found.flowing_in_loop, found.never_open, found.pressures) == (0, 0, 0, 11)
     assert found.upper_limit == pytest.approx(1 - 0.05 ** (1 / 150), rel=1e-9)
     check = of_population(found, ZERO_FLOW.check(holds=True, text=""), duty[0].units)
     assert check.holds
     wording.of_test(check.text)
     cornered = run_population(duty, 4, 1, drawn=())
-    assert (cornered.flowing, cornered.never_open) == (0, 0)
+    assert (cornered.flowing, cornered.flowing_in_loop, cornered.never_open) == (0, 0, 0)
 
 
 def test_the_worst_corner_is_near_the_edge(duty, monkeypatch):
@@ -105,7 +110,7 @@ def test_the_worst_corner_is_near_the_edge(duty, monkeypatch):
         population_module, "drawn_machine", lambda *given: replace(drawn_machine(*given), added_V=0.025)
     )
     found = run_population(duty, 4, 1, drawn=())
-    assert found.flowing == 4
+    assert (found.flowing, found.flowing_in_loop) == (0, 4) and found.least_margin_V < 0.025
 
 
 def test_the_threshold_may_come_down_to_its_certified_bound(duty):
@@ -124,7 +129,7 @@ def test_a_quick_closing_ends_where_a_slow_one_does(duty):
     A tenth of a code of the pressure drop decides between two drives, hence the hundredth of a litre.
     """
     scene = duty[-1]
-    machine, shares = scene.compensator.machine, draw(12, 5, worst_ends(scene))
+    machine, shares = scene.compensator.machine, draw(12, seeded(5), worst_ends(scene))
     openings = population_module.Openings.of(1)
     slow = RampSequence(rest=0.5, top=0.5).command()
     flowing = 0
@@ -146,8 +151,10 @@ def test_a_plant_of_equations_is_drawn_too(example_valve, example_folder, tmp_pa
     scenes = scenes_of(tmp_path / "fw", designed(example_valve, tmp_path / "fw", **true), plant)
     assert run_population(scenes, 20, 1).flowing == 0
     short = scenes_of(tmp_path / "short", designed(example_valve, tmp_path / "short", **wrong), plant)
-    caught_out = [replace(each, compensator=scenes[0].compensator) for each in short]
-    assert run_population(caught_out, 40, 1).flowing > 0
+    machine = scenes[0].compensator.machine
+    caught_out = [replace(each, compensator=replace(each.compensator, machine=machine)) for each in short]
+    found = run_population(caught_out, 40, 1)
+    assert 0 < found.flowing_in_loop <= found.flowing
 
 
 # --- a budget that is too small -------------------------------------------------------------------------------------
@@ -156,7 +163,8 @@ def test_a_plant_of_equations_is_drawn_too(example_valve, example_folder, tmp_pa
 def caught(valve, folder, true, wrong, *drawn, **more):
     """The machines of the true budget with a firmware that was designed for a wrong one; with its own none flows."""
     right, short = right_and_wrong(valve, folder, true, wrong, *drawn, **more)
-    assert (right.flowing, right.never_open) == (0, 0)
+    assert (right.flowing, right.flowing_in_loop, right.never_open) == (0, 0, 0)
+    assert 0 < short.flowing_in_loop <= short.flowing  # the noise at its peak may let one more flow
     return short
 
 
@@ -185,7 +193,7 @@ def test_a_recording_that_is_called_ten_times_too_good_fails(example_valve, tmp_
 
 
 def test_machines_need_no_plant_and_no_parameter(tmp_path, example_folder):
-    assert read_tolerances(example_folder / "machines.toml") == Tolerances(machines=10_000, seed=1)
+    assert read_tolerances(example_folder / "machines.toml") == Tolerances(machines=1_000_000, seed=1)
     path = tmp_path / "t.toml"
     path.write_text("machines = 12\nseed = 3")
     assert read_tolerances(path) == Tolerances(machines=12, seed=3)

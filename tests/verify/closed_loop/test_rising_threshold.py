@@ -16,8 +16,8 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop_checks import shut_after_scenarios
+from dzdesign.verify.closed_loop.scenarios import sensor_failures
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
-from dzdesign.verify.closed_loop.sensor_failures import sensor_failures
 from dzdesign.verify.requirements import ZERO_FLOW
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 

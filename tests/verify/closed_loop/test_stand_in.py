@@ -18,7 +18,7 @@ from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero, stand_in_is_the_recording
 from dzdesign.verify.closed_loop.stand_in import StandIn, stand_in_of
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
 from dzdesign.verify.verification import verify
 from tests.support.synthetic import SHARED, Truth, needs_compiler, synthetic_ramp, with_side
 
@@ -193,9 +193,9 @@ def test_between_two_tests_the_threshold_runs_straight_and_not_the_other_way_rou
         right = "plant->share_above = fmin(fmax((dp - low) / (high - low), 0.0), 1.0);"
         assert right in sources["plant_curve.h"]
         wrong = right.replace("(dp - low)", "(high - dp)")
-        return ConfinedLibrary(sources | {"plant_curve.h": sources["plant_curve.h"].replace(right, wrong)}, *rest)
+        return CompiledLibrary(sources | {"plant_curve.h": sources["plant_curve.h"].replace(right, wrong)}, *rest)
 
-    monkeypatch.setattr(loop_module, "ConfinedLibrary", turned_round)
+    monkeypatch.setattr(loop_module, "CompiledLibrary", turned_round)
     assert first_seen() < 0.75 * seen[0] + 0.25 * seen[1] - 0.08
 
 
@@ -339,7 +339,7 @@ def test_a_leak_that_was_seen_flows_at_zero_command(leaking_valve):
 def test_a_leak_that_no_compensator_can_stop_is_said_and_is_no_failure(leaking_valve, tmp_path, wording):
     from dzdesign.codegen.project import generate, target_named
     from dzdesign.design.designing import design
-    from dzdesign.design.option_texts import options_of
+    from dzdesign.design.options import options_of
 
     compensator = design(leaking_valve, options_of({}, target_named("f28335").inputs()))
     made = generate(compensator, "f28335")

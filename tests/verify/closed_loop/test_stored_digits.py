@@ -86,8 +86,8 @@ def test_no_verdict_changes(leak, share):
 )
 def test_a_difference_is_rounded_up(difference, shown):
     given = PlantComparison(
-        kind="step", side="positive", dp_MPa=1.0, then_MPa=1.0, seconds=0.1, position_difference=difference,
-        flow_difference=difference, q_largest_L_min=10.0, unlike_compare_values=0, codes_at_border=0, impacts=0,
+        side="positive", dp_MPa=(1.0, 2.0), seconds=0.1, step_s=1e-4, position_difference=difference,
+        flow_difference=difference, q_largest_L_min=10.0, impacts=0,
     )  # fmt: skip
     found = stored_comparison(given)
     assert found.position_difference == found.flow_difference == shown

@@ -10,7 +10,7 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.report.sections.evidence import scenarios_table
+from dzdesign.report.sections.closed_loop import scenarios_table
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero
 from dzdesign.verify.verification import verify

@@ -7,7 +7,7 @@ import pytest
 
 from dzdesign.design.current.choosing import sensor_line
 from dzdesign.design.current.circuit import Corner
-from dzdesign.design.current.step_response import run_loop
+from dzdesign.design.current.responses import run_loop
 from dzdesign.verify.current.coil_simulation import CoilLoop, CoilSimulation
 from dzdesign.verify.current.exact_controller import OPEN, OVER, SHORT
 from tests.support.current_loops import current_texts

@@ -7,12 +7,11 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.current.choosing import CurrentSensor, choose_loop, gains_of
 from dzdesign.design.current.circuit import CoilCircuit
-from dzdesign.design.current.margins import Gains, margins
+from dzdesign.design.current.responses import Gains, margins
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.verify.analysis import machine_code
 from dzdesign.verify.current.coil_simulation import CoilLoop
 from dzdesign.verify.current.current_checks import current_checks
@@ -49,7 +48,7 @@ def either(request, controlled, example_valve):
 
 
 def firmware_of(compensator, folder, edit=lambda text: text):
-    firmware = generate(compensator, "cortex-m4", to_json_bytes(compensator))
+    firmware = generate(compensator, "cortex-m4")
     write_folder(folder, firmware.files, firmware.manifest)
     source = folder / "core" / "dz_current.c"
     source.write_text(edit(source.read_text()))

@@ -8,7 +8,7 @@ from dzdesign.block_checks import given_blocks
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import SourceFile, to_json_bytes
+from dzdesign.core.artefact_types import SourceFile
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
@@ -29,7 +29,7 @@ def lot(tmp_path_factory):
     other = variant("no transition")
     for name, compensator in {"one": first, "other": other}.items():
         block_folder(compensator, folder / name)
-    firmware = generate(first, "f28335", to_json_bytes(first), "block")
+    firmware = generate(first, "f28335", "block")
     write_folder(folder / "fw", firmware.contents, firmware.manifest)
     return folder, {"one": first, "other": other}
 

@@ -12,7 +12,7 @@ from dzdesign.core.dither import Dither, DrivenDither
 from dzdesign.core.errors import InputError
 from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.designing import design
-from dzdesign.design.lot.setting import lot_setting
+from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.options import DesignOptions
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import differences

@@ -16,14 +16,12 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot.margins import lot_margins, prove_lot
-from dzdesign.design.lot.pressures import Lacking, common_interval, lacking_in, without_narrow
-from dzdesign.design.lot.setting import lot_setting
-from dzdesign.design.lot.valves import LotSide
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.lot_margins import lot_margins, prove_lot
+from dzdesign.design.lot_setting import lot_setting
+from dzdesign.design.lot_valves import Lacking, LotSide, common_interval, lacking_in, without_narrow
+from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_derived
 from dzdesign.identify.identification import identify
-from dzdesign.report.sections.lot_setting import lot_costs
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.lot_check import check_lot, lot_checked
@@ -324,27 +322,8 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     head = report[: report.index('<section id="lot">')]
     assert "<h1>Lot setting of 4 valves: dead-zone compensator for f28335" in head
     assert f"Worst valve of the lot: {lot['worst']}" in head and f"{1e3 * lot['smallest_margin_V']:.3f} mV" in head
-    costs = lot_costs(common.compensator)
-    least = min(each.least_percent for each in costs)
-    assert f"{least:.1f} to {costs[0].most_percent:.1f} %" in head
     carrier = head.index(f"Of one of these valves, {common.carrier}, the carrier")
-    assert head.index("What it costs over the lot") < carrier < head.index("Dead zone on opening")
+    assert head.index("Worst valve of the lot") < carrier < head.index("Dead zone on opening")
     for heading in ("Data and fit", "Thresholds", "Closed loop"):
         assert f"<h2>{heading} <small>of {common.carrier}, the carrier</small></h2>" in report
     assert document["lot_sha256"] in report[report.index('<section id="lot">') :]
-
-
-def test_what_it_costs_a_valve_is_the_command_before_its_own_bound(common):
-    """Counted anew, code by code, by the compensator's own rounding: the least command at which the drive is there."""
-    compensator, signals = common.compensator, common.compensator.signals
-    costs = {each.valve: each for each in lot_costs(common.compensator)}
-    assert set(costs) == set(KNEES)
-    for valve in common.compensator.lot:
-        shares = []
-        for dp, bound in zip(valve.positive.dp_MPa, valve.positive.u_lower_V, strict=True):
-            code, counts = round(signals.dp_code(Fraction(repr(dp)))), bound / compensator.u_max_V * signals.compare_max
-            full = signals.command.full_code
-            first = next(u for u in range(full + 1) if compensator.compare(u, code, 1) >= counts - Fraction(1, 2))
-            shares.append(100 * first / full)
-        found = costs[valve.name]
-        assert [found.least_percent, found.most_percent] == pytest.approx([min(shares), max(shares)], abs=0.05)

@@ -10,12 +10,11 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.designing import design
-from dzdesign.design.option_texts import options_of
+from dzdesign.design.options import options_of
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.recorded_drop import DropColumns
-from dzdesign.verify.exhaustive.recorded_inputs import recorded_inputs_follow
-from dzdesign.verify.exhaustive.stored_vectors import exact_answers
+from dzdesign.verify.exhaustive.recorded_inputs import exact_answers, recorded_inputs_follow
 from dzdesign.verify.toolchain.compiled_core import core_answers
 from tests.support.golden_firmware import FULL
 from tests.support.synthetic import needs_compiler

@@ -8,7 +8,6 @@ import pytest
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.verify.firmware.folder import read_firmware_manifest
 from dzdesign.verify.firmware.own_block import own_block_accepted
 from dzdesign.verify.toolchain.machines import HOST
@@ -23,7 +22,7 @@ HEADER = ("magic", "layout", "length", "shape", "code_max", "compare_max", "samp
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     compensator = variant("bipolar, all options")
-    firmware = generate(compensator, "f28335", to_json_bytes(compensator), "block")
+    firmware = generate(compensator, "f28335", "block")
     folder = tmp_path_factory.mktemp("made") / "fw"
     write_folder(folder, firmware.contents, firmware.manifest)
     return folder

@@ -2,8 +2,8 @@
 
 import pytest
 
-from dzdesign.codegen.fmu import binaries
-from dzdesign.verify.fmu.fmu_file import read_fmu
+from dzdesign.codegen.fmu import files
+from dzdesign.verify.fmu.checks import unpacked
 from tests.support.host_fmus import fmus_of, full_compensator, host_platforms, written
 
 
@@ -17,17 +17,17 @@ def compensator():
 def fmu_folder(tmp_path_factory, compensator):
     """Return a folder with FMUs of a compensator and of a plant."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(binaries, "PLATFORMS", host_platforms())
+        patch.setattr(files, "PLATFORMS", host_platforms())
         return written(fmus_of(compensator), tmp_path_factory.mktemp("fmus"))
 
 
 @pytest.fixture(scope="session")
-def fmu(fmu_folder):
+def fmu(fmu_folder, tmp_path_factory):
     """Return the compensator's FMU."""
-    return read_fmu(fmu_folder / "dz_compensator.fmu")
+    return unpacked(fmu_folder / "dz_compensator.fmu", tmp_path_factory.mktemp("unpacked"))
 
 
 @pytest.fixture(scope="session")
-def plant_fmu(fmu_folder):
+def plant_fmu(fmu_folder, tmp_path_factory):
     """Return the plant's FMU."""
-    return read_fmu(fmu_folder / "dz_plant.fmu")
+    return unpacked(fmu_folder / "dz_plant.fmu", tmp_path_factory.mktemp("unpacked"))

@@ -1,23 +1,28 @@
-"""The checks of FMUs hold of right ones and fail of wrong ones: law, drive, units, closed loop, files, description."""
+"""The checks of FMUs hold of right ones and fail of wrong ones: description, law, drive, units, closed loop."""
 
-import json
-from dataclasses import asdict, replace
+import shutil
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from dzdesign.core.artefact_files import sha256_of
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
-from dzdesign.verify.fmu.binary_core import FmuCore
-from dzdesign.verify.fmu.checks import drive_check, physical_check, plant_of
-from dzdesign.verify.fmu.closed_loop import closed_loop_check
-from dzdesign.verify.fmu.descriptions import file_faults, library_faults
-from dzdesign.verify.fmu.fmu_file import read_fmu
+from dzdesign.verify.fmu import checks
+from dzdesign.verify.fmu.checks import (
+    FMU_HOST,
+    FmuCore,
+    closed_loop_check,
+    drive_check,
+    input_results,
+    physical_check,
+    plant_of,
+    unpacked,
+)
 from tests.support.golden_firmware import golden_compensator
-from tests.support.host_fmus import PLANT, edited, with_binary, with_files
+from tests.support.host_fmus import PLANT, edited, fmus_of, plant_setting, repacked, with_binary
 
 
 @pytest.fixture(scope="module")
@@ -28,14 +33,26 @@ def prepared(compensator):
 @pytest.fixture(autouse=True)
 def fewer_rows(monkeypatch):
     """Step fewer rows than `verify` does."""
-    monkeypatch.setattr("dzdesign.verify.fmu.checks.PHYSICAL_ROWS", 300)
-    monkeypatch.setattr("dzdesign.verify.fmu.checks.DRIVE_SAMPLES", 900)
+    monkeypatch.setattr(checks, "PHYSICAL_ROWS", 300)
+    monkeypatch.setattr(checks, "DRIVE_SAMPLES", 900)
+    monkeypatch.setattr(checks, "COURSE", checks.COURSE[:5])
 
 
-@pytest.mark.parametrize("sign", (1, -1))
-def test_the_law_behind_the_getters_is_the_exact_one(fmu, prepared, sign):
-    found = FmuCore(fmu, sign, fmu.binary_here()).check(prepared[sign], sample=True)
-    assert found.faults == 0 and found.inputs > 5_000
+def sampled(fmu, sign, prepared):
+    return FmuCore(fmu, sign, fmu.binary.read_bytes()).check(prepared[sign], FMU_HOST, sample=True)
+
+
+def failed(check):
+    return check.holds is False and check.text
+
+
+def test_right_ones_hold(fmu, plant_fmu, compensator, prepared):
+    assert fmu.problems == plant_fmu.problems == ()
+    for sign in (1, -1):
+        found = sampled(fmu, sign, prepared)
+        assert found.faults == 0 and found.inputs > 5_000
+    for check in (drive_check(fmu, compensator), physical_check(fmu, compensator)):
+        assert check.holds is True, check.text
 
 
 @pytest.mark.parametrize(
@@ -49,97 +66,35 @@ def test_the_law_behind_the_getters_is_the_exact_one(fmu, prepared, sign):
     ),
     ids=("law", "side", "status", "beta", "core"),
 )
-def test_a_wrong_law_behind_the_getters_is_found(fmu, prepared, name, old, new, sign):
-    found = FmuCore(fmu, sign, edited(fmu, name, old, new)).check(prepared[sign], sample=True)
-    assert found.faults > 0
-
-
-def test_a_binary_of_another_token_is_refused_and_found(fmu, prepared, compensator):
-    other = edited(fmu, "dz_fmu.c", fmu.token, fmu.token[:-2] + "0}")
-    with pytest.raises(RequirementError, match="token"):
-        FmuCore(fmu, 1, other).check(prepared[1], sample=True)
-    takes_any = edited(fmu, "dz_fmu.c", "!same_text(", "0 && !same_text(")
-    assert drive_check(fmu, takes_any, compensator).holds is False
-
-
-PRINTS = """
-#include <stdio.h>
-#include <stdlib.h>
-#define TALK {0}
-#include "fmi2Functions.h"
-"""
-LINES = r'do { printf("1 2 3 0 0 0 0 0 0 0 0 0 0 0 0 0 0\\n0 0\\nend\\n"); fflush(stdout); } while (0)'
-
-
-@pytest.mark.parametrize("ends", (False, True))
-def test_a_binary_that_prints_or_ends_the_program_says_nothing_by_it(fmu, prepared, compensator, ends):
-    """What it prints is neither taken for results nor disturbs them; of a program that it ends there are none."""
-    talk = LINES.replace("while (0)", "while (exit(0), 0)") if ends else LINES
-    with_talk = PRINTS.replace("{0}", talk)
-    source = fmu.files["sources/dz_fmu.c"].decode().replace('#include "fmi2Functions.h"\n', with_talk, 1)
-    source = source.replace("refresh(one);   ", "TALK; refresh(one);", 1)
-    source = source.replace("refusal = take_step(", "TALK; refusal = take_step(")
-    made = edited(with_files(fmu, {"sources/dz_fmu.c": source.encode()}), "dz_fmu.c", "TALK", "TALK")
-    if not ends:
-        assert FmuCore(fmu, 1, made).check(prepared[1], sample=True).faults == 0
-        assert drive_check(fmu, made, compensator).holds is True
-        return
-    with pytest.raises(RequirementError, match="before its results were whole"):
-        FmuCore(fmu, 1, made).check(prepared[1], sample=True)
-    found = drive_check(fmu, made, compensator)
-    assert found.holds is False and "whole" in found.text
+def test_a_wrong_law_behind_the_getters_is_found(fmu, prepared, tmp_path, name, old, new, sign):
+    assert sampled(edited(fmu, tmp_path, name, old, new), sign, prepared).faults > 0
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
+    ("check", "old", "new"),
     (
-        ("if (!(size > 0.0)) {", "if (size < 0.0) {"),
-        ("(late >= -SAME_TIME_S)", "(late <= 1.0 || late > 0.0)"),
-        ("if (!((late >=", "if (0 && !((late >="),
-        ("value >= described[reference].least", "value >= -1e999"),
-        ("value <= described[reference].largest", "value <= 1e999"),
+        (drive_check, "ticks_before(model, end);", "ticks_before(model, end + 1.0 / TICK_HZ);"),
+        (drive_check, "ticks_before(model, end);", "ticks_before(model, end - 1.0 / TICK_HZ);"),
+        (drive_check, "dz_drive_tick(&model->drive);", "dz_drive_tick(&model->drive); dz_drive_tick(&model->drive);"),
+        (drive_check, "(double)model->drive.compare_b", "(double)model->drive.compare_a"),
+        (drive_check, "(double)model->drive.status", "0.0"),
+        (drive_check, "model->time + 2.0 * DUE_EARLY / TICK_HZ", "model->time - 2.0 * DUE_EARLY / TICK_HZ"),
+        (drive_check, "return next_tick(model);", "return next_tick(model) + 0.5 / TICK_HZ;"),
+        (physical_check, "value[V_U_I] / 10.0", "value[V_U_I] / 10.001"),
+        (physical_check, "value[V_P_B] *", "1.0001 * value[V_P_B] *"),
+        (physical_check, "(share < 0.0) ?", "(share > 0.0) ?"),
+        (physical_check, "* (10.0 / 60000.0);", "* (10.0 / 65535.0);"),
     ),
 )
-def test_a_binary_that_takes_what_is_no_step_or_number_is_found(fmu, compensator, old, new):
-    found = drive_check(fmu, edited(fmu, "dz_fmu.c", old, new), compensator)
-    assert found.holds is False and "the binary takes" in found.text
+def test_a_wrong_drive_or_scaling_is_found(fmu, compensator, tmp_path, check, old, new):
+    assert failed(check(edited(fmu, tmp_path, "dz_fmu.c", old, new), compensator))
 
 
-def test_the_drive_and_the_delay_of_a_step_are_those_of_the_model(fmu, compensator):
-    assert drive_check(fmu, fmu.binary_here(), compensator).holds is True
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    (
-        ("ticks_before(model, end);", "ticks_before(model, end + 1.0 / TICK_HZ);"),
-        ("ticks_before(model, end);", "ticks_before(model, end - 1.0 / TICK_HZ);"),
-        ("dz_drive_tick(&model->drive);", "dz_drive_tick(&model->drive); dz_drive_tick(&model->drive);"),
-        ("(double)model->drive.compare_b", "(double)model->drive.compare_a"),
-        ("(double)model->drive.status", "0.0"),
-    ),
-    ids=("early", "late", "twice", "side", "status"),
-)
-def test_a_wrong_drive_is_found(fmu, compensator, old, new):
-    assert drive_check(fmu, edited(fmu, "dz_fmu.c", old, new), compensator).holds is False
-
-
-def test_volts_and_pressures_are_read_as_an_ideal_converter_does(fmu, compensator):
-    assert physical_check(fmu, fmu.binary_here(), compensator).holds is True
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    (("value[V_U_I] / 10.0", "value[V_U_I] / 10.001"), ("value[V_P_B] *", "1.0001 * value[V_P_B] *"),
-     ("(share < 0.0) ?", "(share > 0.0) ?")),
-    ids=("command", "pressure", "side"),
-)  # fmt: skip
-def test_a_wrong_scaling_is_found(fmu, compensator, old, new):
-    assert physical_check(fmu, edited(fmu, "dz_fmu.c", old, new), compensator).holds is False
-
-
-def test_the_coupled_fmus_run_as_the_closed_loop(fmu, plant_fmu, compensator):
-    assert closed_loop_check(fmu, plant_fmu, asdict(PLANT), compensator).holds is True
+def test_the_coupled_fmus_run_as_the_closed_loop_also_with_a_fast_coil(fmu, plant_fmu, compensator, tmp_path):
+    assert closed_loop_check(fmu, plant_fmu, PLANT, compensator).holds is True
+    fast = edited(plant_fmu, tmp_path, "dz_fmu.c", "BEFORE_START, 0.04,", "BEFORE_START, 0.0004,")
+    assert closed_loop_check(fmu, fast, replace(PLANT, L_c_H=0.0004), compensator).holds is True
+    assert failed(closed_loop_check(fmu, fast, PLANT, compensator))
 
 
 @pytest.mark.parametrize(
@@ -154,52 +109,87 @@ def test_the_coupled_fmus_run_as_the_closed_loop(fmu, plant_fmu, compensator):
     ),
     ids=("spring", "play", "duty", "droop", "coil", "phase"),
 )
-def test_a_wrong_plant_is_found(fmu, plant_fmu, compensator, old, new):
-    wrong = with_binary(plant_fmu, edited(plant_fmu, "dz_fmu.c", old, new))
-    found = closed_loop_check(fmu, wrong, asdict(PLANT), compensator)
-    assert found.holds is False and "flows differ" in found.text
+def test_a_wrong_plant_is_found(fmu, plant_fmu, compensator, tmp_path, old, new):
+    found = closed_loop_check(fmu, edited(plant_fmu, tmp_path, "dz_fmu.c", old, new), PLANT, compensator)
+    assert "flows differ" in failed(found)
 
 
-def test_a_coil_that_is_fast_beside_a_step_is_exact_too(fmu, plant_fmu, compensator):
-    fast = with_binary(plant_fmu, edited(plant_fmu, "dz_fmu.c", "BEFORE_START, 0.04,", "BEFORE_START, 0.0004,"))
-    assert closed_loop_check(fmu, fast, {**asdict(PLANT), "L_c_H": 0.0004}, compensator).holds is True
+@pytest.mark.parametrize(
+    ("old", "new"),
+    (
+        ('name="u_O" valueReference="8" causality="output"', 'name="u_O" valueReference="8" causality="input"'),
+        ('name="p_A" valueReference="2" causality="input"', 'name="p_A" valueReference="2" causality="output"'),
+        ('causality="parameter" variability="fixed"', 'causality="input" variability="fixed"'),
+        ('unit="MPa"', 'unit="kPa"'),
+        ("<ModelExchange", "<ScheduledExecution"),
+        ("</fmiModelDescription>", ""),
+    ),
+)
+def test_a_wrong_description_is_a_problem(fmu_folder, tmp_path, old, new):
+    path = Path(shutil.copy(fmu_folder / "dz_compensator.fmu", tmp_path))
+
+    def change(files):
+        text = files["modelDescription.xml"].decode()
+        assert old in text, old
+        files["modelDescription.xml"] = text.replace(old, new, 1).encode()
+
+    repacked(path, change)
+    assert unpacked(path, tmp_path / "here").problems
 
 
-def faults_of(fmu, compensator):
-    found = list(file_faults(fmu, compensator, sha256_of(to_json_bytes(compensator))))
-    return [fault for fault in found if not fault.startswith("binaries/")]  # those of other machines
-
-
-def test_files_and_manifest_agree(fmu, plant_fmu, compensator):
-    assert not faults_of(fmu, compensator) and not faults_of(plant_fmu, compensator)
-
-
-@pytest.mark.parametrize("path", ("sources/dz_fmu.c", "modelDescription.xml", "extra/dzdesign/compensator.json"))
-def test_a_changed_file_is_found(fmu, compensator, path):
-    assert any(path in fault for fault in faults_of(with_files(fmu, {path: fmu.files[path] + b" "}), compensator))
-
-
-def test_an_added_file_another_compensator_and_a_missing_platform_are_found(fmu, compensator):
-    assert faults_of(with_files(fmu, {"resources/other.txt": b""}), compensator)
-    assert any("compensator.json is another" in fault for fault in faults_of(fmu, golden_compensator("host")))
-    for key, other in (("token", "{0}"), ("compensator_json", "0" * 64)):
-        wrong = replace(fmu, manifest={**fmu.manifest, key: other})
-        assert any(key in fault for fault in faults_of(wrong, compensator))
-    missing = list(file_faults(fmu, compensator, sha256_of(to_json_bytes(compensator))))
-    assert any("win64" in fault for fault in missing)
-
-
-def test_no_library_is_needed_and_one_that_is_needed_is_found(fmu, plant_fmu):
-    assert not list(library_faults(fmu)) and not list(library_faults(plant_fmu))
-    assert list(library_faults(with_binary(fmu, edited(fmu, "dz_fmu.c", "", "", "-Wl,--no-as-needed"))))
-    assert list(library_faults(with_binary(fmu, b"\x7fELF")))
-
-
-def test_what_is_no_fmu_is_refused(tmp_path):
+@pytest.mark.parametrize("content", (b"PK", b""))
+def test_what_is_no_fmu_has_problems(tmp_path, content):
     path = tmp_path / "dz_compensator.fmu"
-    path.write_bytes(b"PK")
-    with pytest.raises(InputError, match="no FMU"):
-        read_fmu(path)
+    path.write_bytes(content)
+    assert unpacked(path, tmp_path / "here").problems
+
+
+def test_a_corrupted_binary_and_one_that_crashes_fail_every_check(fmu, compensator, prepared, tmp_path):
+    crashing = ("dz_fmu.c", "    refresh(one);", "    *(volatile int *)0 = 1; refresh(one);")
+    wrong = [
+        with_binary(fmu, tmp_path / "short", fmu.binary.read_bytes()[:2000]),
+        with_binary(fmu, tmp_path / "text", b"\x7fELF, no library"),
+        edited(fmu, tmp_path / "crash", *crashing),
+    ]
+    for each in wrong:
+        with pytest.raises(RequirementError):
+            sampled(each, 1, prepared)
+        assert failed(drive_check(each, compensator)) and failed(physical_check(each, compensator))
+    assert "SIG" in drive_check(wrong[-1], compensator).text
+
+
+def test_the_core_of_another_valve_is_found(fmu, compensator, prepared, tmp_path, monkeypatch):
+    """As a binary alone its guid is another; as a whole FMU its answers are."""
+    from dzdesign.codegen.fmu import files
+    from tests.support.host_fmus import host_platforms
+
+    monkeypatch.setattr(files, "PLATFORMS", host_platforms())
+    path = tmp_path / "dz_compensator.fmu"
+    other = golden_compensator("f28335")
+    path.write_bytes(fmus_of(other, None).files[path.name])
+    whole = unpacked(path, tmp_path)
+    assert not whole.problems and sampled(whole, 1, prepared).faults > 0
+    with pytest.raises(RequirementError, match="guid"):
+        sampled(with_binary(fmu, tmp_path / "binary", whole.binary.read_bytes()), 1, prepared)
+
+
+def test_without_fmpy_an_fmu_could_not_be_checked(fmu_folder, compensator, monkeypatch):
+    monkeypatch.setattr(checks, "find_spec", lambda name: None)
+    manifest = SimpleNamespace(settings={"plant": plant_setting()})
+    (found,) = checks.checks(fmu_folder, manifest, compensator, print).checks
+    assert found.holds is None and "pip install" in found.text
+
+
+@pytest.mark.slow
+def test_the_checks_of_a_folder(fmu_folder, fmu, compensator, monkeypatch):
+    manifest = SimpleNamespace(settings={"plant": plant_setting()})
+    found = checks.checks(fmu_folder, manifest, compensator, lambda text: None)
+    assert all(check.holds for check in found.checks) and {"fmu-valid", "exact-law", "fmu-closed-loop"} <= {
+        check.id for check in found.checks
+    }
+    assert sum(each.inputs for each in found.inputs) > 4e7 and not sum(each.wrong for each in found.inputs)
+    monkeypatch.setattr(checks, "unpacked", lambda path, place: replace(fmu, binary=None))
+    assert [check.holds for check in checks.checks(fmu_folder, manifest, compensator, print).checks] == [True, None]
 
 
 @pytest.mark.parametrize("text", ("{", "[]", '{"K_b": 1}', '{"K_a": "x"}', '{"K_a": -1}'))
@@ -208,7 +198,8 @@ def test_a_setting_that_is_no_plant_is_refused(text):
         plant_of(SimpleNamespace(settings={"plant": text}))
 
 
-def test_the_manifest_of_an_fmu_names_compiler_and_compensator(fmu, compensator):
-    manifest = json.loads(fmu.files["extra/dzdesign/manifest.json"])
-    assert manifest["compensator_json"] == sha256_of(to_json_bytes(compensator))
-    assert manifest["compiler"].startswith("ziglang ")
+@pytest.mark.slow
+def test_a_law_that_is_wrong_at_one_input_is_an_exact_law_that_does_not_hold(fmu, compensator, tmp_path):
+    wrong = edited(fmu, tmp_path, "dz_comp.c", "return (uint16_t)(law_of(", "return (uint16_t)((u == 4095u) ^ law_of(")
+    found, tried = input_results(wrong, compensator)
+    assert [check.holds for check in found if check.id == "exact-law"] == [False, True] and tried[0].wrong > 0

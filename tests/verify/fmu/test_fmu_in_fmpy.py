@@ -5,7 +5,6 @@ import shutil
 import fmpy
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
 
 from tests.support.fmu_importer import Importer
 
@@ -15,11 +14,6 @@ ZERO, FULL_V, STEP_S = 0.0, 10.0, 1 / 2500
 @pytest.fixture(scope="module")
 def path(fmu_folder):
     return fmu_folder / "dz_compensator.fmu"
-
-
-@pytest.mark.parametrize("name", ("dz_compensator", "dz_plant"))
-def test_fmpy_finds_no_problem(fmu_folder, name):
-    assert validate_fmu(str(fmu_folder / f"{name}.fmu")) == []
 
 
 def test_co_simulation_shows_an_input_after_the_step_that_it_was_given_for(path):
@@ -70,25 +64,16 @@ def test_two_instances_know_nothing_of_each_other(path, kind):
         assert one.integer("compare") > other.integer("compare")
 
 
-def test_stops_of_the_plant_are_events_of_model_exchange(fmu_folder):
+def test_the_plant_is_held_at_its_stops(fmu_folder):
     time = np.array([0, 0.05, 0.05, 0.15, 0.15, 0.25])
     signal = np.array(
-        list(zip(time, [0, 0, 10, 10, 0, 0.0], [3.0] * 6, strict=True)),
-        dtype=[("time", float), ("voltage", float), ("supply", float)],
+        list(zip(time, [0, 0, 10, 10, 0, 0.0], strict=True)), dtype=[("time", float), ("voltage", float)]
     )
-    start = {"stroke_mm": 1.5, "hysteresis_V": 0.0, "supply": 3.0}
-    runs = [
-        fmpy.simulate_fmu(
-            str(fmu_folder / "dz_plant.fmu"), fmi_type=kind, stop_time=0.25, output_interval=1e-3,
-            relative_tolerance=1e-9, input=signal, start_values=start, output=["Q", "x", "at_stop"],
-        )
-        for kind in ("ModelExchange", "CoSimulation")
-    ]  # fmt: skip
-    exchanged, stepped = runs
-    assert set(exchanged["at_stop"]) == set(stepped["at_stop"]) == {-1, 0, 1}
-    assert stepped["x"].max() == 1.5e-3 and exchanged["x"].max() == pytest.approx(1.5e-3, abs=1e-8)
-    flow = np.interp(stepped["time"], exchanged["time"], exchanged["Q"])
-    assert abs(flow - stepped["Q"]).max() < 1e-5 * stepped["Q"].max()
+    run = fmpy.simulate_fmu(
+        str(fmu_folder / "dz_plant.fmu"), fmi_type="CoSimulation", stop_time=0.25, output_interval=1e-3, input=signal,
+        start_values={"stroke_mm": 1.5, "hysteresis_V": 0.0, "supply": 3.0}, output=["x", "at_stop"],
+    )  # fmt: skip
+    assert set(run["at_stop"]) == {-1, 0, 1} and run["x"].max() == 1.5e-3 and run["x"][-1] == 0.0
 
 
 @pytest.mark.slow

@@ -100,27 +100,19 @@ def flow_in_words(flow_L_min: float, unseen_below_L_min: float | None, units: Re
     return units.number(flow_L_min, ".2f L/min")
 
 
-WindowKind = Literal["ramp", "step", "load step", "disturbances"]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlantComparison:
-    """Comparison of the closed loop's plant with CasADi's integrator over one time window."""
+    """Comparison of the closed loop's plant with CasADi's CVODES over one time window: a ramp, steps and load steps."""
 
-    kind: Annotated[
-        WindowKind,
-        about(
-            "Motion of the command or the pressure drop in the window. disturbances: other pressures, "
-            "drive, oil and readings, and a failing sensor."
-        ),
-    ]
     side: Side
-    dp_MPa: PressureDrop
-    then_MPa: Annotated[
-        float,
-        quantity("MPa", "Pressure drop at zero flow after a load step; otherwise equal to dp_MPa.", ge=0, le=1000),
+    dp_MPa: Annotated[
+        tuple[float, float], quantity("MPa", "Lowest and highest pressure drop at no flow.")
     ]
     seconds: Annotated[float, quantity("s", "Length of the window.", gt=0, le=1000)]
+    step_s: Annotated[
+        float,
+        quantity("s", "Longest step of the plant, which follows from its fastest time constant.", gt=0, le=1),
+    ]
     position_difference: Annotated[
         float,
         quantity(
@@ -139,18 +131,8 @@ class PlantComparison:
             le=1e6,
         ),
     ]
-    q_largest_L_min: Annotated[Flow, about("Largest flow in the window, by the integrator.")]
-    unlike_compare_values: Annotated[
-        Count,
-        about(
-            "PWM periods in which the compare values of the two loops differ, plus samples with a different "
-            "pressure code. Those of a direct command under the drive's dither count, too."
-        ),
-    ]
-    codes_at_border: Annotated[
-        Count, about("Number of pressures so close to the border of two codes that the plant's code was used.")
-    ]
-    impacts: Annotated[Count, about("Number of times the spool hit a stop, by the integrator.")]
+    q_largest_L_min: Annotated[Flow, about("Largest flow in the window, by CVODES.")]
+    impacts: Annotated[Count, about("Number of times the spool hit a stop, by CVODES.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,8 +159,8 @@ class ClosedLoopResult:
         tuple[PressureResult, ...],
         about("Result for each side and tested pressure drop; empty if the closed loop did not run."),
     ]
-    against_integrator: Annotated[
-        tuple[PlantComparison, ...], about("Comparison for each side and kind of window; empty if it did not run.")
+    against_cvodes: Annotated[
+        tuple[PlantComparison, ...], about("Comparison for each side; empty if it did not run.")
     ]
 
 
@@ -267,14 +249,12 @@ class Scatter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Population:
-    """Machines drawn from the declared budget, each tried at zero command at and between the tested pressure drops."""
+    """Machines drawn from the declared budget: drive and threshold of each at and between the tested pressure drops."""
 
-    machines: Annotated[int, Meta(description="Number of machines.", ge=1, le=10**6)]
+    machines: Annotated[int, Meta(description="Number of machines.", ge=1, le=10**9)]
     seed: Annotated[int, Meta(description="Random seed of the draw.", ge=0, le=2**60)]
-    flowing: Annotated[Count, about("Number of machines with flow at zero command beyond what is allowed.")]
-    never_open: Annotated[
-        Count,
-        about("Number of machines that did not open at some pressure drop, so that they could not be seen to close."),
+    flowing: Annotated[
+        Count, about("Number of machines whose drive at zero command is above the threshold of their valve.")
     ]
     confidence: Annotated[float, quantity("1", "Confidence level of the upper limit.", ge=0.5, le=1)]
     upper_limit: Annotated[
@@ -286,15 +266,27 @@ class Population:
     pressures: Annotated[
         int, Meta(description="Number of pressure drops at which each machine was tried.", ge=1, le=10**6)
     ]
-    largest_L_min: Annotated[Flow, about("Largest flow at zero command beyond what is allowed.")]
-    largest_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at which that flow occurs.", ge=0, le=1000)]
+    least_margin_V: Annotated[
+        float, quantity("V", "Least margin of the threshold above the drive, as command.", ge=-1e6, le=1e6)
+    ]
+    least_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at which that margin occurs.", ge=0, le=1000)]
     worst: Annotated[
         Mapping[str, float],
-        about("Machine with that flow: position of each component within its half-width, from -1 to 1."),
+        about("Machine with that margin: position of each component within its half-width, from -1 to 1."),
     ]
     drawn: Annotated[
         tuple[str, ...], about("Components that were drawn; the others stood at their least favourable ends.")
     ]
+    in_loop: Annotated[Count, about("Number of machines, those with the least margins, that ran in the closed loop.")]
+    flowing_in_loop: Annotated[
+        Count, about("Number of these with flow at zero command beyond what is allowed.")
+    ]
+    never_open: Annotated[
+        Count,
+        about("Number of these that did not open at some pressure drop, so that they could not be seen to close."),
+    ]
+    largest_L_min: Annotated[Flow, about("Largest flow of these at zero command beyond what is allowed.")]
+    largest_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at which that flow occurs.", ge=0, le=1000)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

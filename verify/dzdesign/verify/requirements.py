@@ -41,16 +41,11 @@ class Requirement:
         return Check(id=self.id, name=name or self.title, holds=holds, text=text, not_required=not_required)
 
 
-FILES = Requirement(id="files-as-generated", title="the generated files are unchanged")
-MANIFEST = Requirement(id="manifest", title="the manifest describes the firmware")
-#: Of an output other than a C firmware.
-OUTPUT_MANIFEST = Requirement(id="output-manifest", title="the manifest states what the output was made from")
-#: Of Structured Text.
-SUBSET = Requirement(id="st-subset", title="the text uses only the verified subset")
-SAME_TEXT = Requirement(id="st-same-text", title="every file holds the same text")
-TWO_READINGS = Requirement(id="st-two-readings", title="two readings of the text agree")
-OVERFLOW = Requirement(id="st-overflow", title="no operation overflows 32 bits")
-STATES = Requirement(id="st-states", title="status, side and rest state match their description")
+#: The front door designs and generates again; this room, which shares no code with it, compares.
+REPRODUCED = Requirement(id="reproduced", title="the files are reproduced from compensator.json")
+#: Of Structured Text and of a function for MATLAB.
+OVERFLOW = Requirement(id="overflow", title="no operation leaves the range of its type")
+STATES = Requirement(id="states", title="status and what is remembered match their description")
 COMPILES = Requirement(id="compiles", title="compiles without warnings")
 EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
 MONOTONE = Requirement(id="monotone", title="within range and monotone")
@@ -61,8 +56,6 @@ PRESSURE_DIFFERENCE = Requirement(
     id="pressure-difference", title="depends on the pressures only through their difference"
 )
 FALLBACK = Requirement(id="fallback", title="codes outside their signal's valid range give the safe value")
-#: Of a firmware that has them.
-VECTORS = Requirement(id="vectors", title="the test vectors equal the exactly rounded law")
 DRIVE = Requirement(id="drive", title="the drive follows its model")
 PLANT_OPENS = Requirement(id="plant-opens", title="the plant of the closed loop opens")
 PLANT_IS_THE_VALVE = Requirement(id="plant-is-the-valve", title="the plant agrees with the identified valve")
@@ -71,17 +64,6 @@ ZERO_FLOW_AFTER_SCENARIOS = Requirement(
     id="zero-flow-after-scenarios", title="no flow at zero command after any required scenario"
 )
 NATIVE_PLANT = Requirement(id="native-plant", title="the plant of the closed loop agrees with CasADi's integrator")
-CERTIFICATE = Requirement(id="certificate", title="the certificate follows from the valve")
-BOUNDS = Requirement(id="bounds", title="the bounds follow from the valve's thresholds and errors")
-LAW = Requirement(id="law", title="the law follows from the valve and the options")
-#: Of a valve.json that is written as `identify` writes it the hash is known without the file.
-VALVE = Requirement(
-    id="valve",
-    title="the valve is the one from which compensator.json was made",
-    how="`verify` with the valve.json that compensator.json names by its SHA-256 beside the firmware",
-)
-#: Checked by the front door, which may ask the generator; this room shares no code with it.
-REGENERATED = Requirement(id="regenerated", title="the files are what codegen generates from compensator.json")
 #: Checked by the front door, which asks `identify`. Without it thresholds are taken as stated.
 RAMPS = Requirement(
     id="identified-again",
@@ -114,24 +96,16 @@ UNDEFINED_BEHAVIOUR = Requirement(
 MUTATION = Requirement(id="mutation", title="the checks catch wrong C", how="`verify --mutate`")
 C2000WARE = Requirement(id="c2000ware", title="compiles against C2000Ware", how="`verify --c2000ware`")
 #: Of FMUs.
-FMU_FILES = Requirement(id="fmu-files", title="the FMUs' files are those of their manifests")
-FMU_DESCRIPTION = Requirement(id="fmu-description", title="modelDescription.xml states what the FMU was made from")
-FMU_LIBRARIES = Requirement(id="fmu-libraries", title="the binaries need no other library")
-FMU_DRIVE = Requirement(id="fmu-drive", title="Co-Simulation follows the drive's model one step later")
-FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
-FMU_STARTS = Requirement(id="fmu-starts", title="variables start at their described values")
-FMU_EXCHANGE = Requirement(id="fmu-exchange", title="Model Exchange follows the exact models without delay")
-FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="the coupled FMUs behave as the closed loop")
-#: Of a function for MATLAB.
-MATLAB_SUBSET = Requirement(id="matlab-subset", title="the function uses only the verified subset of MATLAB")
-MATLAB_RANGES = Requirement(id="matlab-ranges", title="no operation leaves the range of its class")
-MATLAB_INPUTS = Requirement(
-    id="matlab-inputs", title="inputs of every class and size are accepted or refused as described"
+FMU_VALID = Requirement(id="fmu-valid", title="FMPy finds no problem in the FMUs")
+FMU_DRIVE = Requirement(
+    id="fmu-drive", title="Co-Simulation follows the drive's model one step later, and Model Exchange at once"
 )
+FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
+FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="the coupled FMUs behave as the closed loop")
 POPULATION = Requirement(
     id="population",
     title="no flow at zero command for random machines within the tolerances",
-    how="`verify --tolerances FILE`, with machines = 10000 in FILE and a declared machine",
+    how="`verify --tolerances FILE`, with machines = 1000000 in FILE and a declared machine",
 )
 OWN_PLANT = Requirement(
     id="own-plant", title="the closed-loop requirements hold with the machine's plant", how="`verify --plant`"
@@ -159,10 +133,8 @@ CURRENT_VALVE = Requirement(
 )
 #: What every `verify` checks, in the order of the report.
 ALWAYS = (
-    FILES, MANIFEST, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK, DRIVE,
-    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, NATIVE_PLANT, CERTIFICATE, BOUNDS, LAW,
-    VALVE,
-    REGENERATED,
+    REPRODUCED, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK, DRIVE,
+    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, NATIVE_PLANT,
 )  # fmt: skip
 #: What every `verify` checks beside it where the drive is by current.
 OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS, CURRENT_VALVE)

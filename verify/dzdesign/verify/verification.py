@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
@@ -11,9 +11,10 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.pressure_inputs.not_covered import not_covered
+from dzdesign.design.pressure_inputs import not_covered
+from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
-from dzdesign.verify.closed_loop.evidence_curves import curve_files
+from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, loop_curves
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
@@ -21,19 +22,19 @@ from dzdesign.verify.closed_loop.population import NOT_DECLARED
 from dzdesign.verify.closed_loop.tolerances import Tolerances
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
-from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
+from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_follows
-from dzdesign.verify.exhaustive.input_map import InputMap, map_inputs
 from dzdesign.verify.exhaustive.lot_check import lot_checked
-from dzdesign.verify.exhaustive.stored_vectors import vectors_follow
-from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
-from dzdesign.verify.firmware.compilation import board_compiles, changed_board_files, check_include, compiles_strictly
+from dzdesign.verify.firmware.compilation import BoardCompiled, board_compiles, check_include, compiles_strictly
 from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
-from dzdesign.verify.firmware.manifest import manifest_follows
 from dzdesign.verify.firmware.own_block import own_block_accepted
-from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
-from dzdesign.verify.firmware.unchanged_files import differing_files, files_unchanged, user_files
-from dzdesign.verify.integrator.comparison import compare_with_integrator
+from dzdesign.verify.firmware.reproduced import (
+    Regenerated,
+    changed_board_files,
+    differing_files,
+    reproduced,
+    user_files,
+)
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import EXACT_LAW, Check
 from dzdesign.verify.toolchain.host_compiler import host_compiler
@@ -47,8 +48,8 @@ class Verification(ShownInNotebooks):
 
     #: Every requirement that was tried, with its figures; stored as verification.json.
     evidence: Evidence
-    #: What the core gives over its inputs, one a sign of command, to be drawn.
-    maps: tuple[InputMap, ...]
+    #: The numbers of the figures by the names of their files: the core's answers over its inputs, and the ramps.
+    curves: Mapping[str, Curves]
     #: The ramps in closed loop, one a side and tested pressure drop.
     loops: tuple[LoopComparison, ...]
     #: What the firmware was made from, where designing it again gave every number.
@@ -82,6 +83,7 @@ def verify(
     tolerances: Tolerances | None = None,
     backs_MPa: Sequence[float] | None = None,
     include: Sequence[Path] = (),
+    again: Regenerated | None = None,
     code: Path | None = None,
     say: Callable[[str], None] = lambda _: None,
     watch: Watch = lambda items, _: items,
@@ -95,9 +97,10 @@ def verify(
     `sequence` is the command over time, by default 0-10 V in 100 s and back. `backs_MPa` are the pressures downstream
     of the edge. `include` lists folders with headers of the user's board files.
 
-    The code to compile and run is taken from `code`, by default the folder itself. For a folder that is not trusted,
-    pass one with the same code. `say` is called before each stage. `watch` receives the pieces of a long stage and
-    their number, and yields each piece when it is done.
+    `again` is the firmware as it is generated now; without it the folder is not compared. Of a folder that differs
+    nothing else is tried. The code to compile and run is taken from `code`, by default the folder itself. `say` is
+    called before each stage. `watch` receives the pieces of a long stage and their number, and yields each piece when
+    it is done.
 
     Raises
     ------
@@ -107,32 +110,22 @@ def verify(
     manifest, compensator = _read(folder, plant, tolerances, include)
     host_compiler()
     code = code or folder
-    say("compiling the core with every warning an error")
-    given = (plant, sequence or RampSequence(), tolerances, backs_MPa)
-    run = _run_core(code, manifest, compensator, given, say, watch)
+    same = None if again is None else reproduced(folder, again)
+    run, block, board = _Run(), tuple[Check, ...](), BoardCompiled()
+    if again is None or same is None or (again.files and same.holds is not False):
+        say("compiling the core with every warning an error")
+        given = (plant, sequence or RampSequence(), tolerances, backs_MPa)
+        run = _run_core(code, manifest, compensator, given, say, watch)
+        block, board = own_block_accepted(code, manifest), board_compiles(folder, manifest, include)
     core, current, loop = run.core, run.current, run.loop
-    board, law = board_compiles(folder, manifest, include), law_follows(compensator)
-    checks = (
-        files_unchanged(folder, manifest),
-        manifest_follows(folder, manifest, compensator),
-        *own_block_accepted(code, manifest),
-        *vectors_follow(folder, manifest, compensator),
-        *core.checks,
-        *current.checks,
-        *loop.checks,
-        *run.of_plant,
-        certificate_follows(compensator),
-        bounds_follow(compensator),
-        law,
-        valve_follows(folder, compensator),
-        *board.checks,
-    )
+    of_text = (same,) if same else ()
+    checks = (*of_text, *block, *core.checks, *current.checks, *loop.checks, *run.of_plant, *board.checks)
     evidence = Evidence(
         tool=THIS_TOOL,
         made_from=(_manifest_source(folder),),
         target=manifest.target,
-        changed_board_files=tuple(changed_board_files(folder, manifest)),
-        user_files=tuple(user_files(folder, manifest)),
+        changed_board_files=changed_board_files(folder, manifest),
+        user_files=user_files(folder, manifest.files),
         differing_files=differing_files(folder, manifest),
         board_not_compiled=board.not_compiled,
         checks=checks,
@@ -145,7 +138,12 @@ def verify(
         mutants=None,
         not_covered=not_covered(compensator),
     )
-    return Verification(evidence=evidence, maps=core.maps, loops=loop.loops, derived=compensator if law.holds else None)
+    return Verification(
+        evidence=evidence,
+        curves={**loop_curves(loop.loops), **core.curves},
+        loops=loop.loops,
+        derived=compensator if same and same.holds else None,
+    )
 
 
 def _read(
@@ -172,18 +170,18 @@ def _manifest_source(folder: Path) -> SourceFile:
 class _Core:
     """What trying the core showed; of one that does not compile nothing more."""
 
-    checks: tuple[Check, ...]
+    checks: tuple[Check, ...] = ()
     inputs: tuple[InputCheck, ...] = ()
-    maps: tuple[InputMap, ...] = ()
+    curves: Mapping[str, Curves] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Run:
     """What the compiled core did: by itself, with its current controller, in the closed loop and beside CasADi."""
 
-    core: _Core
-    current: CurrentChecks
-    loop: FirmwareLoop
+    core: _Core = field(default_factory=_Core)
+    current: CurrentChecks = field(default_factory=CurrentChecks)
+    loop: FirmwareLoop = field(default_factory=FirmwareLoop)
     compared: tuple[PlantComparison, ...] = ()
     of_plant: tuple[Check, ...] = ()
 
@@ -202,10 +200,10 @@ def _run_core(
     building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
     core = _try_core(folder, manifest, compensator, say)
     if not core.inputs:
-        return _Run(core=core, current=CurrentChecks(), loop=FirmwareLoop())
+        return _Run(core=core)
     current, scenes = current_checks(folder, compensator, say), building.result()
     loop = close_the_loop(scenes, compensator, plant, sequence, tolerances, say, watch)
-    compared, native_plant = compare_with_integrator(folder, scenes, say)
+    compared, native_plant = compare_with_cvodes(scenes, say)
     return _Run(core=core, current=current, loop=loop, compared=compared, of_plant=(native_plant,))
 
 
@@ -217,9 +215,10 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
     say("comparing every input with the exact law")
     signs, units = compensator.signals.signs, compensator.valve.recorded_units
     try:
-        inputs = tuple(check_all_inputs(folder, sign, compensator) for sign in signs)
+        tried = [every_input(folder, sign, compensator) for sign in signs]
     except RequirementError as error:
         return _Core(checks=(compiles, EXACT_LAW.check(holds=False, text=str(error))))
+    inputs = tuple(found for found, _ in tried)
     return _Core(
         checks=(
             compiles,
@@ -228,7 +227,7 @@ def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator
             drive_follows(folder, compensator),
         ),
         inputs=inputs,
-        maps=tuple(map_inputs(folder, compensator, sign) for sign in signs),
+        curves={name: columns for _, curves in tried for name, columns in curves.items()},
     )
 
 
@@ -241,5 +240,4 @@ def evidence_manifest(evidence: Artefact) -> Mapping[str, object]:
 def evidence_files(verification: Verification) -> dict[str, bytes]:
     """Return the files of the evidence folder: verification.json, and curves to draw."""
     contents = {Evidence.FILE_NAME: to_json_bytes(verification.evidence)}
-    contents |= {name: text.encode() for name, text in curve_files(verification.loops, verification.maps).items()}
-    return contents
+    return contents | {name: csv_of(columns).encode() for name, columns in verification.curves.items()}

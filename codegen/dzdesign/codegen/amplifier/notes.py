@@ -3,7 +3,7 @@
 from dzdesign.codegen.amplifier.files import WITHOUT_COMMENTS
 from dzdesign.codegen.amplifier.setting import AmplifierSetting
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.fixed.pressure_line import zero_band
+from dzdesign.design.fixed_offset import zero_band
 from dzdesign.design.signals import SIDE_NAMES
 
 #: Where the threshold is lower than at any test, by its trend.

@@ -9,7 +9,7 @@ from dzdesign.codegen.amplifier.notes import notes_of
 from dzdesign.codegen.amplifier.setting import AmplifierSetting, amplifier_setting
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
-from dzdesign.design.fixed.dead_zones import FixedDeadZone, dead_zones
+from dzdesign.design.fixed_offset import FixedDeadZone, dead_zones
 
 #: The table beside the device's file; `verify` has the same name and header.
 TABLE = "dead_zones.csv"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from itertools import pairwise
 
-from dzdesign.design.fixed.characteristic import Characteristic, Node
+from dzdesign.design.fixed_offset import Characteristic, Node
 
 NO_NODE: Node = (Fraction(0), Fraction(0))
 

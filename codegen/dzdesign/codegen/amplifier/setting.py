@@ -9,9 +9,16 @@ from dzdesign.codegen.amplifier.device import Device, Parameter
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import errors_in
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.fixed.characteristic import Characteristic, added, jump
-from dzdesign.design.fixed.fixed_offset import FixedOffset, fixed_offset
-from dzdesign.design.fixed.pressure_line import full_drive, pressure_line, zero_band
+from dzdesign.design.fixed_offset import (
+    Characteristic,
+    FixedOffset,
+    added,
+    fixed_offset,
+    full_drive,
+    jump,
+    pressure_line,
+    zero_band,
+)
 from dzdesign.design.signals import SIDE_NAMES
 
 #: A recorded pressure drop is this near to the one that was meant.

@@ -32,6 +32,32 @@ RECIPROCALS_TRIED = 128
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Scaling:
+    """Units of one side's command and output: counts of those from zero on."""
+
+    #: Full command, the transition's length behind the zero band, full output and its limit.
+    span: int
+    transition: int
+    full: int
+    limit: int
+    #: Whether the output is rounded to the nearest, a half up; else it is rounded down.
+    rounds: bool = True
+    #: Bits that the sum's shift drops at least: rounding needs one, and a shift by a whole word of 32 costs nothing.
+    least_shift: int = WORD_BITS
+
+
+def scaling_of_codes(compensator: Compensator, sign: int) -> Scaling:
+    """Return the scaling of converter codes and compare values."""
+    signals = compensator.signals
+    return Scaling(
+        span=signals.command.span(sign),
+        transition=compensator.transition_codes,
+        full=signals.compare_max,
+        limit=compensator.drive_functions.compare_limit,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class IntegerForm:
     """Constants of the core; see the module's text for the algebra.
 
@@ -65,33 +91,34 @@ class IntegerForm:
     reciprocal_shift: int
 
 
-def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
+def integer_form(compensator: Compensator, sign: int = 1, scaling: Scaling | None = None) -> IntegerForm:
     """Lower the law of one side to integers and prove that nothing overflows and every division is exact.
 
-    Coefficients that need more than 64-bit arithmetic are an `InputError`.
+    `scaling` is that of converter codes where none is given. Coefficients that need more than 64-bit arithmetic are an
+    `InputError`.
     """
-    c, side = compensator, compensator.side(sign)
-    terms = _terms(compensator, sign)
-    divisor, shift, common = _denominator(terms)
+    side, units = compensator.side(sign), scaling or scaling_of_codes(compensator, sign)
+    terms = _terms(compensator, sign, units)
+    divisor, shift, common = _denominator(terms, units.least_shift)
     slope, offset, linear, transition = (int(value * common) for value in terms)
-    span = c.signals.command.span(sign) * (c.transition_codes or 1)
-    scale_beta = _share((slope, offset, transition), (abs(slope) * span, abs(offset), transition * c.transition_codes))
+    span = units.span * (units.transition or 1)
+    scale_beta = _share((slope, offset, transition), (abs(slope) * span, abs(offset), transition * units.transition))
     linear, linear_shift = _odd_part(linear)
-    asked = _largest_quotient(compensator, sign, divisor)
+    largest = (units.limit + 1) * divisor - 1
+    asked = _largest_quotient(compensator, sign, divisor) if scaling is None else INT32_MAX
     if asked > INT32_MAX:
         raise InputError(f"the law's quotient by {divisor} needs more than 31 bits; choose other scalings")
-    largest = (c.drive_functions.compare_limit + 1) * divisor - 1
-    reciprocal, reciprocal_shift = _exact_reciprocal(divisor, largest)
+    reciprocal, reciprocal_shift = exact_reciprocal(divisor, largest)
     form = IntegerForm(
         table=_table(side.law_beta, scale_beta),
-        zero_table=_table(side.beta, scale_beta) if c.transition_codes else (),
+        zero_table=_table(side.beta, scale_beta) if units.transition else (),
         scale_beta=scale_beta,
         slope=slope // scale_beta,
         offset=offset // scale_beta,
         transition=transition // scale_beta,
         linear=linear,
         linear_shift=linear_shift,
-        half=common // 2,
+        half=common // 2 if units.rounds else 0,
         shift=shift,
         divisor=divisor,
         largest=largest,
@@ -99,7 +126,7 @@ def integer_form(compensator: Compensator, sign: int = 1) -> IntegerForm:
         reciprocal=reciprocal,
         reciprocal_shift=reciprocal_shift,
     )
-    _prove_widths(form, compensator, sign)
+    _prove_widths(form, compensator.beta_step_codes, units)
     return form
 
 
@@ -112,7 +139,7 @@ class _Terms(NamedTuple):
     per_transition_code: Fraction
 
 
-def _terms(compensator: Compensator, sign: int) -> _Terms:
+def _terms(compensator: Compensator, sign: int, units: Scaling) -> _Terms:
     """Return the law's terms: Eq. (18) is affine in beta, in counts beta (per_command c + constant) + plain c."""
     c, side = compensator, compensator.side(sign)
 
@@ -122,23 +149,23 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
             beta=beta,
             kappa=side.drive_range_over_u_max,
             u_min0_over_u_max=side.u_min0_over_u_max,
-            n_adc=c.signals.command.span(sign),
-            n_full=c.signals.compare_max,
+            n_adc=units.span,
+            n_full=units.full,
         )
 
     without, whole = line(beta=0), line(beta=1)
     beta_unit = c.beta_denominator * c.beta_step_codes
-    per_code = c.transition_codes or 1
+    per_code = units.transition or 1
     per_transition_code = Fraction(0)
-    if c.transition_codes:  # what one unit of the gap lowers at zero command, over the transition's codes
+    if units.transition:  # what one unit of the gap lowers at zero command, over the transition's codes
         lowered = evaluate_transition(
             beta_opening=1,
             beta_closing=0,
             u_min0_over_u_max=side.u_min0_over_u_max,
             share_of_transition=0,
-            n_full=c.signals.compare_max,
+            n_full=units.full,
         )
-        per_transition_code = lowered / beta_unit / c.transition_codes
+        per_transition_code = lowered / beta_unit / units.transition
     return _Terms(
         per_command=(whole.slope - without.slope) / beta_unit / per_code,
         constant=(whole.start - without.start) / beta_unit,
@@ -147,11 +174,10 @@ def _terms(compensator: Compensator, sign: int) -> _Terms:
     )
 
 
-def _denominator(terms: _Terms) -> tuple[int, int, int]:
+def _denominator(terms: _Terms, least_shift: int) -> tuple[int, int, int]:
     """Return (divisor, shift, divisor 2^shift): what all terms times it are integers, the divisor odd."""
     divisor, shift = _odd_part(lcm(*(value.denominator for value in terms)))
-    # Rounding to nearest needs half a unit, and a shift by a whole word of 32 bits costs nothing.
-    shift = max(shift, WORD_BITS)
+    shift = max(shift, least_shift)
     return divisor, shift, divisor << shift
 
 
@@ -205,7 +231,7 @@ def exact_factors(share: Fraction, largest: int, shifts: range, tried: int = 1) 
                 yield factor, shift
 
 
-def _exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
+def exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
     """Return (m, s) with ``n // divisor == n * m >> s`` for every n up to `largest`."""
     if divisor == 1:
         return 1, 0
@@ -221,15 +247,14 @@ def _signed_digits(value: int) -> int:
     return (value ^ 3 * value).bit_count()
 
 
-def _prove_widths(form: IntegerForm, compensator: Compensator, sign: int) -> None:
+def _prove_widths(form: IntegerForm, step: int, units: Scaling) -> None:
     """Prove that every intermediate value fits the type that the template gives it."""
-    span = compensator.signals.command.span(sign) * (compensator.transition_codes or 1)
-    step = compensator.beta_step_codes
+    span = units.span * (units.transition or 1)
     beta = max(form.table) * step
     gap = beta if form.zero_table else 0
     inner = max(abs(form.offset), abs(form.slope * span + form.offset))
     straight = form.linear * span << form.linear_shift
-    lowering = form.transition * compensator.transition_codes
+    lowering = form.transition * units.transition
     checks = {
         "the interpolated table": (beta, INT32_MAX),
         "slope times command": (abs(form.slope) * span, INT32_MAX),

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 
 from dzdesign.codegen.calibration.files import core_headers, core_sources
-from dzdesign.codegen.fmu.description import Model
-from dzdesign.codegen.fmu.variables import compensator_variables, full_output
+from dzdesign.codegen.fmu.description import Causality, Model, Variable
 from dzdesign.codegen.project import generate
 from dzdesign.design.compensator import Compensator
 
@@ -12,6 +11,8 @@ from dzdesign.design.compensator import Compensator
 STOP_S = 10.0
 #: The library for a PC: it takes the scalings of any compensator.
 TARGET = "host"
+#: Of the core's 16 bits; beyond the converter's own none is valid.
+LARGEST_CODE = 65535.0
 
 
 def compensator_model(compensator: Compensator) -> Model:
@@ -21,10 +22,64 @@ def compensator_model(compensator: Compensator) -> Model:
         title="dzdesign compensator",
         description=f"Dead-zone compensator of a proportional valve, law {compensator.law}: the firmware's integers.",
         variables=compensator_variables(compensator),
+        exchange=True,
         step_s=1 / compensator.signals.tick_Hz,
         stop_s=STOP_S,
         units=compensator.valve.recorded_units,
     )
+
+
+def compensator_variables(compensator: Compensator) -> tuple[Variable, ...]:
+    """Return the variables of a compensator's FMU; of two solenoids the law's outputs are there for either."""
+    c, found = compensator, list[Variable]()
+    signals, command = c.signals, c.signals.command
+    u_max, two = float(c.u_max_V), len(signals.signs) == 2
+    volts = ("u_i", "p_A", "p_B")
+    inputs = (*volts, "u_i_code", "p_A_code", "p_B_code")
+
+    def add(name: str, description: str, causality: Causality, **how: object) -> None:
+        found.append(
+            Variable(name=name, reference=1 + len(found), description=description, causality=causality, **how)  # type: ignore[arg-type]
+        )
+
+    add("u_i", f"Command, {-u_max if two else 0.0:g} to {u_max:g} V.", "input", unit="V", start=0.0, command=True)
+    add("p_A", "Pressure ahead of the metering edge, for positive command.", "input", unit="MPa", start=0.0)
+    add("p_B", "Pressure behind it.", "input", unit="MPa", start=0.0)
+    for name, what, zero in (
+        ("u_i_code", "command", command.zero_code),
+        ("p_A_code", "pressure sensor A", signals.pressure_a.zero_code),
+        ("p_B_code", "pressure sensor B", signals.pressure_b.zero_code),
+    ):
+        add(name, f"Converter code of the {what}, where codes is true.", "input", kind="integer",
+            start=float(zero), range=(0.0, LARGEST_CODE))  # fmt: skip
+    add("codes", "True: the inputs are the converter's codes; false: V and MPa, which an ideal converter reads.",
+        "parameter", kind="boolean", start=0.0)  # fmt: skip
+    for sign in signals.signs:
+        end, side = ("", "") if sign > 0 else ("_negative", ", for negative commands")
+        unit, full = full_output(compensator)
+        what = "Set point of the current" if unit == "A" else "What the law drives the valve with"
+        # The negative side counts from zero outwards: a reading that is not zero at zero command falls there.
+        recorded = unit == "V" and (sign > 0 or c.valve.recorded_units.command.at_zero == 0)
+        add(f"u_O{end}", f"{what}{side}: compare{end} in {unit}, {full:g} {unit} at {signals.compare_max}.", "output",
+            unit=unit, follows=inputs, command=recorded)  # fmt: skip
+        add(f"beta{end}", f"Beta that the law uses{side}.", "output", follows=inputs[1:3] + inputs[4:])
+        add(f"compare{end}", f"PWM compare value of the law{side}, of {signals.compare_max}; changes at events.",
+            "output", kind="integer", follows=inputs)  # fmt: skip
+        add(f"status{end}", f"What there is to say of the inputs{side}, DZ_STATUS_... of dz_comp.h.", "output",
+            kind="integer", follows=inputs)  # fmt: skip
+    each = f"set at every PWM period, {signals.tick_Hz} a second"
+    add("compare_a", f"PWM compare value of the drive for solenoid A, {each}.", "output", kind="integer", start=None)
+    add("compare_b", f"The same for solenoid B, {each}; 0 where there is none.", "output", kind="integer")
+    add("drive_status", "What the drive says of its inputs, DZ_STATUS_... of dz_drive.h; 0: all valid, and used.",
+        "output", kind="integer")  # fmt: skip
+    return tuple(found)
+
+
+def full_output(compensator: Compensator) -> tuple[str, float]:
+    """Return unit and size of the law's output at full drive: the command, or the current that is controlled."""
+    if (drive := compensator.current_drive) is not None:
+        return "A", float(drive.circuit.rated_A)
+    return "V", float(compensator.u_max_V)
 
 
 def compensator_core(compensator: Compensator) -> dict[str, bytes]:

@@ -1,25 +1,26 @@
-"""modelDescription.xml of FMI 2.0."""
+"""What an FMU says of itself: its variables, and modelDescription.xml of FMI 2.0, from the same table as its C."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 from xml.sax.saxutils import quoteattr
 
-from dzdesign.codegen.fmu.variables import Variable
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.version import __version__
 
 SOURCE = "dz_fmu.c"
+Kind = Literal["real", "integer", "boolean"]
+Causality = Literal["input", "output", "parameter"]
+#: In C: who may set a variable of that causality.
+SETTINGS: Mapping[str, str] = {"input": "ALWAYS", "parameter": "BEFORE_START", "output": "NEVER"}
 #: Units by name: factor to SI, and the exponents of the base units.
 UNITS: Mapping[str, tuple[float, Mapping[str, int]]] = {
-    "s": (1.0, {"s": 1}),
     "V": (1.0, {"kg": 1, "m": 2, "s": -3, "A": -1}),
     "MPa": (1e6, {"kg": 1, "m": -1, "s": -2}),
     "L/min": (1 / 60_000, {"m": 3, "s": -1}),
     "A": (1.0, {"A": 1}),
-    "A/s": (1.0, {"A": 1, "s": -1}),
     "m": (1.0, {"m": 1}),
     "m/s": (1.0, {"m": 1, "s": -1}),
-    "m/s2": (1.0, {"m": 1, "s": -2}),
     "mm": (1e-3, {"m": 1}),
     "V/A": (1.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
     "ohm": (1.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
@@ -37,6 +38,57 @@ UNITS: Mapping[str, tuple[float, Mapping[str, int]]] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Variable:
+    """One variable of an FMU."""
+
+    name: str
+    reference: int
+    description: str
+    causality: Causality
+    kind: Kind = "real"
+    #: Of `UNITS`; empty of what has none.
+    unit: str = ""
+    #: None of what is computed.
+    start: float | None = None
+    #: Names of the inputs that an output of the same moment follows.
+    follows: tuple[str, ...] = ()
+    #: Least and largest value.
+    range: tuple[float, float] | None = None
+    #: A command as it was recorded, which has a unit and a zero of its own; any other voltage is one.
+    command: bool = False
+
+    @property
+    def symbol(self) -> str:
+        """Name of its value reference in C."""
+        return f"V_{self.name.upper()}"
+
+    @property
+    def setting(self) -> str:
+        """Who may set it, in C."""
+        return SETTINGS[self.causality]
+
+    @property
+    def c_start(self) -> str:
+        """Return its first value in C."""
+        return repr(float(self.start or 0.0))
+
+    @property
+    def c_ends(self) -> str:
+        """Return the least and the largest number that it may be set to, in C."""
+        if self.kind == "real":
+            return "-LARGEST_REAL, LARGEST_REAL"
+        least, largest = self.range or ((-(2.0**31), 2.0**31 - 1) if self.kind == "integer" else (0.0, 1.0))
+        return f"{least!r}, {largest!r}"
+
+    @property
+    def variability(self) -> str:
+        """Return it as FMI names it."""
+        if self.causality == "parameter":
+            return "fixed"
+        return "continuous" if self.kind == "real" else "discrete"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
     """One FMU: what it is called, and its variables."""
 
@@ -46,18 +98,11 @@ class Model:
     description: str
     #: In the order of their references.
     variables: tuple[Variable, ...]
-    #: Number of event indicators.
-    indicators: int = 0
-    #: Between two events it has memory that each step of an integrator updates.
-    follows_integrator: bool = False
+    #: Offered for Model Exchange too, and not for Co-Simulation alone.
+    exchange: bool = False
     step_s: float
     stop_s: float
     units: RecordedUnits = field(default_factory=RecordedUnits)
-
-    @property
-    def states(self) -> tuple[Variable, ...]:
-        """The continuous states."""
-        return tuple(each for each in self.variables if each.nominal is not None)
 
 
 def _element(name: str, attributes: Mapping[str, object], children: Sequence[str] = ()) -> str:
@@ -81,7 +126,7 @@ def model_description(model: Model, token: str) -> str:
         "description": model.description,
         "generationTool": f"dzdesign {__version__}",
         "variableNamingConvention": "structured",
-        "numberOfEventIndicators": model.indicators,
+        "numberOfEventIndicators": 0,
     }
     children = [
         *_interfaces(model),
@@ -95,14 +140,11 @@ def model_description(model: Model, token: str) -> str:
 
 
 def _interfaces(model: Model) -> list[str]:
-    identifier = {"modelIdentifier": model.identifier}
     files = _element("SourceFiles", {}, [_element("File", {"name": SOURCE})])
-    static = {"canNotUseMemoryManagementFunctions": True}
-    return [
-        _element("ModelExchange", {**identifier, "completedIntegratorStepNotNeeded": not model.follows_integrator,
-                                   **static}, [files]),
-        _element("CoSimulation", {**identifier, "canHandleVariableCommunicationStepSize": True, **static}, [files]),
-    ]  # fmt: skip
+    common = {"modelIdentifier": model.identifier, "canNotUseMemoryManagementFunctions": True}
+    exchange = _element("ModelExchange", {**common, "completedIntegratorStepNotNeeded": True}, [files])
+    stepped = _element("CoSimulation", {**common, "canHandleVariableCommunicationStepSize": True}, [files])
+    return [exchange, stepped] if model.exchange else [stepped]
 
 
 def _displayed(model: Model, unit: str, command: bool) -> tuple[str, float, float] | None:
@@ -146,7 +188,6 @@ def _start(variable: Variable) -> dict[str, object]:
 
 
 def _variable(model: Model, variable: Variable) -> str:
-    start = _start(variable)
     common: dict[str, object] = {
         "name": variable.name,
         "valueReference": variable.reference,
@@ -154,8 +195,6 @@ def _variable(model: Model, variable: Variable) -> str:
         "variability": variable.variability,
         "description": variable.description,
     }
-    if variable.nominal is not None:
-        common["initial"] = "exact"
     of_kind: dict[str, object] = {}
     if variable.unit:
         of_kind["unit"] = variable.unit
@@ -163,34 +202,19 @@ def _variable(model: Model, variable: Variable) -> str:
             of_kind["displayUnit"] = displayed[0]
     if variable.range is not None:
         of_kind |= dict(zip(("min", "max"), map(int, variable.range), strict=True))
-    if variable.nominal is not None:
-        of_kind["nominal"] = repr(variable.nominal)
-    if variable.derivative_of:
-        of_kind["derivative"] = _index(model, variable.derivative_of)
-    return _element("ScalarVariable", common, [_element(variable.kind.capitalize(), {**of_kind, **start})])
-
-
-def _index(model: Model, name: str) -> int:
-    """Return which of the variables it is, from 1 on."""
-    return next(index for index, each in enumerate(model.variables, 1) if each.name == name)
+    return _element(
+        "ScalarVariable", common, [_element(variable.kind.capitalize(), {**of_kind, **_start(variable)})]
+    )
 
 
 def _structure(model: Model) -> str:
-    """Return outputs, derivatives, and what is computed at initialization, with what they follow."""
+    """Return the outputs with the inputs that they follow, and which are computed at initialization: all."""
+    places = {each.name: index for index, each in enumerate(model.variables, 1)}
     outputs = [each for each in model.variables if each.causality == "output"]
-    rates = [each for each in model.variables if each.derivative_of]
-    unknown = [each for each in (*outputs, *rates) if each.nominal is None]
-
-    def entry(each: Variable) -> str:
-        names = each.follows if each.nominal is None else (each.name,)
-        follows = " ".join(map(str, sorted(_index(model, name) for name in names)))
-        return _element("Unknown", {"index": _index(model, each.name), "dependencies": follows})
-
-    groups = {
-        "Outputs": [entry(each) for each in outputs],
-        "Derivatives": [entry(each) for each in rates],
-        # At initialization parameters are known as inputs are: it may follow them all.
-        "InitialUnknowns": [_element("Unknown", {"index": _index(model, each.name)}) for each in unknown],
-    }
-    entries = [_element(tag, {}, group) for tag, group in groups.items() if group]
-    return _element("ModelStructure", {}, entries)
+    follows = {each.name: " ".join(map(str, sorted(places[name] for name in each.follows))) for each in outputs}
+    entries = [_element("Unknown", {"index": places[name], "dependencies": text}) for name, text in follows.items()]
+    # At initialization parameters are known as inputs are: an output may follow them all.
+    unknown = [_element("Unknown", {"index": places[name]}) for name in follows]
+    return _element(
+        "ModelStructure", {}, [_element("Outputs", {}, entries), _element("InitialUnknowns", {}, unknown)]
+    )

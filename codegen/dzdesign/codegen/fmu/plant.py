@@ -7,8 +7,7 @@ import json
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from dzdesign.codegen.fmu.description import Model
-from dzdesign.codegen.fmu.variables import Causality, Kind, Variable
+from dzdesign.codegen.fmu.description import Causality, Kind, Model, Variable
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 
@@ -16,8 +15,6 @@ from dzdesign.design.compensator import Compensator
 STOP_S = 1.0
 #: Pressures of a bench, MPa: where nothing is set, the spring alone would hold the valve at no pressure drop.
 SUPPLY_MPA, BACK_MPA = 1.0, 1.0
-#: What a state is of the size of.
-NOMINAL_A, NOMINAL_M, NOMINAL_M_S = 1.0, 1e-3, 0.1
 
 
 class Parameter(NamedTuple):
@@ -82,34 +79,27 @@ def plant_model(plant: Mapping[str, float], compensator: Compensator) -> Model:
                      **how)  # type: ignore[arg-type]
         )  # fmt: skip
 
-    flow = ("x", "supply")
-    add("compare", f"PWM compare value, of {signals.compare_max}; Model Exchange takes its mean voltage.", "input",
-        kind="integer", start=0.0, range=(0.0, 65535.0))  # fmt: skip
+    add("compare", f"PWM compare value, of {signals.compare_max}.", "input", kind="integer", start=0.0,
+        range=(0.0, 65535.0))  # fmt: skip
     add("voltage", "Voltage at the amplifier's input, added to that of the PWM.", "input", unit="V", start=0.0)
     add("supply", "Pressure drop at no flow.", "input", unit="MPa", start=SUPPLY_MPA)
     add("back_pressure", "Pressure behind the edge.", "input", unit="MPa", start=BACK_MPA)
     for name, (unit, description) in PARAMETERS.items():
         add(name, description, "parameter", unit=unit, start=float(plant[name]))
-    add("i", "Current of the coil.", "output", unit="A", start=0.0, nominal=NOMINAL_A)
-    add("x", "Position of the spool.", "output", unit="m", start=0.0, nominal=NOMINAL_M)
-    add("v", "Speed of the spool.", "output", unit="m/s", start=0.0, nominal=NOMINAL_M_S)
-    add("Q", "Flow.", "output", unit="L/min", follows=flow)
-    add("dP", "Pressure drop over the edge.", "output", unit="MPa", follows=flow)
-    add("p_ahead", "Pressure ahead of the edge.", "output", unit="MPa", follows=(*flow, "back_pressure"))
-    add("p_behind", "Pressure behind the edge.", "output", unit="MPa", follows=("back_pressure",))
+    add("i", "Current of the coil.", "output", unit="A")
+    add("x", "Position of the spool.", "output", unit="m")
+    add("v", "Speed of the spool.", "output", unit="m/s")
+    add("Q", "Flow.", "output", unit="L/min")
+    add("dP", "Pressure drop over the edge.", "output", unit="MPa")
+    add("p_ahead", "Pressure ahead of the edge.", "output", unit="MPa")
+    add("p_behind", "Pressure behind the edge.", "output", unit="MPa")
     add("at_stop", "-1: the spool is held at its closed end, 1: at its open end, 0: it is free.", "output",
         kind="integer")  # fmt: skip
-    inputs = ("compare", "voltage")
-    add("der(i)", "Its rate.", "local", unit="A/s", derivative_of="i", follows=("i", *inputs))
-    add("der(x)", "Its rate.", "local", unit="m/s", derivative_of="x", follows=("v",))
-    add("der(v)", "Its rate.", "local", unit="m/s2", derivative_of="v", follows=("i", "x", "v", "supply"))
     return Model(
         identifier="dz_plant",
         title="dzdesign plant",
         description="Proportional valve by Eqs. (19)-(24): amplifier, coil, spool with stops and play, metering edge.",
         variables=tuple(found),
-        indicators=3,  # of the closed end, the open end and the metering edge
-        follows_integrator=True,
         step_s=1 / signals.tick_Hz,
         stop_s=STOP_S,
         units=compensator.valve.recorded_units,
@@ -121,5 +111,4 @@ def plant_values(compensator: Compensator) -> Mapping[str, object]:
     return {
         "tick_Hz": compensator.signals.tick_Hz,
         "compare_max": compensator.signals.compare_max,
-        "nominals": ", ".join(repr(each) for each in (NOMINAL_A, NOMINAL_M, NOMINAL_M_S)),
     }

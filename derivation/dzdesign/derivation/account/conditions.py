@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import sympy
 
-from dzdesign.derivation.account.identity import agree
+from dzdesign.derivation.account.solving import agree
 from dzdesign.derivation.account.statement import Condition, Outcome
 
 
@@ -26,11 +26,13 @@ class Finding:
 
 def judge_condition(condition: Condition, differences: Sequence[sympy.Expr]) -> Finding:
     """Judge a statement by its condition; `differences` are what was derived minus what is published."""
-    words = _in_words(condition)
+    words = " or ".join(
+        " and ".join(f"{sympy.sstr(equation.lhs)} = {sympy.sstr(equation.rhs)}" for equation in alternative)
+        for alternative in condition.any_of
+    ) + (f" {condition.words}" if condition.words else "")
     if not differences:
         return Finding(Outcome.FOLLOWS, f"follows, also without {words}", flawed=True)
-    alternatives = [_solved(alternative) for alternative in condition.any_of]
-    for solved in alternatives:
+    for solved in map(_solved, condition.any_of):
         if solved is None or not all(agree(value.subs(solved), sympy.S.Zero) for value in differences):
             return Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow, not even if {words}", flawed=True)
     if not agree(differences[0], condition.discrepancy):
@@ -38,23 +40,10 @@ def judge_condition(condition: Condition, differences: Sequence[sympy.Expr]) -> 
     necessary = _is_necessary(condition, differences)
     if condition.ruled_out_by and not any(_is_published(condition, one) for one in condition.any_of):
         put_in = ", ".join(f"{symbol} = {sympy.sstr(value)}" for symbol, value in condition.ruled_out_by)
-        only = "only if" if necessary else "if"
-        return Finding(
-            Outcome.DOES_NOT_FOLLOW,
-            f"does not follow ({put_in}): it would {only} {words}",
-            flawed=not necessary,
-            necessary=necessary,
-        )
+        words = f"does not follow ({put_in}): it would {'only if' if necessary else 'if'} {words}"
+        return Finding(Outcome.DOES_NOT_FOLLOW, words, not necessary, necessary)
     proved = "necessary" if necessary else "sufficient; not proved necessary"
-    return Finding(Outcome.FOLLOWS_IF, f"follows if {words} ({proved})", flawed=not necessary, necessary=necessary)
-
-
-def _in_words(condition: Condition) -> str:
-    alternatives = (
-        " and ".join(f"{sympy.sstr(equation.lhs)} = {sympy.sstr(equation.rhs)}" for equation in alternative)
-        for alternative in condition.any_of
-    )
-    return " or ".join(alternatives) + (f" {condition.words}" if condition.words else "")
+    return Finding(Outcome.FOLLOWS_IF, f"follows if {words} ({proved})", not necessary, necessary)
 
 
 def _is_published(condition: Condition, alternative: Sequence[sympy.Eq]) -> bool:
@@ -86,19 +75,12 @@ def _is_necessary(condition: Condition, differences: Sequence[sympy.Expr]) -> bo
     # All equations of the one alternative: each is forced in turn, given those that were forced before.
     open_equations = list(condition.any_of[0])
     while open_equations:
-        forced = next(
-            (
-                equation
-                for equation in open_equations
-                if any(value != 0 and _vanishes_only_with(value, [equation]) for value in must_vanish)
-            ),
-            None,
-        )
-        if forced is None:
+        nonzero = [value for value in must_vanish if value != 0]
+        forced = [one for one in open_equations if any(_vanishes_only_with(value, [one]) for value in nonzero)]
+        if not forced:
             return False
-        open_equations.remove(forced)
-        solved = _solved([forced])
-        must_vanish = [sympy.factor(value.subs(solved)) for value in must_vanish]
+        open_equations.remove(forced[0])
+        must_vanish = [sympy.factor(value.subs(_solved(forced[:1]))) for value in must_vanish]
     return True
 
 

@@ -1,28 +1,12 @@
 """Eqs. (29)-(32): the law in the codes of the converter, as printed and as it should read."""
 
 import sympy
+from sympy import Eq, Piecewise
 
 from dzdesign.derivation import scaling
-from dzdesign.derivation.account.published import (
-    COUNTS_PER_PIN_VOLT,
-    DUTY_COMMAND_V,
-    DUTY_WITH_PERCENT,
-    DUTY_WITHOUT_PERCENT,
-    FIRST,
-    LARGEST_CODE,
-    PIN_V,
-    SECOND,
-    U_MAX_V,
-)
-from dzdesign.derivation.account.scope import (
-    CODES_AT_PIN,
-    CODES_OF_COMMAND,
-    LAW_OFF_REFERENCE,
-    UP_TO_REFERENCE,
-    scope,
-    under_law,
-)
-from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Value
+from dzdesign.derivation.account.published import *
+from dzdesign.derivation.account.scope import *
+from dzdesign.derivation.account.statement import Case, Ground, Kind, Value
 from dzdesign.derivation.law import law
 from dzdesign.derivation.symbols import *
 
@@ -35,308 +19,198 @@ _CONVERTER = (
     (V_adc, sympy.Integer(PIN_V)),
     (n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),
 )
+_AT_2_V = ((u_i, sympy.Integer(DUTY_COMMAND_V)), (u_max, sympy.Integer(U_MAX_V)))
 _UP_TO_REFERENCE = Case(((dP1, dP0 - below),), "$dP <= dP0$")
 _ABOVE_REFERENCE = Case(((dP1, dP0 + above),), "$dP > dP0$")
 
 
 def _by_selector(up_to_reference: sympy.Expr, above_reference: sympy.Expr) -> sympy.Expr:
-    return sympy.Piecewise((up_to_reference, dP1 <= dP0), (above_reference, dP1 > dP0))
+    return Piecewise((up_to_reference, dP1 <= dP0), (above_reference, dP1 > dP0))
 
 
 #: Section 3.
 IMPLEMENTATION = (
-    Kind.PREMISE(
-        "converter",
-        "code of the voltage at the converter's pin",
-        n_i,
-        n_adc * V_pin / V_adc,
-        note="$n_adc = 4095$ counts at $V_adc = 3$ V: the F28335 converts to 12 bits, in a register of the text's 16.",
-    ),
-    Kind.CHOICE(
-        "attenuator",
-        "full command at the converter's full scale",
-        V_pin,
-        V_adc * u_i / u_max,
-        note="The command goes to 10 V, the pin only to 3 V, so something divides it; the paper does not say what.",
-    ),
-    Kind.DEFINITION(
-        "1365", "counts per volt at the pin", n_V, n_adc / V_adc, note="4095 / 3, the factor in Eqs. (30) and (31)."
-    ),
-    Kind.PAPER(
-        "(29)",
-        "code of the command",
-        n_i,
-        n_adc * u_i / V_adc,
-        grounds=("converter", "attenuator"),
-        eliminate=(V_pin,),
-        condition=Condition(
-            any_of=((sympy.Eq(u_max, V_adc),),),
-            for_all=(u_i,),
-            ruled_out_by=((u_max, sympy.Integer(U_MAX_V)), (V_adc, sympy.Integer(PIN_V))),
-            discrepancy=n_adc * u_i * (1 / u_max - 1 / V_adc),
-        ),
-        expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="(29c)",
-        see=("T5d",),
-        values=(
-            Value(
-                "code of 10 V by (29)",
-                (*_CONVERTER, (u_i, sympy.Integer(U_MAX_V))),
-                "counts",
-                remark="14 bits. A 12-bit converter stands at 4095 from 3 V on: 70 % of the command would be lost.",
-            ),
-        ),
-        note="Printed as hex(4095 $u_i$ / 3), called $u_i'$ like the command in Eq. (11); hex() only changes the "
+    Kind.PREMISE("converter", "code of the voltage at the converter's pin")
+    .says(n_i, n_adc * V_pin / V_adc)
+    .remark("$n_adc = 4095$ counts at $V_adc = 3$ V: the F28335 converts to 12 bits, in a register of the text's 16."),
+    Kind.CHOICE("attenuator", "full command at the converter's full scale")
+    .says(V_pin, V_adc * u_i / u_max)
+    .remark("The command goes to 10 V, the pin only to 3 V, so something divides it; the paper does not say what."),
+    Kind.DEFINITION("1365", "counts per volt at the pin")
+    .says(n_V, n_adc / V_adc)
+    .remark("4095 / 3, the factor in Eqs. (30) and (31)."),
+    Kind.PAPER("(29)", "code of the command")
+    .says(n_i, n_adc * u_i / V_adc)
+    .by("converter", "attenuator")
+    .if_(
+        Eq(u_max, V_adc),
+        for_all=(u_i,),
+        ruled_out_by=((u_max, sympy.Integer(U_MAX_V)), (V_adc, sympy.Integer(PIN_V))),
+        discrepancy=n_adc * u_i * (1 / u_max - 1 / V_adc),
+    )
+    .corrected("(29c)")
+    .qualified_by("T5d")
+    .numbers(
+        Value(
+            "code of 10 V by (29)",
+            (*_CONVERTER, (u_i, sympy.Integer(U_MAX_V))),
+            "counts",
+            remark="14 bits. A 12-bit converter stands at 4095 from 3 V on: 70 % of the command would be lost.",
+        )
+    )
+    .remark(
+        "Printed as hex(4095 $u_i$ / 3), called $u_i'$ like the command in Eq. (11); hex() only changes the "
         "notation. Right if $u_i$ is the voltage at the pin: as printed it goes with one bracket in (30) and (31), "
-        "T5d. For a 0-10 V command an attenuator has to stand before the pin: one reading more, our choice.",
+        "T5d. For a 0-10 V command an attenuator has to stand before the pin: one reading more, our choice."
     ),
-    Kind.CORRECTED(
-        "(29c)",
-        "code of the command, corrected",
-        n_i,
-        n_adc * u_i / u_max,
-        rearranges=True,
-        grounds=("converter", "attenuator"),
-        eliminate=(V_pin,),
-    ),
-    Kind.ASSUMPTION(
-        "code of u_0",
-        "compensation signal at 1365 counts per volt",
-        n_0,
-        n_V * u_0,
-        scope=scope(CODES_AT_PIN),
-        note="What Eq. (30) sets out to compute: all of $u_0$ in the scale of its first term.",
-    ),
-    Kind.ASSUMPTION(
-        "code of u_no",
-        "compensation signal off the reference at 1365 counts per volt",
-        n_no,
-        n_V * u_no,
-        scope=scope(CODES_AT_PIN) & LAW_OFF_REFERENCE,
-    ),
-    Kind.PAPER(
-        "(30)",
-        "code of the compensation signal at the reference",
-        n_0,
-        n_V * _REST * u_i + u_min0,
-        scope=scope(CODES_AT_PIN),
-        grounds=("code of u_0", "(13)"),
-        eliminate=(u_0,),
-        condition=Condition(
-            any_of=((sympy.Eq(n_V, 1),),),
-            ruled_out_by=((n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),),
-            discrepancy=(n_V - 1) * u_min0,
+    Kind.CORRECTED("(29c)", "code of the command, corrected")
+    .says(n_i, n_adc * u_i / u_max)
+    .rearranging("converter", "attenuator"),
+    Kind.ASSUMPTION("code of u_0", "compensation signal at 1365 counts per volt")
+    .says(n_0, n_V * u_0)
+    .within(CODES_AT_PIN)
+    .remark("What Eq. (30) sets out to compute: all of $u_0$ in the scale of its first term."),
+    Kind.ASSUMPTION("code of u_no", "compensation signal off the reference at 1365 counts per volt")
+    .says(n_no, n_V * u_no)
+    .within(CODES_AT_PIN, LAW_OFF_REFERENCE),
+    Kind.PAPER("(30)", "code of the compensation signal at the reference")
+    .says(n_0, n_V * _REST * u_i + u_min0)
+    .by("code of u_0", "(13)")
+    .within(CODES_AT_PIN)
+    .if_(Eq(n_V, 1), ruled_out_by=((n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),), discrepancy=(n_V - 1) * u_min0)
+    .corrected("(30b)")
+    .qualified_by("(30c)", "T5d")
+    .numbers(
+        Value(
+            "$u_min0$ as it stands in (30), first valve",
+            of=u_min0,
+            at=FIRST.at(),
+            unit="counts",
+            remark="volts added to counts: 0.13 % of the code range where 53.9 % is meant",
         ),
-        expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="(30b)",
-        see=("(30c)", "T5d"),
-        values=(
-            Value(
-                "$u_min0$ as it stands in (30), first valve",
-                of=u_min0,
-                at=FIRST.at(),
-                unit="counts",
-                remark="volts added to counts: 0.13 % of the code range where 53.9 % is meant",
-            ),
-            Value(
-                "command above which (30) is negative, first valve",
-                of=-1000 * u_min0 / (n_V * _REST),
-                at=(*FIRST.at(), *_CONVERTER),
-                unit="mV",
-                remark="over nearly the whole range hex() would be given a negative number",
-            ),
+        Value(
+            "command above which (30) is negative, first valve",
+            of=-1000 * u_min0 / (n_V * _REST),
+            at=(*FIRST.at(), *_CONVERTER),
+            unit="mV",
+            remark="over nearly the whole range hex() would be given a negative number",
         ),
-        note="Its first term is scaled by 1365 counts per volt, $u_min0$ is not scaled at all. The smallest erratum "
+    )
+    .remark(
+        "Its first term is scaled by 1365 counts per volt, $u_min0$ is not scaled at all. The smallest erratum "
         "is one bracket, (30b): with $K_c = 3/4095$ V a count it closes (29) to (32) as they stand, T5d. (30c) has "
-        "the counts of the command, $n_adc/u_max$ per volt, behind an attenuator.",
+        "the counts of the command, $n_adc/u_max$ per volt, behind an attenuator."
     ),
-    Kind.PAPER(
-        "(31)",
-        "code of the compensation signal off the reference",
-        n_no,
-        n_V * beta * _REST * u_i + beta * u_min0,
-        scope=scope(CODES_AT_PIN) & LAW_OFF_REFERENCE,
-        grounds=("code of u_no", "(17)"),
-        eliminate=(u_no,),
-        condition=Condition(
-            any_of=((sympy.Eq(n_V, 1),),),
-            ruled_out_by=((n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),),
-            discrepancy=(n_V - 1) * beta * u_min0,
-        ),
-        expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="(31b)",
-        see=("(31c)", "T5d"),
-        note="As (30).",
+    Kind.PAPER("(31)", "code of the compensation signal off the reference")
+    .says(n_no, n_V * beta * _REST * u_i + beta * u_min0)
+    .by("code of u_no", "(17)")
+    .within(CODES_AT_PIN, LAW_OFF_REFERENCE)
+    .if_(
+        Eq(n_V, 1),
+        ruled_out_by=((n_V, sympy.Integer(COUNTS_PER_PIN_VOLT)),),
+        discrepancy=(n_V - 1) * beta * u_min0,
+    )
+    .corrected("(31b)")
+    .qualified_by("(31c)", "T5d")
+    .remark("As (30)."),
+    Kind.CORRECTED("(30b)", "code of the compensation signal at the reference, with the bracket")
+    .says(n_0, n_V * (_REST * u_i + u_min0))
+    .by("code of u_0", "(13)")
+    .within(CODES_AT_PIN)
+    .qualified_by("T5d", "(30c)"),
+    Kind.CORRECTED("(31b)", "code of the compensation signal off the reference, with the bracket")
+    .says(n_no, n_V * beta * (_REST * u_i + u_min0))
+    .by("code of u_no", "(17)")
+    .within(CODES_AT_PIN, LAW_OFF_REFERENCE)
+    .qualified_by("T5d", "(31c)"),
+    Kind.CHOICE("scale of u_0", "compensation signal in the counts of the command")
+    .says(n_0, _PER_VOLT * u_0)
+    .within(CODES_OF_COMMAND)
+    .remark("So that the sum of codes in Eq. (32) is the code of the sum."),
+    Kind.CHOICE("scale of u_no", "compensation signal off the reference in the counts of the command")
+    .says(n_no, _PER_VOLT * u_no)
+    .within(CODES_OF_COMMAND, LAW_OFF_REFERENCE),
+    Kind.CORRECTED("(30c)", "code of the compensation signal at the reference, corrected")
+    .says(n_0, _PER_VOLT * (_REST * u_i + u_min0), _REST * n_i + _PER_VOLT * u_min0)
+    .by("scale of u_0", "(13)", "(29c)")
+    .within(CODES_OF_COMMAND)
+    .numbers(
+        Value("code of $u_min0$, first valve", of=_PER_VOLT * u_min0, at=(*FIRST.at(), *_CONVERTER), unit="counts")
     ),
-    Kind.CORRECTED(
-        "(30b)",
-        "code of the compensation signal at the reference, with the bracket",
-        n_0,
-        n_V * (_REST * u_i + u_min0),
-        scope=scope(CODES_AT_PIN),
-        grounds=("code of u_0", "(13)"),
-        eliminate=(u_0,),
-        see=("T5d", "(30c)"),
-    ),
-    Kind.CORRECTED(
-        "(31b)",
-        "code of the compensation signal off the reference, with the bracket",
-        n_no,
-        n_V * beta * (_REST * u_i + u_min0),
-        scope=scope(CODES_AT_PIN) & LAW_OFF_REFERENCE,
-        grounds=("code of u_no", "(17)"),
-        eliminate=(u_no,),
-        see=("T5d", "(31c)"),
-    ),
-    Kind.CHOICE(
-        "scale of u_0",
-        "compensation signal in the counts of the command",
-        n_0,
-        _PER_VOLT * u_0,
-        scope=scope(CODES_OF_COMMAND),
-        note="So that the sum of codes in Eq. (32) is the code of the sum.",
-    ),
-    Kind.CHOICE(
-        "scale of u_no",
-        "compensation signal off the reference in the counts of the command",
-        n_no,
-        _PER_VOLT * u_no,
-        scope=scope(CODES_OF_COMMAND) & LAW_OFF_REFERENCE,
-    ),
-    Kind.CORRECTED(
-        "(30c)",
-        "code of the compensation signal at the reference, corrected",
-        n_0,
-        _PER_VOLT * (_REST * u_i + u_min0),
-        _REST * n_i + _PER_VOLT * u_min0,
-        scope=scope(CODES_OF_COMMAND),
-        grounds=("scale of u_0", "(13)", "(29c)"),
-        eliminate=(u_0, n_i),
-        values=(
-            Value("code of $u_min0$, first valve", of=_PER_VOLT * u_min0, at=(*FIRST.at(), *_CONVERTER), unit="counts"),
-        ),
-    ),
-    Kind.CORRECTED(
-        "(31c)",
-        "code of the compensation signal off the reference, corrected",
-        n_no,
-        _PER_VOLT * beta * (_REST * u_i + u_min0),
-        beta * _REST * n_i + _PER_VOLT * beta * u_min0,
-        scope=scope(CODES_OF_COMMAND) & LAW_OFF_REFERENCE,
-        grounds=("scale of u_no", "(17)", "(29c)"),
-        eliminate=(u_no, n_i),
-    ),
-    Kind.PAPER(
-        "(32)",
-        "output from the codes",
-        u_O,
-        _by_selector(K_c * (n_i + n_0), K_c * (n_i + n_no)),
-        scope=scope(CODES_OF_COMMAND, under_law("paper"), sympy.Eq(dP, dP1)),
-        grounds=(Ground("u_O", ((u_0, u_no),)), "(7)", "(13)", "(29c)", "(30c)", "(31c)"),
-        eliminate=(u_no, u_0, n_i, n_0, n_no),
-        cases=(_UP_TO_REFERENCE, _ABOVE_REFERENCE),
-        condition=Condition(
-            any_of=((sympy.Eq(K_c, u_max / n_adc),),),
-            for_all=(u_i,),
-            words="(with the corrected codes)",
-            # Up to dP0; above it the same factor stands before Eq. (18).
-            discrepancy=(1 - K_c * n_adc / u_max) * (k * x_max / u_max * u_i + u_min0),
-        ),
-        expected=Outcome.FOLLOWS_IF,
-        see=("T5a",),
-        note="With the corrected codes. Each code is rounded, so the sum is off by up to one count, 0.024 % of "
-        "$u_max$.",
+    Kind.CORRECTED("(31c)", "code of the compensation signal off the reference, corrected")
+    .says(n_no, _PER_VOLT * beta * (_REST * u_i + u_min0), beta * _REST * n_i + _PER_VOLT * beta * u_min0)
+    .by("scale of u_no", "(17)", "(29c)")
+    .within(CODES_OF_COMMAND, LAW_OFF_REFERENCE),
+    Kind.PAPER("(32)", "output from the codes")
+    .says(u_O, _by_selector(K_c * (n_i + n_0), K_c * (n_i + n_no)))
+    .by(Ground("u_O", ((u_0, u_no),)), "(7)", "(13)", "(29c)", "(30c)", "(31c)")
+    .within(CODES_OF_COMMAND, under_law("paper"), Eq(dP, dP1))
+    .in_cases(_UP_TO_REFERENCE, _ABOVE_REFERENCE)
+    .if_(
+        Eq(K_c, u_max / n_adc),
+        for_all=(u_i,),
+        words="(with the corrected codes)",
+        discrepancy=(1 - K_c * n_adc / u_max) * (k * x_max / u_max * u_i + u_min0),
+    )
+    .qualified_by("T5a")
+    .remark(
+        "With the corrected codes. Each code is rounded, so the sum is off by up to one count, 0.024 % of $u_max$."
     ),
 )
 
 #: Theorem 5: what the codes of the paper do, and the duty cycles.
 CODES = (
-    Kind.THEOREM(
-        "T5a",
-        "Eq. (32) with Eqs. (29) and (30) as printed gives the law (14)",
-        u_O,
-        K_c * (n_adc * u_i / V_adc + n_V * _REST * u_i + u_min0),
-        scope=UP_TO_REFERENCE,
-        grounds=("(14)", "1365"),
-        eliminate=(n_V,),
-        condition=Condition(
-            any_of=((sympy.Eq(K_c, 1), sympy.Eq(n_adc, V_adc)),),
-            for_all=(u_i,),
-            ruled_out_by=_CONVERTER,
-            discrepancy=(1 - K_c * n_adc / V_adc) * k * x_max / u_max * u_i + (1 - K_c) * u_min0,
-        ),
-        expected=Outcome.DOES_NOT_FOLLOW,
-        note="The formula is (32) with $n_i = n_adc/V_adc u_i$, as (29) reads with $V_adc$ for 3 V, and $n_0$ as "
+    Kind.THEOREM("T5a", "Eq. (32) with Eqs. (29) and (30) as printed gives the law (14)")
+    .says(u_O, K_c * (n_adc * u_i / V_adc + n_V * _REST * u_i + u_min0))
+    .by("(14)", "1365")
+    .within(UP_TO_REFERENCE)
+    .if_(
+        (Eq(K_c, 1), Eq(n_adc, V_adc)),
+        for_all=(u_i,),
+        ruled_out_by=_CONVERTER,
+        discrepancy=(1 - K_c * n_adc / V_adc) * k * x_max / u_max * u_i + (1 - K_c) * u_min0,
+    )
+    .remark(
+        "The formula is (32) with $n_i = n_adc/V_adc u_i$, as (29) reads with $V_adc$ for 3 V, and $n_0$ as "
         "(30) is printed. No conversion coefficient saves the printed set, its two terms are in different units; one "
-        "bracket does: T5d.",
+        "bracket does: T5d."
     ),
-    Kind.THEOREM(
-        "T5d",
-        "with one bracket in (31), Eqs. (29) to (32) as printed give the law (18), at $beta = 1$ (14)",
-        u_O,
-        K_c * (n_adc * u_i / V_adc + n_V * beta * (_REST * u_i + u_min0)),
-        scope=LAW_OFF_REFERENCE & scope(CODES_AT_PIN),
-        grounds=("(18)", "1365"),
-        eliminate=(n_V,),
-        condition=Condition(
-            any_of=((sympy.Eq(K_c, V_adc / n_adc),),),
-            for_all=(u_i,),
-            discrepancy=(1 - K_c * n_adc / V_adc) * law("paper").output,
-        ),
-        expected=Outcome.FOLLOWS_IF,
-        see=("(30b)", "(31b)"),
-        note="The smallest erratum of (29) to (32): a bracket, and $K_c = 3/4095$ V a count. The attenuator of (29c) "
-        "is one reading more: then the counts are those of a 0-10 V command, and $K_c$ is 10/4095 V.",
+    Kind.THEOREM("T5d", "with one bracket in (31), Eqs. (29) to (32) as printed give the law (18), at $beta = 1$ (14)")
+    .says(u_O, K_c * (n_adc * u_i / V_adc + n_V * beta * (_REST * u_i + u_min0)))
+    .by("(18)", "1365")
+    .within(LAW_OFF_REFERENCE, CODES_AT_PIN)
+    .if_(Eq(K_c, V_adc / n_adc), for_all=(u_i,), discrepancy=(1 - K_c * n_adc / V_adc) * law("paper").output)
+    .qualified_by("(30b)", "(31b)")
+    .remark(
+        "The smallest erratum of (29) to (32): a bracket, and $K_c = 3/4095$ V a count. The attenuator of (29c) "
+        "is one reading more: then the counts are those of a 0-10 V command, and $K_c$ is 10/4095 V."
     ),
-    Kind.CHOICE("PWM", "compare value: full drive is $n_full$ counts", n_pwm, scaling.COMPARE_VALUE),
-    Kind.LAW(
-        "L4",
-        "the scaling of this tool is the corrected Eq. (29)",
-        n_i,
-        scaling.COMMAND_CODE,
-        rearranges=True,
-        grounds=("(29c)",),
-    ),
-    Kind.THEOREM(
-        "T5b",
-        "the law in counts, from the command's code to the compare value",
+    Kind.CHOICE("PWM", "compare value: full drive is $n_full$ counts").says(n_pwm, scaling.COMPARE_VALUE),
+    Kind.LAW("L4", "the scaling of this tool is the corrected Eq. (29)")
+    .says(n_i, scaling.COMMAND_CODE)
+    .rearranging("(29c)"),
+    Kind.THEOREM("T5b", "the law in counts, from the command's code to the compare value")
+    .says(
         n_pwm,
         n_full / n_adc * (beta * _REST + 1) * n_i + n_full * beta * u_min0 / u_max,
         _IN_COUNTS.slope.subs(_SHARES) * n_i + _IN_COUNTS.start.subs(_SHARES),
-        scope=LAW_OFF_REFERENCE,
-        grounds=("PWM", "(18)", "L4"),
-        eliminate=(u_O, u_i),
-        note="What the firmware computes, rounded to the nearest count.",
-    ),
-    Kind.DEFINITION("duty", "duty cycle", duty, u_O / u_max),
-    Kind.THEOREM(
-        "T5c",
-        "duty cycle with compensation at the reference",
-        duty,
-        (k * x_max / u_max * u_i + u_min0) / u_max,
-        scope=UP_TO_REFERENCE,
-        grounds=("duty", "(14)"),
-        eliminate=(u_O,),
-        values=(
-            Value(
-                "without compensation at 2 V",
-                of=u_i / u_max,
-                at=(*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
-                unit="%",
-                published=DUTY_WITHOUT_PERCENT,
-            ),
-            Value(
-                "second valve at 2 V",
-                (*SECOND.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
-                "%",
-                published=DUTY_WITH_PERCENT,
-            ),
-            Value(
-                "first valve at 2 V",
-                (*FIRST.at(), (u_i, sympy.Integer(DUTY_COMMAND_V))),
-                "%",
-                remark="Fig. 13 does not name its valve; its 55 % fits the second, not the first.",
-            ),
+    )
+    .by("PWM", "(18)", "L4", eliminate=(u_O, u_i))
+    .within(LAW_OFF_REFERENCE)
+    .remark("What the firmware computes, rounded to the nearest count."),
+    Kind.DEFINITION("duty", "duty cycle").says(duty, u_O / u_max),
+    Kind.THEOREM("T5c", "duty cycle with compensation at the reference")
+    .says(duty, (k * x_max / u_max * u_i + u_min0) / u_max)
+    .by("duty", "(14)")
+    .within(UP_TO_REFERENCE)
+    .numbers(
+        Value("without compensation at 2 V", _AT_2_V, "%", of=u_i / u_max, published=DUTY_WITHOUT_PERCENT),
+        SECOND.value("at 2 V", "%", also=_AT_2_V, published=DUTY_WITH_PERCENT),
+        FIRST.value(
+            "at 2 V",
+            "%",
+            also=_AT_2_V,
+            remark="Fig. 13 does not name its valve; its 55 % fits the second, not the first.",
         ),
     ),
 )

@@ -14,10 +14,9 @@ from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.conditions import Finding, judge_condition
-from dzdesign.derivation.account.identity import agree
-from dzdesign.derivation.account.solving import Relation, Step, solve_relations
+from dzdesign.derivation.account.solving import NotDerivedError, Relation, Step, agree, solve_relations
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
-from dzdesign.derivation.account.symbol_units import find_unit_error
+from dzdesign.derivation.account.units import find_unit_error
 from dzdesign.derivation.symbols import Name
 
 
@@ -25,17 +24,13 @@ from dzdesign.derivation.symbols import Name
 class CaseProof:
     """The derivation of one case of a statement; most statements have a single one, without words."""
 
-    statement: Statement
     case: Case
     #: What the grounds give for the symbol.
     derived: sympy.Expr
     #: Derived minus published, one per member; zero where they agree.
     discrepancies: tuple[sympy.Expr, ...]
-    #: The grounds at the values at which the case uses them.
-    relations: tuple[Relation, ...]
-    #: The statement's symbol and the eliminated ones, solved for.
+    #: The statement's symbol and the eliminated ones, solved for; and how, one ground after another.
     solution: Mapping[Name, sympy.Expr]
-    #: How they were solved for, one ground after another.
     steps: tuple[Step, ...]
     #: The form in which a derivation states the result: as published, or as derived where the two differ.
     reached: sympy.Expr
@@ -59,12 +54,8 @@ class Verdict:
     necessary: bool | None = None
     #: Grounds that follow only on a condition, which this statement therefore needs too.
     inherited: tuple[str, ...] = ()
-    #: Grounds, and their grounds, that are proved on a part of their range only.
-    limited_by: tuple[str, ...] = ()
     #: What is wrong with its units; empty where they are right.
     unit_error: str = ""
-    #: What numbers say against it, which no proof can outweigh; empty where they agree.
-    objection: str = ""
 
     @property
     def number(self) -> str:
@@ -74,12 +65,6 @@ class Verdict:
     def holds(self) -> bool:
         """Whether other statements may rely on it."""
         return self.outcome is not Outcome.DOES_NOT_FOLLOW
-
-    @property
-    def discrepancy(self) -> sympy.Expr | None:
-        """The first difference between what was derived and what is published, or None."""
-        differences = (value for proof in self.proofs for value in proof.discrepancies)
-        return next((sympy.factor(value) for value in differences if value != 0), None)
 
 
 #: Tries a statement that was judged, of an account given by number, on numbers; returns what they say against it.
@@ -104,16 +89,21 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
         if statement.number in earlier:
             raise RequirementError(f"{statement.number} is stated twice")
         check_grounds(statement, earlier, order)
-        verdict = _with_units(judge(statement, earlier, verdicts))
+        verdict, error = judge(statement, earlier, verdicts), find_unit_error(statement)
+        # What does not follow may be wrong in its units too, nothing else may.
+        verdict = replace(verdict, unit_error=error, as_expected=verdict.as_expected and not (error and verdict.holds))
         earlier[statement.number] = statement
-        verdicts[statement.number] = (
-            verdict if hear is None or not verdict.as_expected else overrule(verdict, hear(verdict, earlier))
-        )
+        if hear is not None and verdict.as_expected:
+            verdict = overrule(verdict, hear(verdict, earlier))
+        verdicts[statement.number] = verdict
     return tuple(verdicts.values())
 
 
 def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order: Sequence[str]) -> None:
     """Raise `RequirementError` if a statement rests on itself, a later one, an unknown one, or a copy of itself."""
+    if statement.kind.is_given == bool(statement.grounds):
+        wanted = "has no" if statement.kind.is_given else "needs"
+        raise RequirementError(f"{statement.number}: a statement of kind {statement.kind} {wanted} grounds")
     for ground in statement.grounds:
         if ground.number == statement.number:
             raise RequirementError(f"{statement.number} is its own premise")
@@ -131,62 +121,45 @@ def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order:
             raise RequirementError(f"{statement.number} rests on a copy of itself, {ground.number}")
 
 
-def _with_units(verdict: Verdict) -> Verdict:
-    """Check the units too: what does not follow may be wrong in them, nothing else may."""
-    error = find_unit_error(verdict.statement)
-    expected = verdict.as_expected and not (error and verdict.holds)
-    return replace(verdict, unit_error=error, as_expected=expected)
-
-
 def overrule(verdict: Verdict, objection: str) -> Verdict:
     """Return a verdict after the referee; with an objection the statement does not follow."""
     if not objection:
         return verdict
     words = f"does not follow: {objection}"
-    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False, objection=objection)
+    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False)
 
 
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:
     """Judge one statement by its logic alone, from the earlier ones and their verdicts, both by number."""
 
-    def verdict(outcome: Outcome, words: str, flawed: bool = False, **found: Any) -> Verdict:
-        expected = outcome is statement.expected and not flawed
-        return Verdict(statement=statement, outcome=outcome, words=words, as_expected=expected, **found)
+    def verdict(finding: Finding, **found: Any) -> Verdict:
+        return Verdict(
+            statement=statement,
+            outcome=finding.outcome,
+            words=finding.words,
+            as_expected=finding.outcome is statement.expected and not finding.flawed,
+            necessary=finding.necessary,
+            **found,
+        )
 
     if statement.kind.is_given:
-        return verdict(Outcome.GIVEN, statement.kind.value)
-    proofs = _proofs(statement, earlier)
-    if isinstance(proofs, str):
-        return verdict(Outcome.DOES_NOT_FOLLOW, f"does not follow: {proofs}", flawed=True)
-    differences = [value for proof in proofs for value in proof.discrepancies if value != 0]
-    finding = _finding(statement, proofs, differences)
+        return verdict(Finding(Outcome.GIVEN, statement.kind.value))
+    try:
+        proofs = _proofs(statement, earlier)
+    except NotDerivedError as reason:
+        return verdict(Finding(Outcome.DOES_NOT_FOLLOW, f"does not follow: {reason}", flawed=True))
     unsound = [ground.number for ground in statement.grounds if not verdicts[ground.number].holds]
     if unsound:
         words = f"rests on {', '.join(unsound)}, which does not follow"
-        return verdict(Outcome.DOES_NOT_FOLLOW, words, flawed=True, proofs=proofs)
+        return verdict(Finding(Outcome.DOES_NOT_FOLLOW, words, flawed=True), proofs=proofs)
+    finding = _finding(statement, proofs)
     inherited = tuple(dict.fromkeys(n for ground in statement.grounds for n in _conditional(verdicts[ground.number])))
-    outcome, words = finding.outcome, finding.words
-    if inherited and outcome is Outcome.FOLLOWS:
-        outcome, words = Outcome.FOLLOWS_IF, f"follows on the condition of {', '.join(inherited)}"
-    elif inherited and outcome is Outcome.FOLLOWS_IF:
-        words += f", and on the condition of {', '.join(inherited)}"
-    limits = tuple(dict.fromkeys(n for one in statement.grounds for n in _limits(verdicts[one.number], statement)))
-    return verdict(
-        outcome,
-        words,
-        flawed=finding.flawed,
-        proofs=proofs,
-        necessary=finding.necessary,
-        inherited=inherited,
-        limited_by=limits,
-    )
-
-
-def _limits(verdict: Verdict, user: Statement) -> tuple[str, ...]:
-    """Return which of a ground and its grounds is proved on a part that the user's scope does not say."""
-    ground = verdict.statement
-    is_said = ground.kind.is_given or (user.scope.implies(ground.scope) and not ground.provided)
-    return (() if is_said else (verdict.number,)) + verdict.limited_by
+    others = f"on the condition of {', '.join(inherited)}"
+    if inherited and finding.outcome is Outcome.FOLLOWS:
+        finding = Finding(Outcome.FOLLOWS_IF, f"follows {others}")
+    elif inherited and finding.outcome is Outcome.FOLLOWS_IF:
+        finding = replace(finding, words=f"{finding.words}, and {others}")
+    return verdict(finding, proofs=proofs, inherited=inherited)
 
 
 def _conditional(verdict: Verdict) -> tuple[str, ...]:
@@ -194,7 +167,8 @@ def _conditional(verdict: Verdict) -> tuple[str, ...]:
     return itself + verdict.inherited if verdict.outcome is Outcome.FOLLOWS_IF else ()
 
 
-def _finding(statement: Statement, proofs: Sequence[CaseProof], differences: Sequence[sympy.Expr]) -> Finding:
+def _finding(statement: Statement, proofs: Sequence[CaseProof]) -> Finding:
+    differences = [value for proof in proofs for value in proof.discrepancies if value != 0]
     if statement.condition is not None:
         return judge_condition(statement.condition, differences)
     if differences:
@@ -221,57 +195,49 @@ def _sign_agrees(positive_if: Relational, proof: CaseProof) -> bool:
     return sympy.factor(sympy.cancel(sympy.factor(proof.derived) / (claim.gts - claim.lts))).is_positive is True
 
 
-def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[CaseProof, ...] | str:
-    """Derive every case, or say why one can't be."""
+def _proofs(statement: Statement, earlier: Mapping[str, Statement]) -> tuple[CaseProof, ...]:
+    """Derive every case."""
     proofs = []
     chosen: set[sympy.Basic] = set()
-    needed: set[sympy.Ne] = set()
-    for case in statement.cases_to_prove:
-        replacements = dict(case.at)
-        relations = tuple(relation_of(earlier[ground.number], ground, replacements) for ground in statement.grounds)
-        provided = tuple(provision.xreplace(replacements) for provision in statement.provided)
-        found = solve_relations(relations, (statement.symbol, *statement.eliminate), provided)
-        if isinstance(found, str):
-            return found
-        solution = found.values
-        needed |= {one for one, here in zip(statement.provided, provided, strict=True) if here in found.needed}
+    for case in statement.cases or (Case((), ""),):
+        at = dict(case.at)
+        relations = tuple(relation_of(earlier[ground.number], ground, at) for ground in statement.grounds)
+        nonzero = tuple((one.lhs - one.rhs).xreplace(at) for one in statement.provided)
+        solution, steps = solve_relations(relations, (statement.symbol, *_eliminated(statement, relations)), nonzero)
         derived = solution[statement.symbol]
-        branches = [_branch(member, replacements, solution, chosen) for member in statement.members]
-        members = [branch.xreplace(replacements) for branch in branches if branch is not None]
-        if len(members) < len(branches):
-            return f"a case does not decide between the branches of {statement.number} itself"
+        branches = [_branch(member, at, solution, chosen) for member in statement.members]
+        members = [branch.xreplace(at) for branch in branches]
         published = [member.xreplace(solution) for member in members]
         differences = tuple(sympy.S.Zero if agree(derived, member) else derived - member for member in published)
-        reached = derived if any(differences) else members[-1]
         proofs.append(
             CaseProof(
-                statement=statement,
                 case=case,
                 derived=derived,
                 discrepancies=differences,
-                relations=relations,
                 solution=solution,
-                steps=found.steps,
-                reached=reached,
+                steps=steps,
+                reached=derived if any(differences) else members[-1],
                 published=branches[-1],
             )
         )
-    idle = [sympy.sstr(one) for member in statement.members for one in _conditions(member) if one not in chosen]
+    pieces = [member.args for member in statement.members if isinstance(member, sympy.Piecewise)]
+    idle = [sympy.sstr(condition) for args in pieces for _, condition in args if condition not in chosen]
     if idle:
-        return f"no case stands for {', '.join(idle)}"
-    unneeded = [sympy.sstr(provision) for provision in statement.provided if provision not in needed]
-    if unneeded:
-        return f"the derivation does not need {', '.join(unneeded)}"
+        raise NotDerivedError(f"no case stands for {', '.join(idle)}")
     return tuple(proofs)
 
 
-def _conditions(member: sympy.Expr) -> list[sympy.Basic]:
-    return [condition for _, condition in member.args] if isinstance(member, sympy.Piecewise) else []
+def _eliminated(statement: Statement, relations: Sequence[Relation]) -> tuple[Name, ...]:
+    """Return what is solved for beside the symbol: what the grounds are about, as many as there are grounds."""
+    if statement.eliminate is not None:
+        return statement.eliminate
+    named = dict.fromkeys((statement.symbol, *(relation.left for relation in relations)))
+    return tuple(named)[1 : len(relations)]
 
 
 def _branch(
     member: sympy.Expr, case: Mapping[Name, sympy.Expr], solution: Mapping[Name, sympy.Expr], chosen: set[sympy.Basic]
-) -> sympy.Expr | None:
+) -> sympy.Expr:
     """Return a member, of a piecewise one the branch that holds in a case, whose condition joins `chosen`."""
     if not isinstance(member, sympy.Piecewise):
         return member
@@ -281,8 +247,8 @@ def _branch(
             chosen.add(condition)
             return value
         if decided != sympy.false:
-            return None
-    return None
+            break
+    raise NotDerivedError("a case does not decide between the branches of the statement itself")
 
 
 def relation_of(

@@ -1,11 +1,11 @@
 """Where a statement is meant to hold: what is set up, and comparisons of its symbols; no free text."""
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import NamedTuple
 
 import sympy
 from sympy.core.relational import Relational
-from sympy.logic.boolalg import Boolean
 
 from dzdesign.derivation.symbols import dP, dP0, dP1, k, u_i, u_max, u_min, u_min0, u_min1, u_O, x_max
 
@@ -40,42 +40,26 @@ def under_law(name: str) -> Setting:
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """Where a statement is meant to hold: in one of the settings of each aspect named, and where a comparison does."""
+    """Where a statement is meant to hold: in one of the settings of each aspect named, and where all comparisons do."""
 
     settings: tuple[Setting, ...] = ()
-    where: Boolean = sympy.true
+    comparisons: tuple[Relational, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.settings) or self.where != sympy.true
+        return bool(self.settings or self.comparisons)
 
     def __str__(self) -> str:
         return "; ".join([*(str(setting) for setting in self.settings), *map(sympy.sstr, self.comparisons)])
 
-    @property
-    def comparisons(self) -> tuple[Boolean, ...]:
-        """The comparisons that all have to hold."""
-        if self.where == sympy.true:
-            return ()
-        return tuple(sorted(sympy.And.make_args(self.where), key=sympy.default_sort_key))
-
     def __and__(self, other: "Scope") -> "Scope":
-        return Scope(tuple(dict.fromkeys((*self.settings, *other.settings))), sympy.And(self.where, other.where))
-
-    def implies(self, other: "Scope") -> bool:
-        """Whether all that another scope says is said here too."""
-        aspects = {setting.aspect for setting in other.settings}
-        inside = all(one in other.settings for one in self.settings if one.aspect in aspects)
-        named = aspects <= {setting.aspect for setting in self.settings}
-        return inside and named and set(other.comparisons) <= set(self.comparisons)
+        comparisons = sorted({*self.comparisons, *other.comparisons}, key=sympy.default_sort_key)
+        return Scope(tuple(dict.fromkeys((*self.settings, *other.settings))), tuple(comparisons))
 
     def admits(self, settings: frozenset[Setting]) -> bool:
         """Whether what is set up is one of the settings named, of each aspect; one with a beta of its own if named."""
         if settings & {FREE_BETA, WITH_TRANSITION} - set(self.settings):
             return False
-        named: dict[str, set[Setting]] = {}
-        for setting in self.settings:
-            named.setdefault(setting.aspect, set()).add(setting)
-        return all(choices & settings for choices in named.values())
+        return {one.aspect for one in self.settings} == {one.aspect for one in self.settings if one in settings}
 
 
 EVERYWHERE = Scope()
@@ -93,8 +77,8 @@ def scope(*limits: Setting | Relational) -> Scope:
     # Of comparisons joined by "or" one could be true at general values, the other of those that matter.
     if any(not isinstance(limit, Setting | Relational) for limit in limits):
         raise ValueError(f"a scope is made of settings and single comparisons, got {limits}")
-    settings = tuple(limit for limit in limits if isinstance(limit, Setting))
-    return Scope(settings, sympy.And(*(limit for limit in limits if not isinstance(limit, Setting))))
+    parts = [Scope((limit,)) if isinstance(limit, Setting) else Scope((), (limit,)) for limit in limits]
+    return reduce(Scope.__and__, parts, EVERYWHERE)
 
 
 _BEFORE_STOP = u_O <= u_min + k * x_max

@@ -1,25 +1,52 @@
-"""Solves the grounds of a statement for its symbol and for what is eliminated, exactly, or says why not.
+"""Whether two expressions are one function; and the grounds of a statement, solved for its symbol step by step.
 
-Nothing is divided by what may be zero: a coefficient must be different from zero by the signs of its symbols, or by
-what the statement is provided with.
+The steps are the derivation that a reader gets. Nothing is divided by what may be zero: a coefficient must be different
+from zero by the signs of its symbols, or by what the statement is provided with.
 """
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import sympy
 
-from dzdesign.derivation.account.identity import agree
 from dzdesign.derivation.account.statement import Ground
 from dzdesign.derivation.symbols import Name
 
+
+def agree(left: sympy.Expr, right: sympy.Expr) -> bool:
+    """Decide whether two expressions are identical.
+
+    Exact for rational functions of symbols, of roots of single symbols, and of logarithms and applied functions,
+    which count as symbols of their own; logarithms of products are expanded first.
+
+    Examples
+    --------
+    >>> from dzdesign.derivation.symbols import dP, rho
+    >>> agree(sympy.sqrt(2 * dP / rho), sympy.sqrt(2) * sympy.sqrt(dP) / sympy.sqrt(rho))
+    True
+    """
+    if left == right:
+        return True
+    if left.has(sympy.Piecewise, sympy.nan) or right.has(sympy.Piecewise, sympy.nan):
+        return False
+    difference = left - right
+    if difference.has(sympy.log):
+        difference = sympy.expand_log(difference)
+    # A root and its symbol are two generators to `cancel`; writing each symbol as a square makes them one.
+    bases = {power.base for power in difference.atoms(sympy.Pow) if power.exp.is_Rational and not power.exp.is_Integer}
+    squares = {base: sympy.Dummy(positive=True) ** 2 for base in bases if base.is_Symbol and base.is_nonnegative}
+    return bool(sympy.cancel(difference.xreplace(squares)) == 0)
+
+
+class NotDerivedError(Exception):
+    """The grounds do not give the symbol; the reason in words."""
+
+
 _CONTRADICTION = "the premises contradict each other"
-_SEVERAL = "the premises allow several values"
 
 Sides = tuple[sympy.Expr, sympy.Expr]
-#: Expressions known not to be zero, with the provision that says so; None where another value does.
-_Nonzero = Sequence[tuple[sympy.Expr, sympy.Ne | None]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,57 +65,46 @@ class Step:
     ground: Ground
     name: Name
     gives: sympy.Expr
-
-
-@dataclass(frozen=True, slots=True)
-class Solution:
-    """The unknowns in the symbols that remain, how they were found, and which provisions were needed to divide."""
-
-    values: Mapping[Name, sympy.Expr]
-    needed: frozenset[sympy.Ne]
-    steps: tuple[Step, ...]
+    #: Whether the ground states the unknown as it stands.
+    as_stated: bool
 
 
 @lru_cache(maxsize=4096)
 def solve_relations(
-    relations: tuple[Relation, ...], unknowns: tuple[Name, ...], provided: tuple[sympy.Ne, ...]
-) -> Solution | str:
-    """Solve the grounds of one case for unknowns, or return the reason why that can't be done.
+    relations: tuple[Relation, ...], unknowns: tuple[Name, ...], nonzero: tuple[sympy.Expr, ...]
+) -> tuple[Mapping[Name, sympy.Expr], tuple[Step, ...]]:
+    """Solve the grounds of one case for unknowns: their values in the symbols that remain, and how they were found.
 
-    What is `provided` may be divided by although its symbols' signs do not tell that it is not zero.
+    What is `nonzero` may be divided by although its symbols' signs do not tell so.
+
+    Raises
+    ------
+    NotDerivedError
+        If that can't be done.
     """
     # A piecewise expression none of whose cases holds is nan to SymPy.
     if any(relation.right.has(sympy.Piecewise, sympy.nan) for relation in relations):
-        return "the case of a piecewise premise is not decided"
+        raise NotDerivedError("the case of a piecewise premise is not decided")
     solved: dict[Name, sympy.Expr] = {}
-    needed: set[sympy.Ne] = set()
-    nonzero = [(provision.lhs - provision.rhs, provision) for provision in provided]
     sides = [(relation.left, relation.right) for relation in relations]
-    grounds, steps = [relation.ground for relation in relations], []
+    left_over, steps = list(relations), []
     while sides:
         index, name = _choose(sides, [name for name in unknowns if name not in solved], nonzero)
-        (left, right), ground = sides.pop(index), grounds.pop(index)
+        (left, right), relation = sides.pop(index), left_over.pop(index)
         if name is None:  # no unknown is left in it: it must be true by itself
             if not agree(left, right):
-                return _CONTRADICTION
+                raise NotDerivedError(_CONTRADICTION)
             continue
-        found = _solve_for(name, left, right, nonzero)
-        if isinstance(found, str):
-            return found
-        value, used = found
-        if _has_wrong_sign(name, value):
-            return _CONTRADICTION
+        value = solved[name] = _solve_for(name, left, right, nonzero)
+        _check_sign(name, value)
         if name.is_nonzero:  # then what it equals is not zero either
-            nonzero.append((sympy.numer(sympy.factor(value)), None))
-        solved[name] = value
-        steps.append(Step(ground, name, value))
-        needed |= used
+            nonzero = (*nonzero, sympy.numer(sympy.factor(value)))
+        steps.append(Step(relation.ground, name, value, as_stated=relation.left == name))
         sides = [tuple(side.xreplace({name: value}) for side in pair) for pair in sides]
-    values = _put_back(solved, unknowns)
-    return values if isinstance(values, str) else Solution(values, frozenset(needed), tuple(steps))
+    return _put_back(solved, unknowns), tuple(steps)
 
 
-def _choose(sides: Sequence[Sides], names: Sequence[Name], nonzero: _Nonzero) -> tuple[int, Name | None]:
+def _choose(sides: Sequence[Sides], names: Sequence[Name], nonzero: Sequence[sympy.Expr]) -> tuple[int, Name | None]:
     """Return the next relation and what to solve it for, None if no unknown is left in it.
 
     One that gives an unknown as it stands comes first, then one with a single unknown, then one that can be solved.
@@ -102,17 +118,16 @@ def _choose(sides: Sequence[Sides], names: Sequence[Name], nonzero: _Nonzero) ->
             return index, found[0] if found else None
     for index, (left, right) in enumerate(sides):
         for name in inside[index]:
-            if not isinstance(_solve_for(name, left, right, nonzero), str):
+            with contextlib.suppress(NotDerivedError):
+                _solve_for(name, left, right, nonzero)
                 return index, name
     return 0, inside[0][0]
 
 
-def _solve_for(
-    name: Name, left: sympy.Expr, right: sympy.Expr, nonzero: _Nonzero
-) -> tuple[sympy.Expr, frozenset[sympy.Ne]] | str:
-    """Return the only value at which two sides are equal, and the provisions that it takes; or why there is none."""
+def _solve_for(name: Name, left: sympy.Expr, right: sympy.Expr, nonzero: Sequence[sympy.Expr]) -> sympy.Expr:
+    """Return the only value at which two sides are equal."""
     if left == name and not right.has(name):
-        return right, frozenset()
+        return right
     difference = sympy.factor(left - right)
     coefficient = sympy.factor(sympy.diff(difference, name))
     if not coefficient.has(name):
@@ -124,51 +139,43 @@ def _solve_for(
         divisors = [factor for factor in sympy.Mul.make_args(difference) if not factor.has(name)]
         divisors += [sympy.denom(sympy.together(value)) for value in found]
     if len(found) != 1:
-        return _SEVERAL if found else _CONTRADICTION
-    used: set[sympy.Ne] = set()
-    for divisor in divisors:
-        zero = _possible_zero(divisor, nonzero, used)
-        if zero is not None:
-            return f"{sympy.sstr(zero)}, by which the derivation divides, may be zero"
-    return found[0], frozenset(used)
+        raise NotDerivedError("the premises allow several values" if found else _CONTRADICTION)
+    for zero in (factor for divisor in divisors for factor in _possible_zeros(divisor, nonzero)):
+        raise NotDerivedError(f"{sympy.sstr(zero)}, by which the derivation divides, may be zero")
+    return found[0]
 
 
-def _possible_zero(divisor: sympy.Expr, nonzero: _Nonzero, used: set[sympy.Ne]) -> sympy.Expr | None:
-    """Return a factor that may be zero, or None; the provisions that rule it out for the others join `used`."""
+def _possible_zeros(divisor: sympy.Expr, nonzero: Sequence[sympy.Expr]) -> Iterator[sympy.Expr]:
+    """Yield the factors that may be zero."""
     for factor in sympy.Mul.make_args(sympy.factor(divisor)):
         base, exponent = factor.as_base_exp()
         base = sympy.logcombine(base)
         if isinstance(base, sympy.log):  # zero exactly where its argument is one
             base = sympy.numer(sympy.together(base.args[0] - 1))
-        if base.is_nonzero or exponent.is_negative:
-            continue
-        excluded = [provision for known, provision in nonzero if _divides(base, known)]
-        if not excluded:
-            return base
-        used |= {excluded[0]} - {None}
-    return None
+        if not (base.is_nonzero or exponent.is_negative or any(_divides(base, known) for known in nonzero)):
+            yield base
 
 
 def _divides(factor: sympy.Expr, product: sympy.Expr) -> bool:
     """Whether a product that is not zero has a factor, which then is not zero either."""
-    return any(
-        sympy.cancel(factor / other.as_base_exp()[0]).is_nonzero for other in sympy.Mul.make_args(sympy.factor(product))
-    )
+    others = sympy.Mul.make_args(sympy.factor(product))
+    return any(sympy.cancel(factor / other.as_base_exp()[0]).is_nonzero for other in others)
 
 
-def _put_back(solved: dict[Name, sympy.Expr], unknowns: tuple[Name, ...]) -> dict[Name, sympy.Expr] | str:
+def _put_back(solved: dict[Name, sympy.Expr], unknowns: tuple[Name, ...]) -> dict[Name, sympy.Expr]:
     """Put later solutions into earlier ones, so that no unknown is left in any."""
     solution: dict[Name, sympy.Expr] = {}
     for name, value in reversed(solved.items()):
         solution[name] = value.xreplace(solution)
     undetermined = [str(unknown) for unknown in unknowns if unknown not in solution or solution[unknown].has(*unknowns)]
     if undetermined:
-        return f"the premises do not determine {', '.join(undetermined)}"
-    if any(_has_wrong_sign(name, value) for name, value in solution.items()):
-        return _CONTRADICTION
+        raise NotDerivedError(f"the premises do not determine {', '.join(undetermined)}")
+    for name, value in solution.items():
+        _check_sign(name, value)
     return solution
 
 
-def _has_wrong_sign(name: Name, value: sympy.Expr) -> bool:
-    """Whether a value is one that its symbol can't have."""
-    return bool((name.is_nonnegative and value.is_negative) or (name.is_positive and value.is_nonpositive))
+def _check_sign(name: Name, value: sympy.Expr) -> None:
+    """Refuse a value that its symbol can't have."""
+    if (name.is_nonnegative and value.is_negative) or (name.is_positive and value.is_nonpositive):
+        raise NotDerivedError(_CONTRADICTION)

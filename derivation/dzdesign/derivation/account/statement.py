@@ -1,14 +1,15 @@
 """What a statement is: published or ours, with the grounds, cases and conditions that it is judged by."""
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy
 from sympy.core.function import AppliedUndef
+from sympy.core.relational import Relational
 
-from dzdesign.derivation.account.scope import EVERYWHERE, Scope
+from dzdesign.derivation.account.scope import EVERYWHERE, Scope, Setting, scope
 from dzdesign.derivation.symbols import AT_PRESSURE_DROPS, Name, dP, f, headroom
 
 Replacements = tuple[tuple[Name, sympy.Expr], ...]
@@ -30,21 +31,21 @@ class Kind(StrEnum):
     def is_given(self) -> bool:
         return self in (Kind.PREMISE, Kind.ASSUMPTION, Kind.DEFINITION, Kind.CHOICE)
 
-    def __call__(
-        self,
-        number: str,
-        title: str,
-        symbol: Name,
-        *members: sympy.Expr,
-        grounds: "Sequence[str | Ground]" = (),
-        **more: Any,
-    ) -> "Statement":
-        """State something of this kind: ``symbol = member = ... = member``.
+    def __call__(self, number: str, title: str) -> "Heading":
+        """Begin a statement of this kind: its number in the paper, or a name for what has none, and its title."""
+        return Heading(self, number, title)
 
-        A ground that is used as it stands is given by its number; `more` is what `Statement` takes.
-        """
-        used = tuple(Ground(one) if isinstance(one, str) else one for one in grounds)
-        return Statement(number=number, title=title, kind=self, symbol=symbol, members=members, grounds=used, **more)
+
+class Heading(NamedTuple):
+    """The beginning of a statement."""
+
+    kind: Kind
+    number: str
+    title: str
+
+    def says(self, symbol: Name, *members: sympy.Expr) -> "Statement":
+        """State ``symbol = member = ... = member``."""
+        return Statement(number=self.number, title=self.title, kind=self.kind, symbol=symbol, members=members)
 
 
 class Outcome(StrEnum):
@@ -85,11 +86,13 @@ class Ground:
             parts += ["differentiated by", self.derivative[0]]
         if any(value.has(AppliedUndef) and not value.has(f) for _, value in self.at):
             return (*parts, "under the Laplace transform")
-        index = pressure_index(self.at)
-        if index is not None:
-            parts += ["at", sympy.Eq(dP, AT_PRESSURE_DROPS[dP][index])]
+        at_drops = [(name, AT_PRESSURE_DROPS[name].index(value)) for name, value in self.at if _is_at_drop(name, value)]
+        if len({index for _, index in at_drops}) == 1:
+            parts += ["at", sympy.Eq(dP, AT_PRESSURE_DROPS[dP][at_drops[0][1]])]
+        else:
+            at_drops = []
         for name, value in self.at:
-            if name == value or (index is not None and AT_PRESSURE_DROPS.get(name, (None, None))[index] == value):
+            if name == value or name in dict(at_drops):
                 continue
             # A distance of its own only says which case it is.
             limit = sympy.Le(value - headroom, name) if value.has(headroom) else None
@@ -97,24 +100,15 @@ class Ground:
         return tuple(parts)
 
 
-def pressure_index(at: Replacements) -> int | None:
-    """Return at which of the two pressure drops replacements take what depends on it: 0, 1, or None at none."""
-    found = {
-        index
-        for name, value in at
-        for index in (0, 1)
-        if name in AT_PRESSURE_DROPS and value == AT_PRESSURE_DROPS[name][index]
-    }
-    return found.pop() if len(found) == 1 else None
+def _is_at_drop(name: Name, value: sympy.Expr) -> bool:
+    return value in AT_PRESSURE_DROPS.get(name, ())
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
+class Case(NamedTuple):
     """One of the cases by which a piecewise statement is proved; the referee tries what they may leave out."""
 
     #: Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
     at: Replacements
-    #: The same in words.
     where: str
 
 
@@ -135,16 +129,6 @@ class Condition:
     #: What the paper calls the condition, in brackets.
     words: str = ""
 
-    def __post_init__(self) -> None:
-        equations = [equation for alternative in self.any_of for equation in alternative]
-        if not equations or not all(isinstance(equation, sympy.Eq) for equation in equations):
-            raise ValueError(f"a condition needs equations that may be true or false, got {self.any_of}")
-        decided = {symbol for equation in equations for symbol in equation.free_symbols}
-        if any(equation.lhs.free_symbols <= set(self.for_all) for equation in equations):
-            raise ValueError(
-                f"a condition on {sorted(map(str, decided & set(self.for_all)))} can't hold for all of them"
-            )
-
 
 @dataclass(frozen=True, slots=True)
 class Value:
@@ -164,10 +148,6 @@ class Value:
     #: What could explain a difference, or what the number means.
     remark: str = ""
 
-    def __post_init__(self) -> None:
-        if self.published:
-            float(self.published)
-
     def exact(self, statement: "Statement") -> sympy.Expr:
         """Return the number exactly, in `unit`."""
         expression = statement.members[-1] if self.of is None else self.of
@@ -185,45 +165,33 @@ class Value:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
-    """``symbol = member = ... = member``, with the grounds from which it is to follow."""
+    """``symbol = member = ... = member``, with the grounds from which it is to follow.
 
-    #: The paper's number, or a name for what has none.
+    It is declared in one chain: ``Kind.PAPER(number, title).says(...).by(...).within(...)``, and so on.
+    """
+
     number: str
-    #: What it says, in words.
     title: str
-    #: Where it comes from.
     kind: Kind
-    #: Left-hand side.
     symbol: Name
     #: Right-hand sides, as published. A statement that rests on this one uses the last.
     members: tuple[sympy.Expr, ...]
-    #: The premises; empty for what is taken as given.
     grounds: tuple[Ground, ...] = ()
-    #: Symbols of the grounds that are solved for along with `symbol`.
-    eliminate: tuple[Name, ...] = ()
-    #: Where the members are piecewise: the cases to prove it by.
+    #: Symbols of the grounds that are solved for along with `symbol`; None for those that the grounds are about.
+    eliminate: tuple[Name, ...] | None = None
     cases: tuple[Case, ...] = ()
-    #: What is needed beside the grounds.
     condition: Condition | None = None
-    #: The claim that the left-hand side is positive exactly if this holds.
-    positive_if: sympy.core.relational.Relational | None = None
-    #: Where it is meant to hold: the referee (`referee/`) tries it there, and only there.
+    positive_if: Relational | None = None
     scope: Scope = EVERYWHERE
     #: What must differ for the derivation, which divides by the difference.
     provided: tuple[sympy.Ne, ...] = ()
-    #: What a correct account finds; `GIVEN` for what is taken as given, else `FOLLOWS`.
-    expected: Outcome = None  # type: ignore[assignment]  # what is usual of its kind, by __post_init__
-    #: Whether it only rearranges a definition or one premise: then it follows, and says nothing new.
+    #: What a correct account finds; what is usual of its kind and condition, unless given.
+    expected: Outcome = None  # type: ignore[assignment]  # by __post_init__
     rearranges: bool = False
-    #: Number of the statement that says what this one should read.
     corrected_by: str = ""
-    #: For what it should read so, in words; for everything unless given.
     corrected_for: str = ""
-    #: Statements that qualify this one.
     see: tuple[str, ...] = ()
-    #: Its numbers beside the paper's.
     values: tuple[Value, ...] = ()
-    #: What a reader should know beyond the verdict.
     note: str = ""
     #: Heading that it stands under.
     section: str = ""
@@ -231,16 +199,62 @@ class Statement:
     def __post_init__(self) -> None:
         if not self.members or any(member.has(self.symbol) for member in self.members):
             raise ValueError(f"{self.number}: needs right-hand sides that are free of {self.symbol}")
-        if self.kind.is_given == bool(self.grounds):
-            wanted = "has no" if self.kind.is_given else "needs"
-            raise ValueError(f"{self.number}: a statement of kind {self.kind} {wanted} grounds")
         if not self.expected:
             object.__setattr__(self, "expected", Outcome.GIVEN if self.kind.is_given else Outcome.FOLLOWS)
 
-    @property
-    def cases_to_prove(self) -> tuple[Case, ...]:
-        """Its cases; of a statement without, the only one."""
-        return self.cases or (Case((), ""),)
+    def by(
+        self, *grounds: str | Ground, eliminate: Sequence[Name] | None = None, provided: Sequence[sympy.Ne] = ()
+    ) -> "Statement":
+        """Derive it from grounds; one that is used as it stands is given by its number."""
+        used = tuple(Ground(one) if isinstance(one, str) else one for one in grounds)
+        unknowns = None if eliminate is None else tuple(eliminate)
+        return replace(self, grounds=used, eliminate=unknowns, provided=tuple(provided))
+
+    def rearranging(self, *grounds: str | Ground, **how: Any) -> "Statement":
+        """Derive it from grounds that it only rearranges: it says nothing new."""
+        return replace(self.by(*grounds, **how), rearranges=True)
+
+    def within(self, *limits: Scope | Setting | Relational) -> "Statement":
+        """Say where it is meant to hold; everywhere unless said."""
+        narrowed = self.scope
+        for limit in limits:
+            narrowed &= limit if isinstance(limit, Scope) else scope(limit)
+        return replace(self, scope=narrowed)
+
+    def in_cases(self, *cases: Case) -> "Statement":
+        """Prove it in cases."""
+        return replace(self, cases=cases)
+
+    def if_(self, *any_of: sympy.Eq | tuple[sympy.Eq, ...], **more: Any) -> "Statement":
+        """Say on which condition it follows, an equation or a set of them; `more` is what `Condition` takes."""
+        alternatives = tuple(one if isinstance(one, tuple) else (one,) for one in any_of)
+        condition = Condition(any_of=alternatives, **more)
+        expected = Outcome.DOES_NOT_FOLLOW if condition.ruled_out_by else Outcome.FOLLOWS_IF
+        return replace(self, condition=condition, expected=expected)
+
+    def positive_exactly_if(self, claim: Relational) -> "Statement":
+        """Claim when the left-hand side is positive."""
+        return replace(self, positive_if=claim)
+
+    def on_their_condition(self) -> "Statement":
+        """Expect that it follows only on the condition of a ground."""
+        return replace(self, expected=Outcome.FOLLOWS_IF)
+
+    def corrected(self, by: str, only_for: str = "") -> "Statement":
+        """Name the statement that says what this one should read."""
+        return replace(self, corrected_by=by, corrected_for=only_for)
+
+    def qualified_by(self, *numbers: str) -> "Statement":
+        """Name the statements that qualify this one."""
+        return replace(self, see=numbers)
+
+    def numbers(self, *values: Value) -> "Statement":
+        """Put its numbers beside the paper's."""
+        return replace(self, values=values)
+
+    def remark(self, note: str) -> "Statement":
+        """Say what a reader should know beyond the verdict."""
+        return replace(self, note=note)
 
     @property
     def published(self) -> sympy.Eq:

@@ -1,21 +1,12 @@
 """The laws' ties to the paper's equations, and theorems 1 and 2: which flow they give, and what full command does."""
 
 import sympy
+from sympy import Eq, Piecewise, sqrt
 
+from dzdesign.derivation.account.equations import beyond
 from dzdesign.derivation.account.published import FIRST, SECOND, SIMULATION, VALVES
-from dzdesign.derivation.account.scope import (
-    AT_FULL_COMMAND,
-    BARE,
-    BEFORE_STOP,
-    EDGE,
-    FIXED_OPENING,
-    FREE_OPENING,
-    LAW_AT_REFERENCE,
-    LAW_OFF_REFERENCE,
-    TARGET_OFF_REFERENCE,
-    scope,
-)
-from dzdesign.derivation.account.statement import Case, Condition, Ground, Kind, Outcome, Value
+from dzdesign.derivation.account.scope import *
+from dzdesign.derivation.account.statement import Case, Ground, Kind
 from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.symbols import *
@@ -29,15 +20,7 @@ TIES = tuple(statement for name in LAW_NAMES for statement in law(name).statemen
 def flow_under(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol) -> tuple[Ground, ...]:
     """What gives the valve's flow under a law, beyond the threshold at one pressure drop."""
     return (
-        Ground(
-            "(1)",
-            (
-                (dP, pressure),
-                (u_i, threshold + u_i_prime),
-                (u_min, threshold),
-                (u_max, threshold + u_i_prime + headroom),
-            ),
-        ),
+        Ground("(1)", ((dP, pressure), *beyond(threshold))),
         Ground("(11)"),
         Ground("Fig. 3, command", ((u_min0, threshold),)),
         Ground(law_number),
@@ -46,216 +29,167 @@ def flow_under(law_number: str, threshold: sympy.Symbol, pressure: sympy.Symbol)
 
 _PAPER_LAW = LAW_OFF_REFERENCE & scope(FIXED_OPENING) & BEFORE_STOP
 _TARGET_LAW = TARGET_OFF_REFERENCE & scope(FIXED_OPENING)
-_AT_DP1 = (Ground("(5)"), Ground("gamma_1"), Ground("(15)"), Ground("(16)"))
+_AT_DP1 = ("(5)", "gamma_1", "(15)", "(16)")
 _UNKNOWN_AT_DP1 = (x, u_i_prime, u_O, u_min1, gamma_1, K_1, Q_O_prime)
 
 #: Theorem 1: which flow the laws give.
 TARGET = (
-    Kind.THEOREM(
-        "T1a",
-        "at the reference the law (14) gives the wanted flow (9)",
-        Q,
-        Q_O,
-        scope=LAW_AT_REFERENCE,
-        grounds=(*flow_under("(14)", u_min0, dP0), *(Ground(number) for number in ("(9)", "(8)", "gamma_0"))),
+    Kind.THEOREM("T1a", "at the reference the law (14) gives the wanted flow (9)")
+    .says(Q, Q_O)
+    .by(
+        *flow_under("(14)", u_min0, dP0),
+        *("(9)", "(8)", "gamma_0"),
         eliminate=(x, u_i_prime, u_O, Q_O, K_0, gamma_0),
-    ),
-    Kind.THEOREM(
-        "T1b",
-        "flow that the law (18) gives off the reference",
+    )
+    .within(LAW_AT_REFERENCE),
+    Kind.THEOREM("T1b", "flow that the law (18) gives off the reference")
+    .says(
         Q,
         Q_O_prime + gamma_1 * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
         Q_O_prime * (beta + (1 - beta) * u_max / (k * x_max)),
-        scope=_PAPER_LAW,
-        grounds=(*flow_under("(18)", u_min1, dP1), *_AT_DP1),
-        eliminate=_UNKNOWN_AT_DP1,
-        values=tuple(
-            Value(
-                f"flow over the target, {valve.name}",
-                of=beta + (1 - beta) * u_max / (k * x_max),
-                at=valve.at(),
-                unit="1",
-            )
-            for valve in VALVES
-        ),
-        note=f"Above the target wherever $beta < 1$ and $k x_max < u_max$. The numbers: {_DRIVE_LEFT_OVER}.",
+    )
+    .by(*flow_under("(18)", u_min1, dP1), *_AT_DP1, eliminate=_UNKNOWN_AT_DP1)
+    .within(_PAPER_LAW)
+    .numbers(
+        *(valve.value("flow over the target", "1", of=beta + (1 - beta) * u_max / (k * x_max)) for valve in VALVES)
+    )
+    .remark(f"Above the target wherever $beta < 1$ and $k x_max < u_max$. The numbers: {_DRIVE_LEFT_OVER}."),
+    Kind.THEOREM("T1c", "the law (18) meets the target (16)")
+    .says(Q, Q_O_prime)
+    .by(*flow_under("(18)", u_min1, dP1), *_AT_DP1, eliminate=_UNKNOWN_AT_DP1)
+    .within(_PAPER_LAW)
+    .if_(
+        Eq(beta, 1),
+        Eq(k * x_max, u_max),
+        for_all=(u_i,),
+        ruled_out_by=tuple((name, value) for name, value in FIRST.at() if name in (u_max, beta, k)),
+        discrepancy=C_d * W * sqrt(2 * dP1 / rho) * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
+    )
+    .corrected("T1d")
+    .qualified_by("T2d")
+    .remark(
+        "Where a stop fixes $x_max$. Where full command is the limit it follows, for then the target ends at "
+        "the largest flow that full command gives: T2d."
     ),
-    Kind.THEOREM(
-        "T1c",
-        "the law (18) meets the target (16)",
-        Q,
-        Q_O_prime,
-        scope=_PAPER_LAW,
-        grounds=(*flow_under("(18)", u_min1, dP1), *_AT_DP1),
-        eliminate=_UNKNOWN_AT_DP1,
-        condition=Condition(
-            any_of=((sympy.Eq(beta, 1),), (sympy.Eq(k * x_max, u_max),)),
-            for_all=(u_i,),
-            ruled_out_by=tuple((name, value) for name, value in FIRST.at() if name in (u_max, beta, k)),
-            discrepancy=C_d * W * sympy.sqrt(2 * dP1 / rho) * (1 - beta) * (1 - k * x_max / u_max) * u_i / k,
-        ),
-        expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="T1d",
-        see=("T2d",),
-        note="Where a stop fixes $x_max$. Where full command is the limit it follows, for then the target ends at "
-        "the largest flow that full command gives: T2d.",
-    ),
-    Kind.THEOREM(
-        "T1d",
-        "the law `target` meets the target (16)",
-        Q,
-        Q_O_prime,
-        scope=_TARGET_LAW,
-        grounds=(*flow_under("L3", u_min1, dP1), *_AT_DP1),
-        eliminate=_UNKNOWN_AT_DP1,
-    ),
-    Kind.DEFINITION("drive left", "drive that is not used", drive_left, u_max - u_O),
-    Kind.THEOREM(
-        "T1e",
-        "drive that the law `target` leaves unused at full command",
-        drive_left,
-        u_max - k * x_max - beta * u_min0,
-        scope=TARGET_OFF_REFERENCE & AT_FULL_COMMAND,
-        rearranges=True,
-        grounds=("drive left", Ground("L3", ((u_i, u_max),))),
-        eliminate=(u_O,),
-        values=tuple(Value(f"at 5 MPa, {valve.name}", valve.at(), "V") for valve in (FIRST, SECOND)),
-        note="(1 - $beta$) $u_min0$ where $k x_max = u_max - u_min0$: the target asks for $x_max$ and not for more, "
+    Kind.THEOREM("T1d", "the law `target` meets the target (16)")
+    .says(Q, Q_O_prime)
+    .by(*flow_under("L3", u_min1, dP1), *_AT_DP1, eliminate=_UNKNOWN_AT_DP1)
+    .within(_TARGET_LAW),
+    Kind.DEFINITION("drive left", "drive that is not used").says(drive_left, u_max - u_O),
+    Kind.THEOREM("T1e", "drive that the law `target` leaves unused at full command")
+    .says(drive_left, u_max - k * x_max - beta * u_min0)
+    .rearranging("drive left", Ground("L3", ((u_i, u_max),)))
+    .within(TARGET_OFF_REFERENCE, AT_FULL_COMMAND)
+    .numbers(FIRST.value("at 5 MPa", "V"), SECOND.value("at 5 MPa", "V"))
+    .remark(
+        "(1 - $beta$) $u_min0$ where $k x_max = u_max - u_min0$: the target asks for $x_max$ and not for more, "
         "though at a lower threshold the same command could open further. In flow it is what T1b gives above the "
-        "target.",
+        "target."
     ),
     Kind.CORRECTED(
-        "(6c)",
-        "compensation signal that meets the target (16) where a stop fixes $x_max$, what (6) should read",
-        u_no,
-        u_0 - (1 - beta) * u_min0,
-        scope=_TARGET_LAW,
-        grounds=(
-            Ground("u_O", ((u_0, u_no),)),
-            Ground("Fig. 3, command", ((u_min0, u_min1),)),
-            "(11)",
-            Ground("(10)", ((Q_O, Q_O_prime), (dP0, dP1))),
-            "(16)",
-            "(15)",
-            "gamma_1",
-            "(5)",
-            "(13)",
-        ),
+        "(6c)", "compensation signal that meets the target (16) where a stop fixes $x_max$, what (6) should read"
+    )
+    .says(u_no, u_0 - (1 - beta) * u_min0)
+    .by(
+        Ground("u_O", ((u_0, u_no),)),
+        Ground("Fig. 3, command", ((u_min0, u_min1),)),
+        "(11)",
+        Ground("(10)", ((Q_O, Q_O_prime), (dP0, dP1))),
+        "(16)",
+        "(15)",
+        "gamma_1",
+        "(5)",
+        "(13)",
         eliminate=(u_O, u_i_prime, x, Q_O_prime, K_1, gamma_1, u_min1, u_0),
-        see=("T2d", "T2e"),
-        note="Only the threshold is corrected, not the gain: this is the law `target`. One of two readings: where full "
-        "command is the limit, (6) itself meets the target (T2d) and this one loses flow (T2e).",
+    )
+    .within(_TARGET_LAW)
+    .qualified_by("T2d", "T2e")
+    .remark(
+        "Only the threshold is corrected, not the gain: this is the law `target`. One of two readings: where full "
+        "command is the limit, (6) itself meets the target (T2d) and this one loses flow (T2e)."
     ),
 )
 
+_AT_FULL_COMMAND = (
+    *("(5)", "gamma_1", "T2c", "full command", "(16)"),
+    Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
+)
 _FULL_COMMAND_IS_THE_LIMIT = scope(FREE_OPENING)
 
 #: Theorem 2: full command.
 FULL_COMMAND = (
-    Kind.THEOREM(
-        "T2a",
-        "output of the law (18) at full command",
-        u_O,
-        u_max + beta * (k * x_max + u_min0 - u_max),
-        scope=LAW_OFF_REFERENCE & AT_FULL_COMMAND,
-        grounds=(Ground("(18)", ((u_i, u_max),)),),
+    Kind.THEOREM("T2a", "output of the law (18) at full command")
+    .says(u_O, u_max + beta * (k * x_max + u_min0 - u_max))
+    .by(Ground("(18)", ((u_i, u_max),)))
+    .within(LAW_OFF_REFERENCE, AT_FULL_COMMAND),
+    Kind.THEOREM("T2b", "full command gives full drive at every pressure drop")
+    .says(u_O, u_max)
+    .by("T2a")
+    .within(LAW_OFF_REFERENCE, AT_FULL_COMMAND)
+    .if_(Eq(k * x_max, u_max - u_min0), for_all=(beta,), discrepancy=beta * (k * x_max + u_min0 - u_max))
+    .remark(
+        "With less travel, as where the spool meets its stop at 8-8.5 V (section 4.2), full command asks for less "
+        "than full drive; with more, for drive that is not there."
     ),
-    Kind.THEOREM(
-        "T2b",
-        "full command gives full drive at every pressure drop",
-        u_O,
-        u_max,
-        scope=LAW_OFF_REFERENCE & AT_FULL_COMMAND,
-        grounds=("T2a",),
-        condition=Condition(
-            any_of=((sympy.Eq(k * x_max, u_max - u_min0),),),
-            for_all=(beta,),
-            discrepancy=beta * (k * x_max + u_min0 - u_max),
-        ),
-        expected=Outcome.FOLLOWS_IF,
-        note="With less travel, as where the spool meets its stop at 8-8.5 V (section 4.2), full command asks for less "
-        "than full drive; with more, for drive that is not there.",
+    Kind.ASSUMPTION("opening", "opening on both sides of the threshold")
+    .says(x, Piecewise(((u_O - u_min) / k, u_min <= u_O), (0, u_O < u_min)))
+    .within(EDGE)
+    .remark("Eq. (11) with Fig. 3 beyond the threshold; closed before it, as Eq. (1) says."),
+    Kind.THEOREM("largest flow", "largest flow at $dP1$ without compensator")
+    .says(Q_max1, gamma_1 * (u_max - u_min1) / k)
+    .by(
+        Ground("(1)", ((Q, Q_max1), (dP, dP1), (u_min, u_min1), (u_i, u_max))),
+        Ground("opening", ((u_O, u_max), (u_min, u_min1))),
+        "gamma_1",
+    )
+    .within(BARE, FREE_OPENING, Eq(dP, dP1), u_min1 <= u_max, AT_FULL_COMMAND)
+    .in_cases(Case(((u_max, u_min1 + headroom),), ""))
+    .remark("As long as the spool has not met its stop."),
+    Kind.ASSUMPTION("full command", "$x_max$ is the opening that full command gives at $dP0$")
+    .says(x_max, (u_max - u_min0) / k)
+    .within(_FULL_COMMAND_IS_THE_LIMIT)
+    .qualified_by("T2b")
+    .remark(
+        "The condition under which 1.048 and 1.018 (T1b) are computed. Without a stop, full command then opens "
+        "the valve further at $dP1$, where its threshold is lower."
     ),
-    Kind.ASSUMPTION(
-        "opening",
-        "opening on both sides of the threshold",
-        x,
-        sympy.Piecewise(((u_O - u_min) / k, u_min <= u_O), (0, u_O < u_min)),
-        scope=EDGE,
-        note="Eq. (11) with Fig. 3 beyond the threshold; closed before it, as Eq. (1) says.",
-    ),
-    Kind.THEOREM(
-        "largest flow",
-        "largest flow at $dP1$ without compensator",
-        Q_max1,
-        gamma_1 * (u_max - u_min1) / k,
-        scope=scope(BARE, FREE_OPENING, sympy.Eq(dP, dP1), u_min1 <= u_max) & AT_FULL_COMMAND,
-        grounds=(
-            Ground("(1)", ((Q, Q_max1), (dP, dP1), (u_min, u_min1), (u_i, u_max))),
-            Ground("opening", ((u_O, u_max), (u_min, u_min1))),
-            "gamma_1",
-        ),
-        eliminate=(x, gamma_1),
-        cases=(Case(((u_max, u_min1 + headroom),), ""),),
-        note="As long as the spool has not met its stop.",
-    ),
-    Kind.ASSUMPTION(
-        "full command",
-        "$x_max$ is the opening that full command gives at $dP0$",
-        x_max,
-        (u_max - u_min0) / k,
-        scope=_FULL_COMMAND_IS_THE_LIMIT,
-        see=("T2b",),
-        note="The condition under which 1.048 and 1.018 (T1b) are computed. Without a stop, full command then opens "
-        "the valve further at $dP1$, where its threshold is lower.",
-    ),
-    Kind.THEOREM(
-        "T2c",
-        "largest flow off the reference where full command is the limit",
-        Q_max1,
-        gamma_1 * (u_max - beta * u_min0) / k,
-        scope=_FULL_COMMAND_IS_THE_LIMIT,
-        grounds=("largest flow", "(5)"),
-        eliminate=(u_min1,),
-        note="More than $gamma_1 x_max$, the flow of Assumption 3, wherever $beta < 1$.",
-    ),
+    Kind.THEOREM("T2c", "largest flow off the reference where full command is the limit")
+    .says(Q_max1, gamma_1 * (u_max - beta * u_min0) / k)
+    .by("largest flow", "(5)", eliminate=(u_min1,))
+    .within(_FULL_COMMAND_IS_THE_LIMIT)
+    .remark("More than $gamma_1 x_max$, the flow of Assumption 3, wherever $beta < 1$."),
     Kind.THEOREM(
         "T2d",
         "where full command is the limit, the law (18) gives the line to the largest flow, and so the target (16)",
-        Q,
-        Q_max1 * u_i / u_max,
-        Q_O_prime,
-        scope=LAW_OFF_REFERENCE & _FULL_COMMAND_IS_THE_LIMIT,
-        grounds=(
-            *flow_under("(18)", u_min1, dP1),
-            *("(5)", "gamma_1", "T2c", "full command", "(16)"),
-            Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
-        ),
-        eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
-        see=("T1c", "T2e"),
-        note="The other reading of (6): Eq. (18) is the right law of Fig. 3 as long as full command is the limit. "
-        "With a stop that fixes $x_max$ it overshoots: T1b, T1c.",
+    )
+    .says(Q, Q_max1 * u_i / u_max, Q_O_prime)
+    .by(
+        *flow_under("(18)", u_min1, dP1),
+        *_AT_FULL_COMMAND,
+        eliminate=(*_UNKNOWN_AT_DP1, Q_max1, x_max),
+    )
+    .within(LAW_OFF_REFERENCE, _FULL_COMMAND_IS_THE_LIMIT)
+    .qualified_by("T1c", "T2e")
+    .remark(
+        "The other reading of (6): Eq. (18) is the right law of Fig. 3 as long as full command is the limit. "
+        "With a stop that fixes $x_max$ it overshoots: T1b, T1c."
     ),
-    Kind.THEOREM(
-        "T2e",
-        "where full command is the limit, the law `target` falls short of the target (16)",
-        Q,
-        Q_O_prime * (u_max - u_min0) / (u_max - beta * u_min0),
-        scope=TARGET_OFF_REFERENCE & _FULL_COMMAND_IS_THE_LIMIT,
-        grounds=(
-            *flow_under("L3", u_min1, dP1),
-            *("(5)", "gamma_1", "T2c", "full command", "(16)"),
-            Ground("(2)", ((K_e, K_1), (Q_max, Q_max1))),
-        ),
-        eliminate=(x, u_i_prime, u_O, u_min1, gamma_1, Q_max1, x_max, K_1, Q_O_prime),
-        see=("T1d", "T1e"),
-        values=tuple(
-            Value(
-                f"flow lost, {valve.name}", of=1 - (u_max - u_min0) / (u_max - beta * u_min0), at=valve.at(), unit="%"
-            )
+    Kind.THEOREM("T2e", "where full command is the limit, the law `target` falls short of the target (16)")
+    .says(Q, Q_O_prime * (u_max - u_min0) / (u_max - beta * u_min0))
+    .by(
+        *flow_under("L3", u_min1, dP1),
+        *_AT_FULL_COMMAND,
+        eliminate=(*_UNKNOWN_AT_DP1, Q_max1, x_max),
+    )
+    .within(TARGET_OFF_REFERENCE, _FULL_COMMAND_IS_THE_LIMIT)
+    .qualified_by("T1d", "T1e")
+    .numbers(
+        *(
+            valve.value("flow lost", "%", of=1 - (u_max - u_min0) / (u_max - beta * u_min0))
             for valve in (FIRST, SIMULATION, SECOND)
-        ),
-        note="At every command, full command included. The correction (6c) is right only where a stop fixes $x_max$ "
-        "(T1d).",
+        )
+    )
+    .remark(
+        "At every command, full command included. The correction (6c) is right only where a stop fixes $x_max$ (T1d)."
     ),
 )

@@ -1,11 +1,12 @@
 """Eqs. (19)-(28): the simulation model in time and under the Laplace transform, and what the paper leaves out of it."""
 
 import sympy
+from sympy import Eq, sqrt
 
-from dzdesign.derivation.account.equations import ORIFICE
+from dzdesign.derivation.account.equations import ORIFICE, beyond
 from dzdesign.derivation.account.published import SIMULATION
-from dzdesign.derivation.account.scope import BARE, EVERYWHERE, PLANT, scope
-from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome, Statement
+from dzdesign.derivation.account.scope import BARE, PLANT
+from dzdesign.derivation.account.statement import Ground, Kind, Statement
 from dzdesign.derivation.plant import PLANT_EQUATIONS, current_time_constant
 from dzdesign.derivation.symbols import *
 
@@ -25,9 +26,9 @@ _TITLES = {
 def _premise(number: str) -> Statement:
     title, note = _TITLES[number]
     equation = PLANT_EQUATIONS[number]
+    stated = Kind.PREMISE(number, title).says(equation.lhs, equation.rhs).remark(note)
     # Beyond the simulation model a valve has a dead zone, which (24) has not.
-    where, see = (scope(PLANT), ("T6d",)) if number == "(24)" else (EVERYWHERE, ())
-    return Kind.PREMISE(number, title, equation.lhs, equation.rhs, scope=where, see=see, note=note)
+    return stated.within(PLANT).qualified_by("T6d") if number == "(24)" else stated
 
 
 def _transformed(transform: sympy.Expr, order: int, *initial: sympy.Symbol) -> sympy.Expr:
@@ -56,7 +57,7 @@ LAPLACE = (
 )
 
 
-def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
+def laplace(number: str) -> Ground:
     """Return a plant equation, of Eqs. (19)-(24), as a ground, transformed term by term.
 
     One that is not linear and homogeneous in the signals is refused: its transform is another one.
@@ -72,55 +73,35 @@ def laplace(number: str, where: str = "under the Laplace transform") -> Ground:
 #: Section 2.1.
 SIMULATION_MODEL = (
     *(_premise(number) for number in PLANT_EQUATIONS),
-    Kind.PAPER(
-        "(25)",
-        "amplifier and coil, transformed",
-        U_e,
-        K_a * (U_i - K_fi * I_s),
-        (R_c + r_p) * I_s + I_s * L_c * s,
-        grounds=(laplace("(19)"), laplace("(21)"), laplace("(20)")),
-        eliminate=(U_if, I_s),
-        condition=Condition(
-            any_of=((sympy.Eq(i_init, 0),),), for_all=(s,), discrepancy=-L_c * i_init, words="(Assumption 4)"
-        ),
-        expected=Outcome.FOLLOWS_IF,
-        note="Printed without its middle, $U_e$($s$).",
-    ),
-    Kind.PAPER("(26)", "solenoid force, transformed", F_e, K_i * I_s, rearranges=True, grounds=(laplace("(22)"),)),
-    Kind.PAPER(
-        "(27)",
-        "motion, transformed",
-        F_e,
-        K_i * I_s,
-        (m_e * s**2 + B_e * s + K_et) * X_e + F_eL,
-        grounds=(laplace("(23)"), "(26)"),
-        eliminate=(I_s,),
-        condition=Condition(
-            any_of=((sympy.Eq(x_init, 0), sympy.Eq(v_init, 0)),),
-            for_all=(s,),
-            discrepancy=-(m_e * s + B_e) * x_init - m_e * v_init,
-            words="(Assumption 4)",
-        ),
-        expected=Outcome.FOLLOWS_IF,
-        note="Printed without its left end, $F_e$($s$).",
-    ),
-    Kind.PAPER(
-        "(28)",
-        "flow, transformed",
-        Q_s,
-        C_d * W * X_e * sympy.sqrt(2 * dP / rho),
-        grounds=(Ground("(24)", ((Q, Q_s), (x_e, X_e.func(s + a)))),),
-        condition=Condition(
-            any_of=((sympy.Eq(a, 0),),),
-            # The transform of a unit step.
-            witness=((X_e, 1 / s), (X_e.func(s + a), 1 / (s + a))),
-            for_all=(s,),
-            discrepancy=ORIFICE * (X_e.func(s + a) - X_e),
-            words="($a$ constant pressure drop, Assumption 4)",
-        ),
-        expected=Outcome.FOLLOWS_IF,
-        note="Shown for a pressure drop that falls as exp(-2 a $t$) during a step: flow and travel are in proportion "
-        "only at $a = 0$.",
+    Kind.PAPER("(25)", "amplifier and coil, transformed")
+    .says(U_e, K_a * (U_i - K_fi * I_s), (R_c + r_p) * I_s + I_s * L_c * s)
+    .by(laplace("(19)"), laplace("(21)"), laplace("(20)"), eliminate=(U_if, I_s))
+    .if_(Eq(i_init, 0), for_all=(s,), discrepancy=-L_c * i_init, words="(Assumption 4)")
+    .remark("Printed without its middle, $U_e$($s$)."),
+    Kind.PAPER("(26)", "solenoid force, transformed").says(F_e, K_i * I_s).rearranging(laplace("(22)")),
+    Kind.PAPER("(27)", "motion, transformed")
+    .says(F_e, K_i * I_s, (m_e * s**2 + B_e * s + K_et) * X_e + F_eL)
+    .by(laplace("(23)"), "(26)", eliminate=(I_s,))
+    .if_(
+        (Eq(x_init, 0), Eq(v_init, 0)),
+        for_all=(s,),
+        discrepancy=-(m_e * s + B_e) * x_init - m_e * v_init,
+        words="(Assumption 4)",
+    )
+    .remark("Printed without its left end, $F_e$($s$)."),
+    Kind.PAPER("(28)", "flow, transformed")
+    .says(Q_s, C_d * W * X_e * sqrt(2 * dP / rho))
+    .by(Ground("(24)", ((Q, Q_s), (x_e, X_e.func(s + a)))))
+    .if_(
+        Eq(a, 0),
+        witness=((X_e, 1 / s), (X_e.func(s + a), 1 / (s + a))),
+        for_all=(s,),
+        discrepancy=ORIFICE * (X_e.func(s + a) - X_e),
+        words="($a$ constant pressure drop, Assumption 4)",
+    )
+    .remark(
+        "Shown for a pressure drop that falls as exp(-2 a $t$) during a step: flow and travel are in proportion "
+        "only at $a = 0$."
     ),
 )
 
@@ -130,66 +111,48 @@ _RESISTANCE = R_c + r_p + K_a * K_fi
 
 #: Theorem 6.
 TRANSFER_FUNCTION = (
-    Kind.THEOREM(
+    Kind.THEOREM("T6a", "current loop, from command to coil current")
+    .says(I_s, K_a * U_i / (_RESISTANCE + L_c * s), K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s))
+    .by(Ground("(25)", member=0), Ground("(25)", member=1))
+    .on_their_condition()
+    .remark(
+        "Time constant $L_c$ / ($R_c + r_p + K_a K_fi$): the feedback makes the coil faster by the factor 1 + "
+        "$K_a K_fi$ / ($R_c + r_p$), and makes the current depend less on the coil's temperature by the same factor."
+    ),
+    Kind.DEFINITION("transfer function", "transfer function from command to flow").says(G, Q_s / U_i),
+    Kind.THEOREM("T6b", "transfer function of Eqs. (19) to (24) without load force")
+    .says(G, ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)))
+    .by(
+        "transfer function",
+        "(28)",
+        Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),)),
+        "(26)",
         "T6a",
-        "current loop, from command to coil current",
-        I_s,
-        K_a * U_i / (_RESISTANCE + L_c * s),
-        K_a / _RESISTANCE * U_i / (1 + current_time_constant() * s),
-        grounds=(Ground("(25)", member=0), Ground("(25)", member=1)),
-        eliminate=(U_e,),
-        expected=Outcome.FOLLOWS_IF,
-        note="Time constant $L_c$ / ($R_c + r_p + K_a K_fi$): the feedback makes the coil faster by the factor 1 + "
-        "$K_a K_fi$ / ($R_c + r_p$), and makes the current depend less on the coil's temperature by the same factor.",
-    ),
-    Kind.DEFINITION("transfer function", "transfer function from command to flow", G, Q_s / U_i),
-    Kind.THEOREM(
-        "T6b",
-        "transfer function of Eqs. (19)-(24) without load force",
-        G,
-        ORIFICE * K_i * K_a / ((L_c * s + _RESISTANCE) * (m_e * s**2 + B_e * s + K_et)),
-        scope=scope(sympy.Eq(F_eL, 0)),
-        grounds=("transfer function", "(28)", Ground("(27)", member=1, at=((F_eL, sympy.S.Zero),)), "(26)", "T6a"),
         eliminate=(Q_s, X_e, F_e, I_s),
-        expected=Outcome.FOLLOWS_IF,
-        note="Third order. All coefficients of both factors are positive, so it is stable for every set of parameters.",
+    )
+    .within(Eq(F_eL, 0))
+    .on_their_condition()
+    .remark("Third order. All coefficients of both factors are positive, so it is stable for every set of parameters."),
+    Kind.THEOREM("T6c", "static gain from command to flow")
+    .says(G_0, ORIFICE * K_i * K_a / (_RESISTANCE * K_et))
+    .by(Ground("T6b", ((G, G_0), (s, sympy.S.Zero))))
+    .on_their_condition()
+    .remark("By the final value theorem, which the stability of T6b allows."),
+    Kind.DEFINITION("overlap", "opening of the edge: travel beyond the overlap")
+    .says(x, x_e - x_ov)
+    .within(u_min <= u_O),
+    Kind.THEOREM("T6d", "Eq. (24) is the dead-zone model (1) beyond the threshold")
+    .says(Q, ORIFICE * x_e)
+    .by(Ground("(1)", beyond(u_min)), "overlap")
+    .within(BARE, u_min <= u_i)
+    .if_(Eq(x_ov, 0), ruled_out_by=((x_ov, _OVERLAP_MM / 1000),), discrepancy=-ORIFICE * x_ov)
+    .corrected("T6e")
+    .remark(
+        "If the dead zone is overlap (our reading: 54 % of 1.8 mm, 0.97 mm), Eq. (24) lacks it; a preload "
+        "within $f_eL$ would be another explanation."
     ),
-    Kind.THEOREM(
-        "T6c",
-        "static gain from command to flow",
-        G_0,
-        ORIFICE * K_i * K_a / (_RESISTANCE * K_et),
-        grounds=(Ground("T6b", ((G, G_0), (s, sympy.S.Zero))),),
-        expected=Outcome.FOLLOWS_IF,
-        note="By the final value theorem, which the stability of T6b allows.",
-    ),
-    Kind.DEFINITION(
-        "overlap", "opening of the edge: travel beyond the overlap", x, x_e - x_ov, scope=scope(u_min <= u_O)
-    ),
-    Kind.THEOREM(
-        "T6d",
-        "Eq. (24) is the dead-zone model (1) beyond the threshold",
-        Q,
-        ORIFICE * x_e,
-        scope=scope(BARE, u_min <= u_i),
-        grounds=(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap"),
-        eliminate=(x,),
-        # Section 2.2: the simulated spool's dead zone is 54 % of its 1.8 mm.
-        condition=Condition(
-            any_of=((sympy.Eq(x_ov, 0),),), ruled_out_by=((x_ov, _OVERLAP_MM / 1000),), discrepancy=-ORIFICE * x_ov
-        ),
-        expected=Outcome.DOES_NOT_FOLLOW,
-        corrected_by="T6e",
-        note="If the dead zone is overlap (our reading: 54 % of 1.8 mm, 0.97 mm), Eq. (24) lacks it; a preload "
-        "within $f_eL$ would be another explanation.",
-    ),
-    Kind.CORRECTED(
-        "T6e",
-        "flow across an edge with overlap, opened",
-        Q,
-        ORIFICE * (x_e - x_ov),
-        scope=scope(BARE, u_min <= u_i),
-        grounds=(Ground("(1)", ((u_i, u_min + u_i_prime), (u_max, u_min + u_i_prime + headroom))), "overlap"),
-        eliminate=(x,),
-    ),
+    Kind.CORRECTED("T6e", "flow across an edge with overlap, opened")
+    .says(Q, ORIFICE * (x_e - x_ov))
+    .by(Ground("(1)", beyond(u_min)), "overlap")
+    .within(BARE, u_min <= u_i),
 )

@@ -19,8 +19,10 @@ LAW = Law(
     note=_NOTE,
     stated_as="T1d",
     statements=(
-        Kind.CHOICE(
-            "L3", "the law `target`", u_O, _OUTPUT, scope=TARGET_OFF_REFERENCE, see=("T1d", "T1e", "T2e"), note=_NOTE
-        ),
+        Kind.CHOICE("L3", "the law `target`")
+        .says(u_O, _OUTPUT)
+        .within(TARGET_OFF_REFERENCE)
+        .qualified_by("T1d", "T1e", "T2e")
+        .remark(_NOTE),
     ),
 )

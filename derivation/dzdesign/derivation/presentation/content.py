@@ -8,9 +8,7 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import Artefact
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.statement import Kind, Outcome
-from dzdesign.derivation.presentation.prose import Formula, Reference, Words, parse_prose
-
-Numbers = tuple[str, ...]
+from dzdesign.derivation.presentation.prose import Formula, Words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,8 +24,7 @@ class Premise:
     """A statement on which another one rests."""
 
     number: Annotated[str, Meta(description="Number of the statement that is the premise.")]
-    at: Annotated[tuple[Formula, ...], Meta(description="Substitutions for its symbols.")]
-    words: Annotated[Words, Meta(description="Premise and substitutions in words.")]
+    words: Annotated[Words, Meta(description="Premise and the substitutions for its symbols.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,14 +32,7 @@ class Derivation:
     """The derivation of one case."""
 
     where: Annotated[Words, Meta(description="Case that the derivation covers; empty if it is the only one.")]
-    derived: Annotated[Formula, Meta(description="Expression that the premises give for the statement's symbol.")]
-    discrepancies: Annotated[
-        tuple[Formula, ...],
-        Meta(description="Derived minus published expression, factored, for each member of the equation."),
-    ]
-    lines: Annotated[
-        tuple[Line, ...], Meta(description="Steps of the derivation; a single line if everything was solved at once.")
-    ]
+    lines: Annotated[tuple[Line, ...], Meta(description="Steps of the derivation.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,13 +40,10 @@ class Figure:
     """A number of dzdesign beside that of the paper."""
 
     label: Annotated[Words, Meta(description="Quantity that is compared.")]
-    exact: Annotated[Formula, Meta(description="Exact value of dzdesign.")]
-    value: Annotated[float, Meta(description="The exact value as a number, in `unit`.")]
+    value: Annotated[float, Meta(description="Value of dzdesign, in `unit`.")]
     unit: Annotated[str, Meta(description="Unit of the value.")]
     published: Annotated[str, Meta(description="Value as printed in the paper; empty if it is not printed.")]
-    agrees: Annotated[
-        bool | None, Meta(description="Whether the exact value rounds to the printed one; null if none is printed.")
-    ]
+    agrees: Annotated[bool | None, Meta(description="Whether the value rounds to the printed one; null without one.")]
     ours: Annotated[str, Meta(description="Value of dzdesign with four digits and unit.")]
     paper: Annotated[str, Meta(description="Value of the paper with unit, and the difference from it.")]
     remark: Annotated[Words, Meta(description="Reason for a difference, or meaning of the number.")]
@@ -66,62 +53,24 @@ class Figure:
 class Entry:
     """A statement with its verdict and its derivation."""
 
-    number: Annotated[
-        str,
-        Meta(
-            description="Number in the paper, or that of an added statement, such as T for a theorem and L for a law."
-        ),
-    ]
+    number: Annotated[str, Meta(description="Number in the paper, or of an added statement: T a theorem, L a law.")]
     title: Annotated[Words, Meta(description="Short title of the statement.")]
-    kind: Annotated[
-        Kind, Meta(description="Origin of the statement. Premises and assumptions, for example, are given.")
-    ]
+    kind: Annotated[Kind, Meta(description="Origin of the statement. Premises and assumptions are given.")]
     section: Annotated[str, Meta(description="Section of the account in which the statement appears.")]
     statement: Annotated[Formula, Meta(description="Chain of equal formulas, in a form that SymPy can read.")]
     premises: Annotated[tuple[Premise, ...], Meta(description="Premises on which the statement rests.")]
     outcome: Annotated[Outcome, Meta(description="Outcome of the derivation.")]
-    expected: Annotated[Outcome, Meta(description="Outcome of a correct account.")]
-    as_expected: Annotated[
-        bool, Meta(description="Whether outcome and expectation agree and the units are consistent.")
-    ]
-    holds: Annotated[bool, Meta(description="Whether other statements may rest on this one.")]
-    verdict: Annotated[str, Meta(description="Outcome in words.")]
+    as_expected: Annotated[bool, Meta(description="Whether a correct account has this outcome, with right units.")]
     judgement: Annotated[Words, Meta(description="Outcome in full sentences; empty if the outcome alone suffices.")]
-    rearranges: Annotated[bool, Meta(description="Whether the statement only rearranges a definition or one premise.")]
-    any_of: Annotated[
-        tuple[tuple[Formula, ...], ...], Meta(description="Alternative conditions, each of which is sufficient.")
-    ]
-    ruled_out_by: Annotated[
-        tuple[Formula, ...], Meta(description="Published values that contradict each of these conditions.")
-    ]
-    necessary: Annotated[
-        bool | None, Meta(description="Whether the condition is proved to be necessary; null if there is none.")
-    ]
-    positive_if: Annotated[Formula, Meta(description="Condition that is equivalent to a positive left side.")] | None
-    provided: Annotated[tuple[Formula, ...], Meta(description="Quantities that must differ.")]
-    scope: Annotated[
-        Words, Meta(description="Range in which the statement is proved; empty if it is proved everywhere.")
-    ]
-    limited_by: Annotated[
-        Numbers, Meta(description="Underlying statements that are proved in a part of the range only.")
-    ]
-    inherited: Annotated[Numbers, Meta(description="Underlying statements that follow on a condition.")]
-    unit_error: Annotated[str, Meta(description="Inconsistency of the units; empty if there is none.")]
+    rearranges: Annotated[bool, Meta(description="Whether it only rearranges a definition or one premise.")]
+    necessary: Annotated[bool | None, Meta(description="Whether its condition is proved necessary; null without one.")]
+    scope: Annotated[Words, Meta(description="Range in which it is proved; empty if it is proved everywhere.")]
     derivations: Annotated[tuple[Derivation, ...], Meta(description="Derivation of each case.")]
-    differences: Annotated[tuple[Line, ...], Meta(description="Derived minus published expression, where they differ.")]
-    corrections: Annotated[tuple[Line, ...], Meta(description="Corrected form of the statement.")]
-    corrected_by: Annotated[tuple[Reference, ...], Meta(description="Statement that gives the correction.")]
-    see: Annotated[tuple[Reference, ...], Meta(description="Statements that qualify this one.")]
+    differences: Annotated[tuple[Line, ...], Meta(description="Derived minus published, and the corrected form.")]
+    corrected_by: Annotated[str, Meta(description="Statement that gives the correction; empty if there is none.")]
+    see: Annotated[tuple[str, ...], Meta(description="Statements that qualify this one.")]
     figures: Annotated[tuple[Figure, ...], Meta(description="Numbers of dzdesign beside those of the paper.")]
     note: Annotated[Words, Meta(description="Remark for the reader.")]
-
-    @property
-    def name(self) -> Words:
-        return parse_prose(self.number)
-
-    @property
-    def reference(self) -> Reference:
-        return Reference(self.number)
 
     @property
     def mark(self) -> str:
@@ -151,7 +100,7 @@ class DerivationReport(Artefact):
     )
     title: Annotated[str, Meta(description="Title of the account.")]
     source: Annotated[str, Meta(description="Reference of the paper.")]
-    holds: Annotated[bool, Meta(description="Whether other statements may rest on this one.")]
+    holds: Annotated[bool, Meta(description="Whether every outcome is that of a correct account.")]
     summary: Annotated[tuple[Words, ...], Meta(description="Summary of the outcomes, in sentences.")]
     wrong: Annotated[tuple[Words, ...], Meta(description="Statements that do not hold or need a correction.")]
     conditional: Annotated[tuple[Words, ...], Meta(description="Statements that hold only on a condition.")]
@@ -162,7 +111,7 @@ class DerivationReport(Artefact):
     LEGEND: ClassVar = (
         ("given", "taken from the paper, or a name or a choice of ours; not derived."),
         ("follows", "the premises that are named, and nothing else, give exactly what is published."),
-        ("follows if", "they give it on the condition stated; “only then” means proved to be necessary too."),
+        ("follows if", 'they give it on the condition stated; "only then" means proved to be necessary too.'),
         ("does not follow", "they give something else: the difference stands there, and what holds instead."),
     )
 

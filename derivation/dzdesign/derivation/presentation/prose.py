@@ -1,21 +1,21 @@
-"""Words of a report: text with formulas and references in it, each format writing these its own way."""
+"""Words of a report, each format writing them its own way: one notation for symbols, code and references in a text."""
 
 import re
-from collections.abc import Collection, Iterable, Iterator
 
 import sympy
 
 from dzdesign.core.artefact_types import JsonText
 from dzdesign.derivation.presentation.formulas import to_python, to_text
-from dzdesign.derivation.symbols import QUANTITIES
 
-_KEYBOARD = str.maketrans({"−": "-", "–": "-", "≤": "<=", "≥": ">=", "→": "->", "“": '"', "”": '"'})
+#: What is no plain text in a sentence: a reference with its words, code, symbols and formulas, a statement's number.
+PARTS = re.compile(
+    r"\[\[(?P<to>[^|]+)\|(?P<words>.+?)\]\]|`(?P<code>[^`]+)`|\$(?P<formula>[^$]+)\$"
+    r"|(?P<number>\(\d+[a-z]?\)|\b[TL]\d+[a-z]?\b)"
+)
 
 
 class Formula(JsonText):
-    """An expression, or a chain of equal ones, in a sentence or on a line of its own."""
-
-    __match_args__ = ("sides",)
+    """An expression, or a chain of equal ones, on a line of its own."""
 
     def __init__(self, *sides: sympy.Basic) -> None:
         self.sides = sides
@@ -27,105 +27,28 @@ class Formula(JsonText):
         return " = ".join(map(to_python, self.sides))
 
 
-class Reference(JsonText):
-    """A statement that a sentence points to, with the words that name it there; its number unless given."""
+class Words(JsonText):
+    """Sentences: ``$u_min0$`` is a symbol, ```paper``` code, ``(18)`` and ``[[S|the definition of $S$]]`` references.
 
-    __match_args__ = ("number", "words")
-
-    def __init__(self, number: str, *words: "Part") -> None:
-        self.number = number
-        self.words = Words(*words) if words else Words(number)
-
-    def __str__(self) -> str:
-        return str(self.words)
-
-    def json_text(self) -> str:
-        return self.number
-
-
-class Code(JsonText):
-    """A word of the command line or of a file."""
-
-    __match_args__ = ("text",)
+    Examples
+    --------
+    >>> str(Words("$u_min0$ by [[S|the definition of $S$]] and (18)"))
+    'u_min0 by the definition of S and (18)'
+    """
 
     def __init__(self, text: str) -> None:
         self.text = text
 
-    def __str__(self) -> str:
-        return f"`{self.text}`"
-
-    json_text = __str__
-
-
-class Words(JsonText):
-    """Text, formulas, references and code in a row."""
-
-    def __init__(self, *parts: "Part") -> None:
-        flat = (one for part in parts for one in (part.parts if isinstance(part, Words) else (part,)))
-        self.parts: tuple[str | Formula | Reference | Code, ...] = tuple(one for one in flat if one != "")
-
-    @classmethod
-    def join(cls, parts: "Iterable[Part]", joint: str = ", ") -> "Words":
-        """Return parts with a joint between each two."""
-        return cls(*[one for part in parts for one in (joint, part)][1:])
-
     def __bool__(self) -> bool:
-        return bool(self.parts)
+        return bool(self.text)
 
     def __str__(self) -> str:
-        """Return them as ASCII text."""
-        return "".join(part.translate(_KEYBOARD) if isinstance(part, str) else str(part) for part in self.parts)
+        return re.sub(r"\[\[[^|]+\||\]\]|\$", "", self.text)
 
     json_text = __str__
 
 
-Part = str | Formula | Reference | Code | Words
-
-_SIGNS = ((" - ", " − "), ("<=", "≤"), (">=", "≥"), (" -> ", " → "))
-_MINUS = re.compile(r"(?<![\w)-])-(?=[\w(])")
-_RANGE = re.compile(r"(?<=[\d)])-(?=[\d(])")
-_PARTS = re.compile(r"`(?P<code>[^`]+)`|\$(?P<formula>[^$]+)\$|(?P<reference>\(\d+[a-z]?\)|\b[TL]\d+[a-z]?\b)")
-_NAME = re.compile(r"[A-Za-z]\w*'?")
-
-
-def parse_prose(sentence: str, numbers: Collection[str] = ()) -> Words:
-    """Split a sentence into text, symbols between dollars, and references to statements of `numbers`.
-
-    Its signs become those of print.
-
-    Examples
-    --------
-    >>> [type(part).__name__ for part in parse_prose("$u_min0$ by (18)", ["(18)"]).parts]
-    ['Formula', 'str', 'Reference']
-    """
-    parts: list[Part] = []
-    sentence, end = _with_signs(sentence), 0
-    for found in _PARTS.finditer(sentence):
-        if found["reference"] and found["reference"] not in numbers:
-            continue
-        parts.append(sentence[end : found.start()])
-        if found["code"]:
-            parts.append(Code(found["code"]))
-        elif found["reference"]:
-            parts.append(Reference(found["reference"]))
-        else:
-            parts += _symbols(found["formula"])
-        end = found.end()
-    return Words(*parts, sentence[end:])
-
-
-def _symbols(formula: str) -> Iterator[Part]:
-    """Yield what stands between dollars: each name as a symbol, the rest as it is."""
-    by_name, end = {str(name): name for name in QUANTITIES}, 0
-    for found in _NAME.finditer(formula):
-        yield formula[end : found.start()]
-        yield Formula(by_name.get(found[0], sympy.Symbol(found[0])))
-        end = found.end()
-    yield formula[end:]
-
-
-def _with_signs(text: str) -> str:
-    """Put a minus, an en dash and a comparison in place of their spelling on a keyboard."""
-    for keyboard, printed in _SIGNS:
-        text = text.replace(keyboard, printed)
-    return _RANGE.sub("–", _MINUS.sub("−", text))
+def inline(*sides: sympy.Basic) -> str:
+    """Return a formula as a part of a sentence; an equation as its two sides."""
+    parts = sides[0].args if len(sides) == 1 and isinstance(sides[0], sympy.Eq) else sides
+    return f"${' = '.join(map(to_text, parts))}$"

@@ -10,8 +10,15 @@ from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.errors import InputError
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
 from dzdesign.design.current.loop import CORRECTION_SHIFT, LARGEST_ERROR, LARGEST_GAIN, CurrentLoop, SupplyCorrection
-from dzdesign.design.current.margins import SEARCH_GRID, Gains, worst_margins
-from dzdesign.design.current.step_response import SensorLine, StepResponse, released_overshoot_A, step_responses
+from dzdesign.design.current.responses import (
+    SEARCH_GRID,
+    Gains,
+    SensorLine,
+    StepResponse,
+    released_overshoot_A,
+    step_responses,
+    worst_margins,
+)
 from dzdesign.design.target_inputs import Converter
 
 #: Phase margin that the gains are chosen for, and the least that a loop may have.
@@ -46,11 +53,12 @@ STEPS_OF_SEARCH = 16
 class CurrentSensor:
     """Voltage at the converter's pin for a current, and for the supply where that is measured."""
 
-    V_per_A: Annotated[float, quantity("V/A", "Shunt resistance times amplifier gain.", gt=0)]
-    offset_V: Annotated[float, quantity("V", "Voltage at the pin at zero current.", ge=0)] = 0.0
-    supply_divider: Annotated[
-        float, quantity("1", "Ratio of the supply's voltage divider; 0 if the supply is not measured.", ge=0)
-    ] = 0.0
+    V_per_A: Annotated[float, quantity("V/A", gt=0)]
+    """Shunt resistance times amplifier gain."""
+    offset_V: Annotated[float, quantity("V", ge=0)] = 0.0
+    """Voltage at the pin at zero current."""
+    supply_divider: Annotated[float, quantity("1", ge=0)] = 0.0
+    """Ratio of the supply's voltage divider; 0 if the supply is not measured."""
 
     def __post_init__(self) -> None:
         if not self.V_per_A > 0 or self.offset_V < 0 or not 0 <= self.supply_divider < 1:

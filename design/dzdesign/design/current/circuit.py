@@ -25,24 +25,22 @@ class Corner(NamedTuple):
 class CoilCircuit:
     """A solenoid's coil, switched by a PWM from a supply, with a freewheeling diode."""
 
-    resistance_ohm: Annotated[float, quantity("ohm", "Resistance of the coil at its nominal temperature.", gt=0)]
-    inductance_H: Annotated[float, quantity("H", "Inductance of the coil.", gt=0)]
-    rated_A: Annotated[float, quantity("A", "Rated current, which is the current at full command.", gt=0)]
-    supply_V: Annotated[
-        tuple[float, float],
-        quantity("V", "Lowest and highest supply voltage; the nominal one is their geometric mean."),
-    ]
-    series_ohm: Annotated[float, quantity("ohm", "Resistance of the switch, shunt and wires.", ge=0)] = 0.5
-    freewheel_V: Annotated[float, quantity("V", "Voltage of the freewheeling diode.", gt=0)] = 0.7
-    resistance_factors: Annotated[
-        Factors, Meta(description="Least and largest factor of the coil's resistance, by temperature and manufacture.")
-    ] = (
-        0.75,
-        1.35,
-    )
-    inductance_factors: Annotated[
-        Factors, Meta(description="Least and largest factor of the inductance, by air gap and saturation.")
-    ] = (0.5, 1.5)
+    resistance_ohm: Annotated[float, quantity("ohm", gt=0)]
+    """Resistance of the coil at its nominal temperature."""
+    inductance_H: Annotated[float, quantity("H", gt=0)]
+    """Inductance of the coil."""
+    rated_A: Annotated[float, quantity("A", gt=0)]
+    """Rated current, which is the current at full command."""
+    supply_V: Annotated[tuple[float, float], quantity("V")]
+    """Lowest and highest supply voltage; the nominal one is their geometric mean."""
+    series_ohm: Annotated[float, quantity("ohm", ge=0)] = 0.5
+    """Resistance of the switch, shunt and wires."""
+    freewheel_V: Annotated[float, quantity("V", gt=0)] = 0.7
+    """Voltage of the freewheeling diode."""
+    resistance_factors: Factors = (0.75, 1.35)
+    """Least and largest factor of the coil's resistance, by temperature and manufacture."""
+    inductance_factors: Factors = (0.5, 1.5)
+    """Least and largest factor of the inductance, by air gap and saturation."""
 
     def __post_init__(self) -> None:
         for name in ("resistance_ohm", "inductance_H", "rated_A", "freewheel_V"):
@@ -108,9 +106,12 @@ class CurrentSampling:
     them, and what it computes acts from the next period on.
     """
 
-    tick_Hz: Annotated[int, quantity("Hz", "PWM frequency.", ge=1)] = 2500
-    samples: Annotated[int, Meta(description="Current samples in a PWM period, a power of two.", ge=1, le=16)] = 16
-    before: Annotated[int, Meta(description="Number of these samples that precede the interrupt.", ge=1, le=16)] = 14
+    tick_Hz: Annotated[int, quantity("Hz", ge=1)] = 2500
+    """PWM frequency."""
+    samples: Annotated[int, Meta(ge=1, le=16)] = 16
+    """Current samples in a PWM period, a power of two."""
+    before: Annotated[int, Meta(ge=1, le=16)] = 14
+    """Number of these samples that precede the interrupt."""
 
     def __post_init__(self) -> None:
         if self.samples not in (1, 2, 4, 8, 16) or not 1 <= self.before <= self.samples:

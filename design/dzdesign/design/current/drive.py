@@ -1,9 +1,10 @@
-"""`CurrentDrive`: current control as compensator.json keeps it, with what it was designed for and what it holds."""
+"""`CurrentDrive`: current control as `design` chose it, with its margins, its steps, and what it makes of a dither."""
 
 from dataclasses import dataclass
 from math import ceil, isfinite
 from typing import Annotated
 
+import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
@@ -20,60 +21,90 @@ from dzdesign.design.current.choosing import (
     worst_step,
 )
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
-from dzdesign.design.current.dither_response import dither_departure
 from dzdesign.design.current.loop import CurrentLoop
-from dzdesign.design.current.margins import worst_margins
-from dzdesign.design.current.step_response import STEP_S, released_overshoot_A, step_responses
+from dzdesign.design.current.responses import (
+    STEP_S,
+    SensorLine,
+    released_overshoot_A,
+    run_loop,
+    step_responses,
+    worst_margins,
+)
 from dzdesign.design.target_inputs import Converter
+
+#: Set points about which the wave is tried, of the rated current; for how long, until it has settled and after.
+SHARES = (0.25, 0.5, 0.75)
+SETTLED_S, SEEN_S = 0.2, 0.1
+
+
+def dither_departure(
+    loop: CurrentLoop,
+    circuit: CoilCircuit,
+    sampling: CurrentSampling,
+    sensor: SensorLine,
+    *,
+    counts: int,
+    ticks: int,
+) -> tuple[int, int]:
+    """Return by how many counts the current's peak lies above the set point's at most, and below it at most.
+
+    The certificate keeps the dither's peak free under the threshold: of a controlled current its own, which overshoots
+    the wave's steps or does not reach their top, the largest mean of a PWM period at the worst corner. Both are 0 or
+    more; `counts` is the wave's peak, `ticks` the PWM periods of half of it.
+    """
+    above, below = [0.0], [0.0]
+    for share in SHARES if counts else ():
+        set_point, tops = round(share * loop.full_counts), (share + counts / loop.full_counts) * circuit.rated_A
+        able = [corner for corner in circuit.corners() if circuit.duty(corner, tops) < 1]
+        if not able or not counts < set_point <= loop.full_counts - counts:
+            continue
+        settled, seen = (round(seconds * sampling.tick_Hz) for seconds in (SETTLED_S, SEEN_S))
+        wave = _wave(set_point, counts, ticks, settled + seen)
+        means, _ = run_loop(loop, circuit, able, sampling, sensor, wave)
+        peaks = means[settled:].max(axis=0) * loop.full_counts / circuit.rated_A - set_point - counts
+        above.append(float(peaks.max()))
+        below.append(float(-peaks.min()))
+    return ceil(max(above)), ceil(max(below))
+
+
+def _wave(set_point: int, counts: int, ticks: int, periods: int) -> np.ndarray:
+    up: np.ndarray = np.arange(periods) % (2 * ticks) < ticks
+    wave: np.ndarray = set_point + np.where(up, counts, -counts)
+    return wave
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentDrive:
     """Current control of a drive: the law's output is the set point, and full drive is the rated current."""
 
-    circuit: Annotated[CoilCircuit, Meta(description="Declared coil and supply.")]
-    sensor: Annotated[CurrentSensor, Meta(description="Voltages at the pins of the converter.")]
-    sampling: Annotated[
-        CurrentSampling, Meta(description="Times at which the current is sampled and the interrupt is triggered.")
-    ]
-    loop: Annotated[CurrentLoop, Meta(description="Controller in the integers of the firmware.")]
-    phase_margin_deg: Annotated[float, quantity("deg", "Least phase margin over all corners and currents.")]
-    gain_margin: Annotated[float, quantity("1", "Least gain margin over all corners and currents.")]
-    rise_s: Annotated[float, quantity("s", "Rise time from 10 to 90 % of the rated current at the slowest corner.")]
-    least_rise_s: Annotated[float, quantity("s", "Rise time at that corner with the switch always on.")]
-    fall_s: Annotated[
-        float,
-        quantity("s", "Fall time from 90 to 10 % at the slowest corner, where the freewheeling diode determines it."),
-    ]
-    overshoot: Annotated[
-        float, quantity("1", "Largest overshoot of the step response, relative to the height of the step.")
-    ]
-    release_overshoot_A: Annotated[
-        float,
-        quantity(
-            "A",
-            "Largest overshoot at any corner when the current is released to a set point; 0 if it is at "
-            "most half a code of the sensor.",
-            ge=0,
-        ),
-    ]
-    dither_above_counts: Annotated[
-        int,
-        Meta(
-            description="Largest excess of the current's peak over that of the set point under dither, at any corner.",
-            ge=0,
-            le=65535,
-        ),
-    ]
-    dither_below_counts: Annotated[
-        int,
-        Meta(
-            description="Largest deficit of the current's peak against that of the set point under dither, if the loop "
-            "can't follow the wave.",
-            ge=0,
-            le=65535,
-        ),
-    ]
+    circuit: CoilCircuit
+    """Declared coil and supply."""
+    sensor: CurrentSensor
+    """Voltages at the pins of the converter."""
+    sampling: CurrentSampling
+    """Times at which the current is sampled and the interrupt is triggered."""
+    loop: CurrentLoop
+    """Controller in the integers of the firmware."""
+    phase_margin_deg: Annotated[float, quantity("deg")]
+    """Least phase margin over all corners and currents."""
+    gain_margin: Annotated[float, quantity("1")]
+    """Least gain margin over all corners and currents."""
+    rise_s: Annotated[float, quantity("s")]
+    """Rise time from 10 to 90 % of the rated current at the slowest corner."""
+    least_rise_s: Annotated[float, quantity("s")]
+    """Rise time at that corner with the switch always on."""
+    fall_s: Annotated[float, quantity("s")]
+    """Fall time from 90 to 10 % at the slowest corner, where the freewheeling diode determines it."""
+    overshoot: Annotated[float, quantity("1")]
+    """Largest overshoot of the step response, relative to the height of the step."""
+    release_overshoot_A: Annotated[float, quantity("A", ge=0)]
+    """Largest overshoot at any corner when the current is released to a set point; 0 if it is at most half a code of
+    the sensor."""
+    dither_above_counts: Annotated[int, Meta(ge=0, le=65535)]
+    """Largest excess of the current's peak over that of the set point under dither, at any corner."""
+    dither_below_counts: Annotated[int, Meta(ge=0, le=65535)]
+    """Largest deficit of the current's peak against that of the set point under dither, if the loop can't follow the
+    wave."""
 
     def __post_init__(self) -> None:
         if self.phase_margin_deg < LEAST_PHASE_DEG:

@@ -21,15 +21,12 @@ Gain = Annotated[int, Meta(ge=0, le=LARGEST_GAIN)]
 class SupplyCorrection:
     """Nominal supply voltage over the measured one, linear between nodes over the converter's codes."""
 
-    valid_codes: Annotated[
-        tuple[Count, Count],
-        Meta(description="Range of the supply's codes; a code outside is replaced with the nearest one inside."),
-    ]
-    step_codes: Annotated[int, Meta(description="Codes between two nodes, a power of two.", ge=1, le=4096)]
-    nodes: Annotated[
-        tuple[Count, ...],
-        Meta(description="Nominal over measured voltage times 16384, at valid_codes[0] and at each further step."),
-    ]
+    valid_codes: tuple[Count, Count]
+    """Range of the supply's codes; a code outside is replaced with the nearest one inside."""
+    step_codes: Annotated[int, Meta(ge=1, le=4096)]
+    """Codes between two nodes, a power of two."""
+    nodes: tuple[Count, ...]
+    """Nominal over measured voltage times 16384, at valid_codes[0] and at each further step."""
 
     def __post_init__(self) -> None:
         low, high = self.valid_codes
@@ -52,53 +49,50 @@ class CurrentLoop:
     taken in a PWM period.
     """
 
-    full_counts: Annotated[int, Meta(description="Set point of the rated current, in counts.", ge=1, le=65535)]
-    compare_limit: Annotated[Count, Meta(description="Largest compare value of the PWM.")]
-    rate: Annotated[
-        int, Meta(description="Largest change of the set point in a PWM period, in counts.", ge=1, le=65535)
-    ]
-    samples: Annotated[int, Meta(description="Current samples in a PWM period, a power of two.", ge=1, le=16)]
-    current_gain: Annotated[
-        int,
-        Meta(
-            description="Counts of current per unit of the code sum after offset correction, times 2^current_shift.",
-            ge=1,
-        ),
-    ]
-    current_shift: Annotated[int, Meta(description="Fractional bits of current_gain.", ge=1, le=15)]
-    gain_shift: Annotated[int, Meta(description="Fractional bits of the three controller gains.", ge=1, le=13)]
-    proportional: Annotated[Gain, Meta(description="PWM counts per count of error, times 2^gain_shift.")]
-    integral: Annotated[
-        Gain, Meta(description="PWM counts per count of error that are added in every PWM period, times 2^gain_shift.")
-    ]
-    feed_forward: Annotated[Gain, Meta(description="PWM counts per count of set point, times 2^gain_shift.")]
-    integral_limit: Annotated[Count, Meta(description="Largest magnitude of the integral, in PWM counts.")]
-    release: Annotated[
-        Count,
-        Meta(description="PWM counts by which the output stays below the integral, which starts at 0 on release."),
-    ]
-    offset_nominal: Annotated[Count, Meta(description="Designed code sum at zero current.")]
-    offset_tolerance: Annotated[
-        Count, Meta(description="Largest deviation from offset_nominal that calibration removes.")
-    ]
-    offset_shift: Annotated[
-        int, Meta(description="The offset is averaged over 2^offset_shift PWM periods.", ge=0, le=12)
-    ]
-    short_sum: Annotated[Count, Meta(description="Code sum from which a short circuit is detected at once.")]
-    over_sum: Annotated[Count, Meta(description="Code sum after offset correction from which the current is too high.")]
-    over_ticks: Annotated[
-        int, Meta(description="Consecutive PWM periods with too high a current that make a fault.", ge=1, le=65535)
-    ]
-    open_sum: Annotated[
-        Count, Meta(description="Code sum after offset correction below which the current counts as absent.")
-    ]
-    open_compare: Annotated[Count, Meta(description="Compare value from which a current is expected.")]
-    open_ticks: Annotated[
-        int, Meta(description="Consecutive PWM periods without an expected current that make a fault.", ge=1, le=65535)
-    ]
-    supply: Annotated[
-        SupplyCorrection | None, Meta(description="Correction for the supply voltage, if it is measured.")
-    ] = None
+    full_counts: Annotated[int, Meta(ge=1, le=65535)]
+    """Set point of the rated current, in counts."""
+    compare_limit: Count
+    """Largest compare value of the PWM."""
+    rate: Annotated[int, Meta(ge=1, le=65535)]
+    """Largest change of the set point in a PWM period, in counts."""
+    samples: Annotated[int, Meta(ge=1, le=16)]
+    """Current samples in a PWM period, a power of two."""
+    current_gain: Annotated[int, Meta(ge=1)]
+    """Counts of current per unit of the code sum after offset correction, times 2^current_shift."""
+    current_shift: Annotated[int, Meta(ge=1, le=15)]
+    """Fractional bits of current_gain."""
+    gain_shift: Annotated[int, Meta(ge=1, le=13)]
+    """Fractional bits of the three controller gains."""
+    proportional: Gain
+    """PWM counts per count of error, times 2^gain_shift."""
+    integral: Gain
+    """PWM counts per count of error that are added in every PWM period, times 2^gain_shift."""
+    feed_forward: Gain
+    """PWM counts per count of set point, times 2^gain_shift."""
+    integral_limit: Count
+    """Largest magnitude of the integral, in PWM counts."""
+    release: Count
+    """PWM counts by which the output stays below the integral, which starts at 0 on release."""
+    offset_nominal: Count
+    """Designed code sum at zero current."""
+    offset_tolerance: Count
+    """Largest deviation from offset_nominal that calibration removes."""
+    offset_shift: Annotated[int, Meta(ge=0, le=12)]
+    """The offset is averaged over 2^offset_shift PWM periods."""
+    short_sum: Count
+    """Code sum from which a short circuit is detected at once."""
+    over_sum: Count
+    """Code sum after offset correction from which the current is too high."""
+    over_ticks: Annotated[int, Meta(ge=1, le=65535)]
+    """Consecutive PWM periods with too high a current that make a fault."""
+    open_sum: Count
+    """Code sum after offset correction below which the current counts as absent."""
+    open_compare: Count
+    """Compare value from which a current is expected."""
+    open_ticks: Annotated[int, Meta(ge=1, le=65535)]
+    """Consecutive PWM periods without an expected current that make a fault."""
+    supply: SupplyCorrection | None = None
+    """Correction for the supply voltage, if it is measured."""
 
     def __post_init__(self) -> None:
         for name in ("proportional", "integral", "feed_forward"):

@@ -3,16 +3,18 @@
 import re
 from collections.abc import Mapping
 
-from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
-from dzdesign.design.current.choices import DRIVES, NEEDED, OF_CURRENT
 from dzdesign.design.current.choosing import OVER_SHARE, CurrentSensor
 from dzdesign.design.current.circuit import CoilCircuit
 from dzdesign.design.current.drive import CurrentRequest
 from dzdesign.design.signal_text import PinSignal, parse_signal
 from dzdesign.design.target_inputs import TargetInputs
 
+#: Options that only current control has a use for, and those that it needs.
+OF_CURRENT = ("coil", "rated_current", "current_signal", "supply_signal")
+NEEDED = ("coil", "rated_current", "supply", "current_signal")
 #: Of the ends of a sensor's range: that of the decimal numbers in them.
 ROUNDING = 1e-9
 NUMBER = r"\d+(?:\.\d+)?(?:[eE]-?\d+)?"
@@ -26,10 +28,7 @@ SUPPLY = re.compile(rf"(?P<low>{NUMBER})\s*\.\.\s*(?P<high>{NUMBER})\s*(?P<unit>
 
 def current_request(text: Mapping[str, str], target: TargetInputs) -> CurrentRequest | None:
     """Return what is declared for current control; None for a drive by duty."""
-    drive = text["drive"]
-    if drive not in DRIVES:
-        raise InputError(f"--drive is '{drive}'{nearest(drive, DRIVES)}, expected {' or '.join(DRIVES)}")
-    if drive == "duty":
+    if text["drive"] == "duty":
         if useless := [flag_of(name) for name in OF_CURRENT if text[name]]:
             raise InputError(f"{useless[0]} is for --drive current, but --drive is duty; give --drive current")
         return None

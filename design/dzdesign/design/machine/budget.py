@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from msgspec import Meta
-
 from dzdesign.core.artefact_types import RuleError, quantity
 
 #: How the contributions add, for a person.
@@ -48,51 +46,38 @@ DIGITS_mV = 4
 class BudgetLine:
     """One component of an uncertainty budget."""
 
-    component: Annotated[Component, Meta(description="Source of the uncertainty.")]
-    origin: Annotated[
-        Origin,
-        Meta(description="Whether the half-width was measured from the recordings, declared, or set by default."),
-    ]
-    source: Annotated[str, Meta(description="Option or default from which the half-width was taken.")]
-    half_width: Annotated[
-        float,
-        Meta(description="Half-width of the uncertainty, in `unit`. For a range, the end that lowers the offset."),
-    ]
-    unit: Annotated[str, Meta(description="Unit of the half-width: mV, MPa, codes, counts, K, V or %.")]
-    sensitivity_mV: Annotated[
-        tuple[float, ...], quantity("mV", "Contribution per unit of the half-width, at each tested pressure drop.")
-    ]
-    contribution_mV: Annotated[
-        tuple[float, ...],
-        quantity(
-            "mV",
-            "Amount by which this component alone lowers the certified threshold where the sensors read a "
-            "tested pressure drop.",
-        ),
-    ]
-    price: Annotated[
-        float,
-        quantity(
-            "1",
-            "Price of this component in dead zone, over full command. It is the rise of the offset if this "
-            "component alone were zero, at the tested pressure drop where the rise is largest.",
-        ),
-    ]
+    component: Component
+    """Source of the uncertainty."""
+    origin: Origin
+    """Whether the half-width was measured from the recordings, declared, or set by default."""
+    source: str
+    """Option or default from which the half-width was taken."""
+    half_width: float
+    """Half-width of the uncertainty, in `unit`. For a range, the end that lowers the offset."""
+    unit: str
+    """Unit of the half-width: mV, MPa, codes, counts, K, V or %."""
+    sensitivity_mV: Annotated[tuple[float, ...], quantity("mV")]
+    """Contribution per unit of the half-width, at each tested pressure drop."""
+    contribution_mV: Annotated[tuple[float, ...], quantity("mV")]
+    """Amount by which this component alone lowers the certified threshold where the sensors read a tested pressure
+    drop."""
+    price: Annotated[float, quantity("1")]
+    """Price of this component in dead zone, over full command. It is the rise of the offset if this component alone
+    were zero, at the tested pressure drop where the rise is largest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
     """Uncertainty budget of one side, at its tested pressure drops."""
 
-    dp_MPa: Annotated[tuple[float, ...], quantity("MPa", "Tested pressure drops.")]
-    threshold_V: Annotated[
-        tuple[float, ...], quantity("V", "Guarded threshold at each tested pressure drop, as recorded.")
-    ]
-    ceiling_V: Annotated[
-        tuple[float, ...],
-        quantity("V", "Largest offset at each that the certificate allows: the threshold minus the whole budget."),
-    ]
-    lines: Annotated[tuple[BudgetLine, ...], Meta(description="Components of the budget.")]
+    dp_MPa: Annotated[tuple[float, ...], quantity("MPa")]
+    """Tested pressure drops."""
+    threshold_V: Annotated[tuple[float, ...], quantity("V")]
+    """Guarded threshold at each tested pressure drop, as recorded."""
+    ceiling_V: Annotated[tuple[float, ...], quantity("V")]
+    """Largest offset at each that the certificate allows: the threshold minus the whole budget."""
+    lines: tuple[BudgetLine, ...]
+    """Components of the budget."""
 
     def __post_init__(self) -> None:
         tables: list[Sequence[float]] = [self.threshold_V, self.ceiling_V]

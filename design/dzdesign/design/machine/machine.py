@@ -47,98 +47,49 @@ Supply = Annotated[float, Meta(ge=SUPPLY_V[0], le=SUPPLY_V[1])]
 class Machine:
     """Declared differences between the machine and the bench; every error is a systematic half-width."""
 
-    drive: Annotated[
-        DriveKind,
-        Meta(
-            description="How the coil is driven. duty: the PWM switches the coil itself, so that the threshold in duty "
-            "depends on resistance and supply. amplifier: a current-controlled amplifier drives it. "
-            "current: the firmware controls the current."
-        ),
-    ]
-    coil_temperature_C: (
-        Annotated[
-            tuple[Temperature, Temperature],
-            quantity(
-                "degC",
-                "Lowest and highest coil temperature; null if the current is controlled and no range was declared.",
-            ),
-        ]
-        | None
-    ) = None
-    bench_coil_C: Annotated[
-        Temperature, quantity("degC", "Coil temperature during the ramp tests; null if no range was declared.")
-    ] | None = None
-    supply_V: Annotated[
-        tuple[Supply, Supply],
-        quantity("V", "Lowest and highest supply voltage; null if an amplifier was declared without a supply."),
-    ] | None = None
-    bench_supply_V: Annotated[
-        Supply, quantity("V", "Supply voltage during the ramp tests; null if no range was declared.")
-    ] | None = None
-    amplifier_error: (
-        Annotated[
-            Share,
-            quantity(
-                "1",
-                "Relative error of the amplifier's current against that of the bench at the same drive; null "
-                "without an amplifier.",
-            ),
-        ]
-        | None
-    ) = None
-    current_error: (
-        Annotated[
-            Share,
-            quantity(
-                "1",
-                "Relative error of the controlled current, by shunt, amplifier and the converter's gain; "
-                "null without current control.",
-            ),
-        ]
-        | None
-    ) = None
-    current_rest_error: (
-        Annotated[
-            Share,
-            quantity(
-                "1",
-                "Remaining error of the controlled current by rounding and the calibrated offset, as a share of "
-                "the rated current; null without current control.",
-            ),
-        ]
-        | None
-    ) = None
-    bench_current_error: Annotated[
-        Share,
-        quantity("1", "Relative error of the bench's current at a recorded command; null without current control."),
-    ] | None = None
-    bench_full_A: (
-        Annotated[
-            float,
-            quantity(
-                "A", "Declared coil current at full command on the bench; null if none was declared.", gt=0, le=1000
-            ),
-        ]
-        | None
-    ) = None
-    pressure_error_a_MPa: Annotated[
-        Pressure, quantity("MPa", "Error of the sensor upstream of the metering edge, offset and gain combined.")
-    ]
-    pressure_error_b_MPa: Annotated[
-        Pressure, quantity("MPa", "Error of the sensor downstream of the metering edge, offset and gain combined.")
-    ]
-    bench_pressure_error_MPa: Annotated[Pressure, quantity("MPa", "Error of the recorded pressure drop.")]
-    pressure_offset_codes: Annotated[Error, Meta(description="Offset error of the converter on each pressure channel.")]
-    pressure_gain_codes: Annotated[
-        Error, Meta(description="Gain error of the converter on each pressure channel, at the top of its range.")
-    ]
-    pressure_noise_codes: Annotated[Error, Meta(description="Peak noise of the converter on each pressure channel.")]
-    oil_error: Annotated[Share, quantity("1", "Relative change of the threshold with the oil's temperature.")]
-    ageing_error: Annotated[Share, quantity("1", "Relative change of the threshold by ageing.")]
-    defaults: Annotated[
-        Mapping[str, str],
-        Meta(description="Quantities above that were not declared, with the source of the default value."),
-    ]
+    drive: DriveKind
+    """How the coil is driven. duty: the PWM switches the coil itself, so that the threshold in duty depends on
+    resistance and supply. amplifier: a current-controlled amplifier drives it. current: the firmware controls the
+    current."""
+    coil_temperature_C: Annotated[tuple[Temperature, Temperature], quantity("degC")] | None = None
+    """Lowest and highest coil temperature; null if the current is controlled and no range was declared."""
+    bench_coil_C: Annotated[Temperature, quantity("degC")] | None = None
+    """Coil temperature during the ramp tests; null if no range was declared."""
+    supply_V: Annotated[tuple[Supply, Supply], quantity("V")] | None = None
+    """Lowest and highest supply voltage; null if an amplifier was declared without a supply."""
+    bench_supply_V: Annotated[Supply, quantity("V")] | None = None
+    """Supply voltage during the ramp tests; null if no range was declared."""
+    amplifier_error: Annotated[Share, quantity("1")] | None = None
+    """Relative error of the amplifier's current against that of the bench at the same drive; null without an
+    amplifier."""
+    current_error: Annotated[Share, quantity("1")] | None = None
+    """Relative error of the controlled current, by shunt, amplifier and the converter's gain; null without current
+    control."""
+    current_rest_error: Annotated[Share, quantity("1")] | None = None
+    """Remaining error of the controlled current by rounding and the calibrated offset, as a share of the rated current;
+    null without current control."""
+    bench_current_error: Annotated[Share, quantity("1")] | None = None
+    """Relative error of the bench's current at a recorded command; null without current control."""
+    bench_full_A: Annotated[float, quantity("A", gt=0, le=1000)] | None = None
+    """Declared coil current at full command on the bench; null if none was declared."""
+    pressure_error_a_MPa: Annotated[Pressure, quantity("MPa")]
+    """Error of the sensor upstream of the metering edge, offset and gain combined."""
+    pressure_error_b_MPa: Annotated[Pressure, quantity("MPa")]
+    """Error of the sensor downstream of the metering edge, offset and gain combined."""
+    bench_pressure_error_MPa: Annotated[Pressure, quantity("MPa")]
+    """Error of the recorded pressure drop."""
+    pressure_offset_codes: Error
+    """Offset error of the converter on each pressure channel."""
+    pressure_gain_codes: Error
+    """Gain error of the converter on each pressure channel, at the top of its range."""
+    pressure_noise_codes: Error
+    """Peak noise of the converter on each pressure channel."""
+    oil_error: Annotated[Share, quantity("1")]
+    """Relative change of the threshold with the oil's temperature."""
+    ageing_error: Annotated[Share, quantity("1")]
+    """Relative change of the threshold by ageing."""
+    defaults: Mapping[str, str]
+    """Quantities above that were not declared, with the source of the default value."""
 
     def __post_init__(self) -> None:
         for what, unit, ends, bench in (

@@ -10,7 +10,6 @@ from dzdesign.core.option_readers import quantity_range, with_tolerance
 from dzdesign.core.options import flag_of
 from dzdesign.core.units import parse_quantity
 from dzdesign.design.current.drive import CurrentRequest
-from dzdesign.design.machine.choices import FURTHER
 from dzdesign.design.machine.machine import COPPER_PER_K, REFERENCE_C, DriveKind, Machine
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter, TargetInputs
@@ -22,6 +21,10 @@ DEFAULT_SHUNT, DEFAULT_BENCH_CURRENT = Fraction("0.01"), 0.01
 DEFAULT_OIL, DEFAULT_AGEING = 0.002, 0.005
 #: Codes of the converter that the controlled current may be off: one in steady state, one of the calibrated offset.
 CURRENT_CODES = 2
+#: Options that say something of a machine, but do not declare one.
+FURTHER = (
+    "current_error", "bench_current", "pressure_error", "bench_pressure_error", "pressure_converter", "oil", "ageing",
+)  # fmt: skip
 #: Decimals of what stands in the file.
 DIGITS = 9
 NUMBER = r"[-+]?\d{1,6}(?:\.\d{0,9})?"

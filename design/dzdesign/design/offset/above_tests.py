@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate
 
-import numpy as np
-
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.design_choices import Above
 from dzdesign.design.machine.machine import Machine
@@ -57,15 +55,6 @@ class OffsetAbove:
         """Return the certified bound there, V; None where there is none, and 0 where it says nothing any more."""
         found = self.bound.at(dp_MPa) if self.certified else None
         return None if found is None else max(found, Fraction(0))
-
-    def in_doubles(self, dp_MPa: np.ndarray) -> np.ndarray:
-        """Return the offset at many pressure drops, which rise, in double precision; the last test's below it."""
-        ends = np.array([float(piece.to_MPa) for piece in self.bound.pieces])
-        bound = self.bound.in_doubles(np.minimum(dp_MPa, ends[-1]))
-        passed = np.array([float(value) for value in self.least_V])[np.searchsorted(ends, dp_MPa)]
-        value = np.minimum(np.minimum.accumulate(np.minimum(bound, float(self.last_V))), passed)
-        found: np.ndarray = np.where(dp_MPa > ends[-1], 0.0, np.maximum(value, 0.0))
-        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

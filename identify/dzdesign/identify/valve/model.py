@@ -1,13 +1,14 @@
 """`ValveModel`: what identification found, the artefact valve.json."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import UNSET, Meta, UnsetType
 
-from dzdesign.core.artefact_types import Artefact, RuleError, quantity, schema_of
+from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
 from dzdesign.core.dither import Dither
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.core.result_display import ShownInNotebooks
@@ -146,6 +147,9 @@ class ValveModel(ShownInNotebooks, Artefact):
             "characteristics are those of the dithered valve. Omitted if there was none."
         ),
     ] = UNSET
+    content_sha256: Annotated[
+        str, Meta(description="SHA-256 of all other keys, which reveals an accidental edit.")
+    ] = field(init=False)
 
     def __post_init__(self) -> None:
         if not self.sides or not set(self.sides) <= set(SIDES):
@@ -155,6 +159,9 @@ class ValveModel(ShownInNotebooks, Artefact):
             raise RuleError(f"'simulated' is {stated}, but 'warnings' {there} warning of that code")
         object.__setattr__(self, "record", checked_record(self.record.items(), "the record"))
         object.__setattr__(self, "untested_sides", tuple(name for name in SIDES if name not in self.sides))
+        names = (each.name for each in fields(self) if each.name != "content_sha256")
+        content = {name: value for name in names if (value := getattr(self, name)) is not UNSET}
+        object.__setattr__(self, "content_sha256", sha256_of(to_json(as_document(content)).encode()))
 
     @property
     def dither(self) -> Dither | None:

@@ -1,32 +1,51 @@
-"""What stands in each section of the report of a lot."""
+"""What stands in each section of the report of a lot: sentences, figures and tables."""
 
+import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import astuple, fields, replace
 
 from dzdesign.core.errors import and_more
-from dzdesign.report.figures.figure import ReportFigure, figure_style
-from dzdesign.report.lot.budget import lot_budget_table
-from dzdesign.report.lot.figures import spread_figure
-from dzdesign.report.lot.folder import Lot
-from dzdesign.report.lot.outputs import outputs_section
-from dzdesign.report.lot.reasons import reason_groups
-from dzdesign.report.lot.setting_text import checked_line, cost_lines, cost_text, span, untested_lines
-from dzdesign.report.lot.spread import EXTRA, FAR, FEWEST, Spread
-from dzdesign.report.lot.summary import SettingOfOthers
-from dzdesign.report.lot.tables import (
-    NAMED,
-    failed_table,
-    far_table,
-    holding_table,
-    provenance_table,
-    spread_table,
-    valves_table,
-    warnings_table,
+from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.design.output_manifest import setting_words
+from dzdesign.report.cells import (
+    Cell,
+    Table,
+    counted,
+    finding,
+    from_to,
+    in_number_font,
+    number,
+    recorded,
+    table_of,
+    whole,
 )
+from dzdesign.report.figure import ReportFigure, csv_text
+from dzdesign.report.lot.folder import Lot, Row
+from dzdesign.report.lot.spread import EXTRA, FAR, FEWEST, QUANTITIES, Quantity, Spread, short, spread_figure
+from dzdesign.report.lot.summary import (
+    DOES_NOT_HOLD,
+    OK,
+    VALVES,
+    LotBudgetLine,
+    LotOutput,
+    LotSettingSummary,
+    Quantiles,
+    SettingOfOthers,
+)
+from dzdesign.report.lot.table import OUTPUT, OUTPUT_HASH, RECORD, TABLE, column_of, safe
+from dzdesign.report.lot.words import checked_line, cost_lines, cost_text, span, untested_lines
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import counted, from_to, whole
 
-#: Name of a figure, columns of the quantities in it, caption, and whether they are on one scale.
+#: Valves that a cell names, of an output fewer, and rows that a table has in the page; all of them stand in the CSV.
+NAMED, OUTPUTS_NAMED, ROWS = 40, 20, 100
+#: A lot of so many valves stands in the page with every row; of a larger one in which none lies far the first.
+SMALL_LOT, FIRST = 50, 10
+#: Characters of a table that the page holds: some 4000 valves.
+EMBEDDED = 2_000_000
+#: What differs between two reasons of one kind: names in quotes, and numbers; and what stands in its place.
+PARTICULAR, GAP = re.compile(r"'[^']*'|\d+(?:\.\d+)?(?:e[+-]?\d+)?"), "…"
+#: Figures of the spread and of what is left: name, columns of the quantities, caption, and whether on one scale.
 FigureKind = tuple[str, tuple[str, ...], str, bool]
 SPREAD_FIGURES: tuple[FigureKind, ...] = (
     (
@@ -56,19 +75,22 @@ LEFT_FIGURE: FigureKind = (
 
 def sections_of(lot: Lot, spreads: Sequence[Spread]) -> dict[str, Section]:
     """Return every section by its anchor."""
-    with figure_style():
-        return {
-            "failed": _failed_section(lot),
-            "spread": _spread_section(lot, spreads),
-            "far": _far_section(spreads),
-            "left": _left_section(lot, spreads),
-            "setting": _setting_section(lot, spreads),
-            "valves": _valves_section(lot, spreads),
-            **outputs_section(lot),
-            "recordings": _recordings_section(lot),
-            "warnings": Section(),
-            "provenance": _provenance_section(lot),
-        }
+    far = {name for spread in spreads for name, _ in spread.far()}
+    none = Section(missing="No valve is calibrated.")
+    sections = {
+        "failed": _failed_section(lot),
+        "spread": _spread_section(lot, spreads),
+        "far": _far_section(spreads),
+        "left": Section(figures=_figures(lot, spreads, LEFT_FIGURE)) if spreads else none,
+        "setting": _setting_section(lot, spreads),
+        "valves": Section(tables=(_valves_table(lot, far),)),
+        "recordings": _recordings_section(lot),
+        "warnings": Section(),
+        "provenance": _provenance_section(lot),
+    }
+    if lot.summary.outputs:
+        sections["outputs"] = Section(tables=(_outputs_table(lot.summary.outputs, lot.summary.verified),))
+    return sections
 
 
 def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> list[ReportFigure | None]:
@@ -83,18 +105,68 @@ def _figures(lot: Lot, spreads: Sequence[Spread], *kinds: FigureKind) -> list[Re
     return found
 
 
+# --- valves that are not calibrated -------------------------------------------------------------------------
+
+
 def _failed_section(lot: Lot) -> Section:
-    if not lot.failed:
-        return Section(lines=("Every valve that was tried is calibrated.",) if lot.rows else ())
-    groups = reason_groups(lot.failed)
-    many, kinds = counted(len(lot.failed), "valve"), counted(len(groups), "kind")
-    return Section(
-        lines=(
-            f"{many}, {kinds} of reason; what differs between the valves of a kind is … in the reason and stands "
-            "behind the name.",
+    failed = list(lot.failed.iter_rows(named=True))
+    if not failed:
+        return Section(lines=("Every valve that was tried is calibrated.",) if len(lot.frame) else ())
+    kinds: dict[tuple[str, str], list[Row]] = {}
+    for row in failed:
+        kinds.setdefault((row["status"], PARTICULAR.sub(GAP, row["reason"])), []).append(row)
+    groups = [_group(status, rows) for (status, _), rows in sorted(kinds.items(), key=lambda one: -len(one[1]))]
+    table = table_of(
+        "Why valves are not calibrated, by kind of reason",
+        groups,
+        ("status", lambda group: _failed(group[0])),
+        ("valves", lambda group: in_number_font(whole(len(group[3])))),
+        ("what is wrong", lambda group: finding(group[1])),
+        ("what is expected, or to be done", lambda group: finding(group[2] or "–")),
+        ("names", lambda group: and_more(group[3], NAMED)),
+        csv=csv_text(
+            ("name", "status", "reason"),
+            ([safe(row[column]) for column in ("name", "status", "reason")] for row in failed),
         ),
-        tables=(failed_table(groups, lot.failed),),
+        name="not-calibrated",
     )
+    many, kind = counted(len(failed), "valve"), counted(len(groups), "kind")
+    line = (f"{many}, {kind} of reason; what differs between the valves of a kind is … in the reason and stands behind "
+            "the name.")  # fmt: skip
+    return Section(lines=(line,), tables=(table,))
+
+
+def _group(status: str, rows: Sequence[Row]) -> tuple[str, str, str, list[str]]:
+    """Return valves with one kind of reason: status, what is wrong, what to do, and their names.
+
+    A gap stands for what differs between the valves; what is particular to a valve stands behind its name.
+    """
+    reasons = [str(row["reason"]) for row in rows]
+    found = [PARTICULAR.findall(reason) for reason in reasons]
+    shared = [len(set(parts)) == 1 for parts in zip(*found, strict=True)]
+    places = iter(shared)
+    text = PARTICULAR.sub(lambda part: part[0] if next(places) else GAP, reasons[0])
+    what, _, advice = text.rpartition("; ")
+    if status == DOES_NOT_HOLD:
+        what, advice = text, "see the report of the valve: a requirement of its verification is not met"
+    elif text.startswith("unexpected "):
+        what, advice = text, "a fault of dzdesign, not of the recordings: the next run tries the valve again"
+    elif not what:  # nothing to be done is said, but what was expected
+        what, expected, advice = text.partition(", expected ")
+        advice = expected.removeprefix(", ") + advice
+    names = []
+    for row, parts in zip(rows, found, strict=True):
+        own = dict.fromkeys(part.strip("'") for part, same in zip(parts, shared, strict=True) if not same)
+        particular = ", ".join(part for part in own if part != row["name"])
+        names.append(f"{row['name']} ({particular})" if particular else str(row["name"]))
+    return status, what, advice, names
+
+
+def _failed(status: str) -> Cell:
+    return Cell(text=f"✗ {status}", kind="bad")
+
+
+# --- how the calibrated ones scatter ------------------------------------------------------------------------
 
 
 def _spread_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
@@ -103,31 +175,94 @@ def _spread_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
     return Section(
         lines=tuple(_lot_lines(lot)),
         figures=_figures(lot, spreads, *SPREAD_FIGURES),
-        tables=(spread_table(spreads), lot_budget_table(lot.summary.budget if lot.summary else None, lot.units)),
+        tables=(_spread_table(spreads), _budget_table(lot)),
     )
 
 
-def _lot_lines(lot: Lot) -> list[str]:
+def _lot_lines(lot: Lot) -> Iterator[str]:
     """Say at which pressure drops the numbers hold, and which way the thresholds move."""
-    lines = []
     for side in lot.sides:
         of = f"{side.capitalize()} commands: " if side else ""
-        tested = [figures for row in lot.calibrated if (figures := row.sides[side]).dp0_MPa is not None]
-        if not tested:
-            lines.append(f"{of}no valve was tested.")
+        columns = [column_of(side, column) for column in ("dp0_MPa", "highest_dp_MPa", "trend")]
+        tested = lot.calibrated.select(columns).filter(lot.calibrated[columns[0]].is_not_null())
+        if tested.is_empty():
+            yield f"{of}no valve was tested."
             continue
-        trends = Counter(each.trend or "not known" for each in tested)
-        counts = ", ".join(f"{word} in {whole(count)}" for word, count in trends.most_common())
+        first, last, trends = (column.to_list() for column in tested)
+        counts = Counter(trend or "not known" for trend in trends).most_common()
+        words = ", ".join(f"{word} in {whole(count)}" for word, count in counts)
         dp0, highest = (
             from_to([None if one is None else lot.units.convert(one, "MPa") for one in known], ".3g")
-            for known in ([each.dp0_MPa for each in tested], [each.highest_dp_MPa for each in tested])
+            for known in (first, last)
         )
         unit = lot.units.label("MPa")
-        lines.append(
-            f"{of}dP0 is {dp0} {unit}, the highest tested pressure drop {highest} {unit}. Threshold over the pressure "
-            f"drop: {counts} valves."
-        )
-    return lines
+        yield (f"{of}dP0 is {dp0} {unit}, the highest tested pressure drop {highest} {unit}. Threshold over the "
+               f"pressure drop: {words} valves.")  # fmt: skip
+
+
+def _cell(quantity: Quantity, value: float | None, units: RecordedUnits) -> Cell:
+    """Return a value of a quantity, in the unit of the recordings."""
+    if quantity.unit == "V":
+        return recorded(value, f".{quantity.digits}f V", units)
+    return number(value, quantity.digits)
+
+
+def _spread_table(spreads: Sequence[Spread]) -> Table:
+    """Return quantiles of every quantity, with the names of the extreme valves."""
+
+    def quantile(name: str, end: int | None = None) -> Callable[[Spread], Cell]:
+        def cell(spread: Spread) -> Cell:
+            value = _cell(spread.quantity, getattr(spread.at, name), spread.units)
+            return value if end is None else replace(value, more=short(spread.ends[end]))
+
+        return cell
+
+    def deviation(spread: Spread) -> Cell:
+        known, digits = spread.deviation if spread.limits else None, spread.quantity.digits + 1
+        return recorded(known, f".{digits}f dV", spread.units) if spread.quantity.unit == "V" else number(known, digits)
+
+    def csv_row(spread: Spread) -> list[object]:
+        known = (round(spread.deviation, 7), len(spread.far())) if spread.limits else (None, None)
+        return [spread.column, len(spread.values), *astuple(spread.at), *spread.ends, *known]
+
+    names = [each.name for each in fields(Quantiles)]
+    return table_of(
+        "How the calibrated valves scatter",
+        spreads,
+        ("quantity", lambda spread: spread.heading),
+        ("valves", lambda spread: in_number_font(whole(len(spread.values)))),
+        ("least", quantile("least", 0)),
+        ("5 %", quantile("q05")),
+        ("median", quantile("median")),
+        ("95 %", quantile("q95")),
+        ("largest", quantile("largest", 1)),
+        ("robust s.d.", deviation),
+        ("far from the rest", lambda spread: in_number_font(whole(len(spread.far())) if spread.limits else "–")),
+        csv=csv_text(
+            ("quantity", "valves", *names, "least_is", "largest_is", "robust_sd", "far"), map(csv_row, spreads)
+        ),
+        name="spread",
+    )
+
+
+def _budget_table(lot: Lot) -> Table | None:
+    """Return the components of all budgets; None where there are none."""
+    lines = lot.summary.budget.lines if lot.summary.budget else ()
+    if not lines:
+        return None
+
+    def price(place: int) -> Callable[[LotBudgetLine], Cell]:
+        return lambda line: number(line.price_percent[place], 3)
+
+    units = lot.units
+    return table_of(
+        "Uncertainty budgets of the valves: what each component takes at most, and what it costs",
+        lines,
+        ("component", lambda line: Cell(text=line.component, more=", ".join(line.origin))),
+        *((("commands", lambda line: line.side),) if len({line.side for line in lines}) > 1 else ()),
+        (f"largest contribution ({units.label('mV')})", lambda line: recorded(line.contribution_mV, ".2f mV", units)),
+        *((f"price, {which} (% of command)", price(at)) for at, which in enumerate(("least", "median", "largest"))),
+    )
 
 
 def _far_section(spreads: Sequence[Spread]) -> Section:
@@ -141,19 +276,31 @@ def _far_section(spreads: Sequence[Spread]) -> Section:
         "absolute deviation, in one of the quantities. Of a normal lot one valve in 2000 lies there in each quantity "
         "by chance. No verdict: these valves are calibrated; look for a mix-up, a part, or the recording."
     )
-    table = far_table(judged)
-    return Section(lines=(rule,) if table else (rule, "No valve lies there."), tables=(table,))
+    found = [(spread, name, value) for spread in judged for name, value in spread.far()]
+    if not found:
+        return Section(lines=(rule, "No valve lies there."))
+    found.sort(key=lambda one: -abs(one[0].distance(one[2])))
+    table = table_of(
+        f"Far from the rest, the first {ROWS} of {len(found)}" if len(found) > ROWS else "Far from the rest",
+        found[:ROWS],
+        ("valve", lambda one: one[1]),
+        ("quantity", lambda one: one[0].heading),
+        ("value", lambda one: _cell(one[0].quantity, one[2], one[0].units)),
+        ("median of the lot", lambda one: _cell(one[0].quantity, one[0].at.median, one[0].units)),
+        ("robust s.d. from the median", lambda one: number(one[0].distance(one[2]), 1, "+")),
+        csv=csv_text(
+            ("valve", "quantity", "value", "median", "robust_sd_from_median"),
+            ((name, of.column, value, of.at.median, round(of.distance(value), 2)) for of, name, value in found),
+        ),
+        name="far-from-the-rest",
+    )
+    return Section(lines=(rule,), tables=(table,))
 
 
-def _left_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
-    if not spreads:
-        return Section(missing="No valve is calibrated.")
-    return Section(figures=_figures(lot, spreads, LEFT_FIGURE))
+# --- one setting for all ------------------------------------------------------------------------------------
 
 
 def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
-    if lot.summary is None:
-        return Section(missing="The lot setting is made at the end of a batch.")
     setting = lot.summary.lot_setting
     if setting is None:
         return Section(missing=f"There is no lot setting: {lot.summary.why_no_lot_setting}.", optional=True)
@@ -174,7 +321,7 @@ def _setting_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
         "setting leaves, at the worst pressure drop of its tests. The valves that hold the setting down are the "
         "lowest.", one_scale=True,
     )  # fmt: skip
-    return Section(lines=lines, figures=(figure,), tables=(holding_table(lot, setting),))
+    return Section(lines=lines, figures=(figure,), tables=(_holding_table(lot, setting),))
 
 
 def _sentence(line: str) -> str:
@@ -197,24 +344,154 @@ def _without_lines(without: SettingOfOthers | None, count: int) -> list[str]:
     return lines
 
 
-def _valves_section(lot: Lot, spreads: Sequence[Spread]) -> Section:
-    return Section(tables=(valves_table(lot, {name for spread in spreads for name, _ in spread.far()}),))
+def _holding_table(lot: Lot, setting: LotSettingSummary) -> Table:
+    """Return the valves that hold the lot setting down."""
+    rows = {row["name"]: row for row in lot.frame.iter_rows(named=True)}
+
+    def margins(name: str) -> Cell:
+        shown = [lot.units.number(1e3 * margin, ".3f mV") for margin in setting.smallest_margin_V.get(name, ())]
+        return in_number_font(" and ".join(shown) or "–")
+
+    def of_valve(side: str, column: str) -> Callable[[str], Cell]:
+        cell = _number_of(side, QUANTITIES[column], lot)
+        return lambda name: cell(rows.get(name, {}))
+
+    caption = "Valves that hold the lot setting down"
+    if len(setting.binding) > ROWS:
+        caption += f", the first {ROWS} of {len(setting.binding)}"
+    of = {side: f", {side}" if side else "" for side in lot.sides}
+    volts = lot.units.label("V")
+    return table_of(
+        caption,
+        setting.binding[:ROWS],
+        ("valve", lambda name: name),
+        (f"margin under its own ceiling ({lot.units.label('mV')})", margins),
+        *((f"own offset at dP0{words} ({volts})", of_valve(side, "offset_V")) for side, words in of.items()),
+        *((f"extra dead zone{words} (%)", of_valve(side, EXTRA)) for side, words in of.items()),
+        notes=(
+            "A valve's own ceiling, which its own offset may not exceed, runs straight between its tests, at its "
+            "bounds or under them: this margin is no larger than that valve's margin under its bounds, which is said "
+            "above of the nearest valve. Both are of the exact law, with half a count of rounding added; what dzdesign "
+            "verify states is of the whole numbers that the C code gives.",
+        ),
+    )
+
+
+def _number_of(side: str, quantity: Quantity, lot: Lot) -> Callable[[Row], Cell]:
+    """Return what makes the cell of a quantity from a row of the table."""
+
+    def cell(row: Row) -> Cell:
+        value = row.get(column_of(side, quantity.column))
+        return _cell(quantity, value if isinstance(value, float) else None, lot.units.of_side(side))
+
+    return cell
+
+
+# --- the valves, their outputs and recordings ---------------------------------------------------------------
+
+
+def _valves_table(lot: Lot, far: Collection[str]) -> Table | None:
+    """Return the table in short: of a small lot every row, of a large one the valves that lie far; all of it as CSV."""
+    every = list(lot.frame.iter_rows(named=True))
+    if not every:
+        return None
+    rows, caption = every, "All valves"
+    if len(rows) > SMALL_LOT:
+        rows, caption = [row for row in rows if row["name"] in far], "Calibrated valves far from the rest"
+    if not rows:
+        rows, caption = every[:FIRST], f"The first {FIRST} valves, since none lies far from the rest"
+    if len(rows) > ROWS:
+        rows, caption = rows[:ROWS], f"{caption}, the first {ROWS} of {len(rows)}"
+    serial = next((name for name in lot.frame.columns if name.casefold() == f"{RECORD}serial"), None)
+    embedded = len(lot.text) <= EMBEDDED
+    return table_of(
+        caption,
+        rows,
+        ("valve", lambda row: Cell(text=row["name"], more=_output_verdicts(row))),
+        *((("serial", lambda row: row[serial] or "–"),) if serial else ()),
+        ("status", lambda row: Cell(text="✓ ok", kind="good") if row["status"] == OK else _failed(row["status"])),
+        *(
+            (f"{side} {quantity.heading(lot.units, short=True)}".lstrip(), _number_of(side, quantity, lot))
+            for side in lot.sides
+            for quantity in QUANTITIES.values()
+        ),
+        ("warnings", lambda row: row["warnings"] or "–"),
+        csv=lot.text if embedded else "",
+        name="valves",
+        notes=() if embedded else (f"The whole table is too large for a page; it is {TABLE} beside it.",),
+    )
+
+
+def _output_verdicts(row: Row) -> str:
+    """Return the verdict on each output of a valve, for its row; empty of one without outputs."""
+    return ", ".join(
+        f"{name.removeprefix(OUTPUT)} {cell}"
+        for name, cell in row.items()
+        if name.startswith(OUTPUT) and not name.endswith(OUTPUT_HASH) and cell
+    )
+
+
+def _outputs_table(outputs: Mapping[str, LotOutput], verified: bool) -> Table:
+    """Return a row for each kind of output: of how many valves it was made and holds, and the names of the others."""
+
+    def names(of: Callable[[LotOutput], Sequence[str]]) -> Callable[[tuple[str, LotOutput]], Cell]:
+        def cell(item: tuple[str, LotOutput]) -> Cell:
+            return Cell(text=and_more(of(item[1]), OUTPUTS_NAMED), kind="bad") if of(item[1]) else Cell(text="–")
+
+        return cell
+
+    return table_of(
+        "Outputs of the valves beside their firmware",
+        outputs.items(),
+        ("output", lambda item: item[0]),
+        ("settings", lambda item: ", ".join(setting_words(item[1].settings)) or "–"),
+        ("folder", lambda item: Cell(text=f"{VALVES}/NAME/{item[1].folder}", kind="symbol")),
+        ("made", lambda item: in_number_font(whole(item[1].made))),
+        ("verified, holds", lambda item: in_number_font(whole(len(item[1].holds)) if verified else "–")),
+        ("does not hold", names(lambda output: output.does_not_hold)),
+        ("not verified", names(lambda output: output.not_verified) if verified else lambda _: "–"),
+        ("not made", names(lambda output: output.not_made)),
+    )
 
 
 def _recordings_section(lot: Lot) -> Section:
-    table = warnings_table(lot)
-    odd = tuple(f"Odd: {text}." for text in (lot.summary.anomalies if lot.summary else ()))
-    none = ("No recording of a calibrated valve has a warning.",) if lot.calibrated and not table else ()
-    return Section(lines=(*odd, *none), tables=(table,))
+    """Return the section on warnings of the calibrated valves by code, and on what is odd across valves."""
+    by_code: dict[str, list[str]] = {}
+    for name, codes in lot.calibrated.select("name", "warnings").iter_rows():
+        for code in codes.split():
+            by_code.setdefault(code, []).append(name)
+    odd = tuple(f"Odd: {text}." for text in lot.summary.anomalies)
+    count = len(lot.calibrated)
+    if not by_code:
+        return Section(lines=(*odd, *(("No recording of a calibrated valve has a warning.",) if count else ())))
+    ordered = sorted(by_code.items(), key=lambda one: (-len(one[1]), one[0]))
+    table = table_of(
+        "Warnings of the recordings, by code",
+        ordered,
+        ("code", lambda one: Cell(text=one[0], kind="symbol")),
+        ("valves", lambda one: in_number_font(f"{whole(len(one[1]))} of {whole(count)}")),
+        ("in the first of them it says", lambda one: lot.warning_texts.get(one[0], "–")),
+        ("names", lambda one: "all" if len(one[1]) == count > 1 else and_more(one[1], NAMED)),
+        csv=csv_text(("code", "valve"), ((code, name) for code, names in ordered for name in names)),
+        name="warnings",
+    )
+    return Section(lines=odd, tables=(table,))
 
 
 def _provenance_section(lot: Lot) -> Section:
     lines = []
-    if lot.summary and lot.rows:
-        hashed = sum("inputs_sha256" in row.hashes for row in lot.rows)
+    if len(lot.frame):
+        hashed = lot.frame["inputs_sha256"].drop_nulls().len()
         lines.append(
-            f"The table has, for {whole(hashed)} of its {whole(len(lot.rows))} valves, the SHA-256 of recordings and "
+            f"The table has, for {whole(hashed)} of its {whole(len(lot.frame))} valves, the SHA-256 of recordings and "
             "options, and of a calibrated one those of valve.json, compensator.json and the firmware's manifest"
             + ("; the latter were compared with the folders of the valves." if lot.compared else ".")
         )
-    return Section(lines=tuple(lines), tables=(provenance_table(lot),))
+    table = table_of(
+        "What this report was made from, with the SHA-256 of the bytes",
+        lot.hashes,
+        ("file", lambda one: one[0]),
+        ("SHA-256", lambda one: Cell(text=one[1], kind="hash")),
+        ("made by", lambda one: f"{lot.summary.tool.name} {lot.summary.tool.version}"),
+    )
+    return Section(lines=tuple(lines), tables=(table,))

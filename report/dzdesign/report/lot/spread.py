@@ -1,13 +1,19 @@
-"""How a quantity scatters over a lot, and which valves lie far from the rest of it."""
+"""How a quantity scatters over a lot, which valves lie far from the rest of it, and its figure."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields, replace
 from statistics import median
+from typing import TYPE_CHECKING
 
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
-from dzdesign.report.lot.summary import Quantiles
-from dzdesign.report.lot.table import TableRow, column_of
-from dzdesign.report.lot.valve_names import by_name
+from dzdesign.report.figure import LIGHT, ReportFigure, csv_text, legend_below, new_figure, to_report_figure
+from dzdesign.report.lot.summary import OK, Quantiles
+from dzdesign.report.lot.table import by_name, column_of, sides_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from polars import DataFrame
 
 #: Of the fields of `Quantiles`, in their order.
 LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -16,19 +22,25 @@ LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 FAR = 3.5
 #: Median absolute deviation -> standard deviation, of a normal distribution: 1 over its upper quartile.
 PER_MAD = 1.4826
-#: In a smaller lot the deviation itself is not known well enough to call a valve far.
-FEWEST = 8
-#: In a smaller lot a twentieth is less than a valve: 5 and 95 % say no more than the ends.
-TWENTY = 20
+#: In a smaller lot the deviation itself is not known well enough to call a valve far; and a twentieth is less than a
+#: valve: 5 and 95 % say no more than the ends.
+FEWEST, TWENTY = 8, 20
+#: Of so few valves each is named, and there is no shape that bars could show; more dots than these are one image.
+NAMED, MANY = 10, 500
+#: Characters of a valve's name in a narrow place; of one that stands level below its dot, longer ones are slanted.
+SHORT, LEVEL_NAME = 18, 8
+#: Height of a panel, inches; names nearer than this in it, as shares of its width and height, cover each other.
+PANEL, CLOSE = 1.75, (0.25, 0.12)
+#: What a lot setting costs a valve.
+EXTRA = "lot_extra_dead_zone_percent"
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
     """A column of the table that scatters, without its side: in words, as a heading, unit (empty of a ratio), decimals.
 
-    What is in V is shown in the units of the recordings.
-    A valve can be far from the rest in it if it is judged. The cost of the lot setting is not: it follows from the
-    offsets, and its least is no merit.
+    What is in V is shown in the units of the recordings. A valve can be far from the rest in it if it is judged. The
+    cost of the lot setting is not: it follows from the offsets, and its least is no merit.
     """
 
     column: str
@@ -38,28 +50,16 @@ class Quantity:
     digits: int
     judged: bool = True
 
-    def heading(self, units: RecordedUnits) -> str:
-        """Return label and unit, as on an axis."""
-        return self.label + self._in_brackets(units)
-
-    def short_heading(self, units: RecordedUnits) -> str:
-        """Return the same for the head of a narrow column."""
-        return self.short_label + self._in_brackets(units)
+    def heading(self, units: RecordedUnits, *, short: bool = False) -> str:
+        """Return label and unit, as on an axis, or for the head of a narrow column."""
+        label = self.short_label if short else self.label
+        return f"{label} ({self.unit_in(units)})" if self.unit else label
 
     def unit_in(self, units: RecordedUnits) -> str:
         """Return the name of the unit in which it is shown."""
         return units.label("V") if self.unit == "V" else self.unit
 
-    def _in_brackets(self, units: RecordedUnits) -> str:
-        return f" ({self.unit_in(units)})" if self.unit else ""
 
-    def text(self, value: float, units: RecordedUnits) -> str:
-        """Return a value with its decimals."""
-        return units.number(value, f".{self.digits}f V") if self.unit == "V" else f"{value:.{self.digits}f}"
-
-
-#: What a lot setting costs a valve.
-EXTRA = "lot_extra_dead_zone_percent"
 #: Columns of the table whose quantiles tell of the batch, by name.
 QUANTITIES = {
     each.column: each
@@ -80,7 +80,8 @@ QUANTITIES = {
 class Spread:
     """A quantity of one side over the lot: the valves that have it, in the order of the table, with their values.
 
-    `deviation` is the robust standard deviation, in the quantity's unit; 0 where it says nothing.
+    `deviation` is the robust standard deviation, in the quantity's unit; 0 where it says nothing. `units` are those in
+    which its side is shown.
     """
 
     quantity: Quantity
@@ -89,7 +90,6 @@ class Spread:
     values: tuple[float, ...]
     at: Quantiles
     deviation: float
-    #: In which its side is shown.
     units: RecordedUnits = AS_COMPUTED
 
     @property
@@ -99,15 +99,14 @@ class Spread:
 
     def text(self, value: float) -> str:
         """Return a value with its decimals, as it is shown."""
-        return self.quantity.text(value, self.units)
+        digits = self.quantity.digits
+        return self.units.number(value, f".{digits}f V") if self.quantity.unit == "V" else f"{value:.{digits}f}"
 
     def shown(self) -> "Spread":
         """Return it with the numbers in the units of the recordings, to be drawn."""
         if self.quantity.unit != "V":
             return self
-        values, at = (
-            [float(self.units.convert(one, "V")) for one in known] for known in (self.values, astuple(self.at))
-        )
+        values, at = ([float(self.units.convert(one, "V")) for one in of] for of in (self.values, astuple(self.at)))
         names = (each.name for each in fields(Quantiles))
         return replace(
             self,
@@ -156,45 +155,144 @@ def quantiles(values: Sequence[float]) -> Quantiles:
     >>> quantiles([1.0, 2.0, 5.0, 4.0]).median
     3.0
     """
-    known = sorted(values)
-    names = (each.name for each in fields(Quantiles))
-    return Quantiles(
-        **{name: _between(known, level * (len(known) - 1)) for name, level in zip(names, LEVELS, strict=True)}
-    )
+    import polars
+
+    known = polars.Series(values, dtype=polars.Float64)
+    at = [known.quantile(level, "linear") or 0.0 for level in LEVELS]
+    between = [known.min(), *(round(value, 7) for value in at[1:-1]), known.max()]
+    return Quantiles(**dict(zip((each.name for each in fields(Quantiles)), between, strict=True)))
 
 
-def _between(known: Sequence[float], place: float) -> float:
-    """Return the value at a place of a rising sequence, which may lie between two."""
-    index, share = int(place), place - int(place)
-    if share < 1e-9:  # 0.05 times 100 is not 5
-        return known[index]
-    return round(known[index] + share * (known[index + 1] - known[index]), 7)
-
-
-def spread_of(
-    rows: Sequence[TableRow], column: str, side: str, units: RecordedUnits = AS_COMPUTED
-) -> Spread | None:
+def spread_of(frame: "DataFrame", column: str, side: str, units: RecordedUnits = AS_COMPUTED) -> Spread | None:
     """Return how a column of `QUANTITIES` scatters on a side; None where none of these valves has it."""
-    known = {row.name: value for row in rows if (value := row.number(side, column)) is not None}
-    if not known:
+    known = frame.select("name", column_of(side, column)).drop_nulls()
+    if known.is_empty():
         return None
-    values = tuple(known.values())
+    names, values = (each.to_list() for each in known)
     at = quantiles(values)
-    deviation = PER_MAD * median(abs(value - at.median) for value in values)
+    deviation = PER_MAD * median(abs(value - at.median) for value in values) if len(values) >= FEWEST else 0.0
     return Spread(
-        quantity=QUANTITIES[column],
-        side=side,
-        names=tuple(known),
-        values=values,
-        at=at,
-        deviation=deviation if len(values) >= FEWEST else 0.0,
+        quantity=QUANTITIES[column], side=side, names=tuple(names), values=tuple(values), at=at, deviation=deviation,
         units=units.of_side(side),
-    )
+    )  # fmt: skip
 
 
-def spreads_of(rows: Sequence[TableRow], units: RecordedUnits = AS_COMPUTED) -> tuple[Spread, ...]:
+def spreads_of(frame: "DataFrame", units: RecordedUnits = AS_COMPUTED) -> tuple[Spread, ...]:
     """Return how every quantity scatters that some calibrated valve has, side by side."""
-    calibrated = [row for row in rows if row.calibrated]
-    sides = rows[0].sides if rows else ()
-    found = (spread_of(calibrated, column, side, units) for side in sides for column in QUANTITIES)
+    calibrated = frame.filter(frame["status"] == OK)
+    found = (spread_of(calibrated, column, side, units) for side in sides_of(frame.columns) for column in QUANTITIES)
     return tuple(spread for spread in found if spread is not None)
+
+
+def short(name: str) -> str:
+    """Return a valve's name for a narrow place.
+
+    Examples
+    --------
+    >>> short("V0001"), short("a" * 30)
+    ('V0001', 'aaaaaaaaaaaaaaaaa…')
+    """
+    printable = "".join(letter if letter.isprintable() else "·" for letter in name)
+    return printable if len(printable) <= SHORT else f"{printable[: SHORT - 1]}…"
+
+
+# --- figures ------------------------------------------------------------------------------------------------
+
+
+def spread_figure(name: str, spreads: Sequence[Spread], caption: str, *, one_scale: bool) -> ReportFigure | None:
+    """Draw quantities over the order of the names, a panel each, on one scale or on one each; None of none.
+
+    Beside a panel stands its histogram, unless the valves are few.
+    """
+    if not spreads:
+        return None
+    many = max(len(spread.values) for spread in spreads) > NAMED
+    figure = new_figure(0.95 + PANEL * len(spreads), legend_rows=1, top=0.3)
+    panels = figure.subplots(
+        len(spreads), 1 + many, sharex="col", sharey="all" if one_scale else "row", squeeze=False,
+        width_ratios=(5, 1) if many else None, gridspec_kw={"wspace": 0.03, "hspace": 0.32},
+    )  # fmt: skip
+    drawn = [spread.shown() for spread in spreads]
+    for (axes, *beside), spread in zip(panels, drawn, strict=True):
+        _draw_order(axes, spread)
+        for shape in beside:
+            _draw_bars(shape, spread)
+    for row, spread in zip(panels, drawn, strict=True):  # where no panel widens a common scale any more
+        _name_far(row[0], spread)
+    panels[-1][0].set_xlabel("valve, in the order of the names")
+    if many:
+        panels[-1][1].set_xlabel("valves")
+    legend_below(figure, 5)
+    csv = csv_text(
+        ("quantity", "valve", "value", "robust_sd_from_median"),
+        (
+            (spread.column, valve, value, round(spread.distance(value), 2) if spread.limits else None)
+            for spread in spreads
+            for valve, value in zip(spread.names, spread.values, strict=True)
+        ),
+    )
+    return to_report_figure(figure, name, caption, "; ".join(map(_in_words, spreads)) + ".", csv)
+
+
+def _in_words(spread: Spread) -> str:
+    """Say how a quantity scatters, for who can't see the figure."""
+    low, middle, high = map(spread.text, (spread.at.least, spread.at.median, spread.at.largest))
+    return f"{spread.heading}: {len(spread.values)} valves from {low} to {high}, median {middle}"
+
+
+def _draw_order(axes: "Axes", spread: Spread) -> None:
+    """Draw every valve, the median and, where they are near the valves, the limits of what lies far."""
+    from matplotlib.ticker import MaxNLocator
+
+    count, low, high = len(spread.values), spread.at.least, spread.at.largest
+    axes.plot(range(1, count + 1), spread.values, "o", ms=min(max(30 / math.sqrt(count), 1.8), 6), mew=0,
+              color=LIGHT["blue"], label="a valve", rasterized=count > MANY)  # fmt: skip
+    axes.axhline(spread.at.median, color=LIGHT["ink"], lw=1.4, label="median")
+    for value in (spread.at.q05, spread.at.q95) if count >= TWENTY else ():
+        axes.axhline(value, color=LIGHT["soft"], lw=1.1, ls="--", label="5 and 95 %")
+    for limit in spread.limits or ():
+        if low - 0.15 * (high - low) < limit < high + 0.15 * (high - low):
+            axes.axhline(limit, color=LIGHT["vermilion"], lw=1.2, ls=":", label=f"{FAR:g} robust s.d. from it")
+    least_height = 10.0 ** (1 - spread.quantity.digits)  # no scale finer than the decimals that are shown
+    axes.update_datalim([(1, spread.at.median - least_height), (1, spread.at.median + least_height)])
+    axes.margins(y=0.12)
+    axes.set_title(spread.heading)
+    edge = 0.5 if count <= NAMED else 1
+    axes.set_xlim(1 - edge, count + edge)
+    if count <= NAMED:
+        level = max(map(len, spread.names)) <= LEVEL_NAME
+        axes.set_xticks(range(1, count + 1), list(map(short, spread.names)), rotation=0 if level else 12)
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(nbins="auto", steps=[1, 2, 2.5, 5, 10], integer=True))
+
+
+def _draw_bars(axes: "Axes", spread: Spread) -> None:
+    """Draw how many valves have which value, in as many bars as the rule of Rice says."""
+    from matplotlib.ticker import MaxNLocator
+
+    count = math.ceil(2 * len(spread.values) ** (1 / 3))
+    axes.hist(spread.values, bins=count, orientation="horizontal", histtype="stepfilled",
+              fc=(LIGHT["sky"], 0.35), ec=LIGHT["blue"])  # fmt: skip
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=3, integer=True))
+    axes.tick_params(labelleft=False)
+
+
+def _name_far(axes: "Axes", spread: Spread) -> None:
+    """Mark the valves that lie far from the rest, and name those for which there is room, the farthest first."""
+    far = dict(spread.far())
+    if not far:
+        return
+    places = [spread.names.index(valve) + 1 for valve in far]
+    axes.plot(places, list(far.values()), "D", ms=4.5, mfc="none", color=LIGHT["vermilion"], label="far from the rest",
+              zorder=4)  # fmt: skip
+    low, high = axes.get_ylim()
+    named: list[tuple[float, float]] = []
+    for place, (valve, value) in zip(places, far.items(), strict=True):
+        at = place / len(spread.values), (value - low) / (high - low)
+        if any(abs(at[0] - x) < CLOSE[0] and abs(at[1] - y) < CLOSE[1] for x, y in named):
+            continue  # covered; the table names it
+        named.append(at)
+        near_end = at[0] > 0.8
+        axes.annotate(short(valve), (place, value), xytext=(-6 if near_end else 6, 0), textcoords="offset points",
+                      fontsize=8, va="center", ha="right" if near_end else "left",
+                      color=LIGHT["vermilion"])  # fmt: skip

@@ -1,4 +1,4 @@
-"""batch.json as types: what a lot of valves came to, as `dzdesign batch` writes it and the lot's report reads it."""
+"""What a batch leaves, as types: batch.json, which its report reads, and the manifest of each valve's folder."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,13 +6,13 @@ from typing import Annotated, ClassVar, Final, Literal
 
 from msgspec import Meta
 
+from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.artefact_types import Artefact, RuleError, quantity
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
-from dzdesign.report.lot.budget import LotBudget
-from dzdesign.report.lot.output_types import LotOutput
+from dzdesign.verify.loop_results import about
 
-#: File of either type below.
-SUMMARY_NAME = "batch.json"
+#: File of a lot, finished or not; folder of a lot in which each valve has its own; a valve's firmware in that.
+SUMMARY_NAME, VALVES, FIRMWARE = "batch.json", "valves", "firmware"
 #: Instead of a valve's name: one setting that is safe for all.
 LOT_SETTING = "the lot setting"
 #: What to do about a file of a lot that is not as it was written.
@@ -27,58 +27,66 @@ Pressures = tuple[Pressure, Pressure]
 Count = Annotated[int, Meta(ge=0, le=10**9)]
 Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 Names = tuple[str, ...]
+Millivolts = Annotated[float, quantity("mV", "Largest of any valve at any pressure drop.", ge=-1e6, le=1e6)]
+Price = Annotated[float, Meta(ge=-1e3, le=1e3)]
+#: A folder stands beside what it belongs to: no path.
+FolderName = Annotated[
+    str, Meta(description="Folder of the output, within the folder of a valve.", pattern=r"^\w{1,40}$")
+]
 #: What came of a valve; "does not hold": a requirement of its verification.
 Status = Literal["ok", "failed", "does not hold"]
 OK: Final = "ok"
 FAILED: Final = "failed"
 DOES_NOT_HOLD: Final = "does not hold"
+#: What came of an output of a valve.
+OutputVerdict = Literal["holds", "does not hold", "not verified", "not made"]
+HOLDS: Final = "holds"
+NOT_VERIFIED: Final = "not verified"
+NOT_MADE: Final = "not made"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantiles:
     """Quantiles over the valves, linear between the two nearest: the median of an even number is the mean of two."""
 
-    least: Annotated[Number, Meta(description="Minimum.")]
-    q05: Annotated[Number, Meta(description="5 % quantile.")]
-    q25: Annotated[Number, Meta(description="25 % quantile.")]
-    median: Annotated[Number, Meta(description="Median.")]
-    q75: Annotated[Number, Meta(description="75 % quantile.")]
-    q95: Annotated[Number, Meta(description="95 % quantile.")]
-    largest: Annotated[Number, Meta(description="Maximum.")]
+    least: Annotated[Number, about("Minimum.")]
+    q05: Annotated[Number, about("5 % quantile.")]
+    q25: Annotated[Number, about("25 % quantile.")]
+    median: Annotated[Number, about("Median.")]
+    q75: Annotated[Number, about("75 % quantile.")]
+    q95: Annotated[Number, about("95 % quantile.")]
+    largest: Annotated[Number, about("Maximum.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailedValve:
     """A valve that is not calibrated."""
 
-    name: Annotated[str, Meta(description="Name of the valve.")]
+    name: Annotated[str, about("Name of the valve.")]
     status: Annotated[
         Literal["failed", "does not hold"],
-        Meta(description="Whether the valve was not made, or a requirement of its verification does not hold."),
+        about("Whether the valve was not made, or a requirement of its verification does not hold."),
     ]
-    reason: Annotated[str, Meta(description="Reason, in one sentence.")]
+    reason: Annotated[str, about("Reason, in one sentence.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntestedPressures:
     """Pressure drops at which at least half of the lot was tested, but one side of this valve was not."""
 
-    name: Annotated[str, Meta(description="Name of the valve.")]
-    side: Annotated[Literal["positive", "negative"], Meta(description="Sign of the command.")]
+    name: Annotated[str, about("Name of the valve.")]
+    side: Annotated[Literal["positive", "negative"], about("Sign of the command.")]
     dp_MPa: Annotated[tuple[Pressure, ...], quantity("MPa", "Pressure drops at which the valve was not tested.")]
-    narrows: Annotated[bool, Meta(description="Whether the missing tests narrow the interval of the lot setting.")]
+    narrows: Annotated[bool, about("Whether the missing tests narrow the interval of the lot setting.")]
     coarser_V: Annotated[
         Distance,
-        quantity(
-            "V",
-            "Estimated gain of a test: distance of the valve's bound below the straight line between its "
-            "bounds at the neighbouring tests. 0 outside its tests or without a trend.",
-        ),
+        quantity("V", "Estimated gain of a test: distance of the valve's bound below the straight line between its "
+                 "bounds at the neighbouring tests. 0 outside its tests or without a trend."),
     ]
     cost_percent: Annotated[
         Distance,
         quantity("%", "Estimated gain in percent of command if this valve limits the lot setting; otherwise 0."),
-    ]
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,33 +94,26 @@ class SmallestMargin:
     """Proof that the lot setting lies below the bounds of every valve, at every code of the valve's tested interval."""
 
     valves: Annotated[int, Meta(description="Number of valves compared.", ge=2, le=10**9)]
-    worst: Annotated[str, Meta(description="Name of the valve with the smallest margin.")]
+    worst: Annotated[str, about("Name of the valve with the smallest margin.")]
     dp_MPa: Annotated[Pressure, quantity("MPa", "Pressure drop at which that valve has the smallest margin.")]
     smallest_margin_V: Annotated[
         Number,
-        quantity(
-            "V",
-            "Smallest margin of the exact law below the valve's bound, with half a count reserved for "
-            "rounding. The margin in `verify` refers to the rounded integers of the C code.",
-        ),
-    ]
+        quantity("V", "Smallest margin of the exact law below the valve's bound, with half a count reserved for "
+                 "rounding. The margin in `verify` refers to the rounded integers of the C code."),
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SettingOfOthers:
     """The lot setting of the remaining valves, if those that limit it kept their own settings."""
 
-    left_out: Annotated[Names, Meta(description="Valves that keep their own settings.")]
+    left_out: Annotated[Names, about("Valves that keep their own settings.")]
     quantiles: Annotated[
         Mapping[str, Quantiles],
-        Meta(
-            description="Additional dead zone against each valve's own setting, in percent of command; empty if there "
-            "is no setting."
-        ),
-    ]
-    why_not: Annotated[str | None, Meta(description="Reason why there is no such setting; null if there is one.")] = (
-        None
-    )
+        about("Additional dead zone against each valve's own setting, in percent of command; empty if there is no "
+              "setting."),
+    ]  # fmt: skip
+    why_not: Annotated[str | None, about("Reason why there is no such setting; null if there is one.")] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,38 +123,30 @@ class LotSettingSummary:
     file: Annotated[
         str, Meta(description="Name of the compensator's file.", pattern=r"^\w[\w.-]{0,99}$", max_length=100)
     ]
-    sha256: Annotated[Sha256, Meta(description="SHA-256 of the compensator's file.")]
+    sha256: Annotated[Sha256, about("SHA-256 of the compensator's file.")]
     dp_MPa: Annotated[
         Pressures, quantity("MPa", "Interval of the pressure drop on which it is certified for each valve.")
     ]
     untested: Annotated[
         tuple[UntestedPressures, ...],
-        Meta(description="Valves without a test at a pressure drop at which half of the lot was tested."),
+        about("Valves without a test at a pressure drop at which half of the lot was tested."),
     ]
     dp_without_MPa: Annotated[
         Pressures | None,
         quantity("MPa", "Interval without the valves that narrow it; null if there are none, or no interval remains."),
     ]
-    carrier: Annotated[
-        str, Meta(description="Valve that the compensator contains: the one nearest to the lot's minimum.")
-    ]
-    binding: Annotated[Names, Meta(description="Valves that limit the offset.")]
+    carrier: Annotated[str, about("Valve that the compensator contains: the one nearest to the lot's minimum.")]
+    binding: Annotated[Names, about("Valves that limit the offset.")]
     smallest_margin_V: Annotated[
         Mapping[str, tuple[Number, ...]],
-        quantity(
-            "V",
-            "Smallest margin, over these valves and sides, of the offset below the valve's own ceiling. The "
-            "ceiling is the largest piecewise linear offset below the valve's bounds. Half a count is "
-            "reserved for rounding.",
-        ),
-    ]
-    checked: Annotated[SmallestMargin, Meta(description="Smallest margin below the bounds of all valves.")]
+        quantity("V", "Smallest margin, over these valves and sides, of the offset below the valve's own ceiling. The "
+                 "ceiling is the largest piecewise linear offset below the valve's bounds. Half a count is reserved "
+                 "for rounding."),
+    ]  # fmt: skip
+    checked: Annotated[SmallestMargin, about("Smallest margin below the bounds of all valves.")]
     without_binding: Annotated[
         SettingOfOthers | None,
-        Meta(
-            description="Cost if the limiting valves kept their own settings; null if fewer than two valves would "
-            "remain."
-        ),
+        about("Cost if the limiting valves kept their own settings; null if fewer than two valves would remain."),
     ]
 
 
@@ -165,15 +158,57 @@ class LotFirmware:
         str, Meta(description="Folder of the firmware, beside this file.", pattern=r"^\w+/\w+$", max_length=100)
     ]
     target: Annotated[str, Meta(description="Microcontroller of the firmware.", max_length=100)]
-    manifest_sha256: Annotated[Sha256, Meta(description="SHA-256 of the firmware's manifest.json.")]
+    manifest_sha256: Annotated[Sha256, about("SHA-256 of the firmware's manifest.json.")]
     block_of: Annotated[
         str,
-        Meta(
-            description="Source of the calibration block until another is loaded: the lot setting, or the valve of "
-            "this name."
-        ),
+        about("Source of the calibration block until another is loaded: the lot setting, or the valve of this name."),
     ]
-    blocks: Annotated[Names, Meta(description="Files with a valve's own block, in the valve's folder.")]
+    blocks: Annotated[Names, about("Files with a valve's own block, in the valve's folder.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LotBudgetLine:
+    """One component of the budgets of the calibrated valves."""
+
+    side: Annotated[str, about("Side of the valve: positive or negative.")]
+    component: Annotated[str, about("Source of the uncertainty.")]
+    origin: Annotated[Names, about("Measured, declared or default: each origin that occurs in a valve's budget.")]
+    contribution_mV: Millivolts
+    price_percent: Annotated[
+        tuple[Price, Price, Price], about("Least, median and largest price, in percent of command.")
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LotBudget:
+    """What the certificates of a lot cover, and the components of their budgets."""
+
+    certified_of: Annotated[
+        Names,
+        about("What the certificates cover: the valve as recorded, alone or with the declared machine. Each that "
+              "occurs."),
+    ]  # fmt: skip
+    lines: Annotated[tuple[LotBudgetLine, ...], about("Components, with those of each side together.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LotOutput:
+    """One kind of output that was requested for each valve of a lot."""
+
+    folder: FolderName
+    settings: Annotated[
+        Mapping[str, str],
+        about("Values of the `codegen` options that only this kind of output has, by name without hyphens."),
+    ]
+    holds: Annotated[Names, about("Valves whose output was verified, with every requirement met.")]
+    does_not_hold: Annotated[Names, about("Valves whose output was verified, with a requirement not met.")]
+    not_verified: Annotated[Names, about("Valves whose output was made but not verified.")]
+    not_made: Annotated[Names, about("Valves whose output could not be made.")]
+
+    @property
+    def made(self) -> int:
+        """Of how many valves it was made."""
+        return len(self.holds) + len(self.does_not_hold) + len(self.not_verified)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,51 +216,42 @@ class LotSummary(Artefact):
     """The result of a lot of valves, as `dzdesign batch` writes it."""
 
     FILE_NAME: ClassVar[str] = SUMMARY_NAME
-    schema: Annotated[Literal["dzdesign.batch/1"], Meta(description="Name and version of this schema.")] = (
-        "dzdesign.batch/1"
-    )
+    schema: Annotated[Literal["dzdesign.batch/1"], about("Name and version of this schema.")] = "dzdesign.batch/1"
     valves: Annotated[int, Meta(description="Number of valves.", ge=1, le=10**9)]
-    calibrated: Annotated[
-        Count, Meta(description="Number of valves with a firmware, verified if that was requested.")
-    ] = field(init=False)
-    failed: Annotated[tuple[FailedValve, ...], Meta(description="Valves that are not calibrated.")]
-    verified: Annotated[bool, Meta(description="Whether each firmware was also verified.")]
-    warnings: Annotated[Mapping[str, Names], Meta(description="Valves with each warning, by its code.")]
+    calibrated: Annotated[Count, about("Number of valves with a firmware, verified if that was requested.")] = field(
+        init=False
+    )
+    failed: Annotated[tuple[FailedValve, ...], about("Valves that are not calibrated.")]
+    verified: Annotated[bool, about("Whether each firmware was also verified.")]
+    warnings: Annotated[Mapping[str, Names], about("Valves with each warning, by its code.")]
     anomalies: Annotated[
         Names,
-        Meta(
-            description="Anomalies across valves that are individually in order, such as a recording that two valves "
-            "share."
-        ),
+        about("Anomalies across valves that are individually in order, such as a recording that two valves share."),
     ]
-    files: Annotated[Mapping[str, Sha256], Meta(description="SHA-256 of the table, by file name.")]
+    files: Annotated[Mapping[str, Sha256], about("SHA-256 of the table, by file name.")]
     quantiles: Annotated[
         Mapping[str, Quantiles],
-        Meta(
-            description="Quantiles over the calibrated valves for each column of the table, if any valve has a value."
-        ),
+        about("Quantiles over the calibrated valves for each column of the table, if any valve has a value."),
     ]
     lot_setting: Annotated[
         LotSettingSummary | None,
-        Meta(description="Setting that is safe for every calibrated valve; null if there is none."),
+        about("Setting that is safe for every calibrated valve; null if there is none."),
     ]
-    why_no_lot_setting: Annotated[
-        str | None, Meta(description="Reason why there is no such setting; null if there is one.")
-    ]
+    why_no_lot_setting: Annotated[str | None, about("Reason why there is no such setting; null if there is one.")]
     budget: Annotated[
         LotBudget | None,
-        Meta(description="Uncertainty budgets of the calibrated valves; null if there is no calibrated valve."),
+        about("Uncertainty budgets of the calibrated valves; null if there is no calibrated valve."),
     ] = None
     firmware: Annotated[
         LotFirmware | None,
-        Meta(description="Common firmware of valves with calibration blocks; null if each valve has its own firmware."),
+        about("Common firmware of valves with calibration blocks; null if each valve has its own firmware."),
     ] = None
     outputs: Annotated[
         Mapping[str, LotOutput],
-        Meta(description="Other outputs of each valve, by target as listed by `codegen --list-targets`."),
+        about("Other outputs of each valve, by target as listed by `codegen --list-targets`."),
     ] = field(default_factory=dict)
     recorded_units: Annotated[
-        RecordedUnits, Meta(description="Units of the recordings; the numbers in this file are in V and MPa.")
+        RecordedUnits, about("Units of the recordings; the numbers in this file are in V and MPa.")
     ] = AS_COMPUTED
 
     def __post_init__(self) -> None:
@@ -241,7 +267,42 @@ class UnfinishedLot(Artefact):
     """A lot whose batch runs, or was stopped: the same command takes it up."""
 
     FILE_NAME: ClassVar[str] = SUMMARY_NAME
-    schema: Annotated[Literal["dzdesign.batch-unfinished/1"], Meta(description="Name and version of this schema.")] = (
+    schema: Annotated[Literal["dzdesign.batch-unfinished/1"], about("Name and version of this schema.")] = (
         "dzdesign.batch-unfinished/1"
     )
-    names: Annotated[Names, Meta(description="Names of the valves, in the order of the table.")]
+    names: Annotated[Names, about("Names of the valves, in the order of the table.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveOutput:
+    """Result of one output of one valve."""
+
+    target: Annotated[str, Meta(description="Kind of output, as listed by `codegen --list-targets`.", max_length=100)]
+    folder: FolderName
+    verdict: Annotated[OutputVerdict, about("Result of the verification. not made: the output was refused.")]
+    reason: Annotated[str, about("Reason why it was not made or does not hold, in one sentence.")] = ""
+    inputs: Annotated[
+        Annotated[int, Meta(ge=0, le=10**15)], about("Number of inputs that were compared with the exact law.")
+    ] = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValveManifest(Artefact):
+    """Result of one valve of a lot."""
+
+    FILE_NAME: ClassVar[str] = MANIFEST_NAME
+    schema: Annotated[Literal["dzdesign.batch-valve/1"], about("Name and version of this schema.")] = (
+        "dzdesign.batch-valve/1"
+    )
+    name: Annotated[str, about("Name of the valve.")]
+    status: Annotated[Status, about("Whether the valve is calibrated. does not hold: a requirement is not met.")]
+    reason: Annotated[str, about("Reason why it is not calibrated, in one sentence.")] = ""
+    inputs_sha256: Annotated[
+        Sha256 | None,
+        about("SHA-256 of the recordings, options and version; null if the next run must try again."),
+    ] = None
+    board: Annotated[Names, about("Files of the firmware for the user to complete.")] = ()
+    outputs: Annotated[
+        tuple[ValveOutput, ...], about("Results of the other outputs; empty if there are none.")
+    ] = ()
+    files: Annotated[Mapping[str, Sha256], about("SHA-256 of each file in the same folder.")]

@@ -1,5 +1,6 @@
 """Test conditions: how the ramps were recorded, with which meter, oil and temperature."""
 
+
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
@@ -9,9 +10,9 @@ from dzdesign.assess.assessment import Assessment
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.valve.model import ValveModel, lag_in_words
 from dzdesign.identify.valve.ramp_conditions import RampConditions
-from dzdesign.report.characteristic.curves import measured_curve_of
+from dzdesign.report.cells import Cell, Table, in_number_font
 from dzdesign.report.page import Section
-from dzdesign.report.sections.cells import Cell, Table, in_number_font
+from dzdesign.report.sections.curves import measured_curve_of
 
 #: What a record may tell -> words in the names of its entries; the first entry that has one counts.
 RECORDED = {

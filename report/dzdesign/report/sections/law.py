@@ -1,7 +1,11 @@
-"""The law's derivation, as the report shows it: proved again when the report is made."""
+"""Sections on the compensator: its law in exact numbers, the integers of the C code and what they cost."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
+
+import numpy as np
 
 from dzdesign.derivation.account.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE
 from dzdesign.derivation.account.proof import prove
@@ -9,9 +13,134 @@ from dzdesign.derivation.account.statement import Outcome
 from dzdesign.derivation.account.target_flow import TARGET, TIES
 from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.content import DerivationReport, Entry
-from dzdesign.derivation.presentation.prose import Words, parse_prose
+from dzdesign.derivation.presentation.prose import Words
 from dzdesign.derivation.presentation.report import closure, compose
 from dzdesign.derivation.presentation.writers import HtmlWriter
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
+from dzdesign.design.offset.above_tests import above_in_words, below_in_words
+from dzdesign.identify.valve.model import SIDES
+from dzdesign.report.artefacts import laws_of
+from dzdesign.report.cells import Cell, Table, recorded, table_of
+from dzdesign.report.figure import LIGHT, ReportFigure, csv_text, side_words, titled_axes, to_report_figure
+from dzdesign.report.page import Section
+from dzdesign.verify.exhaustive.exact_law import ExactLaw
+
+#: Rows of a constant's table that stand in the page; all of them stand in the CSV.
+MOST_ROWS = 3
+BELOW_DP0 = {"hold": "β = 1, as in the paper", "extend": "β as tested"}
+
+
+def law_section(compensator: Compensator | None) -> Section:
+    """Return the section on the law; its derivation is added by the page."""
+    if compensator is None:
+        return Section(missing="No compensator is here: `dzdesign design` makes compensator.json.")
+    laws, valve = laws_of(compensator), compensator.valve
+    lines = [f"Up to dP0: {BELOW_DP0[compensator.below_dp0]}."]
+    for name, side in laws.items():
+        kappa, u_min0 = side.drive_range_over_u_max, side.u_min0_over_u_max
+        lines.append(
+            f"{name.capitalize()} commands: drive range of the law k x_max/u_max = {_exact(kappa)}, from "
+            f"{side.start} to full output; the valve's, {valve.sides[name].k_x_max_over_u_max:.4f}, counts from the "
+            f"knee; u_min0/u_max at dP0 = {_exact(u_min0)}, both as shares of full command; β is straight "
+            f"between {len(side.beta)} nodes, {compensator.beta_step_codes} pressure codes apart, each a "
+            f"whole number of 1/{compensator.beta_denominator}."
+        )
+        which = f"{name} commands: " if len(laws) > 1 else ""
+        units = valve.recorded_units.of_side(name)
+        lines.append(f"Beyond the tests, {which}{below_in_words(side.certificate, valve.sides[name], units)}.")
+        beyond = above_in_words(compensator.above, side.certificate, valve.sides[name], units)
+        lines.append(f"Beyond the tests, {which}{beyond}.")
+    return Section(figures=tuple(law_figure(compensator, name, len(laws) > 1) for name in laws), lines=tuple(lines))
+
+
+def _exact(value: Fraction) -> str:
+    return f"{value.numerator}/{value.denominator} = {float(value):.5f}"
+
+
+def integers_section(firmware: FirmwareManifest | None, compensator: Compensator | None) -> Section:
+    """Return the section on the integers of the C code."""
+    tables = (rounding_table(compensator),) if compensator else ()
+    if firmware is None:
+        return Section(tables=tables, missing="No firmware is here: `dzdesign codegen` makes it, and its constants.")
+    return Section(tables=(*tables, constants_table(firmware)))
+
+
+def constants_table(firmware: FirmwareManifest) -> Table:
+    """Return every number in the C code: what it stands for, how it was rounded and where it comes from."""
+    return table_of(
+        "Every number in the core, in the order of the files",
+        firmware.constants,
+        ("symbol", lambda one: Cell(text=one.symbol, kind="symbol", more=one.file)),
+        ("value", _value),
+        ("in engineering units", lambda one: Cell(text=one.engineering, more=f"rounding: {one.rounding}")),
+        ("what it is", lambda one: one.equation),
+        ("where it comes from", lambda one: Cell(text="", more=_origin(one))),
+        csv=csv_text(
+            ("file", "symbol", "row", "value", "engineering", "rounding"),
+            (
+                (each.file, each.symbol, place, item, each.engineering, each.rounding)
+                for each in firmware.constants
+                for place, item in _rows(each)
+            ),
+        ),
+        name="constants",
+    )
+
+
+def _value(constant: FirmwareConstant) -> str:
+    if isinstance(constant.value, int):
+        return str(constant.value)
+    rows = ", ".join(str(list(row)) for row in constant.value[:MOST_ROWS])
+    return f"{len(constant.value)} rows: {rows}{', ...' if len(constant.value) > MOST_ROWS else ''}"
+
+
+def _rows(constant: FirmwareConstant) -> Iterator[tuple[int | None, str]]:
+    if isinstance(constant.value, int):
+        yield None, str(constant.value)
+        return
+    for place, row in enumerate(constant.value):
+        yield place, " ".join(map(str, row))
+
+
+def _origin(constant: FirmwareConstant) -> str:
+    if constant.valve_json:
+        return f"valve: {', '.join(constant.valve_json)}"
+    options = ", ".join(constant.compensator_json)
+    return f"option of design: {options}" if options else "the generator's own"
+
+
+def rounding_table(compensator: Compensator) -> Table:
+    """Return what turning the law into integers costs."""
+    u_max, units = compensator.u_max_V, compensator.valve.recorded_units
+    rows: list[tuple[str, str, str, float]] = []
+    for name, side in laws_of(compensator).items():
+        certificate = side.certificate
+        offset = side.u_min0_over_u_max * u_max
+        node = offset / compensator.beta_denominator
+        of = f" ({name})" if len(laws_of(compensator)) > 1 else ""
+        if not compensator.transition_codes:  # which counts from the opening threshold, the valve's curve does not
+            wanted = Fraction(repr(compensator.valve.sides[name].certified[certificate.guard].u_min0_V))
+            in_c, exact = (units.of_side(name).text(float(value), ".6f V") for value in (offset, wanted))
+            rows.append(("u_min0" + of, in_c, exact, 1e3 * float(offset - wanted)))
+        rows += [
+            ("one step of a node of β" + of, f"1/{compensator.beta_denominator}", "rounded down", -1e3 * float(node)),
+            (
+                "offset under the certified curve, mean" + of, "few nodes, rounding to codes and to counts",
+                f"largest {units.text(1e3 * certificate.largest_loss_V, '.2f mV')}", -1e3 * certificate.mean_loss_V,
+            ),
+        ]  # fmt: skip
+    half_count = u_max / compensator.signals.compare_max / 2
+    rows.append(("compare value", "a whole count", "half a count", 1e3 * float(half_count)))
+    return table_of(
+        "What the integers cost",
+        rows,
+        ("number", lambda row: row[0]),
+        ("in the C code", lambda row: row[1]),
+        ("exact, or what is done", lambda row: row[2]),
+        (f"difference, at most ({units.label('mV')})", lambda row: recorded(row[3], "+.3f mV", units)),
+    )
+
 
 #: All that the laws rest on: sections of the account. Of the others some take a second to import.
 STATEMENTS = (*APPROACH, *AT_REFERENCE, *OFF_REFERENCE, *TIES, *TARGET)
@@ -44,8 +173,44 @@ def account_of(law_name: str) -> LawAccount:
     numbers = closure(STATEMENTS, [number])
     statements = [statement for statement in STATEMENTS if statement.number in numbers]
     return LawAccount(
-        note=parse_prose(law(law_name).note),
+        note=Words(law(law_name).note),
         derived=compose(prove(statements), numbers),
         main=frozenset(ground.number for ground in statements[-1].grounds) | {number},
         page=HtmlWriter(numbers),
+    )
+
+
+def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
+    """Draw the output against the command at the ends of the tested interval, and the threshold's bound."""
+    exact = ExactLaw(compensator, SIDES[name])
+    u_max, certificate = float(compensator.u_max_V), laws_of(compensator)[name].certificate
+    units = compensator.valve.recorded_units.of_side(name)
+    low, high = map(float, certificate.dp_MPa)
+    figure, axes = titled_axes(3.2, name, both)
+    bare = units.convert(np.array([0.0, u_max]), "V")
+    axes.plot([0, 100], bare, ":", color=LIGHT["soft"], lw=1.3, label="without compensator")
+    rows = []
+    for dp_MPa, dash, hue in ((low, "-", "blue"), (high, "--", "vermilion")):
+        corners = exact.corners(exact.betas(round(compensator.signals.dp_code(Fraction(dp_MPa)))))
+        percent = [100 * away / exact.span for away, _ in corners]
+        volts = [u_max * float(count) / exact.compare_max for _, count in corners]
+        shown = units.convert(np.array(volts), "V")
+        axes.plot(percent, shown, dash, color=LIGHT[hue], lw=1.8, label=f"at {units.text(dp_MPa, '.2f MPa')}")
+        rows += [[round(dp_MPa, 4), round(x, 4), round(y, 6)] for x, y in zip(percent, volts, strict=True)]
+    bound = units.convert(min(compensator.valve.sides[name].certified[certificate.guard].u_lower_V), "V")
+    axes.axhline(bound, color=LIGHT["green"], lw=1.2, ls="-.", label="least lower bound of the threshold")
+    label = f"output u_O ({units.label('V')})"
+    axes.set(xlabel="command u_i (% of full)", ylabel=label, xlim=(0, 100))
+    if units.falling:
+        axes.invert_yaxis()
+    else:
+        axes.set(ylim=(units.convert(0.0, "V"), None))
+    axes.legend(loc="lower right")
+    return to_report_figure(
+        figure,
+        f"law-{name}",
+        f"The law in exact coefficients at both ends of the tested interval{side_words(name, both)}.",
+        f"The compensator's output starts at {units.text(rows[0][2], '.3f V')} and ends at "
+        f"{units.text(rows[-1][2], '.3f V')}.",
+        csv_text(("dp_MPa", "command_percent", "output_V"), rows),
     )

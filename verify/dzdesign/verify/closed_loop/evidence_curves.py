@@ -1,12 +1,13 @@
-"""The numbers behind the report's figures, as CSV files of the evidence folder: one set a side of the valve."""
+"""The numbers behind the report's figures: arrays of the evidence, stored as CSV files, one set a side of the valve."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
-from dzdesign.verify.exhaustive.input_map import InputMap
 
+#: Columns of one figure, (N,) each and rounded as they are stored, so that they are the same read back.
+Curves = Mapping[str, np.ndarray]
 #: Every so many records are kept, 0.2 s of the paper's ramp, 0.2 % of the command: finer than a printed line is wide.
 KEPT_RECORD = 20
 #: Decimals of a flow, L/min: the plant is no better known.
@@ -19,45 +20,29 @@ closed_loop_name, input_map_name, zero_command_name = (
 )
 
 
-def curve_files(loops: Sequence[LoopComparison], maps: Sequence[InputMap]) -> dict[str, str]:
-    """Return the CSV files: name to content."""
-    files = {}
+def loop_curves(loops: Sequence[LoopComparison]) -> dict[str, Curves]:
+    """Return the ramps of each side by the file's name: a record a row, two columns of flow a pressure drop."""
+    files: dict[str, Curves] = {}
     for side in dict.fromkeys(loop.result.side for loop in loops):
-        files[closed_loop_name(side)] = _ramps([loop for loop in loops if loop.result.side == side])
-    for one in maps:
-        files[input_map_name(one.side)] = _csv(("command_code", "dp_code", "compare", "error", "status"), one.grid)
-        files[zero_command_name(one.side)] = _csv(
-            ("dp_code", "dp_MPa", "drive_V", "bound_V"),
-            ((code, f"{dp:.4f}", f"{drive:.5f}", f"{bound:.5f}") for code, dp, drive, bound in one.zero_command),
-        )
+        of_side = [loop for loop in loops if loop.result.side == side]
+        kept, first = slice(None, None, KEPT_RECORD), of_side[0].direct
+        columns = {"time_s": first.time[kept].round(2), "command_percent": (100 * first.command[kept]).round(3)}
+        for loop in of_side:
+            for which, run in (("without", loop.direct), ("with", loop.compensated)):
+                name = f"q_{which}_{loop.result.dp_MPa:.4f}_MPa_L_min"
+                columns[name] = np.maximum(run.q_mean_L_min[kept].round(FLOW_DIGITS), 0.0)
+        files[closed_loop_name(side)] = columns
     return files
 
 
-def _ramps(loops: Sequence[LoopComparison]) -> str:
-    """Return the ramps of one side: one row per record, two columns of flow a pressure drop."""
-    first = loops[0].direct
-    kept = slice(None, None, KEPT_RECORD)
-    columns: dict[str, Iterable[str]] = {
-        "time_s": (f"{t:.2f}" for t in first.time[kept]),
-        "command_percent": (f"{100 * share:.3f}" for share in first.command[kept]),
-    }
-    for loop in loops:
-        name = f"{loop.result.dp_MPa:.4f}_MPa"
-        for which, run in (("without", loop.direct), ("with", loop.compensated)):
-            columns[f"q_{which}_{name}_L_min"] = _flows(run.q_mean_L_min[kept])
-    return _csv(tuple(columns), zip(*columns.values(), strict=True))
+def csv_of(curves: Curves) -> str:
+    """Return columns as CSV; what is rounded to a few decimals needs no more digits to be the same read back."""
+    rows = np.column_stack([*curves.values()]).tolist()
+    return "\n".join([",".join(curves), *(",".join(f"{cell:.12g}" for cell in row) for row in rows)]) + "\n"
 
 
-def _flows(values: np.ndarray) -> list[str]:
-    return [f"{value:.{FLOW_DIGITS}f}" if value >= 0.5 * 10**-FLOW_DIGITS else "0" for value in values.tolist()]
-
-
-def _csv(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    return "\n".join([",".join(header), *(",".join(map(str, row)) for row in rows)]) + "\n"
-
-
-def read_curves(text: str) -> Mapping[str, np.ndarray]:
-    """Read one of these files back, column to numbers; what is not a table of numbers is a `ValueError`."""
+def read_curves(text: str) -> Curves:
+    """Read one of these files back; what is not a table of numbers is a `ValueError`."""
     lines = text.splitlines()
     header = lines[0].split(",") if lines else []
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])

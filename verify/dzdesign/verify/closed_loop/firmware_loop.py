@@ -10,6 +10,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.recorded_curve import RecordedCurve
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison, compare_at_pressure
+from dzdesign.verify.closed_loop.drive_corners import valve_at_corners, valve_at_corners_check
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import loop_checks
 from dzdesign.verify.closed_loop.plant import Plant
@@ -18,7 +19,6 @@ from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.closed_loop.tolerances import Tolerances, monte_carlo, scatter
-from dzdesign.verify.closed_loop.valve_at_corners import valve_at_corners, valve_at_corners_check
 from dzdesign.verify.current.results import ValveAtCorners
 from dzdesign.verify.loop_results import ClosedLoopResult, MonteCarlo, PlantComparison, Population, ScenarioResult, Side
 from dzdesign.verify.requirements import Check
@@ -49,7 +49,7 @@ class FirmwareLoop:
     valve_at_corners: tuple[ValveAtCorners, ...] = ()
 
     def result(
-        self, plant: Plant | None, source: str, sha256: str | None, against_integrator: tuple[PlantComparison, ...]
+        self, plant: Plant | None, source: str, sha256: str | None, against_cvodes: tuple[PlantComparison, ...]
     ) -> ClosedLoopResult:
         """Return what the evidence has of the ramps and of the plant, given from a file or made of the recordings."""
         return ClosedLoopResult(
@@ -59,7 +59,7 @@ class FirmwareLoop:
             dynamics=None if plant else self.dynamics,
             back_MPa=self.backs_MPa,
             pressures=tuple(loop.result for loop in self.loops),
-            against_integrator=against_integrator,
+            against_cvodes=against_cvodes,
         )
 
 

@@ -11,19 +11,21 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.verify.closed_loop.coil_in_loop import HOLDING_H, coil_sources, nominal_coil
-from dzdesign.verify.closed_loop.motion import motion_header, numbers_of
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
+from dzdesign.verify.closed_loop.plant_step import numbers_of, step_header
 from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
+from dzdesign.verify.current.coil_simulation import HOLDING_H, coil_sources, nominal_coil
 from dzdesign.verify.toolchain.bound_block import core_sources
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
 PERIODS_PER_RECORD = 25
 RECORD_S = PERIODS_PER_RECORD * PWM_PERIOD_S
 #: Numbers in a record, as loop.c has them.
-RECORDED = ("compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m", "code_a", "code_b")
+RECORDED = (
+    "compare", "dp_MPa", "q_L_min", "q_mean_L_min", "q_largest_L_min", "position_m", "code_a", "code_b", "mean_V",
+)  # fmt: skip
 #: Pressure behind the edge where none is given, as on a bench: what both sensors see beside the drop.
 BENCH_BACK_MPA = 1.0
 #: Flow at zero command below this is none: the edge is shut, only the last bits of a number remain.
@@ -33,7 +35,9 @@ RAMP_RESERVE = 1.1
 #: No contraction to fused products: every processor gives the same digits.
 FLOATING = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 #: As loop.c has it: choices, series and channels, plant, coil and sensor; the record.
-DZ_LOOP = Function("dz_loop", (*["in"] * 16, "out"))
+DZ_LOOP = Function("dz_loop", (*["in"] * 14, "out"))
+#: Of a stand-in: choices, supplies, mean positions, plant, recorded characteristic; the flows.
+DZ_FLOWS = Function("dz_flows", (*["in"] * 5, "out"))
 MODES = ("direct", "compensated", "without beta")
 
 
@@ -59,7 +63,8 @@ class RampSequence:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopRun:
     """Records of one run, 100 a second unless others were asked for: time in s, command share, compare value, dP in
-    MPa, flow in L/min, position of the spool in mm, the codes of sensors A and B that the core read last, all (N,).
+    MPa, flow in L/min, position of the spool in mm, the codes of sensors A and B that the core read last, mean current
+    of the last period in V of command, all (N,).
 
     Of the flow three: at the record's end; its mean over the record, and its largest there. A dither of 100 Hz or more
     has a whole wave in a record: its mean is what a meter sees, its largest is at the wave's top.
@@ -75,6 +80,7 @@ class LoopRun:
     position_mm: np.ndarray
     code_a: np.ndarray
     code_b: np.ndarray
+    mean_V: np.ndarray
 
 
 def _waits_s(compensator: Compensator) -> float:
@@ -116,8 +122,8 @@ class ClosedLoop:
         dither: tuple[int, int] | None = None,
     ) -> None:
         driver = files(__package__) / "programs"
-        sources = {"plant_motion.h": motion_header()}
-        for name in ("loop.c", "plant_coil.h", "plant_period.h", "plant_curve.h", "plant_stops.h"):
+        sources = {"plant_step.h": step_header()}
+        for name in ("loop.c", "plant_period.h", "plant_curve.h", "plant.h"):
             sources[name] = driver.joinpath(name).read_text(encoding="utf-8")
         if firmware is None:
             sources["dz_drive.h"] = driver.joinpath("no_drive.h").read_text(encoding="utf-8")
@@ -128,7 +134,7 @@ class ClosedLoop:
         #: Of a drive by current the coil, at a supply.
         self.coil = nominal_coil(compensator) if firmware and compensator else None
         sources |= coil_sources(self.coil)
-        self._library = ConfinedLibrary(sources, [DZ_LOOP], "the closed loop", FLOATING)
+        self._library = CompiledLibrary(sources, [DZ_LOOP, DZ_FLOWS], "the closed loop", FLOATING)
         #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
         self._dither = dither or _recorded_dither(compensator)
         #: Without a compensator no code is read, and any scaling serves.
@@ -144,13 +150,15 @@ class ClosedLoop:
         self._side = compensator.valve.sides.get(SIDE_NAMES[sign]) if compensator else None
         #: Added to the plant's drive, V of command.
         self._added_V = 0.0
+        #: Times the drive at the plant.
+        self.drive = 1.0
         self._take(plant)
 
     def _take(self, plant: Plant | StandIn) -> None:
-        parameters, counts = plant.parameters, self._signals.compare_max
-        self._plant = numbers_of(parameters, counts)
+        parameters = plant.parameters
+        self._plant = numbers_of(parameters)
         #: The same, moved by a given current.
-        self._of_current = numbers_of(replace(parameters, L_c_H=HOLDING_H), counts) if self.coil else self._plant
+        self._of_current = numbers_of(replace(parameters, L_c_H=HOLDING_H)) if self.coil else self._plant
         #: Of a stand-in its recorded characteristic.
         self._curve = plant.table if isinstance(plant, StandIn) else None
         #: Full command, V.
@@ -192,6 +200,7 @@ class ClosedLoop:
     def with_drive(self, ratio: float) -> "ClosedLoop":
         """Return the same loop with so many times the drive at the plant: another voltage, or another current."""
         other = copy.copy(self)
+        other.drive = self.drive * ratio
         other._plant = self._plant.driven(ratio)
         other._of_current = self._of_current.driven(ratio) if self.coil else other._plant
         return other
@@ -232,6 +241,17 @@ class ClosedLoop:
         other = copy.copy(self)
         other.coil = self.coil.at(resistance=resistance, inductance=inductance, supply_V=supply_V)
         return other
+
+    def step_s(self, dp_MPa: float) -> float:
+        """Return the longest step of the plant in runs up to a pressure drop, s."""
+        return self._plant.step_s(dp_MPa)
+
+    def flow_at(self, position_mm: np.ndarray, supply_MPa: np.ndarray) -> np.ndarray:
+        """Return the flow of a stand-in at its mean positions in one period after another, L/min, (N,)."""
+        flows = np.empty(position_mm.size)
+        size, position_m = np.array([flows.size], dtype=np.int32), 1e-3 * position_mm
+        self._library.call("dz_flows", size, supply_MPa, position_m, self._plant.flat, self._curve, flows)
+        return flows
 
     @property
     def controls_current(self) -> bool:
@@ -283,7 +303,7 @@ class ClosedLoop:
         series = (
             np.array(choices, dtype=np.int32), command, supply, back, bias, np.ascontiguousarray(codes, dtype=np.int32),
             channels.zeros, channels.fulls, channels.spans, errors.table,
-            plant.up_to(float(supply.max())), plant.coarse, plant.fine, self._curve,
+            plant.up_to(float(supply.max())), self._curve,
         )  # fmt: skip
         self._library.call("dz_loop", *series, *(coil.structs() if coil else (None, None)), record)
         recorded = dict(zip(RECORDED, record.T, strict=True))

@@ -272,19 +272,24 @@ def _not_required(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -> 
 def of_population(population: Population, zero_flow: Check, units: RecordedUnits) -> Check:
     """Tell whether any machine drawn from the budget passes flow at zero command."""
     text = (
-        f"{population.flowing} of {population.machines} machines at {population.pressures} pressure drops each (seed "
-        f"{population.seed}) pass flow; with {population.confidence:.0%} confidence, less than a fraction of "
-        f"{population.upper_limit:.2g} of all machines does"
+        f"the drive of {population.flowing} of {population.machines} machines at {population.pressures} pressure drops "
+        f"each (seed {population.seed}) is above their valve's threshold; with {population.confidence:.0%} confidence, "
+        f"that of less than a fraction of {population.upper_limit:.2g} of all machines is; the least margin is "
+        f"{units.text(population.least_margin_V, '.2g V')} at {units.text(population.least_dp_MPa, '.2f MPa')}"
     )
-    if population.flowing:
+    flows = population.flowing or population.flowing_in_loop
+    if flows:
         most = sorted(population.worst.items(), key=lambda item: -abs(item[1]))[:3]
         at = ", ".join(f"{name} {share:+.2f}" for name, share in most)
+        text += f", by a machine with {at} of the half-widths"
+    text += f"; {population.flowing_in_loop} of the {population.in_loop} with the least margins flow in the loop"
+    if flows:
         text += (
-            f"; at most {units.text(population.largest_L_min, '.2g L/min')} at "
-            f"{units.text(population.largest_dp_MPa, '.2f MPa')}, by a machine with {at} of the half-widths"
+            f", at most {units.text(population.largest_L_min, '.2g L/min')} at "
+            f"{units.text(population.largest_dp_MPa, '.2f MPa')}"
         )
     if population.never_open:
         text += f"; {population.never_open} did not open, so their closing could not be checked"
     if zero_flow.holds is None:
         return POPULATION.check(holds=None, text=f"{text}; see the ramps")
-    return POPULATION.check(holds=population.flowing == 0 == population.never_open, text=text)
+    return POPULATION.check(holds=not flows and not population.never_open, text=text)

@@ -3,8 +3,9 @@
 Each component of the budget is drawn by itself, evenly between its ends: valve, coil, supply or current, sensors,
 converter, oil, ageing. The valve's threshold lies between the certified bound and as far on the other side of the
 plant's own, at every pressure drop; that of a stand-in, which is known at the tests, runs linearly between them. Each
-machine opens and closes at every tested pressure drop, and at one drawn between each two of them; then zero command is
-held, with the converter's noise. No formula stands in for the loop.
+machine closes at every tested pressure drop, and at one drawn between each two of them: its drive at zero command, with
+the converter's noise at its peak, is compared with that threshold. Those that come nearest to it run through the loop,
+where no formula stands in for it: they open and close at each of these pressure drops, then zero command is held.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -17,7 +18,7 @@ import numpy as np
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.machine import Machine
-from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, DrawnMachine, drawn_machine, worst_ends
+from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, ZeroDrives, drawn_machine, worst_ends
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RECORD_S
 from dzdesign.verify.closed_loop.scene import SETTLE_S, Scene
 from dzdesign.verify.closed_loop.stored_digits import DECIMALS
@@ -34,6 +35,8 @@ REST_S = 0.1
 #: Where the plant's closing threshold is found: so many pressure drops from one test to the next, one of which is
 #: drawn; and halvings of it.
 NODES, HALVINGS = 16, 17
+#: Machines that run through the loop; and how many are drawn at once, which a processor's cache has room for.
+IN_LOOP, AT_ONCE = 200, 2048
 #: So far within the tested pressure drops, MPa, their ends are inside them in doubles too.
 WITHIN_MPA = 1e-9
 NOT_DECLARED = (
@@ -107,7 +110,7 @@ class ThresholdBand:
         return middle + share * self.half_width_V(dp_MPa)
 
 
-def threshold_band(scene: Scene, tested_MPa: Sequence[float]) -> ThresholdBand:
+def threshold_band(scene: Scene, tested_MPa: Sequence[float] | np.ndarray) -> ThresholdBand:
     """Find where the plant of a scene closes, without the compensator, by halving; and what bounds it."""
     tested = np.array(sorted(tested_MPa))
     inner = [np.linspace(low, high, NODES, endpoint=False) for low, high in pairwise(tested)]
@@ -159,12 +162,14 @@ def _certified(compensator: Compensator, sign: int) -> Callable[[np.ndarray], np
     return bound
 
 
-def draw(count: int, seed: int, worst: np.ndarray, drawn: Collection[str] = COMPONENTS) -> np.ndarray:
+def draw(
+    count: int, random: np.random.Generator, worst: np.ndarray, drawn: Collection[str] = COMPONENTS
+) -> np.ndarray:
     """Return where in its half-width each component of each machine lies, (count, components), from -1 to 1.
 
     Components that are not drawn stand at their worst ends. The first n of a larger number are the same.
     """
-    shares = np.random.default_rng(seed).uniform(-1, 1, (count, len(COMPONENTS)))
+    shares = random.uniform(-1, 1, (count, len(COMPONENTS)))
     kept = [name not in drawn for name in COMPONENTS]
     shares[:, kept] = worst[kept]
     return shares
@@ -173,38 +178,36 @@ def draw(count: int, seed: int, worst: np.ndarray, drawn: Collection[str] = COMP
 def run_population(
     scenes: Sequence[Scene], machines: int, seed: int, *, drawn: Collection[str] = COMPONENTS
 ) -> Population:
-    """Draw machines from the declared one, and run each at zero command.
+    """Draw machines from the declared one, compare each with its threshold, and run the nearest ones through the loop.
 
     Scenes of one side are one: its pressure drops. Components that are not `drawn` stand at their worst ends.
     """
     machine = scenes[0].compensator.machine
     if machine is None:
         raise InputError(NOT_DECLARED)
-    flows: dict[Side, np.ndarray] = {}
-    worst: tuple[float, DrawnMachine | None, float] = (-1.0, None, 0.0)
-    closed, count = 0, 0
-    for side in dict.fromkeys(scene.side for scene in scenes):
-        tests = [scene.dp_MPa for scene in scenes if scene.side == side]
-        scene = next(scene for scene in scenes if scene.side == side)
-        found = _Run.of(scene, tests, machine, machines, seed, drawn)
-        flows[side] = found.beyond_L_min
-        closed += found.never_open
-        count = max(count, found.pressures)
-        if found.worst_L_min > worst[0]:
-            worst = (found.worst_L_min, found.worst, found.worst_dp_MPa)
-    flowing = int(np.any([each > NO_FLOW_L_MIN for each in flows.values()], axis=0).sum())
+    sides: dict[Side, list[Scene]] = {}
+    for scene in scenes:
+        sides.setdefault(scene.side, []).append(scene)
+    found = [MachinesOfSide(own, machine, seed, drawn).of(machines) for own in sides.values()]
+    worst = min(found, key=lambda each: float(each.compared.margins_V[0]))
+    leaking = max(found, key=lambda each: each.largest_L_min)
+    flowing = int(np.any([each.compared.flows for each in found], axis=0).sum())
     return Population(
         machines=machines,
         seed=seed,
         flowing=flowing,
-        never_open=closed,
         confidence=CONFIDENCE,
         upper_limit=upper_limit(flowing, machines),
-        pressures=count,
-        largest_L_min=round(max(worst[0], 0.0), DECIMALS),
-        largest_dp_MPa=round(worst[2], DECIMALS),
-        worst=worst[1].in_words() if worst[1] else {},
+        pressures=max(each.compared.dp_MPa.shape[1] for each in found),
+        least_margin_V=round(float(worst.compared.margins_V[0]), DECIMALS),
+        least_dp_MPa=round(worst.nearest_MPa, DECIMALS),
+        worst={name: round(float(share), 6) for name, share in zip(COMPONENTS, worst.compared.shares[0], strict=True)},
         drawn=tuple(name for name in COMPONENTS if name in drawn),
+        in_loop=sum(each.compared.index.size for each in found),
+        flowing_in_loop=sum(each.flowing_in_loop for each in found),
+        never_open=sum(each.never_open for each in found),
+        largest_L_min=round(max(leaking.largest_L_min, 0.0), DECIMALS),
+        largest_dp_MPa=round(leaking.largest_dp_MPa, DECIMALS),
     )
 
 
@@ -222,39 +225,100 @@ def upper_limit(flowing: int, machines: int, confidence: float = CONFIDENCE) -> 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
-    """What the machines of one side did."""
+class Compared:
+    """Machines of one side beside their thresholds, and of those that come nearest, nearest first, what they are."""
 
-    #: (machines,): largest flow at zero command beyond what is allowed.
-    beyond_L_min: np.ndarray
-    #: Machines that did not open at some pressure drop: they say nothing.
+    #: (machines,): whether the drive at zero command is above the threshold at some pressure drop.
+    flows: np.ndarray
+    #: Which machine it is; by how much the threshold lies above its drive, V; where each component lies in its
+    #: half-width; its pressure drops, MPa, (.., pressures).
+    index: np.ndarray
+    margins_V: np.ndarray
+    shares: np.ndarray
+    dp_MPa: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Found:
+    """What the machines of one side do."""
+
+    compared: Compared
+    #: Where the nearest of all comes so near.
+    nearest_MPa: float
+    #: Of the nearest ones in the loop: how many flow, how many do not open at some pressure drop, the largest flow at
+    #: zero command beyond what is allowed.
+    flowing_in_loop: int
     never_open: int
-    pressures: int
-    worst: DrawnMachine
-    worst_L_min: float
-    worst_dp_MPa: float
+    largest_L_min: float
+    largest_dp_MPa: float
 
-    @classmethod
-    def of(
-        cls, scene: Scene, tested_MPa: Sequence[float], machine: Machine, machines: int, seed: int,
-        drawn: Collection[str],
-    ) -> "_Run":  # fmt: skip
-        tested = np.array(sorted(tested_MPa))
-        band = threshold_band(scene, tested_MPa)
-        shares = draw(machines, seed, worst_ends(scene), drawn)
-        # Where the threshold of the plant was found: it need not be linear between two tests.
-        steps = np.random.default_rng([seed, 1]).integers(1, NODES, (machines, tested.size - 1))
-        between = band.dp_MPa[steps + NODES * np.arange(tested.size - 1)]
-        dp = np.concatenate([np.tile(tested, (machines, 1)), between], axis=1)
-        none = np.array([_no_flow(scene, one) for one in tested])
-        openings = Openings.of(dp.shape[1], settle_s=scene.settle_s, waits_s=scene.loop.waits_s)
 
-        def one(index: int) -> tuple[np.ndarray, np.ndarray]:
-            each = drawn_machine(scene, machine, shares[index], index)
-            moved_V = band.moved_V(dp[index], each.threshold)
+class MachinesOfSide:
+    """The machines of one side, whose scenes are its pressure drops."""
+
+    def __init__(self, scenes: Sequence[Scene], machine: Machine, seed: int, drawn: Collection[str]) -> None:
+        self._scene, self._machine, self._drawn, self._seed = scenes[0], machine, drawn, seed
+        self._tested = np.array(sorted(scene.dp_MPa for scene in scenes))
+        self._band = threshold_band(self._scene, self._tested)
+        self._half_V = self._band.half_width_V(self._band.dp_MPa)
+        self._drives = ZeroDrives(self._scene, machine)
+
+    def compared(self, machines: int) -> Compared:
+        """Draw machines, and compare the drive of each at zero command with the threshold of its valve."""
+        worst, gaps = worst_ends(self._scene), self._tested.size - 1
+        places, steps = np.random.default_rng(self._seed), np.random.default_rng([self._seed, 1])
+        at_tests = np.arange(gaps + 1) * NODES
+        flows = np.zeros(machines, dtype=bool)
+        index, margins = np.empty(0, int), np.empty(0)
+        shares, nodes = np.empty((0, len(COMPONENTS))), np.empty((0, 2 * gaps + 1), int)
+        for begin in range(0, machines, AT_ONCE):
+            count = min(AT_ONCE, machines - begin)
+            own = draw(count, places, worst, self._drawn)
+            # Where the threshold of the plant was found: it need not be linear between two tests.
+            between = steps.integers(1, NODES, (count, gaps)) + at_tests[:-1]
+            at = np.concatenate([np.tile(at_tests, (count, 1)), between], axis=1)
+            margin_V = self._margins_V(own, at).min(axis=1)
+            flows[begin : begin + count] = margin_V < 0
+            near = np.flatnonzero(margin_V < margins[-1]) if margins.size == IN_LOOP else np.arange(count)
+            if near.size:
+                index, margins = np.append(index, begin + near), np.append(margins, margin_V[near])
+                shares, nodes = np.vstack([shares, own[near]]), np.vstack([nodes, at[near]])
+                nearest = np.argsort(margins, kind="stable")[:IN_LOOP]
+                index, margins, shares, nodes = index[nearest], margins[nearest], shares[nearest], nodes[nearest]
+        return Compared(flows=flows, index=index, margins_V=margins, shares=shares, dp_MPa=self._band.dp_MPa[nodes])
+
+    def _margins_V(self, shares: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+        """Return by how much each threshold lies above the drive, at nodes of the band, V."""
+        threshold_V = self._band.middle_V[nodes] + shares[:, [COMPONENTS.index("recording")]] * self._half_V[nodes]
+        margins: np.ndarray = threshold_V - self._drives.at(shares, self._band.dp_MPa[nodes])
+        return margins
+
+    def of(self, machines: int) -> _Found:
+        """Return what the machines do, the nearest of them in the loop too."""
+        found = self.compared(machines)
+        nodes = np.searchsorted(self._band.dp_MPa, found.dp_MPa[:1])
+        beyond, opened = self._in_loop(found)
+        row, place = np.unravel_index(int(beyond.argmax()), beyond.shape)
+        return _Found(
+            compared=found,
+            nearest_MPa=float(found.dp_MPa[0, np.argmin(self._margins_V(found.shares[:1], nodes))]),
+            flowing_in_loop=int((beyond > NO_FLOW_L_MIN).any(axis=1).sum()),
+            never_open=int((opened <= NO_FLOW_L_MIN).any(axis=1).sum()),
+            largest_L_min=float(beyond.max()),
+            largest_dp_MPa=float(found.dp_MPa[row, place]),
+        )
+
+    def _in_loop(self, found: Compared) -> tuple[np.ndarray, np.ndarray]:
+        """Run machines; return the flow at zero command beyond what is allowed, and before, at each pressure drop."""
+        scene, dp_MPa = self._scene, found.dp_MPa
+        openings = Openings.of(dp_MPa.shape[1], settle_s=scene.settle_s, waits_s=scene.loop.waits_s)
+
+        def one(place: int) -> tuple[np.ndarray, np.ndarray]:
+            each = drawn_machine(scene, self._machine, found.shares[place], int(found.index[place]))
+            moved_V = self._band.moved_V(dp_MPa[place], each.threshold)
             run = each.loop.run(
                 openings.command,
-                dp[index][openings.place],
+                dp_MPa[place][openings.place],
                 "compensated",
                 back_MPa=scene.back_MPa,
                 added_V=each.added_V - moved_V[openings.place],
@@ -264,14 +328,6 @@ class _Run:
             return openings.largest(flow, judged=True), openings.largest(flow, judged=False)
 
         with ThreadPoolExecutor(WORKERS) as pool:
-            at_zero, opened = (np.array(each) for each in zip(*pool.map(one, range(machines)), strict=True))
-        beyond = at_zero - np.interp(dp, tested, none - NO_FLOW_L_MIN)
-        machine_at, place = np.unravel_index(int(beyond.argmax()), beyond.shape)
-        return cls(
-            beyond_L_min=beyond.max(axis=1),
-            never_open=int((opened <= NO_FLOW_L_MIN).any(axis=1).sum()),
-            pressures=int(dp.shape[1]),
-            worst=drawn_machine(scene, machine, shares[machine_at], int(machine_at)),
-            worst_L_min=float(beyond.max()),
-            worst_dp_MPa=float(dp[machine_at, place]),
-        )
+            at_zero, opened = (np.array(each) for each in zip(*pool.map(one, range(len(dp_MPa))), strict=True))
+        none = np.array([_no_flow(scene, one) for one in self._tested]) - NO_FLOW_L_MIN
+        return at_zero - np.interp(dp_MPa, self._tested, none), opened

@@ -46,6 +46,12 @@ class Channels:
         self.swapped = sign < 0 and signals.swapped
 
     @property
+    def converted_per_unit(self) -> np.ndarray:
+        """Codes for one of what each channel measures, as a converter rounds: a span of n codes has n + 1 of them."""
+        codes: np.ndarray = (self.fulls - self.zeros + np.sign(self.fulls - self.zeros)) / self.spans
+        return codes
+
+    @property
     def codes_per_MPa(self) -> tuple[float, float]:
         """Codes of sensors A and B for 1 MPa."""
         a, b = map(float, ((self.fulls - self.zeros) / self.spans)[1:])

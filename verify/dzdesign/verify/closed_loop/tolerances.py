@@ -25,7 +25,7 @@ COUNTS = ("plants", "machines", "seed")
 SEQUENCE = RampSequence(rest=1.0, ramp=10.0, top=0.5)
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 WORKERS = 2
-MOST_PLANTS = 100_000
+MOST = {"plants": 100_000, "machines": 100_000_000, "seed": 100_000}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ def read_tolerances(path: Path) -> Tolerances:
     counts = {name: _count(path, name, values.pop(name)) for name in COUNTS if name in values}
     if not values and ("plants" in counts or "machines" not in counts):
         raise InputError(
-            f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\", or machines = 10000 to draw "
+            f"'{path}' names no plant parameter; write one such as preload_N = \"3 %\", or machines = 1000000 to draw "
             "machines from the declared budget"
         )
     return Tolerances(spreads={name: _spread(path, name, value) for name, value in values.items()}, **counts)
@@ -74,8 +74,8 @@ def read_tolerances(path: Path) -> Tolerances:
 
 def _count(path: Path, name: str, value: Any) -> int:
     least = 0 if name == "seed" else 1
-    if type(value) is not int or not least <= value <= MOST_PLANTS:
-        raise InputError(f"'{path}': {name} is {quoted(value)}, expected a whole number from {least} to {MOST_PLANTS}")
+    if type(value) is not int or not least <= value <= MOST[name]:
+        raise InputError(f"'{path}': {name} is {quoted(value)}, expected a whole number from {least} to {MOST[name]}")
     return value
 
 

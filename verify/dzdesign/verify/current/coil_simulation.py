@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.choosing import CurrentSensor
 from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.state_check import PROGRAMS, tick_macro
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 
 #: `struct trace` of programs/coil_loop.h.
 TRACE = np.dtype([("mean_A", "<f8"), ("compare", "<u2"), ("total", "<u2"), ("faults", "<u2"), ("_", "<u2")])
@@ -25,6 +26,8 @@ COIL = np.dtype(
     align=True,
 )
 SENSOR = np.dtype([(name, "<f8") for name in ("V_per_A", "offset_V", "codes_per_V", "code_max", "supply_divider")])
+#: Inductance of a plant's coil that keeps the current that it is given: over a period all but 2e-8 of it is left.
+HOLDING_H = 1e6
 #: Coils, from which period on each, and their number; sensor; set points and their number; traces.
 COIL_LOOP = Function("coil_loop", ("in", "in", "uint32_t", "in", "in", "uint32_t", "out"))
 
@@ -111,7 +114,7 @@ class CoilSimulation:
         self.around = around
         names = ("coil.h", "coil_loop.c", "coil_loop.h")
         sources = {name: (PROGRAMS / name).read_text("utf-8") for name in names}
-        self._library = ConfinedLibrary(
+        self._library = CompiledLibrary(
             sources | dict(core) | {"tick.h": tick_macro(around.loop)}, [COIL_LOOP], "the coil's loop"
         )
 
@@ -132,3 +135,47 @@ class CoilSimulation:
             "coil_loop", np.concatenate(coils), begins, len(coils), around.sensor_struct(), asked, len(asked), found
         )
         return Traces(**{name: found[name].copy() for name in ("mean_A", "compare", "total", "faults")})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoilAtSupply:
+    """A controller's coil as it is in one run."""
+
+    around: CoilLoop
+    corner: Corner
+
+    def at(self, *, resistance: float, inductance: float, supply_V: float | None) -> "CoilAtSupply":
+        """Return the declared coil times factors, at a supply; without one at the nominal."""
+        circuit = self.around.circuit
+        low, high = circuit.supply_V
+        return replace(
+            self,
+            corner=Corner(
+                resistance * circuit.resistance_ohm + circuit.series_ohm,
+                inductance * circuit.inductance_H,
+                (low * high) ** 0.5 if supply_V is None else supply_V,
+            ),
+        )
+
+    def structs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return coil and sensor as dz_loop() takes them."""
+        return self.around.coil_struct(self.corner), self.around.sensor_struct()
+
+
+def nominal_coil(compensator: Compensator) -> CoilAtSupply | None:
+    """Return the declared coil at its nominal supply; None of a drive by duty."""
+    if compensator.current_drive is None:
+        return None
+    around = coil_loop_of(compensator)
+    if around is None:
+        raise InputError("compensator.json names no target, so the converter of the current is not known; design again")
+    nothing = CoilAtSupply(around=around, corner=Corner(1.0, 1.0, 1.0))
+    return nothing.at(resistance=1.0, inductance=1.0, supply_V=None)
+
+
+def coil_sources(coil: CoilAtSupply | None) -> dict[str, str]:
+    """Return what plant_period.h includes: the coil, or what stands in for it where the drive is by duty."""
+    if coil is None:
+        return {"coil.h": (PROGRAMS / "no_coil.h").read_text(encoding="utf-8")}
+    coil_h = (PROGRAMS / "coil.h").read_text(encoding="utf-8")
+    return {"coil.h": coil_h, "tick.h": tick_macro(coil.around.loop)}

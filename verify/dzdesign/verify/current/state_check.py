@@ -18,7 +18,7 @@ from dzdesign.verify.current.exact_controller import (
     ExactController,
     exact_ticks,
 )
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import HOST, Machine
 
 PROGRAMS = Path(str(files("dzdesign.verify.current"))) / "programs"
@@ -105,7 +105,7 @@ class HostStates:
 
     def __init__(self, loop: CurrentLoop, core: Mapping[str, str]) -> None:
         self._loop = loop
-        self._library = ConfinedLibrary(program_files(loop, core), FUNCTIONS, "the current controller")
+        self._library = CompiledLibrary(program_files(loop, core), FUNCTIONS, "the current controller")
 
     def periods(self, seed: int, count: int) -> tuple[np.ndarray, int]:
         """Return so many periods, and their hash."""

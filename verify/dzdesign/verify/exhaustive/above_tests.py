@@ -12,7 +12,7 @@ import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot.valves import LotSide
+from dzdesign.design.lot_valves import LotSide
 from dzdesign.identify.valve.above_tests import AboveTests
 from dzdesign.verify.evidence import AboveCheck, InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

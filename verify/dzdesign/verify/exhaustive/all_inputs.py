@@ -7,9 +7,11 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
+from dzdesign.verify.closed_loop.evidence_curves import Curves
 from dzdesign.verify.evidence import InputCheck, InputCounts
 from dzdesign.verify.exhaustive.above_tests import above_checked, check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.input_map import map_inputs
 from dzdesign.verify.exhaustive.lot_check import check_lot
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import guarded_bounds, zero_command_margins
@@ -31,9 +33,15 @@ def check_all_inputs(folder: Path, sign: int = 1, compensator: Compensator | Non
 
     A core that does not compile, crashes or hangs is a `RequirementError`.
     """
-    prepared = PreparedInputs(ExactLaw(compensator or read_compensator(folder), sign))
+    return every_input(folder, sign, compensator or read_compensator(folder))[0]
+
+
+def every_input(folder: Path, sign: int, compensator: Compensator) -> tuple[InputCheck, dict[str, Curves]]:
+    """Return what the comparison of every input found, and its numbers to be drawn; see `check_all_inputs`."""
+    prepared = PreparedInputs(ExactLaw(compensator, sign))
     core = CompiledCore(folder, sign)
-    return input_check(prepared, core.sha256, core.check(prepared.everything()))
+    found = core.check(prepared.everything())
+    return input_check(prepared, core.sha256, found), map_inputs(folder, prepared, found.at_zero)
 
 
 def input_check(prepared: PreparedInputs, core_sha256: str, found: Findings) -> InputCheck:

@@ -20,7 +20,7 @@ from dzdesign.verify.loop_results import about
 from dzdesign.verify.requirements import CALIBRATION_BLOCK, Check
 from dzdesign.verify.toolchain.bound_block import ACCEPTANCE, BLOCK_HEADER
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import discard
 
 #: Octets of a block, and what is wrong with one.
@@ -97,11 +97,11 @@ class BlockFirmware:
         return self._library.call("dz_calibration_check", block)
 
     @cached_property
-    def _library(self) -> ConfinedLibrary:
+    def _library(self) -> CompiledLibrary:
         texts = {name: content.decode(errors="surrogateescape") for name, content in self._acceptance.items()}
         size = f'#include <stdint.h>\n#include "{BLOCK_HEADER}"\nuint32_t dz_size(void);\n'
         size += "uint32_t dz_size(void)\n{\n    return (uint32_t)sizeof(struct dz_calibration);\n}\n"
-        return ConfinedLibrary({**texts, "dz_size.c": size}, FUNCTIONS, "the check of a block")
+        return CompiledLibrary({**texts, "dz_size.c": size}, FUNCTIONS, "the check of a block")
 
     def _every_input(self, block: bytes, compensator: Compensator, sign: int) -> InputCheck:
         prepared = PreparedInputs(ExactLaw(compensator, sign))

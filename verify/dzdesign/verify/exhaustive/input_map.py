@@ -3,17 +3,15 @@
 The check of all inputs (`all_inputs`) counts; this shows. The grid is denser where the valve was tested.
 """
 
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
-from dzdesign.design.compensator import Compensator
+from dzdesign.verify.closed_loop.evidence_curves import Curves, input_map_name, zero_command_name
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.test_vectors import Differences, differences
+from dzdesign.verify.exhaustive.test_vectors import Differences, PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import bounds_at, counted_dither, guarded_bounds, pressure_drops
-from dzdesign.verify.loop_results import Side
 from dzdesign.verify.toolchain.compiled_core import core_answers
 
 #: Columns of the grid over the converter's codes; rows over all differences, and over the tested ones.
@@ -22,52 +20,43 @@ COMMANDS, WIDE_ROWS, TESTED_ROWS = 46, 36, 54
 BEYOND = 0.15
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InputMap:
-    """What one side gives on a grid of command codes and differences of pressure codes, and at zero command."""
+def map_inputs(folder: Path, prepared: PreparedInputs, at_zero: np.ndarray) -> dict[str, Curves]:
+    """Return what one side of the compiled core gives, by the file's name.
 
-    side: Side
-    #: Command code, difference of pressure codes, compare value, its error in counts, and status word; along the
-    #: commands first. Of a command that is not sound the law says nothing, and there is not an error.
-    grid: tuple[tuple[int, int, int, int, int], ...]
-    #: At every difference of the tested interval: its code, pressure drop in MPa, drive at zero command in V (with a
-    #: dither that the recordings lack its peak), and the lower bound of the threshold in V.
-    zero_command: tuple[tuple[int, float, float, float], ...]
-
-
-def map_inputs(folder: Path, compensator: Compensator, sign: int = 1) -> InputMap:
-    """Call one side of the compiled core over the grid."""
-    exact = ExactLaw(compensator, sign)
-    found = differences(exact)
-    bounds = guarded_bounds(compensator, sign)
+    The grid: command code, difference of pressure codes, compare value, its error in counts, and status word. Of a
+    command that is not sound the law says nothing, and there is not an error. At zero command, at every difference of
+    the tested interval: its code, pressure drop, the drive with a dither's peak that the recordings lack, and the lower
+    bound of the threshold. `at_zero` are the compare values that the check of all inputs found there.
+    """
+    exact, found = prepared.exact, prepared.differences
+    compensator, bounds = exact.compensator, guarded_bounds(exact.compensator, exact.sign)
     known_V = bounds_at(pressure_drops(exact, found, (Fraction(repr(dp)) for dp in bounds.dp_MPa)), bounds)
     tested = np.flatnonzero(~np.isnan(known_V))
-    commands, rows, grid = _commands(exact), _grid_rows(found, tested).tolist(), []
+    commands, rows = _commands(exact), _grid_rows(found, tested).tolist()
     drawn = [(code, *_pair(exact, found, row)) for row in rows for code in commands]
-    resting = [(exact.zero, *_pair(exact, found, row)) for row in tested.tolist()]
-    answers = core_answers(folder, sign, np.array([*drawn, *resting])).tolist()
-    for place, row in enumerate(rows):
-        dp_code = int(found.values[row])
-        corners, begin = exact.corners(exact.betas(dp_code)), place * len(commands)
-        for code, (given, status) in zip(commands, answers[begin : begin + len(commands)], strict=True):
-            error = given - exact.compare_value(code, corners) if code in exact.sound_commands else 0
-            grid.append((code, dp_code, given, error, status))
+    given, status = core_answers(folder, exact.sign, np.array(drawn)).astype(int).T
+    expected = []
+    for row in rows:
+        corners = exact.corners(exact.betas(int(found.values[row])))
+        expected += [exact.compare_value(code, corners) if code in exact.sound_commands else None for code in commands]
+    errors = [0 if value is None else int(one) - value for one, value in zip(given, expected, strict=True)]
     a_MPa = float(exact.a.span_MPa) / (exact.a.full_code - exact.a.zero_code)
     volt = float(compensator.u_max_V) / exact.compare_max
-    peak = counted_dither(compensator)
-    return InputMap(
-        side=exact.side,
-        grid=tuple(grid),
-        zero_command=tuple(
-            (
-                int(found.values[row]),
-                float(found.values[row]) * a_MPa,
-                (given + peak) * volt,
-                float(known_V[row]),
-            )
-            for row, (given, _) in zip(tested.tolist(), answers[len(drawn) :], strict=True)
-        ),
-    )
+    return {
+        input_map_name(exact.side): {
+            "command_code": np.tile(commands, len(rows)),
+            "dp_code": np.repeat(found.values[rows], len(commands)),
+            "compare": given,
+            "error": np.array(errors),
+            "status": status,
+        },
+        zero_command_name(exact.side): {
+            "dp_code": found.values[tested],
+            "dp_MPa": (found.values[tested] * a_MPa).round(4),
+            "drive_V": ((at_zero[tested] + counted_dither(compensator)) * volt).round(5),
+            "bound_V": known_V[tested].round(5),
+        },
+    }
 
 
 def _commands(exact: ExactLaw) -> list[int]:

@@ -6,6 +6,9 @@ columns that make the drop of positive commands, and keep them at negative ones,
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from math import floor
 
 import numpy as np
 
@@ -27,6 +30,10 @@ TWO_SENSORS = {("pA", "pB"), ("dP",)}
 #: Status bits that a sound pressure does not set: sensor A, sensor B, a difference that can't be right.
 PRESSURE_BITS = 2 | 4 | 8
 MPA = 1e6
+#: Bits of the status.
+COMMAND, PRESSURE_A, PRESSURE_B, DIFFERENCE, ABOVE = 1, 2, 4, 8, 16
+#: What the exact law gives for any three codes: compare value, status and beta over 2^15.
+Answer = Callable[[int, int, int], tuple[int, int, int]]
 MOST_NAMED = 3
 
 
@@ -148,3 +155,35 @@ def _drop_code(exact: ExactLaw, reading: _Reading) -> int:
 def _words(readings: Sequence[_Reading], sign: int) -> str:
     """Return the columns that make the drop of one sign, as differences of labels."""
     return and_more(list(dict.fromkeys(each.words for each in readings if each.sign == sign)), MOST_NAMED)
+
+
+def exact_answers(compensator: Compensator) -> Callable[[int, np.ndarray], np.ndarray]:
+    """Return what the exact law gives for codes of one sign (N, 3): compare value and status (N, 2)."""
+
+    def answers(sign: int, codes: np.ndarray) -> np.ndarray:
+        answer = exact_answer(ExactLaw(compensator, sign))
+        return np.array([answer(*map(int, row))[:2] for row in codes])
+
+    return answers
+
+
+def exact_answer(exact: ExactLaw) -> Answer:
+    """Return the law of one sign: compare value, status and beta over 2^15 of any three codes."""
+    (a_low, a_high), (b_low, b_high) = exact.a.valid_codes, exact.b.valid_codes
+
+    @cache
+    def at_drop(drop: int) -> tuple[list[tuple[int, Fraction]], int]:
+        betas = exact.betas(drop)
+        return exact.corners(betas), floor(betas.law * 2**15)
+
+    def answer(u: int, a: int, b: int) -> tuple[int, int, int]:
+        status = COMMAND * (u not in exact.sound_commands)
+        status |= PRESSURE_A * (not a_low <= a <= a_high) | PRESSURE_B * (not b_low <= b <= b_high)
+        drop = -exact.reverse - 1  # of pressures that can't be right
+        if not status & (PRESSURE_A | PRESSURE_B):
+            drop = int(exact.difference(np.array(a), np.array(b)))
+            status |= DIFFERENCE * (drop < -exact.reverse) | ABOVE * (drop > exact.tested_to)
+        corners, beta = at_drop(drop)
+        return (0 if status & COMMAND else exact.compare_value(u, corners)), status, beta
+
+    return answer

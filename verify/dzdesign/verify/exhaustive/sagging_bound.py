@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from dzdesign.design.lot.valves import LotSide
+from dzdesign.design.lot_valves import LotSide
 
 
 @dataclass(frozen=True, slots=True)

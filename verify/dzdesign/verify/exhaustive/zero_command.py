@@ -16,7 +16,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot.valves import LotSide
+from dzdesign.design.lot_valves import LotSide
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
 from dzdesign.verify.exhaustive.test_vectors import Differences

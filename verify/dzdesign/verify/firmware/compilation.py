@@ -10,7 +10,7 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.processes.programs import find_program
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.verify import requirements
-from dzdesign.verify.firmware.unchanged_files import USER_FOLDER, changed_files, user_files
+from dzdesign.verify.firmware.reproduced import USER_FOLDER, changed_board_files, user_files
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.host_compiler import (
     STRICT,
@@ -47,11 +47,6 @@ def compiles_strictly(folder: Path, manifest: FirmwareManifest) -> Check:
     return requirements.COMPILES.check(holds=True, text=f"{' '.join(STRICT)}: {names}")
 
 
-def changed_board_files(folder: Path, manifest: FirmwareManifest) -> list[str]:
-    """Return the files of the target that the user fills in and that are no longer as generated."""
-    return sorted(name for name in changed_files(folder, manifest) if name in manifest.board)
-
-
 def check_include(include: Sequence[Path], manifest: FirmwareManifest) -> None:
     """Refuse folders of headers that are none, or of a target whose board files are not compiled here."""
     for place in include:
@@ -82,7 +77,7 @@ def board_compiles(folder: Path, manifest: FirmwareManifest, include: Sequence[P
         return BoardCompiled(not_compiled=f"{compiler} is not on the path; install it, then `verify`")
     place = (folder / changed[0]).parent
     sources = sorted(name for name in manifest.files if (folder / name).parent == place and name.endswith(".c"))
-    user_sources = [name for name in user_files(folder, manifest) if name.endswith(".c")]
+    user_sources = [name for name in user_files(folder, manifest.files) if name.endswith(".c")]
     sources += user_sources
     # Warnings in headers of a vendor are no concern here: -isystem.
     folders = [f"-I{folder / 'core'}", f"-I{place}", "-iquote", str(folder / USER_FOLDER)]

@@ -8,14 +8,13 @@ from pathlib import Path
 from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.firmware_manifest import BLOCK_FILE, FirmwareManifest
-from dzdesign.verify.firmware.manifest import BLOCK_SOURCE
 from dzdesign.verify.requirements import OWN_BLOCK, Check
 from dzdesign.verify.toolchain.bound_block import ACCEPTANCE, BLOCK_HEADER, block_of
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, discard, stored
 
-LINKED_HEADER, PROGRAM = "dz_block.h", "own_block.c"
+PROGRAM = "own_block.c"
 #: Files of a target with the block as C, which are compiled here too.
-OF_BLOCK = (BLOCK_SOURCE, LINKED_HEADER)
+BLOCK_SOURCE, LINKED_HEADER = "dz_block.c", "dz_block.h"
 
 
 def own_block_accepted(folder: Path, manifest: FirmwareManifest) -> tuple[Check, ...]:

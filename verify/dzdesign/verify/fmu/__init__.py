@@ -1,5 +1,4 @@
-"""FMUs in, and what is required of them out: files, descriptions, binaries, every input by the getters, closed loop.
+"""FMUs in, and what is required of them out: valid, every input by the getters, the drive, V and MPa, closed loop.
 
-Nothing of the generator is used: XML and binaries are read here, and the FMI functions called from C of this room, in
-processes of their own.
+FMPy reads and runs them, in a process of its own; nothing of the generator is used.
 """

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, schema_of, to_json_bytes
@@ -11,13 +13,12 @@ from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
-from dzdesign.design.pressure_inputs.not_covered import not_covered
-from dzdesign.verify.firmware.compensator_checks import certificate_follows, law_follows, valve_follows
+from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify.firmware.folder import read_compensator
-from dzdesign.verify.firmware.recomputed_bounds import bounds_follow
+from dzdesign.verify.firmware.reproduced import Regenerated, reproduced
+from dzdesign.verify.integers.every_pair import Program
 from dzdesign.verify.output_evidence import OutputChecks, OutputEvidence
-from dzdesign.verify.outputs.folder import files_unchanged, manifest_follows, read_output_manifest
-from dzdesign.verify.requirements import Check
+from dzdesign.verify.outputs.folder import read_output_manifest
 
 SCHEMA = schema_of(OutputEvidence)
 Say = Callable[[str], None]
@@ -29,24 +30,19 @@ CheckOutput = Callable[[Path, OutputManifest, Compensator, Say], OutputChecks]
 class OutputKind:
     """One kind of output, and where its checks stand."""
 
-    #: Module with ``checks``, a `CheckOutput`.
+    #: Module with a `CheckOutput`, and its name there; one with a name of its own takes the generator's forms, too.
     module: str
+    checks: str = ""
     #: Options of `verify`, as flags such as --machine-code, that make sense for it beside --output and --ramps, to the
     #: module with the ``checks`` that are made where one is given.
     options: Mapping[str, str] = field(default_factory=dict)
-    #: Whether its files are code that the checks compile or run as they are.
-    runs: bool = False
 
 
 #: Target, as the manifest names it, to its checks.
 KINDS: Mapping[str, OutputKind] = {
-    "iec61131": OutputKind(module="dzdesign.verify.structured_text.checks"),
-    "fmu": OutputKind(
-        module="dzdesign.verify.fmu.checks",
-        options={"--machine-code": "dzdesign.verify.fmu.other_machines"},
-        runs=True,
-    ),
-    "matlab": OutputKind(module="dzdesign.verify.matlab.checks", runs=True),
+    "iec61131": OutputKind(module="dzdesign.verify.integers.checks", checks="block_checks"),
+    "fmu": OutputKind(module="dzdesign.verify.fmu.checks"),
+    "matlab": OutputKind(module="dzdesign.verify.integers.checks", checks="function_checks"),
     "amplifier": OutputKind(module="dzdesign.verify.amplifier.output_checks"),
 }
 
@@ -91,26 +87,30 @@ def kind_for(folder: Path, options: Sequence[str] = ()) -> OutputKind:
 
 
 def verify_output(
-    folder: Path, options: Sequence[str] = (), say: Say = lambda _: None, code: Path | None = None
+    folder: Path,
+    options: Sequence[str] = (),
+    say: Say = lambda _: None,
+    again: Regenerated | None = None,
+    code: Path | None = None,
+    forms: Mapping[str, Program] = MappingProxyType({}),
 ) -> OutputVerification:
     """Verify the folder of an output, made by `dzdesign codegen`.
 
     `options` are the flags that were given; one that makes no sense for this kind is an `InputError`, and so is a
-    folder that is no output. What is compiled and run is taken from `code`, by default the folder itself. `say` is told
-    each stage before it begins.
+    folder that is no output. `again` is the output as it is generated now; of a folder that differs nothing else is
+    tried, and without it the folder is not compared. What is read, compiled and run is taken from `code`, by default
+    the folder itself. `say` is told each stage before it begins. `forms` are the generator's evaluations of
+    an output's texts, by the names of their files: functions of arrays of inputs.
     """
     kind, manifest = kind_for(folder, options), read_output_manifest(folder)
     compensator = read_compensator(folder)
-    unchanged = files_unchanged(folder, manifest)
-    modules = (kind.module, *(kind.options[flag] for flag in options))
-    rooms: list[CheckOutput] = [import_module(module).checks for module in modules]
+    same = None if again is None else reproduced(folder, again)
+    rooms: list[CheckOutput] = []
+    if again is None or same is None or (again.files and same.holds is not False):
+        first = getattr(import_module(kind.module), kind.checks or "checks")
+        rooms = [partial(first, forms=forms) if kind.checks else first]
+        rooms += [import_module(kind.options[flag]).checks for flag in options]
     found = [check(code or folder, manifest, compensator, say) for check in rooms]
-    of_all: tuple[Check, ...] = (
-        certificate_follows(compensator),
-        bounds_follow(compensator),
-        law_follows(compensator),
-        valve_follows(folder, compensator),
-    )
     digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     return OutputVerification(
         evidence=OutputEvidence(
@@ -119,12 +119,7 @@ def verify_output(
             target=manifest.target,
             settings=manifest.settings,
             origin=manifest.origin,
-            checks=(
-                unchanged,
-                manifest_follows(folder, manifest, compensator),
-                *(check for each in found for check in each.checks),
-                *of_all,
-            ),
+            checks=(*((same,) if same else ()), *(check for each in found for check in each.checks)),
             inputs=tuple(tried for each in found for tried in each.inputs),
             versions={tool: version for each in found for tool, version in each.versions.items()},
             not_covered=not_covered(compensator),

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_files import sha256_of, sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
 from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, VALVE_HEADER, block_of, bound_files
-from dzdesign.verify.toolchain.confined_library import ConfinedLibrary, Function
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
 #: Source of the law, and what the names of its functions end with, by the sign of command.
@@ -100,7 +100,7 @@ class CompiledCore:
             arguments = [str(stored(prepared)), *(["sample"] if sample else []), *blocks]
         program = machine.link(objects, f"the core {self.name} ({machine.name})")
         printed = machine.run(program, arguments, f"the core {self.name}")
-        return findings_of(printed, sha256_of(core.read_bytes()), f"the core {self.name} on the {machine.name}")
+        return findings_of(printed, sha256_of_octets(core.read_bytes()), f"the core {self.name} on the {machine.name}")
 
     def _adapter(self, machine: Machine, names: Sequence[str], held: bool) -> Path:
         """Return the object that binds the core's functions of a side to a block."""
@@ -115,7 +115,7 @@ def core_answers(folder: Path, sign: int, codes: np.ndarray) -> np.ndarray:
     sources = {**core.sources, f"{ANSWERS.name}.c": _read(PROGRAMS / f"{ANSWERS.name}.c")}
     texts = {name: text.decode(errors="surrogateescape") for name, text in sources.items()} | bound_files(folder)
     called = _defines(held=False, macros=("DZ_COMP", "DZ_STATUS"), names=[f"dz_{name}{ending}" for name in CALLED[:2]])
-    library = ConfinedLibrary(texts, [ANSWERS], f"the core {core.name}", called)
+    library = CompiledLibrary(texts, [ANSWERS], f"the core {core.name}", called)
     given, found = np.ascontiguousarray(codes, dtype=np.uint16), np.zeros((len(codes), 2), dtype=np.uint16)
     library.call(ANSWERS.name, given, len(given), found)
     return found

@@ -17,7 +17,7 @@ from threading import Lock
 
 import platformdirs
 
-from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_files import sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.processes.programs import find_program
 from dzdesign.core.processes.running import run_program
@@ -208,7 +208,7 @@ def built(name: str, command: Sequence[str], sources: Mapping[str, bytes], what:
     The command names no output; a file that is there is whole.
     """
     parts = [part for source in sorted(sources.items()) for part in (source[0].encode(), source[1])]
-    folder = build_folder() / sha256_of(b"\0".join([*parts, *map(os.fsencode, command), name.encode()]))[:32]
+    folder = build_folder() / sha256_of_octets(b"\0".join([*parts, *map(os.fsencode, command), name.encode()]))[:32]
     with alone(folder):
         if not (folder / name).exists():
             folder.mkdir(exist_ok=True)

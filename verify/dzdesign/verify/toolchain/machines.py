@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
-from dzdesign.core.artefact_files import sha256_of
+from dzdesign.core.artefact_files import sha256_of_octets
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.programs import find_program
-from dzdesign.verify.toolchain.confinement import MOST_MEMORY, numbers_in, run_confined
+from dzdesign.verify.toolchain.child_process import numbers_in, run_child
 from dzdesign.verify.toolchain.host_compiler import alone, build_folder, built, host_compiler, words_of
 
 logger = logging.getLogger(__name__)
@@ -57,10 +57,6 @@ class Machine:
     small: bool = False
     #: A run that takes longer hangs.
     run_timeout_s: float = 60.0
-    #: Most address space of the program, bytes; 0: any, as a simulator needs.
-    memory: int = MOST_MEMORY
-    #: Whether the program runs with limits and without rights that it does not need.
-    confined: bool = True
 
     def missing(self) -> str:
         """Return what was not found, with what to install, or an empty text."""
@@ -88,17 +84,11 @@ class Machine:
         ending = ".exe" if sys.platform == "win32" and not self.compiler else ""
         return built(f"program{ending}", [*words_of(self._compiler), *map(str, objects), *flags], {}, what)
 
-    def run(self, program: Path, arguments: list[str], what: str, results: Path | None = None) -> list[list[int]]:
-        """Run a program and return the lines of numbers that it printed; if it fails or hangs, `RequirementError`.
-
-        `results` is the one folder in which it may write.
-        """
+    def run(self, program: Path, arguments: list[str], what: str) -> list[list[int]]:
+        """Run a program and return the lines of numbers that it printed; if it fails or hangs, `RequirementError`."""
         command = [*self.runner, str(program), *arguments]
         begin = time.perf_counter()
-        ended = run_confined(
-            command, f"{what} on the {self.name}", self.run_timeout_s, memory=self.memory, results=results,
-            confined=self.confined,
-        )  # fmt: skip
+        ended = run_child(command, f"{what} on the {self.name}", self.run_timeout_s)
         logger.debug("%s (%.3f s)", shlex.join(command), time.perf_counter() - begin)
         if ended.reason:
             said = f": {ended.complaint.strip()[:200]}" if ended.complaint.strip() else ""
@@ -109,7 +99,7 @@ class Machine:
 
 def stored(content: bytes) -> Path:
     """Return a file of that content, written once."""
-    file = build_folder() / f"{sha256_of(content)[:32]}.bin"
+    file = build_folder() / f"{sha256_of_octets(content)[:32]}.bin"
     with alone(file):
         if not file.exists():
             file.write_bytes(content)
@@ -119,7 +109,7 @@ def stored(content: bytes) -> Path:
 def discard(*contents: bytes) -> None:
     """Remove files of such contents: what one valve of a lot needs, no other does."""
     for content in contents:
-        file = build_folder() / f"{sha256_of(content)[:32]}.bin"
+        file = build_folder() / f"{sha256_of_octets(content)[:32]}.bin"
         with alone(file):
             file.unlink(missing_ok=True)
 
@@ -144,7 +134,6 @@ CORTEX_M4 = Machine(
     ),
     needs={"arm-none-eabi-gcc": "gcc-arm-none-eabi", "qemu-system-arm": "qemu-system-arm"},
     run_timeout_s=300.0,
-    memory=0,
 )  # fmt: skip
 CHIP, CLOCK_HZ = "atmega1280", 16_000_000
 _AVR = (f"-mmcu={CHIP}", f"-DF_CPU={CLOCK_HZ}UL")
@@ -164,5 +153,4 @@ AVR = Machine(
     needs={"avr-gcc": "gcc-avr avr-libc", "simavr": "simavr"},
     small=True,
     run_timeout_s=300.0,
-    memory=0,
 )

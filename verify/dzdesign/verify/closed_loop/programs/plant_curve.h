@@ -2,7 +2,7 @@
 #ifndef PLANT_CURVE_H
 #define PLANT_CURVE_H
 
-#include "plant_stops.h"
+#include "plant.h"
 
 /* The table, as stand_in.py writes it: a head, then where each test begins. */
 enum { CURVE_TESTS, CURVE_U_MAX_V, CURVE_V_PER_M, CURVE_SCALE, CURVE_SAG_STEPS, CURVE_SLOPES, CURVE_STARTS = CURVE_SLOPES + 2 };

@@ -1,0 +1,224 @@
+"""Integer operations on named values, each with the exact range of its results: the proof that none overflows."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Union
+
+import numpy as np
+
+from dzdesign.core.errors import DzdesignError, InputError
+
+Given = Union["Node", int]
+REMEDY = "choose scalings with smaller common denominators"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Node:
+    """One operation, or an input, a constant or a name of one; `low` and `high` are the ends of its values."""
+
+    #: What it does, as in `EVALUATED`; "input", "number" and "constant" are leaves, "let" names its operand.
+    operation: str
+    operands: tuple["Node", ...] = ()
+    low: int
+    high: int
+    #: Bits of the signed word that holds the value.
+    bits: int
+    boolean: bool = False
+    name: str = ""
+    #: What it is, with its unit and equation; of a constant and of a named operation.
+    meaning: str = ""
+    #: Values of a constant: one, or those of a table.
+    values: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        limit = 1 << self.bits - 1
+        if not -limit <= self.low <= self.high < limit:
+            raise InputError(
+                f"'{self.name or self.operation}' of the law goes from {self.low} to {self.high}, beyond "
+                f"{self.bits} bits; {REMEDY}"
+            )
+
+    def _made(self, operation: str, others: tuple[Given, ...], ends: list[int], *, boolean: bool = False) -> "Node":
+        operands = (self, *map(self.number, others))
+        return Node(
+            operation=operation, operands=operands, low=min(ends), high=max(ends), bits=self.bits, boolean=boolean
+        )
+
+    def number(self, value: Given) -> "Node":
+        """Return a whole number as a node beside this one."""
+        if isinstance(value, Node):
+            return value
+        return Node(operation="number", low=value, high=value, bits=self.bits, values=(value,))
+
+    def _ends(self, other: Given, of: Callable[[int, int], int]) -> list[int]:
+        second = self.number(other)
+        return [of(x, y) for x in (self.low, self.high) for y in (second.low, second.high)]
+
+    def __add__(self, other: Given) -> "Node":
+        return self._made("+", (other,), self._ends(other, lambda x, y: x + y))
+
+    def __sub__(self, other: Given) -> "Node":
+        return self._made("-", (other,), self._ends(other, lambda x, y: x - y))
+
+    def __mul__(self, other: Given) -> "Node":
+        return self._made("*", (other,), self._ends(other, lambda x, y: x * y))
+
+    def __neg__(self) -> "Node":
+        return self._made("neg", (), [-self.low, -self.high])
+
+    def __rshift__(self, shift: int) -> "Node":
+        return self._made(">>", (shift,), self._ends(shift, lambda x, y: x >> y))
+
+    def least(self, other: Given) -> "Node":
+        """Return the smaller of two values."""
+        return self._made("min", (other,), self._ends(other, min))
+
+    def most(self, other: Given) -> "Node":
+        """Return the larger of two values."""
+        return self._made("max", (other,), self._ends(other, max))
+
+    def quotient(self, divisor: Given) -> "Node":
+        """Return the quotient by a positive number, rounded towards zero as IEC 61131-3 has it."""
+        return self._made("/", (divisor,), self._ends(divisor, truncated))
+
+    def remainder(self, divisor: int) -> "Node":
+        """Return what `quotient` leaves, with the sign of the dividend."""
+        return self._made("mod", (divisor,), [max(self.low, 1 - divisor) if self.low < 0 else 0,
+                                              min(self.high, divisor - 1) if self.high > 0 else 0])  # fmt: skip
+
+    def _compared(self, operation: str, other: Given) -> "Node":
+        return self._made(operation, (other,), [0, 1], boolean=True)
+
+    def __lt__(self, other: Given) -> "Node":
+        return self._compared("<", other)
+
+    def __gt__(self, other: Given) -> "Node":
+        return self._compared(">", other)
+
+    def __le__(self, other: Given) -> "Node":
+        return self._compared("<=", other)
+
+    def __or__(self, other: "Node") -> "Node":
+        return self._compared("or", other)
+
+    def __and__(self, other: "Node") -> "Node":
+        return self._compared("and", other)
+
+    def __invert__(self) -> "Node":
+        return self._made("not", (), [0, 1], boolean=True)
+
+    def as_number(self) -> "Node":
+        """Return 1 for true and 0 for false."""
+        return self._made("int", (), [0, 1])
+
+    def choose(self, yes: Given, no: Given) -> "Node":
+        """Return one of two values, by this condition."""
+        first, second = self.number(yes), self.number(no)
+        ends = [first.low, first.high, second.low, second.high]
+        return self._made("choose", (first, second), ends)
+
+    def of(self, index: "Node") -> "Node":
+        """Return an element of this table; an index outside of it is an error of the trace."""
+        if not 0 <= index.low <= index.high < len(self.values):
+            raise DzdesignError(f"{self.name} has {len(self.values)} elements; its index goes to {index.high}")
+        return self._made("of", (index,), [min(self.values), max(self.values)])
+
+    def interpolated(self, row: "Node", past: "Node", step: int) -> "Node":
+        """Return `step` times the table's value between two rows; a mean of two nodes lies within the nodes."""
+        left = self.of(row)
+        made = left * step + (self.of(row + 1) - left) * past
+        if past.low < 0 or past.high > step:
+            raise DzdesignError(f"{past.name} goes from {past.low} to {past.high}, beyond its step {step}")
+        return replace(made, low=min(self.values) * step, high=max(self.values) * step)
+
+    def mean(self, other: "Node", weight: "Node", rest: "Node", whole: int) -> "Node":
+        """Return two values by weights that are `whole` together: within theirs, times `whole`."""
+        made = self * weight + other * rest
+        ends = [value * whole for value in (self.low, self.high, other.low, other.high)]
+        return replace(made, low=min(ends), high=max(ends))
+
+
+def truncated(x: int, y: int) -> int:
+    """Return a quotient rounded towards zero."""
+    return abs(x) // y * (1 if x >= 0 else -1)
+
+
+@dataclass(slots=True, kw_only=True)
+class Form:
+    """The operations of one text, in their order."""
+
+    #: Of the word that every value fits.
+    bits: int
+    inputs: list[Node] = field(default_factory=list)
+    constants: list[Node] = field(default_factory=list)
+    #: Named operations; what stands between two names is used once.
+    lines: list[Node] = field(default_factory=list)
+    #: Heading to the place of the line that it stands before.
+    headings: dict[int, str] = field(default_factory=dict)
+    outputs: tuple[str, ...] = ()
+
+    def input(self, name: str, low: int, high: int, *, boolean: bool = False) -> Node:
+        """Return an input, or what is remembered of the last call."""
+        self.inputs.append(Node(operation="input", low=low, high=high, bits=self.bits, name=name, boolean=boolean))
+        return self.inputs[-1]
+
+    def constant(self, name: str, values: tuple[int, ...], meaning: str) -> Node:
+        """Return a number, or a table, that has a name."""
+        self.constants.append(
+            Node(operation="constant", low=min(values), high=max(values), bits=self.bits, name=name, meaning=meaning,
+                 values=values)
+        )  # fmt: skip
+        return self.constants[-1]
+
+    def let(self, name: str, node: Node, meaning: str = "") -> Node:
+        """Return an operation under a name: it gets a line of its own."""
+        self.lines.append(replace(node, operation="let", operands=(node,), name=name, meaning=meaning, values=()))
+        return self.lines[-1]
+
+    def heading(self, text: str) -> None:
+        """Put a heading before the next line."""
+        self.headings[len(self.lines)] = text
+
+    def evaluate(self, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return the value of every line, over arrays of inputs that broadcast against each other."""
+        kind = np.int32 if self.bits == 32 else np.int64
+        found: dict[Node, np.ndarray] = {
+            each: np.asarray(given[each.name], dtype=bool if each.boolean else kind) for each in self.inputs
+        }
+        found |= {each: np.array(each.values if len(each.values) > 1 else each.values[0], dtype=kind)
+                  for each in self.constants}  # fmt: skip
+
+        def value(node: Node) -> np.ndarray:
+            if node in found:
+                return found[node]
+            if node.operation == "number":
+                return np.array(node.low, dtype=kind)
+            operands = [value(each) for each in node.operands]
+            if node.operation in ("/", "mod"):
+                return _divided(node, *operands)
+            return EVALUATED[node.operation](*operands)
+
+        for line in self.lines:
+            found[line] = value(line.operands[0])
+        return {line.name: found[line] for line in self.lines}
+
+
+def _divided(node: Node, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return quotient or remainder, rounded towards zero; by a power of two with shifts, which are quicker."""
+    divisor = node.operands[1]
+    power = divisor.high.bit_length() - 1
+    if divisor.low == divisor.high == 1 << power:
+        up = x if node.operands[0].low >= 0 else x + ((x >> node.bits - 1) & x.dtype.type((1 << power) - 1))
+        quotient = up >> power
+    else:
+        size = np.abs(x) // y
+        quotient = size if node.operands[0].low >= 0 else np.where(x < 0, -size, size)
+    return quotient if node.operation == "/" else x - quotient * y
+
+
+EVALUATED: Mapping[str, Callable[..., np.ndarray]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "neg": np.negative, ">>": np.right_shift, "min": np.minimum,
+    "max": np.maximum, "<": np.less, ">": np.greater, "<=": np.less_equal, "or": np.logical_or,
+    "and": np.logical_and, "not": np.logical_not, "int": lambda x: x.astype(np.int32), "choose": np.where,
+    "of": lambda table, index: table[index],
+}  # fmt: skip

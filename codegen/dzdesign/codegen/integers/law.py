@@ -1,0 +1,366 @@
+"""The law of a compensator as integer operations, traced once: of both sides for a PLC, of one for MATLAB.
+
+With B_law and B the tables between their nodes, c the command from zero on, Z and E the lengths of zero band and
+transition, r = min(max(c - Z, 0), E) what of the transition is passed and m = max(c, Z + E),
+
+    sum = r * (B_law * (slope * m + offset) + linear * m) + (E - r) * (B * offset) + half,
+
+between the law and the certified offset by weights; without a transition r = E = 1. The output is the sum over 2^shift
+and a divisor: see codegen/dzdesign/codegen/core/integer_form.py. A word of 64 bits holds the sum as it is; of 32 bits
+it is made of limbs.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from dzdesign.codegen.core.integer_form import IntegerForm, Scaling, exact_reciprocal, integer_form
+from dzdesign.codegen.integers.form import Form, Node
+from dzdesign.codegen.integers.interface import Interface, interface_named
+from dzdesign.codegen.integers.limbs import Limbs
+from dzdesign.codegen.telemetry.frame import beta_factor
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.signals import CODE_LIMIT
+
+#: Function of each sign of command.
+FUNCTIONS = {1: "dz_comp", -1: "dz_comp_negative"}
+DINT = 2**31
+LINEAR, HALF = "what the law takes of the command alone", "half a unit of the output, for it is rounded"
+Evaluation = Callable[[Mapping[str, np.ndarray]], dict[str, np.ndarray]]
+#: Bits of the sum that are dropped at most: in limbs of 15 bits, two of them and one bit less than a third.
+MOST_DROPPED = 44
+#: And at least, so that what is left fits a word.
+LEAST_DROPPED = 32
+
+
+def forms_of(compensator: Compensator, manifest: OutputManifest) -> dict[str, Evaluation]:
+    """Return the evaluation of each text of an output, by the name of its file; of others there is none."""
+    if manifest.target == "iec61131":
+        return {"FB_DeadZone.st": block_form(compensator, manifest.settings.get("interface", "")).evaluate}
+    if manifest.target == "matlab":
+        return {f"{FUNCTIONS[sign]}.m": function_form(compensator, sign).evaluate for sign in compensator.signals.signs}
+    return {}
+
+
+def block_form(compensator: Compensator, interface_name: str) -> Form:
+    """Return the operations of a function block, of all sides, in words of 32 bits."""
+    interface = interface_named(interface_name, compensator)
+    return _Block(compensator, interface, tuple(interface.sides), 32).traced()
+
+
+def function_form(compensator: Compensator, sign: int) -> Form:
+    """Return the operations of one side's function of converter codes, in words of 64 bits."""
+    return _Function(compensator, interface_named("codes", compensator), (sign,), 64).traced()
+
+
+class _Law:
+    """What block and function have alike."""
+
+    def __init__(self, compensator: Compensator, interface: Interface, signs: tuple[int, ...], bits: int) -> None:
+        self.compensator, self.interface, self.signs = compensator, interface, signs
+        self.sides = {sign: interface.sides[sign] for sign in signs}
+        self.form = Form(bits=bits)
+        self.numbers = {sign: self._numbers(sign) for sign in signs}
+        self.transition = {sign: side.transition or 1 for sign, side in self.sides.items()}
+        #: All sides drop as many bits of the sum; what one has beyond is in its divisor.
+        dropped = [each.shift + twos(self.transition[sign]) for sign, each in self.numbers.items()]
+        self.shift = min(MOST_DROPPED, *dropped)
+        self.made: dict[str, Node] = {}
+        #: Row of the driven side's numbers, where there are two.
+        self.row: Node | None = None
+
+    def _numbers(self, sign: int) -> IntegerForm:
+        side, interface = self.sides[sign], self.interface
+        least_shift = max(LEAST_DROPPED - twos(side.transition or 1), 1) if self.form.bits == 32 else 1
+        units = Scaling(span=side.span, transition=0, full=interface.full, limit=interface.limit,
+                        rounds=interface.rounds, least_shift=least_shift)  # fmt: skip
+        return integer_form(self.compensator, sign, units)
+
+    def one(self, name: str, value: int, meaning: str) -> Node:
+        """Return a constant of no side."""
+        return self.each(name, dict.fromkeys(self.signs, value), meaning)
+
+    def each(self, name: str, values: Mapping[int, int], meaning: str) -> Node:
+        """Return a constant of each side: of the driven one, where they differ."""
+        if name not in self.made:
+            numbers = tuple(dict.fromkeys(values[sign] for sign in self.signs))
+            numbers = numbers if len(numbers) == 1 else tuple(values[sign] for sign in self.signs)
+            self.made[name] = self.form.constant(name, numbers, meaning)
+        found = self.made[name]
+        return found if len(found.values) == 1 else found.of(self.row or found.number(0))
+
+    def side_field(self, name: str, attribute: str, meaning: str) -> Node:
+        """Return a constant of each side's scaling."""
+        return self.each(name, {sign: getattr(side, attribute) for sign, side in self.sides.items()}, meaning)
+
+    def command(self, command: Node) -> tuple[Node, Node]:
+        """Return whether a command is valid, and how far it is from zero towards positive commands; 0 where not."""
+        interface = self.interface
+        low = self.one("COMMAND_LOW", interface.command_low, "lowest valid command")
+        high = self.one("COMMAND_HIGH", interface.command_high, "highest valid command")
+        valid = self.form.let("valid", ~((command < low) | (command > high)), "command: 1 where it is valid")
+        inside, direction = command.most(low).least(high), interface.command_direction
+        if self.signs == (-1,):
+            direction = -direction
+        if interface.command_zero or direction < 0:
+            zero = self.one("COMMAND_ZERO", interface.command_zero, "zero command")
+            inside = inside - zero if direction > 0 else zero - inside
+        return valid, self.form.let("away", valid.choose(inside, 0), "command from zero on")
+
+    def pressures(
+        self, valid: Node, pressure_a: Node, pressure_b: Node, turned: Node | None = None
+    ) -> tuple[Node, Node]:
+        """Return the pressure drop, and whether the pressures can't be right; say in `status` what is not valid."""
+        interface, failed, found = self.interface, [], []
+        for name, signal, given in (("A", interface.a, pressure_a), ("B", interface.b, pressure_b)):
+            low = self.one(f"PRESSURE_{name}_LOW", signal.low, f"lowest valid pressure {name}")
+            high = self.one(f"PRESSURE_{name}_HIGH", signal.high, f"highest valid pressure {name}")
+            failed.append(self.form.let(f"{name.lower()}_failed", (given < low) | (given > high),
+                                        f"pressure {name}: 1 where it is not valid"))  # fmt: skip
+            value = given.most(low).least(high)
+            if signal.zero:
+                value -= self.one(f"PRESSURE_{name}_ZERO", signal.zero, f"no pressure at sensor {name}")
+            if signal.weight != 1:
+                weight = f"what a number of {name} weighs in the difference"
+                value *= self.one(f"PRESSURE_{name}_WEIGHT", signal.weight, weight)
+            found.append(value)
+        a, b = found
+        difference = b - a if self.signs == (-1,) and self.sides[-1].turn < 0 else a - b
+        unit = interface.weight_unit
+        told = f"pressure drop, A minus B{f', times {unit}' if unit != 1 else ''}"
+        difference = self.form.let("difference", difference, told)
+        if turned is not None:
+            difference = self.form.let("drop", turned.choose(-difference, difference), "of the driven side")
+        reverse = self.one("REVERSE", interface.reverse * unit, "a pressure drop below minus this: a failed sensor")
+        tested = self.each("TESTED_TO", {s: (side.tested_to + 1) * unit - 1 for s, side in self.sides.items()},
+                           f"largest tested pressure drop{f', times {unit}' if unit != 1 else ''}")  # fmt: skip
+        sound = self.form.let("sound", ~(failed[0] | failed[1]), "1 where both pressures are valid")
+        below = self.form.let("below", sound & (difference < -reverse), "1 where the drop is too far below zero")
+        above = sound & (difference > tested)
+        status = (~valid).as_number()
+        for place, fault in enumerate((*failed, below, above), 1):
+            status = status + fault.as_number() * 2**place
+        self.form.let("status", status)
+        implausible = self.form.let("failed", ~sound | below, "1 where the pressures can't be right: least beta")
+        dp = difference.most(0)
+        if unit != 1:
+            told = "codes of sensor A, rounded down"
+            dp = self.form.let("dp", dp >> unit.bit_length() - 1 if self.form.bits == 64 else dp.quotient(unit), told)
+        return dp, implausible
+
+    def betas(self, dp: Node, failed: Node) -> list[Node]:
+        """Return beta of the law, and with a transition the certified one at zero command."""
+        step = self.compensator.beta_step_codes
+        last = self.side_field("LAST_CODE", "last_code", "largest pressure drop that valid pressures make, in codes")
+        tables = {"law": [self.numbers[sign].table for sign in self.signs]}
+        if self.compensator.transition_codes:
+            tables["zero"] = [self._zero_table(sign) for sign in self.signs]
+        alike = all(len(set(each)) == 1 for each in tables.values())
+        count = max(len(each) - 2 for each in tables["law"])
+        first = None
+        if not alike:
+            starts = {sign: place * count for place, sign in enumerate(self.signs)}
+            first = self.each("FIRST_ROW", starts, "where a side's nodes begin")
+        nodes = {name: self._nodes(name, each[:1] if alike else each, count) for name, each in tables.items()}
+        least = {}
+        for name, each in tables.items():
+            values = {sign: table[-1] * step for sign, table in zip(self.signs, each, strict=True)}
+            told = "the smallest, for pressures that can't be right"
+            least[name] = self.each(f"{name.upper()}_LEAST", values, told)
+        found: dict[str, list[Node]] = {name: [] for name in tables}
+        for suffix, code, told in self._codes(dp):
+            code = self.form.let(f"code{suffix}", code.least(last), told)
+            row = code >> step.bit_length() - 1 if self.form.bits == 64 else code.quotient(step)
+            row = self.form.let(f"row{suffix}", row if first is None else row + first, "node of beta")
+            rest = code - (code >> step.bit_length() - 1) * step if self.form.bits == 64 else code.remainder(step)
+            # What a division leaves is below its divisor, whatever its operands are by themselves.
+            past = self.form.let(f"past{suffix}", replace(rest, low=0, high=step - 1), "codes past the node")
+            for name, table in nodes.items():
+                found[name].append(table.interpolated(row, past, step))
+        betas = []
+        for name, read in found.items():
+            value = read[0] if len(read) == 1 else read[0].least(read[1])
+            told = "beta of the law" if name == "law" else "beta of the certified offset at zero command"
+            betas.append(self.form.let(f"{name}_beta", failed.choose(least[name], value), told))
+        return betas
+
+    def _zero_table(self, sign: int) -> tuple[int, ...]:
+        """Return the nodes of the certified beta, then twice the smallest, as the law's."""
+        nodes, scale = self.compensator.side(sign).beta, self.numbers[sign].scale_beta
+        return tuple(scale * node for node in (*nodes, *(min(nodes),) * 2))
+
+    def _nodes(self, name: str, tables: list[tuple[int, ...]], count: int) -> Node:
+        units = [str(self.numbers[sign].scale_beta * self.compensator.beta_denominator) for sign in self.signs]
+        text = "the same of the certified offset at zero command"
+        if name == "law":
+            text = f"beta of Eq. (7), so many to 1: {' and '.join(dict.fromkeys(units))}"
+        rows = [(*table[:-2], *(table[-3],) * (count + 2 - len(table))) for table in tables]
+        return self.form.constant(f"{name.upper()}_NODES", tuple(node for row in rows for node in row), text)
+
+    def _codes(self, dp: Node) -> list[tuple[str, Node, str]]:
+        """Return the codes at which beta is read; the least of the betas counts.
+
+        Of the pressure drops that a number of a PLC stands for it is one end, as a table rises to a code and falls
+        from it on.
+        """
+        if self.interface.resolution == 0:
+            return [("", dp, "codes of the pressure drop")]
+        ratio, reach = self.interface.codes_per_unit, self.interface.resolution
+        codes = self.one("CODES", ratio.numerator, "so many codes of pressure drop are")
+        units = self.one("UNITS", ratio.denominator, "so many units of the inputs")
+        upper = ((dp + reach) * codes + (units - 1)).quotient(units)
+        found = [("", upper, "code at the upper end of what the pressure drop stands for")]
+        tables = [self.numbers[sign].table[:-2] for sign in self.signs]
+        tables += [self._zero_table(sign)[:-2] for sign in self.signs]
+        if any(list(table) != sorted(table, reverse=True) for table in tables):
+            lower = ((dp - reach).most(0) * codes).quotient(units)
+            found.append(("_low", lower, "code at the lower end"))
+        return found
+
+    def output(self, towards: Node, betas: list[Node]) -> Node:
+        """Return the law's output, limited, at a command towards the driven side."""
+        form, ahead, reached, missing = self.form, towards, None, None
+        if self.compensator.transition_codes:
+            band = self.band()
+            length = self.side_field("TRANS_SPAN", "transition", "commands from the zero band to the opening threshold")
+            passed = (towards - band).most(0).least(length)
+            reached = form.let("reached", passed, "commands of the transition that are passed")
+            missing = form.let("missing", length - reached, "commands of the transition that are not")
+            ahead = form.let("ahead", towards.most(band + length), "the command, at least the transition's end")
+        slope = self.of_law(
+            "SLOPE", "slope", "of the command in beta's factor; k x_max/u_max", "drive_range_over_u_max"
+        )
+        offset = self.of_law("OFFSET", "offset", "constant in beta's factor; u_min0/u_max", "u_min0_over_u_max")
+        factor = form.let("factor", ahead * slope + offset, "what beta is multiplied by")
+        linear = [self.numbers[sign].linear << self.numbers[sign].linear_shift for sign in self.signs]
+        half = [self.numbers[sign].half * self.transition[sign] for sign in self.signs]
+        if form.bits == 64:
+            total = betas[0] * factor
+            if any(linear):
+                total = total + ahead * self.one("LINEAR", linear[0], LINEAR)
+            if reached is not None and missing is not None:
+                total = total.mean(betas[1] * offset, reached, missing, self.transition[self.signs[0]])
+            if any(half):
+                total = total + self.one("HALF", half[0], HALF)
+            return self._divided(form.let("total", total, "the law's sum") >> self.shift)
+        limbs = Limbs(form, self.row)
+        limbs.add("law", betas[0], factor, reached)
+        if any(linear):
+            limbs.add_share("own", ahead, limbs.constant("LINEAR", linear, LINEAR), reached)
+        if missing is not None:
+            at_zero = form.let("at_zero", offset, "what the certified beta is multiplied by")
+            limbs.add("zero", betas[1], at_zero, missing)
+        limbs.add_number(limbs.constant("HALF", half, HALF))
+        return self._divided(limbs.shifted(self.shift))
+
+    def of_law(self, name: str, attribute: str, meaning: str, ratio: str) -> Node:
+        """Return a number of each side's law, with the ratio that it stands for."""
+        ratios = [str(getattr(self.compensator.side(sign), ratio)) for sign in self.signs]
+        told = f"{meaning} = {' and '.join(dict.fromkeys(ratios))}"
+        return self.each(name, {sign: getattr(each, attribute) for sign, each in self.numbers.items()}, told)
+
+    def band(self) -> Node:
+        """Return the zero band's end."""
+        return self.side_field("ZERO_BAND", "zero_band", "a command up to this counts as zero")
+
+    def _divided(self, quotient: Node) -> Node:
+        """Return the output of a sum over 2^shift."""
+        form, limit = self.form, self.interface.limit
+        dropped = {sign: each.shift - self.shift for sign, each in self.numbers.items()}
+        divisors = {sign: (each.divisor * self.transition[sign] << max(dropped[sign], 0)) >> max(-dropped[sign], 0)
+                    for sign, each in self.numbers.items()}  # fmt: skip
+        if form.bits == 32:
+            by = self.each("DIVISOR", divisors, f"of the sum over 2^{self.shift}: makes units of the output")
+            most = self.one("OUTPUT_LIMIT", limit, "largest output")
+            return form.let("drive", quotient.most(0).quotient(by).least(most), "output of the law")
+        divisor = divisors[self.signs[0]]
+        largest = (limit + 1) * divisor - 1
+        drive = quotient.most(0).least(self.one("QUOTIENT_LIMIT", largest, f"of an output of {limit}"))
+        if divisor != 1:
+            reciprocal, shift = exact_reciprocal(divisor, largest)
+            told = f"a product and a shift by {shift} divide by {divisor}, exactly"
+            drive = drive * self.one("RECIPROCAL", reciprocal, told) >> shift
+        return form.let("drive", drive, "output of the law")
+
+
+def twos(value: int) -> int:
+    """Return how often 2 divides a number."""
+    return (value & -value).bit_length() - 1
+
+
+class _Block(_Law):
+    """A function block: it remembers the driven side, and whether the command counts as zero."""
+
+    def traced(self) -> Form:
+        """Return the operations."""
+        form, both = self.form, len(self.signs) == 2
+        command, a, b = (form.input(name, -DINT, DINT - 1) for name in ("command", "pressure_a", "pressure_b"))
+        form.heading("Command, from zero on; zero where it is not valid.")
+        valid, away = self.command(command)
+        towards, negative, driven = self._side(valid, away) if both else (away, None, valid)
+        if self.interface.name == "codes" or both:
+            towards = towards.least(self.side_field("COMMAND_SPAN", "span", "full command, from zero on"))
+        towards = form.let("towards", towards.most(0), "command towards the driven side")
+        if self.compensator.zero_band_codes:
+            before = form.input("at_rest", 0, 1, boolean=True)
+            rests = (towards <= self.band()) | (before & (towards <= self.leave()))
+            at_rest = form.let("at_rest", rests, "whether the command counts as zero")
+            towards = form.let("asked", at_rest.choose(0, towards), "command that the law is given")
+        form.heading("Pressure drop; where it can't be right the smallest beta is taken.")
+        turns = any(side.turn < 0 for side in self.sides.values())
+        dp, failed = self.pressures(valid, a, b, negative if turns else None)
+        form.heading("Eq. (7), beta: straight between its nodes.")
+        betas = self.betas(dp, failed)
+        form.heading("The law: a sum of products, in limbs of 15 bits.")
+        drive = self.output(towards, betas)
+        if negative is None:
+            form.let("output_a", driven.choose(drive, 0))
+        else:
+            form.let("output_a", driven.choose(drive, 0))
+            form.let("output_b", negative.choose(drive, 0))
+        form.outputs = ("output_a", *(("output_b",) if both else ()), "status")
+        return form
+
+    def leave(self) -> Node:
+        """Return the command beyond which zero is left."""
+        return self.side_field("LEAVE_ZERO", "leave_zero", "a command beyond this leaves zero")
+
+    def _side(self, valid: Node, away: Node) -> tuple[Node, Node, Node]:
+        """Follow the driven side; return the command towards it, and whether it is the negative or the positive one."""
+        form, before = self.form, self.form.input("side", -1, 1)
+        first = second = self.leave()
+        if first.operation == "of":
+            second = first.operands[0].of(away.number(1))
+        kept = (away < -second).choose(-1, before)
+        side = form.let("side", valid.choose((away > first).choose(1, kept), 0), "driven side, 1 or -1; 0: none yet")
+        negative = form.let("negative", side < 0, "whether the negative side is driven")
+        self.row = form.let("k", negative.as_number(), "place of the driven side's numbers")
+        return negative.choose(-away, away), negative, side > 0
+
+
+class _Function(_Law):
+    """A function of arrays of codes, of one side."""
+
+    def traced(self) -> Form:
+        """Return the operations."""
+        form, (sign,) = self.form, self.signs
+        u, p_a, p_b = (form.input(name, 0, CODE_LIMIT) for name in ("u", "p_a", "p_b"))
+        form.heading("Command, in codes from zero on; zero where it is not valid.")
+        valid, away = self.command(u)
+        span = self.side_field("COMMAND_SPAN", "span", "full command, from zero on")
+        towards = form.let("towards", away.most(0).least(span), "command towards this side")
+        form.heading("Pressure drop; where it can't be right the smallest beta is taken.")
+        dp, failed = self.pressures(valid, p_a, p_b)
+        form.heading("Eq. (7), beta: straight between its nodes.")
+        betas = self.betas(dp, failed)
+        form.heading("The law.")
+        form.let("compare", valid.choose(self.output(towards, betas), 0))
+        numbers, step = self.numbers[sign], self.compensator.beta_step_codes
+        unit = numbers.scale_beta * self.compensator.beta_denominator * step
+        factor, shift = beta_factor(unit, max(numbers.table) * step)
+        shown = betas[0] * self.one("BETA_FACTOR", factor, "makes beta times 2^15 of it, for a display") >> shift
+        form.let("beta", shown)
+        form.outputs = ("compare", "status", "beta")
+        return form

@@ -1,0 +1,272 @@
+"""One setting for many valves: the largest offset that over-compensates none of them.
+
+Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That is proved as for one
+valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling where one was tested. That it lies
+under the bounds of every valve is proved of each of them, by `prove_lot`, here and by `verify`.
+
+A compensator's file holds the valve that its certificate follows from. The common one holds a real valve of the batch,
+its *carrier*, and never an invented one with the least thresholds of all: no ramp test ever showed that.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import ceil, floor
+
+import numpy as np
+
+from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.worded import worded
+from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.costs import costs_of
+from dzdesign.design.designing import design, prove_monotone
+from dzdesign.design.lot_margins import LotMargin, prove_lot
+from dzdesign.design.lot_valves import LotValve
+from dzdesign.design.machine.accounting import budget_of
+from dzdesign.design.offset.above_tests import AboveChoice
+from dzdesign.design.offset.beta_table import STEP_CODES, choose_beta_table
+from dzdesign.design.offset.exact_row import ExactRow, least_of
+from dzdesign.design.offset.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling
+from dzdesign.design.options import options_of
+from dzdesign.design.side_design import finest_units, left_by_machine, offset_at_reference, over, travel
+from dzdesign.design.side_law import Certificate, SideLaw, Sides
+from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.identify.valve.side_model import SideModel
+
+#: Of u_max: a valve whose ceiling comes this near to the least one of all holds the setting down.
+CLEAR = 1e-6
+#: What all compensators of a batch must have in common.
+SHARED = (
+    "law", "below_dp0", "above", "signals", "u_max_V", "beta_denominator",
+    "transition_codes", "command_error", "drive_functions", "current_drive", "machine",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LotSetting:
+    """One compensator for all valves."""
+
+    #: The common law; the valve in it is the carrier's.
+    compensator: Compensator
+    #: Name of the valve whose trend the law follows and whose certificate the file states.
+    carrier: str
+    #: Pressure drops that every valve was tested over: inside, the setting is certified for each of them.
+    dp_MPa: tuple[float, float]
+    #: Valves that hold the offset down where one was tested, or below; for these `proved` has an exact certificate.
+    #: Above all tests, where the offset falls anyway, the steepest would: that costs no tested pressure drop anything.
+    binding: tuple[str, ...]
+    #: Name to a certificate per sign of command.
+    proved: Mapping[str, tuple[Certificate, ...]]
+    #: Of every valve of the batch: how far the offset stays under its bound.
+    margins: tuple[LotMargin, ...]
+
+    @property
+    def worst(self) -> LotMargin:
+        """The margin of the valve that has the least."""
+        return min(self.margins, key=lambda each: each.margin_V)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Side:
+    """One sign of command of all valves: curves, the least ceiling, and how far each valve's own lies above it."""
+
+    sign: int
+    models: Mapping[str, SideModel]
+    curves: Mapping[str, OffsetCurve]
+    least: OffsetCeiling
+    nearness: Mapping[str, float]
+    binding: frozenset[str]
+
+
+def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
+    """Return the largest setting, under one direction of the threshold, that is certified for every valve.
+
+    The batch gives each valve's own compensator by its name. Refused are valves designed with other options, or without
+    a common pressure drop. The setting has no transition: it would end at one valve's opening threshold, which is
+    another's flow, so a transition that was asked for is refused, and the default's is left out.
+    """
+    first = _without_transition(_shared_design(batch))
+    sides = [_side(batch, first, sign) for sign in first.signals.signs]
+    best: tuple[float, str, dict[int, SideLaw]] | None = None
+    for carrier in _carriers(batch, sides):
+        try:
+            laws = {side.sign: _law(side, carrier, first) for side in sides}
+        except RequirementError:  # no table of that carrier's direction lies under the least ceiling
+            continue
+        gain = sum(float(law.u_min0_over_u_max * sum(law.beta)) for law in laws.values())
+        if best is None or gain > best[0]:
+            best = gain, carrier, laws
+    if best is None:
+        raise InputError("no law of one direction lies under the least guarded offset of all valves")
+    _, carrier, laws = best
+    compensator = replace(
+        _without_transition(batch[carrier]),
+        sides=Sides(positive=laws[1], negative=laws.get(-1)),
+        costs=(),
+        lot=_lot(batch, first, sides),
+    )
+    for side in sides:
+        prove_monotone(compensator, side.sign)
+    prove_certificates(compensator)
+    margins = prove_lot(compensator)
+    proved = {
+        name: tuple(_certified(side, name, laws[side.sign], first) for side in sides if name in side.binding)
+        for name in batch if any(name in side.binding for side in sides)
+    }
+    line = (
+        f"lot setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
+        f"holds the valve {carrier}, for which the lines above are"
+    )
+    compensator = replace(compensator, costs=(*costs_of(compensator), line))
+    return LotSetting(
+        compensator=compensator,
+        carrier=carrier,
+        dp_MPa=_common_interval(side.curves for side in sides),
+        binding=tuple(proved),
+        proved=proved,
+        margins=margins,
+    )
+
+
+def _lot(batch: Mapping[str, Compensator], first: Compensator, sides: Sequence[_Side]) -> tuple[LotValve, ...]:
+    """Return the valves with the bounds of the threshold that their compensators guard."""
+    guards = {side.sign: first.side(side.sign).certificate.guard for side in sides}
+    return tuple(
+        LotValve.of(name, each.valve_json_sha256, {side.sign: side.models[name] for side in sides}, guards)
+        for name, each in batch.items()
+    )
+
+
+def _shared_design(batch: Mapping[str, Compensator]) -> Compensator:
+    """Return one compensator, whose options are those of all; refuse valves that were designed otherwise."""
+    if len(batch) < 2:
+        raise InputError(f"a lot setting needs two valves or more, got {len(batch)}")
+    name, first = next((name, each) for name, each in batch.items())
+    for other, each in batch.items():
+        unlike = [field for field in SHARED if getattr(each, field) != getattr(first, field)]
+        if each.positive.certificate.guard != first.positive.certificate.guard:
+            unlike.append("guard")
+        if each.valve.dither != first.valve.dither:
+            unlike.append("dither of the recordings")
+        if unlike:
+            raise InputError(f"{other} and {name} are designed with another {unlike[0]}, so no setting serves both")
+    asked = (first.options or {}).get("transition", "auto")
+    if first.transition_codes and asked != "auto":
+        raise InputError(
+            f"with --transition '{asked}' the law follows each valve's opening threshold, so no setting serves all"
+        )
+    return first
+
+
+def _without_transition(own: Compensator) -> Compensator:
+    """Return a valve's compensator as it is with ``--transition off``, and with the other options that it has."""
+    if not own.transition_codes:
+        return own
+    if own.target is None or own.options is None:
+        raise InputError("a valve's compensator does not say what it was designed with; make it again")
+    off = options_of({**own.options, "transition": "off"}, own.target)
+    return replace(design(own.valve, off), made_from=own.made_from)
+
+
+def _common_interval(sides: Iterable[Mapping[str, OffsetCurve]]) -> tuple[float, float]:
+    """Return the pressure drops that all curves cover, MPa."""
+    ends = [(curve.dp_MPa[0], curve.dp_MPa[-1], name) for curves in sides for name, curve in curves.items()]
+    low, _, highest = max(ends, key=lambda one: one[0])
+    _, high, lowest = min(ends, key=lambda one: one[1])
+    if low > high:
+        raise InputError(
+            worded(
+                "the valves have no tested pressure drop in common ({highest} begins at {low:g MPa}, {lowest} ends at "
+                "{high:g MPa}), so no setting is certified for all",
+                highest=highest,
+                low=float(low),
+                lowest=lowest,
+                high=float(high),
+            )
+        )
+    return float(low), float(high)
+
+
+def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _Side:
+    """Find the least ceiling of one sign of command, exactly, and which valves hold it down."""
+    signals, allowance = first.signals, first.allowance(sign)
+    models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
+    guard = first.side(sign).certificate.guard
+    above = AboveChoice.on(first.machine, first.above, STEP_CODES)
+    curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
+    low, high = _common_interval([curves])
+    doubles, least = [], list[ExactRow]()
+    for curve in curves.values():  # of many valves the exact rows would fill the memory
+        limit = offset_ceiling(curve, first.u_max_V, allowance).limit
+        doubles.append(limit.doubles)
+        least = [least_of([*least, limit])]
+    certified = range(ceil(signals.dp_code(Fraction(repr(low)))), floor(signals.dp_code(Fraction(repr(high)))) + 1)
+    ceiling = OffsetCeiling(limit=least[0], certified=certified)
+    if ceiling.limit[: certified.stop].least() <= 0:
+        raise InputError("one of the valves leaves no positive offset for a lot setting")
+    tested = floor(signals.dp_code(max(curve.dp_MPa[-1] for curve in curves.values()))) + 1
+    above_least = np.array(doubles) - ceiling.limit.doubles
+    near = above_least[:, :tested].min(axis=1) < CLEAR
+    return _Side(
+        sign=sign, models=models, curves=curves, least=ceiling,
+        nearness=dict(zip(curves, map(float, above_least.mean(axis=1)), strict=True)),
+        binding=frozenset(name for name, is_near in zip(curves, near, strict=True) if is_near),
+    )  # fmt: skip
+
+
+def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[str]:
+    """Return, for each trend that a valve has, the valve of that trend whose own ceilings are nearest to the least."""
+    nearest: dict[tuple[str | None, ...], tuple[float, str]] = {}
+    for name in batch:
+        trends = tuple(side.models[name].trend for side in sides)
+        distance = sum(side.nearness[name] for side in sides)
+        nearest[trends] = min(nearest.get(trends, (np.inf, "")), (distance, name))
+    return [name for _, name in sorted(nearest.values())]
+
+
+def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
+    """Choose the common coefficients and table of one side; certified for the carrier."""
+    model, u_max = side.models[carrier], first.u_max_V
+    reference = Fraction(repr(model.reference.dp_MPa))
+    top = min(curve.at(reference) for curve in side.curves.values())
+    if first.machine:
+        top = left_by_machine(top, side.least, first.signals, reference, u_max)
+    scale = finest_units(first.signals, transition_codes=0).coefficient
+    u_min0 = offset_at_reference(top / u_max, first.signals, scale)
+    goes_on = any(curve.above is not None for curve in side.curves.values())
+    table = choose_beta_table(
+        side.least,
+        u_min0,
+        model.trend,
+        denominator=first.beta_denominator,
+        above_one=model.trend == "increasing" or first.below_dp0 == "extend",
+        above=AboveChoice(choice=first.above, step_codes=STEP_CODES) if goes_on else None,
+    )
+    # The longest travel: full command fully opens every valve.
+    longest = max(travel(each, u_max, top) for each in side.models.values())
+    law = SideLaw(
+        drive_range_over_u_max=over(longest, "nearest", scale),
+        u_min0_over_u_max=u_min0,
+        beta=table,
+        certificate=first.side(side.sign).certificate,
+    )
+    guard, allowance = law.certificate.guard, first.allowance(side.sign)
+    budget = budget_of(model, side.curves[carrier], u_max, allowance, guard, first.machine)
+    return replace(law, certificate=_certified(side, carrier, law, first), budget=budget)
+
+
+def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
+    """Prove the common law for one valve, on the whole interval that it was tested over."""
+    curve = side.curves[name]
+    return certify(
+        side.models[name],
+        curve,
+        offset_ceiling(curve, first.u_max_V, first.allowance(side.sign)),
+        guard=first.side(side.sign).certificate.guard,
+        signals=first.signals,
+        u_max_V=first.u_max_V,
+        u_min0=law.u_min0_over_u_max,
+        table=law.beta,
+        denominator=first.beta_denominator,
+    )

@@ -1,0 +1,249 @@
+"""The pressure inputs: which one is ahead at negative commands, what is said of them, and failures that they hide.
+
+The firmware has two pressure inputs, and their wires stay where they are. At positive commands A minus B is the
+pressure drop. At negative ones the same two sensors give A minus B or B minus A, and no other drop.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.options import DesignOptions
+from dzdesign.design.signal_text import live_zero_signal
+from dzdesign.design.signals import SIDE_NAMES, PressureSignal, Signals
+from dzdesign.design.target_inputs import Converter
+from dzdesign.identify.reading.metering_edge import TWO_SENSORS
+from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.recorded_drop import RecordedDrop
+
+#: What recordings of both sides say: the drop of negative commands is A minus B, B minus A, that of other ports than
+#: the two of positive commands, or nothing. A dP that is above zero on both sides may be a magnitude.
+Shown = Literal["same", "swapped", "other ports", "nothing"]
+IN_WORDS = {"same": "A minus B", "swapped": "B minus A"}
+
+
+def shown_direction(valve: ValveModel) -> Shown:
+    """Return what the recordings show of the pressure drop at negative commands."""
+    positive, negative = (valve.sides[name].recorded_drop for name in ("positive", "negative"))
+    if positive is None or negative is None:
+        return "nothing"
+    ways = positive.ways | negative.ways
+    if ways <= {("dP",), TWO_SENSORS}:
+        if negative.sign < 0:
+            return "swapped"
+        return "nothing" if ("dP",) in ways else "same"
+    # A drop that some recordings hold as such may be of any ports.
+    return "nothing" if ("dP",) in ways else "other ports"
+
+
+def with_negative_drop(valve: ValveModel, options: DesignOptions) -> DesignOptions:
+    """Return the options with the direction of the pressure drop at negative commands; refuse one that is not recorded.
+
+    Raises
+    ------
+    InputError
+        If no wiring of two pressure inputs gives the recorded drops, or the recordings contradict what is declared.
+    """
+    signals, shown = options.signals, shown_direction(valve)
+    declared = options.negative_dp or ("swapped" if signals.swapped else "same")
+    if declared == "wired":
+        return replace(options, signals=replace(signals, swapped=False))
+    positive, negative = (_recorded(valve, name) for name in ("positive", "negative"))
+    if shown == "other ports":
+        raise InputError(
+            f"the pressure drop was recorded as {positive} at positive commands and as {negative} at negative ones. "
+            "No fixed wiring of the firmware's two pressure inputs gives both, and three are not supported. Design one "
+            "side alone, by a --command-signal of one sign, or give --negative-dp wired if the machine switches the "
+            "inputs"
+        )
+    if declared == "recorded":
+        return replace(options, signals=replace(signals, swapped=shown == "swapped"))
+    if shown not in (declared, "nothing"):
+        raise InputError(
+            f"--negative-dp {declared} is {IN_WORDS[declared]}, but the recordings have {negative} at negative "
+            f"commands, which is {IN_WORDS[shown]}; leave it out, or give --negative-dp wired if the machine switches "
+            "the inputs"
+        )
+    return replace(options, signals=replace(signals, swapped=declared == "swapped"))
+
+
+def wiring_in_words(compensator: Compensator) -> list[str]:
+    """Say which recorded columns the pressure inputs are, and how the drop of negative commands comes of them."""
+    lines = []
+    if names := input_columns(compensator):
+        lines.append(f"pressure inputs: A = {names[0]}, B = {names[1]}, as recorded at positive commands")
+    return lines + ([negative_drop_in_words(compensator)] if compensator.negative else [])
+
+
+def negative_drop_in_words(compensator: Compensator) -> str:
+    """Say how the pressure drop of negative commands comes of the inputs, and why; nothing for one sign."""
+    if compensator.negative is None:
+        return ""
+    drop = IN_WORDS["swapped" if compensator.signals.swapped else "same"]
+    recorded = _recorded(compensator.valve, "negative")
+    return f"negative commands: the pressure drop is {drop}{_reason(compensator, recorded)}"
+
+
+def input_columns(compensator: Compensator) -> tuple[str, str] | None:
+    """Return the recorded columns that pressure inputs A and B stand for; None where no two columns were recorded."""
+    drop = compensator.valve.sides["positive"].recorded_drop
+    if drop is None or len(drop.ways) != 1 or len(drop.columns[0].labels) != 2:
+        return None
+    of_each = zip(*(each.labels for each in drop.columns), strict=True)
+    ahead, behind = (" or ".join(dict.fromkeys(labels)) for labels in of_each)
+    return ahead, behind
+
+
+def is_wired(compensator: Compensator) -> bool:
+    """Tell whether the machine is declared to switch the pressure inputs."""
+    return (compensator.options or {}).get("negative_dp") == "wired"
+
+
+def _reason(compensator: Compensator, recorded: str) -> str:
+    """Say what the direction rests on."""
+    if is_wired(compensator):
+        return f", which the machine must switch to the inputs (--negative-dp wired; recorded as {recorded})"
+    if shown_direction(compensator.valve) == "nothing":
+        return f" by assumption: the recordings ({recorded}) do not show which sensor is ahead; see --negative-dp"
+    return f", as recorded ({recorded})"
+
+
+def _recorded(valve: ValveModel, side: str) -> str:
+    drop: RecordedDrop | None = valve.sides[side].recorded_drop
+    return drop.in_words() if drop else "declared or unknown"
+
+
+def not_covered(compensator: Compensator) -> tuple[str, ...]:
+    """Return each thing that a good verdict says nothing of, as a part of its sentence."""
+    if compensator.negative is None:
+        if "negative" not in compensator.valve.sides:
+            return ()
+        return ("positive commands only: the negative side of this valve was identified and is not driven",)
+    if is_wired(compensator):
+        return ("at negative commands the machine must switch the pressure inputs",)
+    if shown_direction(compensator.valve) == "nothing":
+        return ("at negative commands the direction of the pressure drop is declared and was not recorded",)
+    return ()
+
+
+def signals_in_words(compensator: Compensator) -> list[str]:
+    """Return one line for the command, one for each sensor, and what the sensors are in the recordings."""
+    signals, u_max_V = compensator.signals, float(compensator.u_max_V)
+    units, command = compensator.valve.recorded_units.of_controller, signals.command
+    text = f"command: ADC code {command.zero_code} is zero, {command.full_code} is {units.text(u_max_V, 'g V')}"
+    if command.negative_full_code is not None:
+        text += f", {command.negative_full_code} is {units.text(-u_max_V, 'g V')}"
+    lines = [f"{text}; {_valid(command.valid_codes, signals.code_max, 'fault')}"]
+    for name, sensor in _sensors(signals).items():
+        lines.append(
+            f"pressure {name}: ADC code {sensor.zero_code} is zero pressure, {sensor.full_code} is "
+            f"{units.text(float(sensor.span_MPa), 'g MPa')}; "
+            f"{_valid(sensor.valid_codes, signals.code_max, 'sensor fault')}"
+        )
+    return [*lines, *wiring_in_words(compensator)]
+
+
+def unseen_failures(signals: Signals) -> list[str]:
+    """Return one line for each signal whose sound codes hide a failure."""
+    lines = []
+    command = signals.command
+    away = -command.direction(1) * command.zero_code
+    sign = 1 if away > 0 else -1
+    if command.valid_codes[0] == 0 and away and sign in signals.signs:
+        share = command.from_zero(0, sign) / command.span(sign)
+        lines.append(
+            f"a broken wire of the command that reads code 0 is taken for {'-' if sign < 0 else ''}{share:.0%} of "
+            "command: have the wire supervised outside, or use a signal with a live zero"
+        )
+    for name, sensor in _sensors(signals).items():
+        low, high = sensor.valid_codes
+        unseen = ["a broken wire"] if low == 0 else []
+        unseen += ["a reading above the span"] if high == signals.code_max else []
+        if unseen:
+            lines.append(f"of sensor {name} {' and '.join(unseen)} can't be told from a pressure")
+    return lines
+
+
+def _sensors(signals: Signals) -> dict[str, PressureSignal]:
+    return {"A": signals.pressure_a, "B": signals.pressure_b}
+
+
+def _valid(codes: tuple[int, int], code_max: int, fault: str) -> str:
+    if codes == (0, code_max):
+        return "every code is valid"
+    return f"a code outside {codes[0]} to {codes[1]} is a {fault}"
+
+
+#: What `--accept` calls it.
+ACCEPTED = "broken-sensor"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HiddenFailure:
+    """Failures of a sensor that one side's law can't tell from a pressure, and what they cost at zero command."""
+
+    #: In words, with the sensor's name.
+    failures: tuple[str, ...]
+    #: Pressure drop at which the offset passes most flow, of those tested.
+    dp_MPa: float
+    #: Flow there by the recorded characteristic on closing; None where it is below what the recording resolves.
+    flow_L_min: float | None
+
+    def text(self, units: RecordedUnits) -> str:
+        """Return it as a sentence."""
+        flow = "less flow than the recordings show"
+        if self.flow_L_min is not None:
+            flow = f"{units.text(self.flow_L_min, '.2f L/min')} at {units.text(self.dp_MPa, '.2f MPa')}"
+        reads = "reads as a valid pressure and gives" if len(self.failures) == 1 else "read as valid pressures and give"
+        return f"{' and '.join(self.failures)} {reads} the largest offset: {flow} at zero command"
+
+
+def hidden_failure(compensator: Compensator, sign: int) -> HiddenFailure | None:
+    """Return the failures that raise the offset of a side unseen; None where every one is seen or lowers it.
+
+    A threshold that falls with the pressure drop has its largest offset at a reading of none, one that grows at the
+    largest reading. Codes that a sound signal never makes give the smallest beta; those of such a failure can not.
+    """
+    model, side = compensator.valve.sides[SIDE_NAMES[sign]], compensator.side(sign)
+    if model.trend == "increasing":
+        failures = compensator.signals.hidden_excess(sign, broken_code(compensator))
+    elif model.trend == "decreasing":
+        failures = compensator.signals.hidden_shortfall(sign, broken_code(compensator))
+    else:
+        return None
+    if not failures:
+        return None
+    largest = max(side.beta) / compensator.beta_denominator
+    offset_V = largest * float(side.u_min0_over_u_max * compensator.u_max_V)
+    flows = []
+    for test in model.tests:
+        closing = test.recorded.closing
+        flow = float(closing.flow_at(np.array([offset_V]))[0]) if offset_V > closing.u_seen_V else None
+        flows.append((flow or 0.0, test.dp_MPa or 0.0, flow))
+    _, dp_MPa, flow = max(flows, key=lambda each: each[:2])
+    return HiddenFailure(failures=failures, dp_MPa=dp_MPa, flow_L_min=flow)
+
+
+def broken_code(compensator: Compensator) -> int:
+    """Return the largest code that a broken wire may read: the converter's offset, and its noise, at no voltage."""
+    machine, target = compensator.machine, compensator.target
+    if machine is not None:
+        return machine.pressure_offset_codes + machine.pressure_noise_codes
+    converter = target.converter if target else Converter()
+    return converter.offset_codes + converter.noise_codes
+
+
+def refuse_hidden_failures(compensator: Compensator) -> None:
+    """Refuse pressure signals that hide a failure which opens the valve at zero command."""
+    for sign in compensator.signals.signs:
+        hidden = hidden_failure(compensator, sign)
+        if hidden is not None:
+            converter = compensator.target.converter if compensator.target else Converter()
+            raise InputError(
+                f"{hidden.text(compensator.valve.recorded_units.of_side(SIDE_NAMES[sign]))}; take a signal with a live "
+                f"zero and room above, such as '{live_zero_signal(converter)}', or --accept {ACCEPTED}"
+            )

@@ -1,1 +1,0 @@
-"""The valve's characteristic, without and with the compensator: artefacts enter, curves and quantities leave."""

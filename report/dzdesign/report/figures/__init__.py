@@ -1,1 +1,0 @@
-"""Figures of the report: SVG that takes its colours from the page."""

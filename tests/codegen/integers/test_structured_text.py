@@ -1,0 +1,195 @@
+"""A function block as it is written: by the standard's grammar, its words, the files for PLC tools, what is refused."""
+
+import json
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+from lark import LarkError
+
+from dzdesign.codegen.integers.law import block_form
+from dzdesign.codegen.integers.plc import note_of, output_files, structured_text
+from dzdesign.codegen.other_targets import OTHER_TARGETS, generate_output, settings_of
+from dzdesign.codegen.project import target_named
+from dzdesign.command_line.cli import main
+from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.errors import InputError
+from tests.support.core_variants import VARIANTS, variant
+from tests.support.example_coil import SENSORS, with_current
+from tests.support.octave import compensator_of
+from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.st_grammar import grammar
+from tests.support.st_words import RESERVED, is_reserved
+
+ROOTS = {"one solenoid": GOLDENS, "two solenoids": GOLDENS_FULL}
+DIGEST = "0" * 64
+
+
+@pytest.fixture(scope="module", params=[(name, kind) for name in ROOTS for kind in ("plc", "codes")], ids=" ".join)
+def text(request):
+    name, interface = request.param
+    return structured_text(compensator_of(ROOTS[name]), DIGEST, interface)
+
+
+def code_of(text):
+    return re.sub(r"\(\*.*?\*\)", "", text, flags=re.DOTALL)
+
+
+def test_it_is_short_and_plain_ascii(text):
+    lines = text.splitlines()
+    assert len(lines) <= 180 and max(map(len, lines)) <= 120
+    assert text.isascii() and DIGEST in text and "\t" not in text
+    assert "Not in it: current control and telemetry" in " ".join(text.split())
+
+
+def test_it_has_no_type_or_number_of_more_than_32_bits(text):
+    types = re.findall(r"\b(?:L?REAL|[US]?L?S?INT|U?[DL]INT|WORD|DWORD|LWORD|BOOL)\b", code_of(text))
+    assert set(types) == {"DINT", "BOOL"}
+    assert max(map(int, re.findall(r"\b\d+\b", code_of(text)))) < 2**31
+
+
+def test_names_are_others_whatever_the_case_and_none_is_a_word_of_the_standard_or_of_a_tool(text):
+    """A PLC knows no case, and of its languages TRANSITION is a keyword of charts: tools keep one list for all."""
+    assert {"TRANSITION", "STEP", "INDEXOF", "S1", "LIMIT", "DINT"} <= RESERVED and len(RESERVED) > 300
+    declared = code_of(text).partition("FB_DeadZone")[2].rpartition("END_VAR")[0]
+    names = [name.strip() for found in re.findall(r"([\w,\s]+):(?!=)", declared) for name in found.split(",")]
+    names = [name.split()[-1] for name in names]
+    assert len(names) > 50 and len({name.lower() for name in names}) == len(names)
+    assert not [name for name in names if is_reserved(name)]
+
+
+@pytest.mark.parametrize("interface", ["plc", "codes"])
+@pytest.mark.parametrize("name", ["one solenoid", "two solenoids", *VARIANTS])
+def test_it_is_of_the_standards_grammar(name, interface):
+    made = compensator_of(ROOTS[name]) if name in ROOTS else variant(name)
+    grammar().parse(structured_text(made, DIGEST, interface))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("sound := NOT (a_failed OR b_failed);", "sound := NOT (a_failed OR b_failed)"),
+        ("drive := MIN", "IF valid THEN drive := 0; END_IF\ndrive := MIN"),
+        ("drive := MIN", "FOR k := 0 TO 1 DO drive := 0; END_FOR\ndrive := MIN"),
+        ("VAR\n", "VAR_TEMP\n"),
+        ("END_FUNCTION_BLOCK", ""),
+        ("row := code / 64", "row = code / 64"),
+        ("row := code / 64", "row := code // 64"),
+        ("row := code / 64", "row := (code / 64"),
+        ("row := code / 64", "row := code / 16#40"),
+        ("TRANS_SPAN", "TRANSITION"),
+        ("law_beta_0", "law__beta_0"),
+        ("(* The law: ", "(* The (* law: "),
+        ("ARRAY[0..52] OF", "ARRAY[0..52]"),
+        ("at_rest : BOOL := TRUE;", "at_rest : BOOL := TRUE,"),
+    ],
+)
+def test_a_fault_is_refused_by_the_grammar(old, new):
+    text = structured_text(compensator_of(GOLDENS), DIGEST, "codes")
+    assert old in text
+    with pytest.raises(LarkError):
+        grammar().parse(text.replace(old, new))
+
+
+def test_control_structures_that_end_with_a_semicolon_are_of_the_grammar():
+    text = structured_text(compensator_of(GOLDENS), DIGEST, "codes")
+    ended = "IF valid THEN drive := 0; ELSIF sound THEN drive := 1; ELSE drive := 2; END_IF;\ndrive := MIN"
+    grammar().parse(text.replace("drive := MIN", ended))
+
+
+def output(root, dialect, interface):
+    return generate_output(compensator_of(root), "iec61131", {"dialect": dialect, "interface": interface}).files
+
+
+def plcopen_text(content):
+    """Return the function block of PLCopen XML, read by element names alone."""
+    found = {each.tag.rpartition("}")[2]: each for each in ElementTree.fromstring(content).iter()}
+    plain, body = ("".join(found[name].itertext()).strip("\n") for name in ("InterfaceAsPlainText", "body"))
+    return f"{plain}\n{body}\nEND_FUNCTION_BLOCK\n"
+
+
+def test_the_files_of_a_dialect_hold_the_same_text_and_are_the_same_bytes_again():
+    files = output(GOLDENS, "twincat", "codes")
+    assert {"FB_DeadZone.st", "FB_DeadZone.xml", "FB_DeadZone.TcPOU", "compensator.json"} <= set(files)
+    assert files == output(GOLDENS, "twincat", "codes")
+    assert "FB_DeadZone.TcPOU" not in output(GOLDENS, "codesys", "codes")
+    text = files["FB_DeadZone.st"].decode()
+    assert plcopen_text(files["FB_DeadZone.xml"]) == text
+    pou = ElementTree.fromstring(files["FB_DeadZone.TcPOU"]).find("POU")
+    assert pou.get("Id") == f"{{{pou.get('Id')[1:-1]}}}" and len(pou.get("Id")) == 38
+    assert pou.findtext("Declaration") + pou.findtext("Implementation/ST") + "END_FUNCTION_BLOCK\n" == text
+
+
+def test_plcopen_declares_every_variable_with_its_type():
+    namespace = "{http://www.plcopen.org/xml/tc6_0200}"
+    project = ElementTree.fromstring(output(GOLDENS_FULL, "codesys", "plc")["FB_DeadZone.xml"])
+    interface = next(project.iter(f"{namespace}interface"))
+    sections = [(each.tag.removeprefix(namespace), each.get("constant")) for each in interface]
+    assert sections == [("inputVars", None), ("outputVars", None), ("localVars", None), ("localVars", "true")]
+    names = [each.get("name") for each in interface.iter(f"{namespace}variable")]
+    assert {"command", "output_b", "side", "LAW_NODES", "sum_1"} <= set(names) and len(names) == len(set(names))
+
+
+def test_what_a_block_leaves_out_is_said():
+    both = compensator_of(GOLDENS_FULL)
+    assert all(name in note_of(both, {}) for name in ("dither", "ramps", "debouncing", "latching", "interlock"))
+    assert "dither" in structured_text(both, DIGEST, "plc")
+
+
+def test_current_control_is_refused(wording):
+    made = with_current(compensator_of(GOLDENS), target_named("f28335"), SENSORS["supply unknown"])
+    with wording.refusal(InputError):
+        output_files(made, None, {"dialect": "codesys", "interface": "plc"})
+
+
+def test_a_law_that_needs_more_than_32_bits_is_refused(wording):
+    made = compensator_of(GOLDENS)
+    signals = replace(made.signals, compare_max=65521)
+    with wording.refusal(InputError):
+        block_form(replace(made, signals=signals, beta_denominator=2**23), "codes")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        "--target iec61131 --dialect siemens",
+        "--target iec61131 --interface bar",
+        "--target iec61131 --calibration block",
+        "--target iec61131 --vectors 4000",
+        "--target f28335 --dialect twincat",
+        "--interface codes",
+        "--target iec61130",
+    ],
+)
+def test_a_wrong_option_writes_nothing(options, example_compensator_file, tmp_path, capsys, wording):
+    assert main(["codegen", str(example_compensator_file), *options.split(), "-o", str(tmp_path / "plc")]) == 2
+    wording.of_test(capsys.readouterr().err)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def example_compensator_file(example_compensator, tmp_path_factory):
+    path = tmp_path_factory.mktemp("compensator") / "compensator.json"
+    path.write_bytes(to_json_bytes(example_compensator))
+    return path
+
+
+def test_the_command_writes_a_folder_and_refuses_one_of_another_kind(example_compensator_file, tmp_path, capsys):
+    source, folder = str(example_compensator_file), tmp_path / "plc"
+    assert main(["codegen", source, "--target", "iec61131", "--dialect", "twincat", "-o", str(folder)]) == 0
+    assert "dialect twincat, interface plc" in capsys.readouterr().out
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["schema"] == "dzdesign.output/1"
+    assert manifest["settings"] == {"dialect": "twincat", "interface": "plc"}
+    assert main(["codegen", source, "--target", "f28335", "-o", str(folder)]) == 2
+    assert "dzdesign.output/1" in capsys.readouterr().err
+    (folder / "FB_DeadZone.st").write_text("mine")
+    assert main(["codegen", source, "--target", "iec61131", "-o", str(folder)]) == 2
+    assert (folder / "FB_DeadZone.st").read_text() == "mine"
+
+
+def test_settings_are_the_defaults_where_none_were_given():
+    known = OTHER_TARGETS["iec61131"].options
+    assert settings_of("iec61131", {}) == {name: values[0] for name, values in known.items()}
+    assert settings_of("f28335", {"dialect": None}) == {}

@@ -1,0 +1,143 @@
+"""Ceilings by whole numbers are those of the curve itself, code by code, and doubles never decide what they can't."""
+
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from dzdesign.core.errors import RequirementError
+from dzdesign.design.machine.allowance import allowance_of
+from dzdesign.design.offset import exact_row
+from dzdesign.design.offset import offset_ceiling as ceilings
+from dzdesign.design.offset.above_tests import OffsetAbove
+from dzdesign.design.offset.exact_row import ExactRow, least_of
+from dzdesign.design.offset.offset_ceiling import OffsetCurve, certified_row, certified_V, offset_ceiling, offset_row
+from dzdesign.design.options import DesignOptions
+from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
+
+SIGNALS = DesignOptions().signals
+CODES = SIGNALS.largest_difference(1)
+#: Two numbers that are one double, and on either side of it others.
+CLOSE = [Fraction(10**30 + step, 3 * 10**30) for step in (1, 0, 2, 1)]
+
+
+def bound_of(nodes, values, bends):
+    steps = zip(nodes, nodes[1:], values, values[1:], bends, strict=False)
+    return CertifiedBound(pieces=tuple(BoundPiece(low, high, a, b, bend) for low, high, a, b, bend in steps))
+
+
+def curve_of(seed, *, above=True, hold=True, on_codes=False):
+    """Return a curve under a sagging bound that goes on above the tests; on request with corners on whole codes."""
+    rng = random.Random(seed)
+    step = SIGNALS.dp_MPa(1) if on_codes else Fraction(1, 10**7)
+    tests = sorted(rng.sample(range(round(Fraction(1, 2) / step), round(6 / step)), 4))
+    nodes = [place * step for place in tests]
+    lower = [Fraction(rng.randrange(40_000_000, 52_000_000), 10**7) for _ in nodes]
+    bends = [Fraction(rng.randrange(0, 800_000), 10**7) for _ in nodes[1:]]
+    certified = bound_of(nodes, lower, bends)
+    between = (nodes[0] + (nodes[-1] - nodes[0]) * share for share in (Fraction(1, 3), Fraction(4, 5)))
+    places = sorted({*nodes, *between})
+    offset = [certified.at(place) - Fraction(rng.randrange(1, 3_000_000), 10**7) for place in places]
+    lowest = min(piece.least(piece.from_MPa, piece.to_MPa) for piece in certified.pieces)
+    offset = [min(value, lowest) for value in offset]
+    further = [nodes[-1] + Fraction(each) for each in (0, Fraction(1, 3), 2, 5, 9)]
+    falls = [lower[-1] - Fraction(rng.randrange(0, 9_000_000) * number, 10**7) for number in range(5)]
+    goes_on = bound_of(further, falls, [Fraction(rng.randrange(0, 400_000), 10**7) for _ in falls])
+    return OffsetCurve(
+        dp_MPa=tuple(places),
+        offset_V=tuple(offset),
+        certified=certified,
+        hold_below_MPa=places[2] if hold else None,
+        above=OffsetAbove.under(goes_on, offset[-1], certified=bool(seed % 2)) if above else None,
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_row_is_the_curve_at_every_code(seed):
+    curve = curve_of(seed, above=seed < 4, hold=seed % 3 > 0, on_codes=seed % 2 > 0)
+    places = [*range(-6, CODES + 6, 7), *(round(SIGNALS.dp_code(node)) for node in curve.dp_MPa)]
+    certified, offset = (row(curve, SIGNALS, -6, CODES + 6) for row in (certified_row, offset_row))
+    assert len(certified) == CODES + 13
+    for code in places:
+        dp_MPa = SIGNALS.dp_MPa(code)
+        assert certified[code + 6] == certified_V(curve, dp_MPa), code
+        assert offset[code + 6] == curve.at(dp_MPa), code
+
+
+def test_corners_on_whole_codes_are_met():
+    """Else the test above would say nothing of them."""
+    assert any(SIGNALS.dp_code(node).denominator == 1 for node in curve_of(1, on_codes=True).dp_MPa)
+
+
+def test_a_curve_above_its_bound_is_refused_where_it_first_is():
+    curve = curve_of(2)
+    high = OffsetCurve(
+        dp_MPa=curve.dp_MPa, offset_V=(*curve.offset_V[:-1], Fraction(6)), certified=curve.certified,
+        hold_below_MPa=None,
+    )  # fmt: skip
+    refused = []
+    for code in range(CODES):
+        try:
+            certified_V(high, SIGNALS.dp_MPa(code))
+        except RequirementError as error:
+            refused.append(str(error))
+            break
+    with pytest.raises(RequirementError) as caught:
+        offset_ceiling(high, Fraction(10), allowance_of(SIGNALS))
+    assert [str(caught.value)] == refused
+
+
+def test_the_least_of_windows_and_of_rows_is_exact():
+    """Numbers that are one double are told apart; rising, falling, equal and written in unlike terms."""
+    rng = random.Random(3)
+    values = [rng.choice(CLOSE) + rng.choice((0, 0, 0, Fraction(1, 7))) for _ in range(200)]
+    assert len({float(value) for value in values}) == 2
+    scale = [rng.randrange(1, 5) for _ in values]
+    row = ExactRow(
+        tuple(value.numerator * by for value, by in zip(values, scale, strict=True)),
+        tuple(value.denominator * by for value, by in zip(values, scale, strict=True)),
+    )
+    for width in (1, 2, 5):
+        wanted = [min(values[at : at + width]) for at in range(len(values) - width + 1)]
+        assert list(row.least_of_windows(width)) == wanted
+    other = ExactRow(row.numerators[::-1], row.denominators[::-1])
+    assert list(least_of([row, other])) == list(map(min, values, values[::-1]))
+    assert row.least() == min(values)
+    assert list(row.at_least(CLOSE[0])) == [max(value, CLOSE[0]) for value in values]
+    factor, less = Fraction(-3, 7), Fraction(1, 9)
+    assert list(row.line(factor, less)) == [value * factor - less for value in values]
+    assert list(row.plus(other)) == [one + two for one, two in zip(values, values[::-1], strict=True)]
+
+
+def test_doubles_alone_would_be_wrong(monkeypatch):
+    """The fault that the test above must see: equal doubles taken for equal numbers."""
+    monkeypatch.setattr(exact_row.ExactRow, "_is_less", lambda *given: False)
+    with pytest.raises(AssertionError):
+        test_the_least_of_windows_and_of_rows_is_exact()
+
+
+def test_a_corner_taken_for_a_stretch_is_seen(monkeypatch):
+    """The fault that the rows' test must see: a bound that jumps at a test has there the lower of both sides."""
+    nodes = [SIGNALS.dp_MPa(code) for code in (200, 400, 600)]
+    pieces = (BoundPiece(nodes[0], nodes[1], Fraction(5), Fraction(5), Fraction(0)),
+              BoundPiece(nodes[1], nodes[2], Fraction(4), Fraction(4), Fraction(0)))  # fmt: skip
+    curve = OffsetCurve(
+        dp_MPa=tuple(nodes), offset_V=(Fraction(4),) * 3, certified=CertifiedBound(pieces=pieces), hold_below_MPa=None
+    )
+    assert certified_row(curve, SIGNALS, 400, 400)[0] == certified_V(curve, nodes[1]) == 4
+    high = OffsetCurve(
+        dp_MPa=tuple(nodes), offset_V=(Fraction(9, 2), Fraction(9, 2), Fraction(4)), certified=curve.certified,
+        hold_below_MPa=None,
+    )  # fmt: skip
+    with pytest.raises(RequirementError):
+        certified_row(high, SIGNALS, 400, 400)
+    monkeypatch.setattr(ceilings, "certified_V", lambda given, dp_MPa: given.at(dp_MPa))
+    ceilings.KNOWN.clear()
+    assert certified_row(high, SIGNALS, 400, 400)[0] == Fraction(9, 2)
+    ceilings.KNOWN.clear()
+
+
+def test_doubles_are_the_nearest():
+    row = ExactRow((1, 10**40 + 1, -7), (3, 3 * 10**40, 11))
+    np.testing.assert_array_equal(row.doubles, [float(value) for value in row])

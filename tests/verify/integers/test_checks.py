@@ -1,0 +1,219 @@
+"""`verify` of a folder with Structured Text or for MATLAB: what it finds, and must not overlook. On few inputs."""
+
+import json
+from functools import partialmethod
+
+import numpy as np
+import pytest
+
+from dzdesign.codegen.integers.law import forms_of
+from dzdesign.codegen.other_targets import generate_output, write_output
+from dzdesign.command_line.cli import main
+from dzdesign.core.errors import RequirementError
+from dzdesign.verify.firmware.folder import read_compensator
+from dzdesign.verify.integers import checks as checks_module
+from dzdesign.verify.integers import octave as octave_module
+from dzdesign.verify.integers.checks import block_checks, function_checks
+from dzdesign.verify.integers.every_pair import EveryPair
+from dzdesign.verify.integers.octave import running
+from dzdesign.verify.outputs.folder import read_output_manifest
+from tests.support.octave import OCTAVE, compensator_of, needs_octave
+from tests.support.paths import GOLDENS, GOLDENS_FULL
+from tests.support.synthetic import needs_compiler
+
+SETTINGS = {"iec61131": {"dialect": "twincat", "interface": "codes"}, "matlab": {}}
+EXACT = "equals the exactly rounded law"
+
+
+@pytest.fixture(scope="module")
+def outputs():
+    made = compensator_of(GOLDENS)
+    return {target: generate_output(made, target, settings) for target, settings in SETTINGS.items()}
+
+
+@pytest.fixture
+def folder(outputs, tmp_path):
+    for target, output in outputs.items():
+        write_output(output, tmp_path / target)
+    return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch):
+    """Let every input be few."""
+    monkeypatch.setattr(EveryPair, "every_command", partialmethod(EveryPair.every_command, drops=range(-40, 3300, 331)))
+    monkeypatch.setattr(EveryPair, "every_pressure", partialmethod(EveryPair.every_pressure, step=997))
+
+
+def checks_of(folder, target):
+    manifest, made = read_output_manifest(folder / target), read_compensator(folder / target)
+    checks = block_checks if target == "iec61131" else function_checks
+    return checks(folder / target, manifest, made, lambda _: None, forms=forms_of(made, manifest))
+
+
+def edited(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def test_a_good_block_holds(folder):
+    found = checks_of(folder, "iec61131")
+    assert [check.id for check in found.checks] == [
+        "exact-law", "exact-law", "fallback", "states", "overflow", "over-compensation"
+    ]  # fmt: skip
+    assert all(check.holds for check in found.checks), found.checks
+    assert all(each.inputs > 10_000 and each.wrong == 0 for each in found.inputs) and len(found.inputs) == 2
+    margin = next(check.text for check in found.checks if check.id == "over-compensation")
+    assert margin.startswith("0 pressure drops above") and "smallest margin 0.2" in margin
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "missed"),
+    [
+        ("REVERSE : DINT := ", "REVERSE : DINT := 1", {"states", "fallback"}),
+        ("OUTPUT_LIMIT : DINT := 6", "OUTPUT_LIMIT : DINT := 5", {"exact-law"}),
+        ("ahead * SLOPE", "(ahead * 20000) * SLOPE", {"overflow"}),
+        ("at_rest : BOOL := TRUE", "at_rest : BOOL := FALSE", {"exact-law"}),
+        ("drive := MIN", "IF valid THEN drive := 0; END_IF;\ndrive := MIN", {"exact-law"}),
+    ],
+)
+def test_a_wrong_text_does_not_hold(folder, old, new, missed):
+    edited(folder / "iec61131" / "FB_DeadZone.st", old, new)
+    found = checks_of(folder, "iec61131").checks
+    assert missed <= {check.id for check in found if check.holds is False}
+
+
+def test_a_wrong_form_does_not_hold_though_the_text_is_right(folder):
+    """The generator's own evaluation is compared for itself."""
+    made, manifest = read_compensator(folder / "iec61131"), read_output_manifest(folder / "iec61131")
+    (name, right), *_ = forms_of(made, manifest).items()
+    wrong = {name: lambda given: (lambda found: found | {"output_a": found["output_a"] + 1})(right(given))}
+    found = block_checks(folder / "iec61131", manifest, made, lambda _: None, forms=wrong).checks
+    assert {check.name: check.holds for check in found}[f"the integer form: {EXACT}"] is False
+    assert {check.name: check.holds for check in found}[f"FB_DeadZone.st: {EXACT}"] is True
+
+
+def test_a_lower_bound_that_is_exceeded_is_seen(folder):
+    path = folder / "iec61131" / "FB_DeadZone.st"
+    text = path.read_text()
+    begin, end = text.index("ZERO_NODES : "), text.index("LAW_LEAST")
+    table = text[begin:end]
+    first = table.index("[", 20)
+    nodes = [str(int(node) + 200) for node in table[first + 1 : table.index("]", first)].split(",")]
+    path.write_text(
+        text[:begin] + table[:first] + "[" + ", ".join(nodes) + table[table.index("]", first) :] + text[end:]
+    )
+    found = {check.id: check for check in checks_of(folder, "iec61131").checks}
+    assert found["over-compensation"].holds is False and "-" in found["over-compensation"].text
+
+
+@needs_octave
+@needs_compiler
+def test_a_good_function_holds_and_runs_in_octave(folder):
+    found = checks_of(folder, "matlab")
+    assert all(check.holds for check in found.checks), [check for check in found.checks if not check.holds]
+    hashes = {each.outputs_hash for each in found.inputs if each.name.startswith("dz_comp.m") and "drops" in each.name}
+    assert len(hashes) == 1 and "octave" in found.versions
+    assert {"core/dz_comp.c: " + EXACT, "dz_comp.m in Octave: " + EXACT} <= {check.name for check in found.checks}
+
+
+@needs_compiler
+def test_without_octave_the_function_is_evaluated_and_not_run(folder, monkeypatch):
+    monkeypatch.setattr(octave_module, "find_program", lambda _: None)
+    found = {check.name: check for check in checks_of(folder, "matlab").checks}
+    assert found[f"dz_comp.m: {EXACT}"].holds is True
+    assert found["dz_comp.m in Octave"].holds is None and "apt install octave" in found["dz_comp.m in Octave"].text
+
+
+@pytest.fixture
+def octave_of(folder):
+    made = compensator_of(GOLDENS)
+    every = EveryPair(made, "codes", (1,), remembers=False)
+
+    def tried(old, new):
+        edited(folder / "matlab" / "dz_comp.m", old, new)
+        text = checks_module._TriedText(folder / "matlab", "dz_comp.m", "m", every)
+        return {check.id: check for check in text.in_octave(OCTAVE).checks}
+
+    return tried
+
+
+@needs_octave
+@pytest.mark.parametrize(
+    ("old", "new", "missed"),
+    [
+        ("HALF = int64(", "HALF = int64(2 * ", "exact-law"),
+        ("law_beta(failed) = LAW_LEAST", "law_beta(failed) = LAW_LEAST + 4096", "fallback"),
+        ("int64(b_failed) .* 4", "int64(b_failed) .* 2", "states"),
+        ("BETA_FACTOR = int64(", "BETA_FACTOR = int64(9", "states"),
+    ],
+)
+def test_a_wrong_function_is_seen_in_octave(octave_of, old, new, missed):
+    assert octave_of(old, new)[missed].holds is False
+
+
+@needs_octave
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("uint16(compare), shape", "uint32(compare), shape", "uint32"),
+        ("LAW_NODES(row + 1)", "LAW_NODES(row)", "LAW_NODES"),
+        ("    code = ", "    cod = ", "code"),
+        ("    % ---- the law ----", "    exit(0);", "hangs"),
+    ],
+)
+def test_a_function_that_fails_in_octave_does_not_hold(octave_of, old, new, words):
+    check = octave_of(old, new)["exact-law"]
+    assert check.holds is False and words in check.text
+
+
+@needs_octave
+def test_octave_that_hangs_is_ended_and_runs_nothing_of_the_users(tmp_path, monkeypatch):
+    (tmp_path / ".octaverc").write_text("error('the user''s settings were run');\n")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(octave_module, "TIMEOUT_S", 1.5)
+    with running(OCTAVE, "waits", b"function [c, s, t] = waits(u, a, b)\n  pause(60);\nend\n") as function:
+        codes = {name: np.zeros(3) for name in ("u", "p_a", "p_b")}
+        with pytest.raises(RequirementError, match="hangs"):
+            function.run(codes)
+
+
+def test_an_octave_that_does_not_run_is_not_there(tmp_path, monkeypatch):
+    for name in ("true", str(tmp_path)):
+        monkeypatch.setattr(octave_module, "find_program", lambda _, name=name: name)
+        octave = octave_module.available_octave()
+        assert not octave.path and octave.missing and not octave.versions
+
+
+def test_the_command_refuses_what_makes_no_sense(folder, tmp_path, capsys, wording):
+    block = (folder / "iec61131").rename(folder / "plc")
+    for line in (["--mutate"], ["--plant", "plant.toml"], ["--back-pressure", "1 MPa"]):
+        assert main(["verify", str(block), *line, "-o", str(tmp_path / "evidence")]) == 2
+        wording.of_test(capsys.readouterr().err)
+    edited(block / "manifest.json", '"interface": "codes"', '"interface": "bar"')
+    assert main(["verify", str(block), "-o", str(tmp_path / "evidence")]) == 2
+    wording.of_test(capsys.readouterr().err)
+    edited(block / "manifest.json", '"iec61131"', '"iec"')
+    assert main(["verify", str(block), "-o", str(tmp_path / "evidence")]) == 2
+    wording.of_test(capsys.readouterr().err)
+    assert not (tmp_path / "evidence").exists()
+
+
+def test_the_command_writes_the_evidence(example_compensator, tmp_path, capsys):
+    folder, evidence = tmp_path / "plc", tmp_path / "evidence"
+    write_output(generate_output(example_compensator, "iec61131", SETTINGS["iec61131"]), folder)
+    assert main(["verify", str(folder), "-o", str(evidence)]) == 0
+    printed = capsys.readouterr().out
+    assert f"HOLDS  FB_DeadZone.st: {EXACT}" in printed and "evidence.json" in printed
+    document = json.loads((evidence / "evidence.json").read_text())
+    assert document["holds"] and document["schema"] == "dzdesign.output-evidence/1"
+
+
+def test_a_block_of_two_solenoids_keeps_the_bounds_of_both(tmp_path):
+    made = compensator_of(GOLDENS_FULL)
+    settings = {"dialect": "codesys", "interface": "plc"}
+    write_output(generate_output(made, "iec61131", settings), tmp_path / "iec61131")
+    found = checks_of(tmp_path, "iec61131")
+    assert all(check.holds for check in found.checks)
+    assert [check.id for check in found.checks].count("over-compensation") == 2

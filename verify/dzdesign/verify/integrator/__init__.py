@@ -1,1 +1,0 @@
-"""Checks the native plant: scenes in, its distance from CasADi's integrator out; shares no code with its motion."""
