@@ -19,7 +19,6 @@ from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import CalibrationBlock
 from dzdesign.codegen.calibration.packing import pack
-from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.firmware_manifest import BLOCK_FILE
@@ -28,7 +27,7 @@ from dzdesign.verify.current.state_check import check_states, hashes_on
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST, Machine
 from tests.support.block_cores import block_folder
-from tests.support.current_loops import LOOPS
+from tests.support.current_loops import LOOPS, current_texts
 
 PROGRAM = "block_sequences.c"
 #: Samples of the drive and ticks of the controller; of the states against the exact controller.

@@ -10,7 +10,7 @@ from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
 
-TARGETS = ("f28335", "f280049c", "cortex-m4", "avr", "host")
+TARGETS = ("f28335", "f280049c", "cortex-m4", "host")
 SPANS_MPA = (5, 10, 16, 20, 25, 31.5, 40, 60, 100)
 BOTH_SIGNS = ("-10..10 V x 0.15 + 1.5 V", "4..20 mA on 140 ohm = -10..10 V", "-10..10 V x 0.1 + 1.1 V")
 

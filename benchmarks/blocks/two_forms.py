@@ -30,10 +30,9 @@ from tests.support.golden_firmware import FULL, full_options
 
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
 #: Machine to the target whose fixed form it runs.
-TARGETS = {"host": "host", "Cortex-M4": "cortex-m4", "AVR": "avr"}
+TARGETS = {"host": "host", "Cortex-M4": "cortex-m4", "AVR": "host"}
 CALLED = ("comp", "comp_checked", "status", "beta")
-LAW_AND_DRIVE = ("dz_comp.c", "dz_comp_negative.c", "dz_drive.c")
-LARGEST_WEIGHT = 65535
+LAW_AND_DRIVE = ("dz_comp.c", "dz_drive.c")
 #: What dz_drive.c and dz_current.c define.
 AROUND = ("drive_init", "drive_sample", "drive_tick", "current_init", "current_calibrate", "current_tick")
 
@@ -66,18 +65,17 @@ class TwoForms:
     def objects(self, machine: Machine, sign: int) -> list[Path]:
         """Return one side's two forms compiled: dz_comp_fixed(), dz_comp_block() and so on."""
         ending = "_negative" if sign < 0 else ""
-        fixed = f"dz_comp{ending}.c"
         return [
             machine.compile(name, sources, (*machine.core_flags, *_renamed(ending, form)), f"{self.name}, {form} form")
             for name, form, sources in (
-                (fixed, "fixed", self.fixed_sources(machine)),
+                ("dz_comp.c", "fixed", self.fixed_sources(machine)),
                 ("dz_comp.c", "block", self.block_sources),
             )
         ]
 
     def core_objects(self, machine: Machine) -> list[Path]:
         """Return law and drive of both forms compiled; the functions of the fixed form end with _fixed."""
-        renamed = [flag for ending in ("", "_negative") for flag in _renamed(ending, f"fixed{ending}")]
+        renamed = [f"-Ddz_{name}{ending}=dz_{name}_fixed{ending}" for ending in ("", "_negative") for name in CALLED]
         renamed += [f"-Ddz_{name}=dz_{name}_fixed" for name in AROUND]
         return [
             machine.compile(name, sources, (*machine.core_flags, *flags), f"{self.name}: {name}")
@@ -88,9 +86,9 @@ class TwoForms:
 
     @property
     def has_room(self) -> bool:
-        """Whether a block has room for the tables of beta and for the weight of sensor B."""
+        """Whether a block has room for the tables of beta."""
         nodes = max(len(self.compensator.side(sign).beta) for sign in self.compensator.signals.signs)
-        return nodes <= NODE_MASK and self.compensator.signals.weight_b <= LARGEST_WEIGHT
+        return nodes <= NODE_MASK
 
     @property
     def edges(self) -> list[int]:
@@ -136,7 +134,9 @@ def _identified(folder: Path) -> ValveModel:
 
 
 def _renamed(ending: str, form: str) -> list[str]:
-    return [f"-Ddz_{name}{ending}=dz_{name}_{form}" for name in CALLED]
+    other = "" if ending else "_negative"  # of the other sign, which one object has as well
+    renamed = [f"-Ddz_{name}{ending}=dz_{name}_{form}" for name in CALLED]
+    return [*renamed, *(f"-Ddz_{name}{other}=dz_other_{name}_{form}" for name in CALLED)]
 
 
 def _encoded(files: dict[str, str]) -> dict[str, bytes]:

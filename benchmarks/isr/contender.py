@@ -36,17 +36,8 @@ class Contender:
 
 
 def our_forms(compensator: Compensator) -> list[Contender]:
-    """Return the product's core in every form that the generator has; a new form is one line of `forms`."""
-    forms = {
-        "wide": ("32x32->64 bit products", generate(compensator, "f28335").files),
-        "narrow": ("32-bit arithmetic only", generate(compensator, "avr").files),
-    }
-    return [
-        Contender(
-            name=f"ours, {form}",
-            made=f"`dzdesign codegen`, {text}.",
-            sources={path.removeprefix("core/"): c for path, c in files.items() if path.startswith("core/dz_comp.")},
-            ours=True,
-        )
-        for form, (text, files) in forms.items()
-    ]
+    """Return the product's core, with the numbers of the valve in it."""
+    files = generate(compensator, "f28335").files
+    names = ("dz_comp.c", "dz_comp.h", "dz_calibration.h", "dz_valve.h")
+    sources = {name: files[f"core/{name}"] for name in names}
+    return [Contender(name="ours", made="`dzdesign codegen`, 32x32->64 bit products.", sources=sources, ours=True)]

@@ -7,7 +7,6 @@ from time import perf_counter
 
 from scoreboard import Row, print_rows, say
 
-from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.design.current.choosing import (
     LEAST_PHASE_DEG,
     CurrentSensor,
@@ -24,6 +23,7 @@ from dzdesign.verify.current.corner_runs import HELD_S, fault_runs, run_corner
 from dzdesign.verify.current.declared_circuit import declared_corners
 from dzdesign.verify.current.state_check import check_states, hashes_on
 from dzdesign.verify.toolchain.machines import CORTEX_M4
+from tests.support.current_loops import current_texts
 
 COIL = CoilCircuit(resistance_ohm=3.5, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))
 CONVERTER, SAMPLING = Converter(), CurrentSampling()

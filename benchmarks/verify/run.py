@@ -21,7 +21,6 @@ from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
 from native_plant import print_native_plant  # noqa: E402
 from population import print_population  # noqa: E402
-from proof_of_c import print_proof  # noqa: E402
 from scoreboard import run_parts  # noqa: E402
 from stand_in_flow import print_stand_in  # noqa: E402
 from verify_time import print_verify_time  # noqa: E402
@@ -34,7 +33,6 @@ PARTS = {
     "stand-in": (print_stand_in, 0),
     "hysteresis": (print_hysteresis, 404),
     "mutants": (print_mutants, 202),
-    "proof": (print_proof, 0),
     "current": (print_current_loop, 0),
     "current-valve": (print_current_valve, 0),
     "current-population": (print_current_population, 1),

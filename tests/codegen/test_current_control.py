@@ -122,10 +122,11 @@ def test_the_project_builds_without_a_warning_and_its_selftest_holds(controlled,
 
 
 def test_a_target_without_current_control_is_refused(controlled):
+    without = replace(target_named("host"), current_sampling=None)
     with pytest.raises(InputError, match="--drive"):
-        options(TEXTS, "avr")
+        options_of(TEXTS, without.inputs())
     with pytest.raises(InputError, match="--drive"):
-        generate(replace(controlled, target=None, options=None), "avr")
+        without.check_current_control(controlled.current_drive.sampling)
 
 
 def test_a_target_that_samples_at_other_times_is_refused(controlled):
@@ -143,12 +144,12 @@ def test_the_c2000_targets_control_the_current_with_their_own_sampling(example_v
     assert drive.phase_margin_deg >= 45 and drive.overshoot <= 0.1
     assert read_artefact(to_json_bytes(designed), Compensator, "compensator.json") == designed
     files = generate(designed, target).files
-    assert f"DZ_CURRENT_SAMPLES {ours.samples}u" in files["core/dz_current.h"]
+    assert f"DZ_CURRENT_SAMPLES {ours.samples}u" in files["core/dz_calibration.h"]
     assert f"DZ_CURRENT_REST_TICKS {drive.rest_ticks}u" in files[f"{target}/dz_hardware.h"]
     for name in (f"{target}/dzdesign.projectspec", f"{target}/Makefile"):
         assert "dz_current.c" in files[name] and "dz_current.h" in files[name]
     # A library on a PC takes the loop of any target.
-    assert f"DZ_CURRENT_SAMPLES {ours.samples}u" in generate(designed, "host").files["core/dz_current.h"]
+    assert f"DZ_CURRENT_SAMPLES {ours.samples}u" in generate(designed, "host").files["core/dz_calibration.h"]
 
 
 def test_the_current_has_died_away_when_its_offset_is_taken(controlled):

@@ -12,8 +12,7 @@ import sys
 import pytest
 
 from dzdesign.codegen.host.target import EXPORTS
-from dzdesign.codegen.project import TARGET_NAMES, generate
-from dzdesign.core.artefact_files import write_folder
+from dzdesign.codegen.project import TARGET_NAMES
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.toolchain.host_compiler import STRICT
 from tests.support.drive_model import walked_line
@@ -107,12 +106,12 @@ def test_there_is_no_golden_of_a_target_that_is_gone():
 
 def test_a_difference_is_shown_by_file_and_line(copy):
     folder, files = copy("host"), golden_files("host")
-    header = folder / "core" / "dz_comp.h"
+    header = folder / "core" / "dz_calibration.h"
     header.write_text(header.read_text().replace("DZ_COMPARE_MAX 60000u", "DZ_COMPARE_MAX 60001u"))
     (folder / "host" / "README.md").unlink()
     (folder / "host" / "notes.txt").touch()
     said = differences(folder, files)
-    assert "--- golden host/core/dz_comp.h" in said and "+#define DZ_COMPARE_MAX 60000u" in said
+    assert "--- golden host/core/dz_calibration.h" in said and "+#define DZ_COMPARE_MAX 60000u" in said
     assert "host/host/README.md: no golden" in said and "host/host/notes.txt: a golden that is not generated" in said
 
 
@@ -134,7 +133,7 @@ def test_firmware_of_the_c2000_compiles_strictly_with_the_real_core(root, target
     folder = root / target
     include = [f"-I{path}" for path in (folder / "core", folder / target, DEVICES / target)]
     sources = sorted((folder / target).glob("*.c"))
-    assert len(sources) >= 3
+    assert len(sources) >= 2
     for source in sources:
         run(*compiler.split(), *STRICT, *include, "-c", str(source), "-o", "one.o", cwd=tmp_path)
 
@@ -192,30 +191,6 @@ def test_cortex_m4_in_qemu_prints_the_hashes_of_the_host(copy):
     assert "dz_tick: 35 interrupts, compare values of dz_drive_tick()" in printed
 
 
-@pytest.mark.slow
-@needs_avr
-def test_avr_in_simavr_prints_the_hash_of_the_exact_law(copy):
-    folder = copy("avr") / "avr"
-    printed = run("make", f"CFLAGS={WARNINGS.replace('-O2', '-Os')}", "check", cwd=folder)
-    assert lines_of_selftest(printed) == [
-        exact_line(golden_compensator("avr"), SAMPLE),
-        walked_line(golden_compensator("avr")),
-    ]
-
-
-@pytest.mark.slow
-@needs_avr
-def test_everything_switched_on_in_simavr_prints_the_hashes_of_the_host(tmp_path):
-    """The avr's core has 32-bit arithmetic only, the host's 64-bit products; the walk drives both solenoids."""
-    compensator = golden_compensator("avr", FULL)
-    firmware = generate(compensator, "host")
-    write_folder(tmp_path / "host", firmware.files, firmware.manifest)
-    host = lines_of_selftest(run("make", f"CFLAGS={WARNINGS}", "check", cwd=tmp_path / "host" / "host"))
-    folder = shutil.copytree(FULL / "avr", tmp_path / "avr") / "avr"
-    printed = run("make", f"CFLAGS={WARNINGS.replace('-O2', '-Os')}", "check", cwd=folder)
-    assert lines_of_selftest(printed) == [host[0], host[2]] and host[2] == walked_line(compensator)
-
-
 @needs_arm
 @pytest.mark.slow
 def test_everything_switched_on_in_qemu_prints_the_hash_of_the_model(tmp_path):
@@ -233,24 +208,6 @@ def test_everything_switched_on_is_exact_on_all_inputs(sign, tmp_path):
     shutil.copy(FULL / INPUT, tmp_path / "fw" / INPUT)
     result = check_all_inputs(tmp_path / "fw", sign)
     assert result.holds and result.wrong == 0 and result.over_compensated == 0
-
-
-@pytest.mark.slow
-@needs_avr
-def test_an_int_of_16_bits_shows_in_the_hash(copy):
-    """Seed what a PC hides: a product that needs a longer int."""
-    printed = {}
-    for target in ("host", "avr"):
-        folder = copy(target)
-        core = folder / "core" / "dz_comp.c"
-        name, signature = "uint16_t dz_comp", "(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)\n{"
-        text = core.read_text()
-        assert text.count(name + signature) == 1
-        text = text.replace(name + signature, "static uint16_t right" + signature)
-        text += f"{name}{signature}\n    return right(u_adc, (uint16_t)((p_a_adc * 17) / 17), p_b_adc);\n}}\n"
-        core.write_text(text)
-        printed[target] = lines_of_selftest(run("make", "check", cwd=folder / target))[0]
-    assert printed["host"] == exact_line(golden_compensator("host"), SAMPLE) != printed["avr"]
 
 
 @needs_arm

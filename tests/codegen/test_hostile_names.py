@@ -89,7 +89,7 @@ def test_the_code_without_comments_shows_what_left_one():
     assert "evil" not in code_of("// a ??/\nint evil;")
 
 
-@pytest.fixture(scope="module", params=["f28335", "avr"])
+@pytest.fixture(scope="module", params=["f28335", "host"])
 def both(request):
     """The files of a target, of harmless names and of hostile ones; a banner shows four, one target gets them all."""
     harmless = generate(with_names([HARMLESS]), request.param).files
@@ -131,7 +131,7 @@ def test_hostile_names_compile_without_a_warning(both, tmp_path):
 
 
 def test_every_other_target_prints_names_by_the_same_banner():
-    for target in sorted(set(TARGET_NAMES) - {"f28335", "avr"}):
+    for target in sorted(set(TARGET_NAMES) - {"f28335", "host"}):
         compensator = golden_compensator(target)
         valve = replace(compensator.valve, made_from=recordings(NAMES[:2]))
         for name, text in generate(replace(compensator, valve=valve), target).files.items():

@@ -16,7 +16,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dzdesign.codegen import banner, project
-from dzdesign.codegen.avr import target as avr
 from dzdesign.codegen.comment_text import LONGEST, printable_list, printable_name
 from dzdesign.codegen.cortex_m4 import target as cortex_m4
 from dzdesign.codegen.other_targets import ALL_TARGET_NAMES, OTHER_TARGETS
@@ -56,7 +55,7 @@ HOSTILE = [
 
 def test_targets_are_the_folders_with_a_target_py(tmp_path, monkeypatch):
     folders = sorted(path.parent.name for path in CODEGEN.glob("*/target.py"))
-    assert [folder_of(name) for name in TARGET_NAMES] == folders and {"avr", "cortex-m4", "host"} <= set(TARGET_NAMES)
+    assert [folder_of(name) for name in TARGET_NAMES] == folders and {"cortex-m4", "host"} <= set(TARGET_NAMES)
     for name, has_target in (("zeta", True), ("new_one", True), ("templates", False)):
         (tmp_path / name).mkdir()
         if has_target:
@@ -157,8 +156,8 @@ def test_design_and_codegen_fit_the_target(name, tmp_path, capsys):
 def test_a_compensator_of_another_target_is_refused_with_the_way_out(wording):
     with wording.refusal(InputError):
         generate(golden_compensator("f28335"), "f280049c")
-    for name in ("host", "avr", "cortex-m4"):  # these have no converter and timer of their own
-        assert "DZ_COMPARE_MAX 40000u" in generate(golden_compensator("f280049c"), name).files["core/dz_comp.h"]
+    for name in ("host", "cortex-m4"):  # these have no converter and timer of their own
+        assert "DZ_COMPARE_MAX 40000u" in generate(golden_compensator("f280049c"), name).files["core/dz_calibration.h"]
 
 
 @pytest.mark.slow
@@ -171,18 +170,15 @@ def test_the_core_is_exact_on_every_input_for_another_pwm(tmp_path):
     assert result.holds and result.wrong == 0 and result.inputs == 4096 * (2 * (4014 - 688) + 1)
 
 
-@pytest.mark.parametrize(
-    "change", [{"name": "cortex_m4"}, {"name": "Cortex-M4"}, {"name": "-m4"}, {"arithmetic": "float"}]
-)
-def test_a_target_with_a_wrong_name_or_arithmetic_is_refused(change):
+@pytest.mark.parametrize("name", ["cortex_m4", "Cortex-M4", "-m4"])
+def test_a_target_with_a_wrong_name_is_refused(name):
     with pytest.raises(DzdesignError):
-        replace(target_named("cortex-m4"), **change)
+        replace(target_named("cortex-m4"), name=name)
 
 
 @pytest.mark.parametrize(
     ("module", "name", "value", "derived"),
     [
-        (avr, "BAUD", 115_200, "baud_divider"),
         (cortex_m4, "CLOCK_HZ", 25_000_001, "systick_counts"),
         (cortex_m4, "CLOCK_HZ", 2_500 * (2**24 + 1), "systick_counts"),
     ],
@@ -191,10 +187,6 @@ def test_a_clock_that_does_not_divide_is_refused(monkeypatch, module, name, valu
     monkeypatch.setattr(module, name, value)
     with wording.refusal(DzdesignError):
         getattr(module, derived)()
-
-
-def test_the_avr_asks_for_narrow_arithmetic_and_the_others_do_not():
-    assert [name for name in TARGET_NAMES if target_named(name).arithmetic == "narrow"] == ["avr"]
 
 
 # --- names from users ---------------------------------------------------------------------------------------

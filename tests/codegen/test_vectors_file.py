@@ -29,8 +29,9 @@ from tests.support.synthetic import needs_compiler
 READER = dict(FILE.findall((ROOT / "docs" / "howto" / "core-only.md").read_text("utf-8")))["check_vectors.c"]
 #: A command of one sign; two solenoids, unlike sensors and the pressures turned round; one table, without a transition.
 DEFAULT, FULL_SET, ONE_TABLE = NAMES = ("default", "everything switched on", "no transition")
-#: Of each sign: its file, what its functions' names end with, and its first column.
-SIDES = {1: ("dz_comp.c", "", 3), -1: ("dz_comp_negative.c", "_negative", 6)}
+#: Of each sign: what its functions' names end with, and its first column.
+SIDES = {1: ("", 3), -1: ("_negative", 6)}
+HEADERS = ("dz_comp.h", "dz_calibration.h", "dz_valve.h")
 
 
 def fewest(compensator) -> int:
@@ -71,7 +72,7 @@ def test_every_node_corner_and_fault_is_among_the_fewest(name, firmwares):
     low_a, high_a = signals.pressure_a.valid_codes
     low_b, high_b = signals.pressure_b.valid_codes
     for sign in signals.signs:
-        column = SIDES[sign][2]
+        column = SIDES[sign][1]
         sound = [row for row in rows if low_a <= row[1] <= high_a and low_b <= row[2] <= high_b]
         by_drop = {}
         for row in sound:
@@ -124,16 +125,16 @@ def test_too_few_vectors_are_refused_with_how_many_are_needed(wording):
 
 def read_by_the_page(tmp_path, firmware, sign) -> tuple[int, str]:
     """Compile one side's core and the page's reader, and run it."""
-    file, ending, first = SIDES[sign]
+    ending, first = SIDES[sign]
     names, rows = table(firmware)
     assert names[first].startswith("compare") and names[first + 2].startswith("beta")
     reader = re.sub(r"\bdz_(comp|status|beta)\(", rf"dz_\1{ending}(", READER)
     lines = [f"{{{','.join(map(str, (*row[:3], *row[first : first + 3])))}}},\n" for row in rows]
     sources = {"check.c": reader, "vectors.inc": "".join(lines)}
-    sources |= {name: firmware.files[f"core/{name}"] for name in (file, "dz_comp.h")}
+    sources |= {name: firmware.files[f"core/{name}"] for name in ("dz_comp.c", *HEADERS)}
     for each, text in sources.items():
         (tmp_path / each).write_text(text, encoding="utf-8")
-    command = [*words_of(host_compiler()), "-std=c99", "-Werror", "check.c", file, "-o", "check"]
+    command = [*words_of(host_compiler()), "-std=c99", "-Werror", "check.c", "dz_comp.c", "-o", "check"]
     subprocess.run(command, cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "check"], capture_output=True, text=True, check=False)
     return done.returncode, done.stdout
@@ -148,32 +149,31 @@ def test_the_compiled_core_gives_every_vector(name, sign, firmwares, tmp_path):
 
 #: What is wrong, and how the C says it: a pattern, and what stands in its place.
 FAULTS = {
-    "a node of the law's table": (r"(law_segment\[\d+\] = \{(?:[^\n]*\n){9} *\{UINT32_C\()\d", r"\g<1>9"),
-    "a slope of the law's table": (r"(law_segment\[\d+\] = \{(?:[^\n]*\n){9} *\{UINT32_C\(\d+\), -?)", r"\g<1>1"),
-    "the law's smallest beta": (r"(law_segment\[\d+\] = \{\s*\{UINT32_C\()\d", r"\g<1>2"),
-    "a node of the table at zero": (r"(zero_segment\[\d+\] = \{(?:[^\n]*\n){9} *\{UINT32_C\()\d", r"\g<1>9"),
-    "the smallest beta at zero": (r"(zero_segment\[\d+\] = \{\s*\{UINT32_C\()\d", r"\g<1>2"),
-    "code of zero command": (r"(?<=COMMAND_ZERO )2048u", "2049u"),
-    "least valid command": (r"(?<=COMMAND_LOW )0u", "1u"),
-    "largest valid command": (r"(?<=COMMAND_HIGH )4095u", "4096u"),
-    "least valid pressure A": (r"(#define PRESSURE_A_LOW) (\d+)u", r"\1 (\2u - 1u)"),
-    "largest valid pressure A": (r"(#define PRESSURE_A_HIGH) (\d+)u", r"\1 (\2u + 1u)"),
-    "least valid pressure B": (r"(#define PRESSURE_B_LOW) (\d+)u", r"\1 (\2u + 1u)"),
-    "largest valid pressure B": (r"(#define PRESSURE_B_HIGH) (\d+)u", r"\1 (\2u - 1u)"),
-    "weight of sensor B": (r"(#define PRESSURE_B_WEIGHT) (\d+)u", r"\1 (\2u + 1u)"),
-    "no pressure": (r"(#define PRESSURE_A_ZERO) (\d+)u", r"\1 (\2u + 1u)"),
-    "a failed difference": (r"(#define REVERSE) (\d+)u", r"\1 (\2u - 4096u)"),
-    "the highest tested drop": (r"(#define TESTED_TO) (\d+)u", r"\1 (\2u + 4096u)"),
-    "width of the zero band": (r"(#define ZERO_BAND) (\d+)u", r"\1 (\2u - 1u)"),
-    "width of the transition": (r"(#define TRANSITION_CODES) (\d+)u", r"\1 (\2u - 1u)"),
-    "the output's limit": (r"(#define QUOTIENT_LIMIT) (UINT32_C\(\d+\))", r"\1 (\2 + UINT32_C(2047))"),
-    "rounding": (r"(#define HALF) UINT64_C\(\d+\)", r"\1 UINT64_C(0)"),
-    "the law's slope": (r"(#define FACTOR_SLOPE) (\(-INT32_C\(\d+\)\))", r"\1 (\2 + 1)"),
-    "the shift of the segments": (r"(#define STEP_SHIFT) 6u", r"\1 7u"),
-    "pressures turned round": (r"return \(uint32_t\)\(a - b\);", "return (uint32_t)(b - a);"),
-    "an invalid command is not let go": (r"(law_of\(towards, difference, failed\)) & \(uint32_t\)~let_go", r"\1"),
-    "the status of sensor B": (r"\(\(b >> WORD_TOP\) \* DZ_STATUS_PRESSURE_B\)", "0u"),
-    "beta for a display": (r"(?<=return \(uint16_t\)\(\(beta \* BETA_FACTOR\) >> )BETA_SHIFT", "(BETA_SHIFT + 1u)"),
+    "a node of the law's table": (r"(\.nodes = \{(?:[^\n]*\n){9} *\{UINT32_C\()\d", r"\g<1>9"),
+    "the law's smallest beta": (r"(\{UINT32_C\()\d(?=\d*\), UINT32_C\(\d+\)\}, /\* pressures)", r"\g<1>2"),
+    "a node of the table at zero": (r"(\.nodes = \{(?:[^\n]*\n){9} *\{UINT32_C\(\d+\), UINT32_C\()\d", r"\g<1>9"),
+    "the smallest beta at zero": (r"(\{UINT32_C\(\d+\), UINT32_C\()\d(?=\d*\)\}, /\* pressures)", r"\g<1>2"),
+    "the zero band's end": (r"(\.band_end =) (\d+)u", r"\1 \2u + 1u"),
+    "least valid command": (r"(\.command_low =) 0u", r"\1 1u"),
+    "largest valid command": (r"(\.command_high =) 4095u", r"\1 4096u"),
+    "least valid pressure A": (r"(\.a_low =) (\d+)u", r"\1 \2u - 1u"),
+    "largest valid pressure A": (r"(\.a_high =) (\d+)u", r"\1 \2u + 1u"),
+    "least valid pressure B": (r"(\.b_low =) (\d+)u", r"\1 \2u + 1u"),
+    "largest valid pressure B": (r"(\.b_high =) (\d+)u", r"\1 \2u - 1u"),
+    "weight of sensor B": (r"(\.weight_b = UINT32_C\(\d+\))", r"\1 + 1u"),
+    "no pressure": (r"(\.balance = UINT32_C\(\d+\))", r"\1 + 4096u"),
+    "a failed difference": (r"(\.reverse = UINT32_C\(\d+\))", r"\1 - 4096u"),
+    "the highest tested drop": (r"(\.tested_to = UINT32_C\(\d+\))", r"\1 + 4096u"),
+    "width of the zero band": (r"(\.zero_band =) (\d+)u", r"\1 \2u - 1u"),
+    "width of the transition": (r"(\.transition_codes =) (\d+)u", r"\1 \2u - 1u"),
+    "the output's limit": (r"(\.quotient_limit = UINT32_C\(\d+\))", r"\1 + UINT32_C(2047)"),
+    "rounding": (r"(\.half =) \{[^}]*\}", r"\1 {0u, 0u}"),
+    "the law's slope": (r"(\.slope = UINT32_C\(\d+\))", r"\1 + 1u"),
+    "the shift of the nodes": (r"(#define BETA_STEP_SHIFT) 6u", r"\1 7u"),
+    "pressures turned round": (r"(return )(\(p_a << WEIGHT_SHIFT\) - \(p_b \* block->weight_b\));?", r"\g<1>0u - (\2)"),
+    "an invalid command is not let go": (r"(~below_zero\(from_band\), beta\)\)) & ~let_go", r"\1"),
+    "the status of sensor B": (r"\(\(b >> 31\) \* DZ_STATUS_PRESSURE_B\)", "0u"),
+    "beta for a display": (r"\(side->beta_shift & LARGEST_WIDE_SHIFT\)", "(side->beta_shift + 1u)"),
 }  # fmt: skip
 
 
@@ -181,15 +181,18 @@ FAULTS = {
 def test_every_kind_of_fault_is_caught_by_the_fewest_vectors(firmwares):
     """The core once more for each fault, in one file: what a file may have once gets a number."""
     firmware = firmwares[FULL_SET]
-    core, (_, rows) = firmware.files["core/dz_comp.c"], table(firmware)
-    once = {*re.findall(r"^(?:static )?(?:inline )?\w+ (\w+)\(", core, re.MULTILINE), "segment"}
+    _, rows = table(firmware)
+    files = {name: firmware.files[f"core/{name}"] for name in ("dz_comp.c", *HEADERS)}
+    law = re.sub(r'#include "dz_[^\n]*', "", files["dz_valve.h"] + files["dz_comp.c"])
+    core = re.sub(r"#(?:ifndef|define) DZ_VALVE_H\n|(?<=\};\n)\n#endif", "", law)
+    once = {*re.findall(r"^(?:static )?(?:inline )?\w+ (\w+)\(", core, re.MULTILINE), "dz_valve", "betas", "betas_at"}
     undefined = "".join(f"#undef {symbol}\n" for symbol in re.findall(r"^#define (\w+)", core, re.MULTILINE))
-    cores = ""
+    cores = '#include "dz_comp.h"\n'
     for place, (fault, (pattern, instead)) in enumerate({"none": ("$", ""), **FAULTS}.items()):
         wrong, count = re.subn(pattern, instead, core, count=1)
         assert count == 1, f"{fault} has no place in the C"
         cores += re.sub(rf"\b({'|'.join(once)})\b(?!\.h)", rf"\g<1>_{place}", wrong) + undefined
-    library = load_library({"cores.c": cores, "dz_comp.h": firmware.files["core/dz_comp.h"]}, "cores", ["-O0", "-w"])
+    library = load_library({"cores.c": cores, **{name: files[name] for name in HEADERS[:2]}}, "cores", ["-O0", "-w"])
     caught = []
     for place in range(1 + len(FAULTS)):
         comp, status, beta = (getattr(library, f"dz_{name}_{place}") for name in ("comp", "status", "beta"))

@@ -18,7 +18,7 @@ OF_SENTENCES = {"magic", "layout", "length", "unused words are 0"}
 
 
 def built():
-    return with_current(variant("default", "wide"))[0]
+    return with_current(variant("default"))[0]
 
 
 def test_the_page_has_every_rule_and_no_other():

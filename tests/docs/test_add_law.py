@@ -67,10 +67,9 @@ def test_the_account_proves_it(run):
 
 
 def test_the_firmware_says_which_law_it_is(firmware):
-    header = (firmware / "core/dz_comp.h").read_text()
-    assert "Eq. (14) times beta" in header
-    source = (firmware / "core/dz_comp.c").read_text()
-    assert "coefficient of beta * u_i in u_O: k x_max/u_max =" in source
+    numbers = (firmware / "core/dz_valve.h").read_text()
+    assert "Eq. (14) times beta" in numbers
+    assert "two's complement: k x_max/u_max =" in " ".join(numbers.replace(" * ", " ").split())
 
 
 @needs_compiler

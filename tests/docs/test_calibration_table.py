@@ -21,7 +21,7 @@ def table() -> str:
 
 
 def test_a_block_is_read_by_the_table_alone():
-    block = block_of(variant("bipolar, all options", "wide"), "ab" * 32, serial="V-7")
+    block = block_of(variant("bipolar, all options"), "ab" * 32, serial="V-7")
     octets = pack(block)
     rows = [[cell.strip(" `") for cell in row.strip("|").split("|")] for row in table().splitlines()[2:]]
     rows = [row for row in rows if len(row) == 7]

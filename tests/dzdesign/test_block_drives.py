@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.slow, needs_compiler]
 
 
 def test_blocks_of_one_setting_are_tried_once_and_a_core_that_ignores_another_is_found(tmp_path):
-    own = variant("default", "wide")
+    own = variant("default")
     ramped = replace(own, drive_functions=replace(own.drive_functions, ramp_up=(900, 0), ramp_down=(500, 0)))
     folder = block_folder(own, tmp_path / "firmware")
     given = [(Path(f"{name}.bin"), block_of(ramped, "0" * 64, serial=name), ramped) for name in ("V1", "V2")]

@@ -20,7 +20,7 @@ from tests.support.core_variants import variant
 
 
 def of_valve(serial: str) -> Compensator:
-    compensator = variant("default", "wide")
+    compensator = variant("default")
     return replace(compensator, valve=replace(compensator.valve, record={"Serial": serial} if serial else {}))
 
 

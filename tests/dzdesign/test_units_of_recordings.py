@@ -152,8 +152,8 @@ def test_the_firmware_speaks_in_them(folder, chosen):
     assert run("codegen", compensator, "-o", folder / "chosen_firmware")[0] == 0
     for path in (folder / "chosen_firmware" / "core").iterdir():
         assert not numbers_as_computed(path.read_text(encoding="utf-8")), path.name
-    header = (folder / "chosen_firmware" / "core" / "dz_comp.h").read_text(encoding="utf-8")
-    assert "full command, 100 %" in header and ": 2900.75 psi\n" in header and "4095: 3625.94 psi" in header
+    header = (folder / "chosen_firmware" / "core" / "dz_valve.h").read_text(encoding="utf-8")
+    assert "full command being 100 %" in header and " psi (the converter's code" in header
     readme = (folder / "chosen_firmware" / "f28335" / "README.md").read_text(encoding="utf-8")
     assert "| command u_i, 0 % to 100 % |" in readme and "| pressure A, 0 psi to 2900.75 psi |" in readme
     assert "| 50 %, 50 %" not in readme and "MPa" not in readme

@@ -67,8 +67,8 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
     assert ["figure-characteristic", *of_sections] == [name for name in ids if name.startswith("figure-")]
     links = [each["href"] for each in page.of("a")]
     assert {link[1:] for link in links if link.startswith("#")} <= set(ids)
-    manifest_symbols = re.findall(r"<code>(\w+)</code><small>core/dz_comp.c", html)
-    assert {"FACTOR_SLOPE", "FACTOR_OFFSET", "law_segment"} <= set(manifest_symbols)
+    manifest_symbols = re.findall(r"<code>([\w.\[\]]+)</code><small>core/dz_valve.h", html)
+    assert {"sides[0].slope", "sides[0].offset", "sides[0].nodes"} <= set(manifest_symbols)
 
 
 def test_the_page_needs_nothing_from_outside_and_runs_nothing(html):

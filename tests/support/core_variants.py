@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from itertools import product
 
 from dzdesign.codegen.project import Firmware, generate, target_named
 from dzdesign.core.artefact_reading import read_artefact
@@ -19,8 +18,7 @@ from dzdesign.identify.valve.model import ValveModel
 from dzdesign.identify.valve.side_model import SideModel
 from tests.support.golden_firmware import GOLDENS
 
-#: One target of each arithmetic, products of 32x32->64 bits and none longer than 32 bits.
-TARGETS = {"wide": "f28335", "narrow": "avr"}
+TARGET = "f28335"
 ADC = Converter()
 
 
@@ -63,13 +61,13 @@ VARIANTS = {
     "bipolar, all options": {"signals": UNLIKE | {"command": BOTH, "swapped": True}, "transition": Fraction(1, 100)}
     | DRIVE_FUNCTIONS,
 }  # fmt: skip
-NAMES = tuple(product(VARIANTS, TARGETS))
+NAMES = tuple(VARIANTS)
 
 
 @cache
-def variant(name: str, arithmetic: str) -> Compensator:
-    """Design a variant for the target of that arithmetic."""
-    target = target_named(TARGETS[arithmetic])
+def variant(name: str) -> Compensator:
+    """Design a variant."""
+    target = target_named(TARGET)
     content = (GOLDENS / "valve.json").read_bytes()
     valve = read_artefact(content, ValveModel, "valve.json")
     options = dict(VARIANTS[name])
@@ -92,13 +90,13 @@ def _with_opening_curve(side: SideModel) -> SideModel:
     return replace(side, opening_curve=curve)
 
 
-def firmware(name: str, arithmetic: str) -> Firmware:
+def firmware(name: str) -> Firmware:
     """Generate a variant's firmware."""
-    return generate(variant(name, arithmetic), TARGETS[arithmetic])
+    return generate(variant(name), TARGET)
 
 
-def core_files(name: str, arithmetic: str) -> Iterator[tuple[str, str]]:
+def core_files(name: str) -> Iterator[tuple[str, str]]:
     """Give name and text of each file of a variant's core."""
-    for path, text in firmware(name, arithmetic).files.items():
+    for path, text in firmware(name).files.items():
         if path.startswith("core/"):
             yield path.removeprefix("core/"), text

@@ -1,8 +1,15 @@
 """Current loops for the tests: the gains and limits of a coil of 4 ohm and 40 mH, with and without the supply."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 
+from dzdesign.codegen.calibration.block import current_block, numbers_of
+from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.files import texts, valve_files
+from dzdesign.codegen.calibration.numbers import ValvePage
 from dzdesign.design.current.loop import CurrentLoop, SupplyCorrection
+from tests.support.core_variants import variant
 
 PLAIN = CurrentLoop(
     full_counts=60000,
@@ -50,3 +57,16 @@ LARGEST = replace(
     rate=65535,
 )
 LOOPS = {"plain": PLAIN, "supply": replace(PLAIN, supply=SUPPLY, integral_limit=5000, release=1000), "largest": LARGEST}
+
+
+def current_texts(loop: CurrentLoop, banner: Sequence[str] = ()) -> dict[str, str]:
+    """Return the files of a current controller by itself, its numbers beside those of the goldens' valve."""
+    compensator = variant("default")
+    built = built_for(compensator, fixed=True)
+    sizes = replace(built.sizes, supply_mask=63 if loop.supply else 0)
+    built = replace(built, shape=8 + 16 * bool(loop.supply), samples=loop.samples, sizes=sizes)
+    numbers = replace(numbers_of(compensator), current=current_block(loop, sizes))
+    made = texts(valve_files(ValvePage(compensator=compensator, block=numbers, built=built)), banner)
+    # The stand-ins for dz_comp.h have these two of their own.
+    made["dz_calibration.h"] = re.sub(r"#define DZ_(?:COMPARE|ADC_CODE)_MAX .*", "", made["dz_calibration.h"])
+    return {name: made[name] for name in ("dz_current.c", "dz_current.h", "dz_calibration.h", "dz_valve.h")}

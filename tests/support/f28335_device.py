@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 import pytest
 
 from dzdesign.codegen.banner import Banner
-from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
 from dzdesign.design.current.choosing import CurrentSensor
+from tests.support.current_loops import current_texts
 from tests.support.example_coil import with_current
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 

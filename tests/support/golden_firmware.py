@@ -27,7 +27,7 @@ GOLDENS = TESTS / "goldens"
 FULL = TESTS / "goldens_full"
 #: One firmware in block form, of the second set's compensator.
 BLOCK_GOLDENS = TESTS / "goldens_block"
-FULL_TARGETS = ("avr", "cortex-m4", "f28335")
+FULL_TARGETS = ("cortex-m4", "f28335")
 #: Not compared: it is what goes in.
 INPUT = "compensator.json"
 #: Beside the targets.

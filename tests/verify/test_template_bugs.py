@@ -40,7 +40,7 @@ BUGS = {
 @pytest.fixture(scope="module")
 def everything():
     """A design with both sides and everything switched on, in block form; and one of another valve."""
-    return variant("bipolar, all options", "wide"), variant("bipolar", "wide")
+    return variant("bipolar, all options"), variant("bipolar")
 
 
 def generated(compensator, other, monkeypatch, folder, bug=""):

@@ -12,17 +12,21 @@ from typing import TYPE_CHECKING
 from dzdesign.codegen.banner import Banner, banner_of, board_lines
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
-from dzdesign.codegen.calibration.files import block_core_files
+from dzdesign.codegen.calibration.files import (
+    block_core_files,
+    core_headers,
+    core_sources,
+    fixed_core_files,
+)
 from dzdesign.codegen.calibration.in_project import block_templates, block_values
 from dzdesign.codegen.calibration.layout import CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
-from dzdesign.codegen.core.current_files import CURRENT_HEADERS, CURRENT_SOURCES, FAULT_BITS, current_files
-from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, CoreFile, Values, core_files
+from dzdesign.codegen.core.constants import CoreFile, Values
+from dzdesign.codegen.core.status_bits import FAULT_BITS
 from dzdesign.codegen.core_costs import MEASURED, STAND_IN
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.loading.files import LOAD_FILES, STORE, load_texts
-from dzdesign.codegen.provenance import constants_of
 from dzdesign.codegen.target import Target, folder_of
 from dzdesign.codegen.vectors.vectors_file import vectors_text
 from dzdesign.codegen.wiring import wiring_of
@@ -156,7 +160,7 @@ def generate(
         core = _in_core(block_core_files(built_for(compensator)))
         first_lines = banner.of_any_valve
     else:
-        core = _in_core(core_files(compensator, target.arithmetic) | (current_files(drive.loop) if drive else {}))
+        core = _in_core(fixed_core_files(compensator))
         first_lines = banner.lines
     files = {
         path: _render(PACKAGE, file.template, first_lines(file.template), file.values) for path, file in core.items()
@@ -179,7 +183,7 @@ def generate(
             ramp_tests=compensator.valve.made_from,
         ),
         vectors=vectors,
-        constants=constants_of(compensator, {path: file.constants for path, file in core.items()}),
+        constants=tuple(constant for path in sorted(core) for constant in core[path].constants),
         files={path: sha256_of(text.encode()) for path, text in files.items()}
         | ({BLOCK_FILE: sha256_of(octets)} if octets else {}),
     )
@@ -218,16 +222,8 @@ def target_files(
         "drive": compensator.drive_functions,
         "limited": compensator.drive_functions.compare_limit < signals.compare_max,
         "at_zero": {sign: zero_command(compensator, sign) for sign in signals.signs},
-        "core_sources": (
-            *(("dz_calibration.c", "dz_comp.c") if block else [CORE_SOURCES[sign] for sign in signals.signs]),
-            "dz_drive.c",
-            *(CURRENT_SOURCES if current else ()),
-        ),
-        "core_headers": (
-            *(("dz_calibration.h",) if block else ()),
-            *CORE_HEADERS,
-            *(CURRENT_HEADERS if current else ()),
-        ),
+        "core_sources": core_sources(block=block is not None, current=current is not None),
+        "core_headers": core_headers(block=block is not None, current=current is not None),
         **block_values(compensator, block, target),
         "current": current,
         "link_sources": link_names(target, ".c") if block else (),

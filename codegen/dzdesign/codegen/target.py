@@ -13,9 +13,6 @@ from dzdesign.design.current.circuit import CurrentSampling
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter, TargetInputs
 
-#: Products that the core may use: "wide", 32x32->64 bits, or "narrow", none longer than 32 bits.
-ARITHMETICS = ("wide", "narrow")
-
 #: Names that the renderer itself passes to every template; a target's context may not use them.
 RENDERER_NAMES = frozenset(
     {"banner", "project", "signals", "u_max_V", "drive", "limited", "at_zero", "bipolar", "wiring", "lot_setting"}
@@ -70,8 +67,6 @@ class Target:
     block_templates: Mapping[str, str] = field(default_factory=dict)
     #: Every value that a template prints, already a string.
     context: Mapping[str, str]
-    #: One of `ARITHMETICS`.
-    arithmetic: str = "wide"
     #: Of a target without a converter and timer of its own, such as a library: it takes the scalings of any
     #: compensator, and `compare_max` and `converter` are only what `design` uses if nobody says otherwise.
     takes_any_signals: bool = False
@@ -89,8 +84,6 @@ class Target:
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", self.name):
             raise DzdesignError(f"target name: expected words of a-z and 0-9 with hyphens, got {self.name!r}")
-        if self.arithmetic not in ARITHMETICS:
-            raise DzdesignError(f"target {self.name}: arithmetic must be one of {ARITHMETICS}, got {self.arithmetic!r}")
         for label, number in (("compare_max", self.compare_max), ("converter.code_max", self.converter.code_max)):
             if not 0 < number <= 0xFFFF:
                 raise DzdesignError(f"target {self.name}: {label} must fit 16 bits unsigned, got {number}")

@@ -49,13 +49,13 @@ class FirmwareOrigin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirmwareConstant:
-    """One `#define` or table of the core."""
+    """One number of the core: a `#define`, or a member of the valve's numbers."""
 
     file: Annotated[Text, Meta(description="File in the firmware.")]
     symbol: Annotated[Text, Meta(description="Name in C.")]
     value: Annotated[
         Number | tuple[tuple[Number, Number], ...],
-        Meta(description="Value in C; for a table its rows, each with start and change."),
+        Meta(description="Value in C; for a table its rows: of beta the law's and the certified one, else one number."),
     ]
     equation: Annotated[Text, Meta(description="Source equation and the meaning of the constant in it.")]
     engineering: Annotated[Text, Meta(description="Value in engineering units.")]
@@ -67,7 +67,6 @@ class FirmwareConstant:
         tuple[Text, ...],
         Meta(description="Keys of valve.json from which the value was computed; empty if it is an option of `design`."),
     ]
-    generator: Annotated[Text, Meta(description="Source file of dzdesign that computes the value.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

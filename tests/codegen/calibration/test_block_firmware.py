@@ -14,7 +14,7 @@ from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.analysis.frama_c import PROGRAM, prove, prove_any_block
+from dzdesign.verify.analysis.frama_c import PROGRAM, prove
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.toolchain.host_compiler import STRICT
 from tests.codegen.core.test_misra import findings
@@ -31,8 +31,8 @@ FORMS = ("default", "inverted", "bipolar, all options", "current")
 def core_of(name):
     """The files of a core in block form."""
     if name != "current":
-        return texts(block_core_files(built_for(variant(name, "wide"))))
-    built = replace(built_for(variant("default", "wide")), shape=0b11000, samples=PLAIN.samples)
+        return texts(block_core_files(built_for(variant(name))))
+    built = replace(built_for(variant("default")), shape=0b11000, samples=PLAIN.samples)
     return texts(block_core_files(built))
 
 
@@ -70,7 +70,7 @@ def test_every_compiler_takes_the_core_without_a_warning(compiler, tmp_path):
 
 
 def test_a_firmware_holds_its_block_and_the_core_is_of_no_valve(tmp_path):
-    compensator = variant("bipolar, all options", "wide")
+    compensator = variant("bipolar, all options")
     firmware = written(compensator, "f28335", tmp_path / "fw")
     octets = (tmp_path / "fw" / "calibration.bin").read_bytes()
     digest = firmware.manifest.origin.compensator_json
@@ -83,7 +83,7 @@ def test_a_firmware_holds_its_block_and_the_core_is_of_no_valve(tmp_path):
 
 @needs_compiler
 def test_a_block_firmware_without_its_block_is_not_verified(tmp_path):
-    folder = block_folder(variant("default", "wide"), tmp_path / "fw")
+    folder = block_folder(variant("default"), tmp_path / "fw")
     (folder / "calibration.bin").unlink()
     with pytest.raises(RequirementError, match="calibration block"):
         check_all_inputs(folder)
@@ -91,7 +91,7 @@ def test_a_block_firmware_without_its_block_is_not_verified(tmp_path):
 
 @needs_compiler
 def test_the_block_as_c_is_the_block_as_octets(tmp_path):
-    firmware = written(variant("bipolar, all options", "wide"), "host", tmp_path / "fw")
+    firmware = written(variant("bipolar, all options"), "host", tmp_path / "fw")
     main = tmp_path / "main.c"
     main.write_text(
         '#include <stdio.h>\n#include "dz_block.h"\n'
@@ -115,7 +115,7 @@ SEEDED_CURRENT = ("(place >> shift) & DZ_CALIBRATION_SUPPLY_MASK", "place >> shi
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which(PROGRAM) is None, reason="no frama-c on the path")
 def test_no_octets_of_a_block_make_anything_undefined(tmp_path):
-    folder = block_folder(variant("bipolar, all options", "wide"), tmp_path / "fw")
+    folder = block_folder(variant("bipolar, all options"), tmp_path / "fw")
     proof = prove(folder)
     assert proof.alarms == () and proof.widths == ("x86_16", "x86_64")
     for file, old, new in SEEDED.values():
@@ -123,22 +123,22 @@ def test_no_octets_of_a_block_make_anything_undefined(tmp_path):
         text = path.read_text()
         assert old in text
         path.write_text(text.replace(old, new))
-        assert prove_any_block(folder, ("x86_16",)).alarms, file
+        assert prove(folder, ("x86_16",)).alarms, file
         path.write_text(text)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which(PROGRAM) is None, reason="no frama-c on the path")
 def test_no_octets_of_a_block_make_the_current_controller_undefined(tmp_path):
-    compensator = with_current(variant("default", "wide"), TARGET, SENSORS["supply measured"])
+    compensator = with_current(variant("default"), TARGET, SENSORS["supply measured"])
     folder = block_folder(compensator, tmp_path / "fw")
-    proof = prove_any_block(folder)
+    proof = prove(folder)
     assert proof.alarms == () and "dz_current_tick" in proof.functions
     path = folder / "core" / "dz_current.c"
     text = path.read_text()
     assert SEEDED_CURRENT[0] in text
     path.write_text(text.replace(*SEEDED_CURRENT))
-    found = prove_any_block(folder, ("x86_16",)).alarms
+    found = prove(folder, ("x86_16",)).alarms
     assert {each.file for each in found} == {"dz_current.c"}
 
 

@@ -30,9 +30,9 @@ def with_current(compensator):
 def forms():
     """Firmware and accepted block: two solenoids with everything on, an inverse play, current control."""
     for name in ("bipolar, all options", "bipolar, play", "inverted"):
-        yield name, built_for(variant(name, "wide")), block_of(variant(name, "wide"), "0" * 64)
-    play = variant("bipolar, play", "wide")
-    yield "current", *with_current(variant("default", "wide"))
+        yield name, built_for(variant(name)), block_of(variant(name), "0" * 64)
+    play = variant("bipolar, play")
+    yield "current", *with_current(variant("default"))
     # A converter of 16 bits: a command may have more codes than the drive functions can count.
     yield "wide codes", replace(built_for(play), code_max=65535), replace(block_of(play, "0" * 64), code_max=65535)
 
@@ -50,7 +50,7 @@ def agree(check, built, block) -> bool:
 @pytest.mark.parametrize("name", VARIANTS)
 @pytest.mark.slow
 def test_every_block_that_design_makes_is_accepted(name):
-    compensator = variant(name, "wide")
+    compensator = variant(name)
     built, block = built_for(compensator), block_of(compensator, "0" * 64)
     assert refusals(block, built) == {} and CompiledCheck(built).findings(pack(block)) == set()
 

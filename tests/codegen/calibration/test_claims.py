@@ -31,7 +31,7 @@ SEEDED = {
 
 @pytest.fixture(scope="module")
 def firmware():
-    compensator = variant("bipolar, all options", "wide")
+    compensator = variant("bipolar, all options")
     return built_for(compensator), block_of(compensator, "0" * 64)
 
 
@@ -57,7 +57,7 @@ def test_a_wrong_check_lets_a_block_break_its_claim(firmware, name):
 
 
 def test_accepted_corrections_of_the_supply_are_straight_between_their_nodes():
-    built, block = with_current(variant("default", "wide"))
+    built, block = with_current(variant("default"))
     program = (TESTS / "support" / "supply_claims.c").read_text()
     files = texts(block_core_files(built))
     headers = {name: files[name] for name in ("dz_calibration.h", "dz_current.h")}

@@ -23,12 +23,12 @@ COMPILERS = {"gcc": (), "avr-gcc": ("-mmcu=atmega1280",)}
 
 @pytest.fixture(scope="module")
 def block() -> CalibrationBlock:
-    return block_of(variant("bipolar, all options", "wide"), DIGEST, serial="V-7 №3", record="lot 12")
+    return block_of(variant("bipolar, all options"), DIGEST, serial="V-7 №3", record="lot 12")
 
 
 @pytest.mark.parametrize("name", ["default", "bipolar, play", "bipolar, all options"])
 def test_a_block_comes_back_as_it_was(name):
-    block = block_of(variant(name, "wide"), DIGEST)
+    block = block_of(variant(name), DIGEST)
     octets = pack(block)
     assert replace(unpack(octets), crc32=0) == block
     assert pack(unpack(octets)) == octets
@@ -54,7 +54,7 @@ def test_no_compiler_pads_the_struct():
 def test_the_c_struct_is_the_layout(compiler, tmp_path):
     if not shutil.which(compiler):
         pytest.skip(f"{compiler} not found")
-    header = texts({"dz_calibration.h": calibration_header(built_for(variant("default", "wide")))})
+    header = texts({"dz_calibration.h": calibration_header(built_for(variant("default")))})
     (tmp_path / "dz_calibration.h").write_text(header["dz_calibration.h"])
     source = ["#include <stddef.h>", '#include "dz_calibration.h"', "static const struct dz_calibration block;"]
     for number, member in enumerate(members()):
@@ -92,7 +92,7 @@ def test_what_is_no_block_is_refused(block, damage, named):
 
 
 def test_what_a_block_has_no_room_for_is_refused():
-    compensator = variant("default", "wide")
+    compensator = variant("default")
     nodes = (100,) * (compensator.signals.largest_difference(1) // 16 + 2)
     positive = replace(compensator.positive, beta=nodes, transition_beta=nodes)
     many = replace(compensator, beta_step_codes=16, sides=replace(compensator.sides, positive=positive))
@@ -112,7 +112,7 @@ def test_a_number_that_does_not_fit_is_no_block(block):
 
 
 def test_unlike_sensors_and_sides_stand_in_the_block(block):
-    compensator = variant("bipolar, all options", "wide")
+    compensator = variant("bipolar, all options")
     signals = compensator.signals
     assert block.weight_b == signals.weight_b != 4096 and block.shape == 0b101
     for place, sign in enumerate(signals.signs):

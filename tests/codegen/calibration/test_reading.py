@@ -18,12 +18,12 @@ DIGEST = "0123456789abcdef" * 4
 
 
 def block_named(name: str) -> CalibrationBlock:
-    return block_of(variant(name, "wide"), DIGEST, serial="V-7 №3", record="lot 12")
+    return block_of(variant(name), DIGEST, serial="V-7 №3", record="lot 12")
 
 
 @pytest.mark.parametrize("name", ["default", "target law, no transition", "bipolar, all options", "bipolar, play"])
 def test_the_reading_is_what_the_compensator_says(name):
-    compensator, block = variant(name, "wide"), block_named(name)
+    compensator, block = variant(name), block_named(name)
     signals, functions = compensator.signals, compensator.drive_functions
     reading = reading_of(block, "block")
     full = float(compensator.u_max_V)
@@ -55,7 +55,7 @@ def test_ramps_and_dither_are_those_that_were_asked_for():
 
 @pytest.mark.parametrize("name", ["default", "no transition", "target law, no transition", "bipolar, all options"])
 def test_the_law_at_the_nodes_is_the_exact_one(name):
-    compensator, block = variant(name, "wide"), block_named(name)
+    compensator, block = variant(name), block_named(name)
     reading = reading_of(block, "block")
     counts = compensator.signals.compare_max / float(compensator.u_max_V)
     for place, (side, sign) in enumerate(_sides(compensator)):

@@ -71,7 +71,8 @@ def wrong_codes(compensator, folder, seed: int) -> int:
 
     firmware = generate(compensator, "f28335")
     write_folder(folder, firmware.files, firmware.manifest)
-    library = load_library({name: (folder / "core" / name).read_text() for name in ("dz_comp.c", "dz_comp.h")}, "core")
+    names = ("dz_comp.c", "dz_comp.h", "dz_calibration.h", "dz_valve.h")
+    library = load_library({name: (folder / "core" / name).read_text() for name in names}, "core")
     draw = random.Random(seed)
     pairs = CORNERS + [(draw.randint(0, 4095), draw.randint(-200, 3326)) for _ in range(300)]
     wrong = 0

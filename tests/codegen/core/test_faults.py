@@ -150,29 +150,30 @@ def test_a_latched_fault_stays_whatever_comes_until_the_drive_is_initialised():
 #: What is put for what in dz_drive.c, and the options that show it.
 SEEDED = {
     "the interlock is forgotten after an invalid command": (
-        "too_few(drive->valid_commands) &", "too_few(drive->valid_commands) & all_ones((drive->status & 1u) ^ 1u) &"),
+        "too_few(block, drive->valid_commands) &",
+        "too_few(block, drive->valid_commands) & all_ones((drive->status & 1u) ^ 1u) &"),
     "no interlock after a reset": (
-        "drive->valid_commands = 0u;", "drive->valid_commands = FAULT_SAMPLES;"),
+        "? block->fault_samples : 0u;", "? block->fault_samples : block->fault_samples;"),
     "an invalid command does not wait": (
-        " = valid_samples(drive->valid_commands, invalid |", " = valid_samples(drive->valid_commands,"),
+        " = valid_samples(block, drive->valid_commands, invalid |", " = valid_samples(block, drive->valid_commands,"),
     "zero one code too wide": (
-        "(INTERLOCK - asked)", "(INTERLOCK + 1 - asked)"),
+        "is_negative(block->interlock - codes)", "is_negative(block->interlock + 1u - codes)"),
     "zero one code too narrow": (
-        "(INTERLOCK - asked)", "(INTERLOCK - 1 - asked)"),
+        "is_negative(block->interlock - codes)", "is_negative(block->interlock - 1u - codes)"),
     "back one sample early": (
-        "return 0u - ((valid - FAULT_SAMPLES) >> 31);", "return 0u - ((valid + 1u - FAULT_SAMPLES) >> 31);"),
+        "return is_negative(valid - block->fault_samples);", "return is_negative(valid + 1u - block->fault_samples);"),
     "back one sample late": (
-        "(valid + ((valid - FAULT_SAMPLES) >> 31))", "(valid + ((valid - FAULT_SAMPLES - 1u) >> 31))"),
+        "(valid + ((valid - block->fault_samples) >> 31))", "(valid + ((valid - block->fault_samples - 1u) >> 31))"),
     "valid samples need not be in a row": (
         " >> 31)) & ~fault;", " >> 31)) & (~fault | valid);"),
     "latched one sample early": (
-        "((FAULT_SAMPLES - 1u) - faulty)", "((FAULT_SAMPLES - 2u) - faulty)"),
+        "(block->fault_samples - (uint32_t)1u)", "(block->fault_samples - (uint32_t)2u)"),
     "a single sound command clears the latch": (
         "(uint16_t)(faulty & gone)", "(uint16_t)(faulty & invalid)"),
     "a single sound pressure clears the latch": (
         "(uint16_t)(faulty & held)", "(uint16_t)(faulty & fault)"),
     "the latch of the command is not asked": (
-        " | latched(faulty));\n    /* All", ");\n    /* All"),
+        "invalid | early | latched(block, faulty)", "invalid | early"),
     "pressure B's bit is no fault": (
         "DZ_STATUS_PRESSURE_B | ", ""),
     "an implausible difference is no fault": (

@@ -41,8 +41,8 @@ def findings(folder) -> list[tuple[str, str, str]]:
 
 
 def symbol_of(line: str) -> str | None:
-    define = re.match(r"#define (\w+)", line)
-    return define and define[1]
+    found = re.match(r"#define (\w+)|static const struct \w+ (\w+) =", line)
+    return found and (found[1] or found[2])
 
 
 def justified(text: str) -> set[tuple[str, str]]:
@@ -52,8 +52,8 @@ def justified(text: str) -> set[tuple[str, str]]:
     return {(rule, symbol) for rule, symbols in stated for symbol in symbols.split(", ")}
 
 
-def written(folder, name: str, arithmetic: str):
-    for path, text in core_files(name, arithmetic):
+def written(folder, name: str):
+    for path, text in core_files(name):
         (folder / path).write_text(text)
     return folder
 
@@ -65,17 +65,17 @@ def test_the_goldens_are_clean(target):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "arithmetic"), NAMES)
-def test_every_form_of_the_core_is_clean(name, arithmetic, tmp_path):
-    assert findings(written(tmp_path, name, arithmetic)) == []
+@pytest.mark.parametrize("name", NAMES)
+def test_every_form_of_the_core_is_clean(name, tmp_path):
+    assert findings(written(tmp_path, name)) == []
 
 
 SEEDED = {
-    "5.9": ("dz_comp_negative.c", "below_zero_negative", "below_zero"),
-    "7.2": ("dz_comp.c", "#define WORD_TOP 31u", "#define WORD_TOP 0xFFFF"),
-    "10.8": ("dz_comp.c", "(int64_t)(int32_t)beta * factor", "(int64_t)(factor * factor)"),
+    "5.9": ("dz_drive.c", "is_negative", "below_zero"),
+    "7.2": ("dz_comp.c", "#define LARGEST_SHIFT 31u", "#define LARGEST_SHIFT 0xFFFF"),
+    "10.8": ("dz_comp.c", "(int64_t)number(left) * number(right)", "(int64_t)(number(left) * number(right))"),
     "15.6": ("dz_drive.c", "    drive->faulty_pressures = 0u;\n}", "    if (drive->law == 0u) drive->side = 0;\n}"),
-    "2.5": ("dz_comp.c", "#define WORD_TOP", "#define NOBODY 1u\n#define WORD_TOP"),
+    "2.5": ("dz_comp.c", "#define LARGEST_SHIFT", "#define NOBODY 1u\n#define LARGEST_SHIFT"),
 }
 
 
@@ -83,7 +83,7 @@ SEEDED = {
 @pytest.mark.parametrize("rule", SEEDED)
 def test_a_seeded_violation_is_found(rule, tmp_path):
     file, right, wrong = SEEDED[rule]
-    source = written(tmp_path, "bipolar", "wide") / file
+    source = written(tmp_path, "bipolar") / file
     text = source.read_text()
     assert right in text
     source.write_text(text.replace(right, wrong))
@@ -91,8 +91,8 @@ def test_a_seeded_violation_is_found(rule, tmp_path):
 
 
 def test_a_deviation_without_its_justification_is_found(tmp_path):
-    header = written(tmp_path, "default", "wide") / "dz_comp.h"
+    header = written(tmp_path, "default") / "dz_calibration.h"
     text = header.read_text()
     assert "deviation from rule 2.5 (advisory) in DZ_COMPARE_MAX, " in text
     header.write_text(text.replace("in DZ_COMPARE_MAX, ", "in "))
-    assert [(file, name) for file, name, _ in findings(tmp_path)] == [("dz_comp.h", "misra-c2012-2.5")]
+    assert [(file, name) for file, name, _ in findings(tmp_path)] == [("dz_calibration.h", "misra-c2012-2.5")]

@@ -15,13 +15,13 @@ import pytest
 
 from dzdesign.codegen import c2000
 from dzdesign.codegen.banner import Banner
-from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.codegen.f280049c import target as f280049c
 from dzdesign.codegen.f280049c.target import TARGET
 from dzdesign.codegen.project import target_files
 from dzdesign.core.errors import DzdesignError
 from dzdesign.design.current.choosing import CurrentSensor
 from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
+from tests.support.current_loops import current_texts
 from tests.support.example_coil import with_current
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
 from tests.support.paths import DEVICES
@@ -307,7 +307,7 @@ def test_projectspec_and_makefile_name_the_same_files(firmware):
     files = [entry.get("path") for entry in project.findall("file")]
     assert {entry.get("action") for entry in project.findall("file")} == {"link"}
     ours = {Path(path).name for path in files if not path.startswith("C2000WARE_ROOT/")}
-    core_files = {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h"}
+    core_files = {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h", "dz_calibration.h", "dz_valve.h"}
     assert ours == {path.name for path in firmware.iterdir()} - {"Makefile", "dzdesign.projectspec"} | core_files
     make = shutil.which("make") or pytest.skip("no make on the path")
     core = firmware.parent / "core"

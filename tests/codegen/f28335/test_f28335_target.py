@@ -238,8 +238,7 @@ def test_projectspec_and_makefile_name_the_same_files(signs, tmp_path):
     assert all(entry.get("action") == "link" for entry in project.findall("file"))
     ours = {Path(path).name for path in files if not path.startswith("C2000WARE_ROOT/")}
     generated = {Path(path).name for path in firmware} - {"Makefile", "dzdesign.projectspec"}
-    core_files = {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h"}
-    core_files |= {"dz_comp_negative.c"} if len(signs) == 2 else set()
+    core_files = {"dz_comp.c", "dz_comp.h", "dz_drive.c", "dz_drive.h", "dz_calibration.h", "dz_valve.h"}
     assert ours == generated | core_files
 
     make = shutil.which("make") or pytest.skip("no make on the path")

@@ -62,7 +62,7 @@ def test_names_are_others_whatever_the_case_and_none_is_a_word_of_the_standard_o
 @pytest.mark.parametrize("interface", ["plc", "codes"])
 @pytest.mark.parametrize("name", ["one solenoid", "two solenoids", *VARIANTS])
 def test_it_is_of_the_standards_grammar(name, interface):
-    made = compensator_of(ROOTS[name]) if name in ROOTS else variant(name, "wide")
+    made = compensator_of(ROOTS[name]) if name in ROOTS else variant(name)
     grammar().parse(structured_text(made, DIGEST, interface))
 
 

@@ -222,7 +222,8 @@ def test_a_state_read_once_is_torn(firmware):
 def test_beta_of_the_frame_is_the_compensators_at_every_difference(example_compensator, example_firmware):
     from tests.support.c_library import load_library
 
-    sources = {name: example_firmware.files[f"core/{name}"] for name in ("dz_comp.c", "dz_comp.h")}
+    names = ("dz_comp.c", "dz_comp.h", "dz_calibration.h", "dz_valve.h")
+    sources = {name: example_firmware.files[f"core/{name}"] for name in names}
     core = load_library(sources, "dz_comp.c")
     core.dz_beta.restype, core.dz_beta.argtypes = ctypes.c_uint16, [ctypes.c_uint16] * 2
     wrong = [
@@ -259,7 +260,7 @@ def test_a_pass_costs_what_is_stated_and_packs_the_same_where_int_has_16_bits(fi
     folder = firmware["f28335/dz_frame.c"].parent
     core = tmp_path / "core"
     core.mkdir()
-    for name in ("dz_comp.c", "dz_comp.h", "dz_drive.h"):
+    for name in ("dz_comp.c", "dz_comp.h", "dz_calibration.h", "dz_valve.h", "dz_drive.h"):
         (core / name).write_text(example_firmware.files[f"core/{name}"])
     program = tmp_path / "a.elf"
     sources = [core / "dz_comp.c", folder / "dz_telemetry.c", folder / "dz_frame.c", HERE / "telemetry_avr.c"]

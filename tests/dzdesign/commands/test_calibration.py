@@ -253,7 +253,7 @@ def test_an_options_file_for_all_commands_is_taken(written, tmp_path, capsys, un
 
 
 def test_serial_and_record_come_from_the_test_record_unless_given(unproven, tmp_path):
-    compensator = variant("default", "wide")
+    compensator = variant("default")
     record = {"Serial": "4711 №", "record": "lot 12", "oil": "HLP 46"}
     compensator = replace(compensator, valve=replace(compensator.valve, record=record))
     by_record, given, none = (
@@ -277,14 +277,14 @@ def test_serial_and_record_come_from_the_test_record_unless_given(unproven, tmp_
     of_lot = members_of(pack(api.calibration(replace(compensator, lot=lot)).block))
     assert (of_lot["serial"], of_lot["record"]) == (b"", b"")
     with pytest.raises(api.InputError, match="at most 24; shorten it"):
-        api.calibration(variant("default", "wide"), serial="x" * 25)
+        api.calibration(variant("default"), serial="x" * 25)
 
 
 def test_the_page_is_in_the_units_of_the_recordings_where_the_compensator_is_known(tmp_path, capsys):
     units = RecordedUnits(
         command=CommandUnit(unit="mA", at_zero=4.0, factor=1.6), pressure=PressureUnit(unit="bar", factor=10.0)
     )
-    compensator = variant("default", "wide")
+    compensator = variant("default")
     compensator = replace(compensator, valve=replace(compensator.valve, recorded_units=units))
     (tmp_path / "compensator.json").write_bytes(to_json_bytes(compensator))
     octets = pack(block_of(compensator, sha256_of(to_json_bytes(compensator))))

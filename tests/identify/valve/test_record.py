@@ -81,7 +81,7 @@ def test_none_of_it_reaches_the_c(here):
     """Its one way into a firmware folder is compensator.json, whose valve is that of the hash."""
     valve = identify([synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)], record=HOSTILE)
     Path("valve.json").write_bytes(to_json_bytes(valve))
-    for target in ("f28335", "avr"):
+    for target in ("f28335", "host"):
         files = api.generate(api.design("valve.json", target=target), target=target).files
         compensator = json.loads(files["compensator.json"])
         assert compensator["valve"]["record"] == HOSTILE

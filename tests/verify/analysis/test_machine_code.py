@@ -9,7 +9,7 @@ from dzdesign.verify.toolchain.machines import Machine
 
 
 @pytest.mark.parametrize(
-    ("target", "tried"), [("cortex-m4", ["Cortex-M4"]), ("avr", ["AVR"]), ("f28335", ["Cortex-M4", "AVR"])]
+    ("target", "tried"), [("cortex-m4", ["Cortex-M4"]), ("f28335", ["Cortex-M4", "AVR"])]
 )
 def test_without_tools_the_targets_own_machine_alone_is_required(tmp_path, monkeypatch, target, tried):
     monkeypatch.setattr(machine_code, "read_compensator", lambda _: SimpleNamespace(current_drive=None))

@@ -96,19 +96,19 @@ def test_the_original_passes_and_a_wrong_one_is_no_bench(plain, tmp_path, wordin
     plain.check_original()
     bench = bench_of(GOLDENS, "f28335", tmp_path / "fw")
     source = tmp_path / "fw" / "core" / "dz_comp.c"
-    source.write_text(source.read_text().replace("#define STEP_CODES 64u", "#define STEP_CODES 63u"))
+    source.write_text(source.read_text().replace("DZ_BETA_STEP - past", "63u - past"))
     with wording.refusal(RequirementError):
         MutationBench(tmp_path / "fw").check_original()
-    assert bench.judge(edited(bench, "dz_comp.c", "STEP_CODES 64u", "STEP_CODES 63u")).verdict == KILLED
+    assert bench.judge(edited(bench, "dz_comp.c", "DZ_BETA_STEP - past", "63u - past")).verdict == KILLED
 
 
 #: By hand, one a verdict.
 JUDGED = [
-    ("dz_comp.c", "#define REVERSE 30u", "#define REVERSE 31u", KILLED),
-    ("dz_comp.c", "return (uint16_t)(law_of(", "return (uint16_t)((law_of(", REFUSED),
-    ("dz_comp.c", "/* The law, Eq. (18):", "/* The law:", SAME_OBJECT),
-    ("dz_comp.h", "DZ_ADC_CODE_MAX 4095u", "DZ_ADC_CODE_MAX 4096u", SAME_OBJECT),
-    ("dz_comp.c", "#define HALF UINT64_C(4690104287232)", "#define HALF UINT64_C(4690104287233)", SAME_OUTPUTS),
+    ("dz_valve.h", ".reverse = UINT32_C(122880)", ".reverse = UINT32_C(126976)", KILLED),
+    ("dz_comp.c", "return (uint16_t)(counts_of(", "return (uint16_t)((counts_of(", REFUSED),
+    ("dz_comp.c", "/* ---- the law ---- */", "/* the law */", SAME_OBJECT),
+    ("dz_calibration.h", "DZ_ADC_CODE_MAX 4095u", "DZ_ADC_CODE_MAX 4096u", SAME_OBJECT),
+    ("dz_valve.h", ".half = {UINT32_C(0)", ".half = {UINT32_C(1)", SAME_OUTPUTS),
     ("dz_drive.c", "drive->status = 0u;", "drive->status = 1u;", KILLED),
     ("dz_drive.c", "dz_comp_checked(past, p_a_adc", "dz_comp_checked(past, p_b_adc", KILLED),
 ]
@@ -158,7 +158,7 @@ def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, c
     assert main(["verify", str(firmware_folder), "--mutate", "-o", str(tmp_path / "evidence")]) == 0
     out = capsys.readouterr().out
     assert "HOLDS  the checks catch wrong C: 1 of 2 mutants killed, 1 equivalent (1 of the same object code" in out
-    assert "same object code, dz_comp.h line 1: DZ_ADC_CODE_MAX 4095u -> DZ_ADC_CODE_MAX 4096u" in out
+    assert "same object code, dz_calibration.h line 1: DZ_ADC_CODE_MAX 4095u -> DZ_ADC_CODE_MAX 4096u" in out
     document = json.loads((tmp_path / "evidence" / "verification.json").read_text())
     assert document["mutants"]["killed"] == 1 and document["holds"]
     assert [check["holds"] for check in document["checks"] if check["name"] == "the drive follows its model"] == [True]
@@ -166,13 +166,13 @@ def test_the_command_line_adds_the_row_and_the_list(firmware_folder, tmp_path, c
 
 def test_a_negative_side_and_the_drive_of_both_have_their_killers(full):
     for file, old, new, killer in (
-        ("dz_comp_negative.c", "#define REVERSE ", "#define REVERSE 1", "inputs"),
-        ("dz_drive.c", "command > LEAVE_ZERO", "command >= LEAVE_ZERO", "drive"),
-        ("dz_drive.c", "(LEAVE_ZERO + 1)", "LEAVE_ZERO", "drive"),
-        ("dz_drive.c", "(ZERO_BAND + 1)", "ZERO_BAND", "drive"),
-        ("dz_drive.c", "(gone != 0u) ? 0 : ramp(", "ramp(", "drive"),
-        ("dz_comp_negative.c", "#define ZERO_BAND 34u", "#define ZERO_BAND 33u", "inputs"),
-        ("dz_drive.c", "drive->ticks >= DITHER_PERIOD", "drive->ticks > DITHER_PERIOD", "drive"),
+        ("dz_valve.h", ".reverse = UINT32_C(", ".reverse = UINT32_C(1", "inputs"),
+        ("dz_drive.c", "command > leave)", "command >= leave)", "drive"),
+        ("dz_drive.c", "(codes - block->leave_zero) - 1u", "(codes - block->leave_zero)", "drive"),
+        ("dz_drive.c", "(codes - block->zero_band) - 1u", "(codes - block->zero_band)", "drive"),
+        ("dz_drive.c", "to) & ~gone)", "to))", "drive"),
+        ("dz_valve.h", ".zero_band = 34u", ".zero_band = 33u", "inputs"),
+        ("dz_drive.c", "drive->ticks >= (2u", "drive->ticks > (2u", "drive"),
     ):
         outcome = full.judge(edited(full, file, old, new))
         assert outcome.verdict == KILLED and killer in outcome.killer, outcome
@@ -186,13 +186,14 @@ def test_a_fault_high_up_a_slow_ramp_is_seen(example_valve, tmp_path):
     drive, prepared = CompiledDrive(tmp_path / "fw"), PreparedDrive(compensator)
     assert drive.check(prepared).faults == 0
     text = drive.sources["dz_drive.c"].decode()
-    right, wrong = "command = ramped / RAMP_UNIT;", "command = (ramped > 3800 * RAMP_UNIT) ? 0 : (ramped / RAMP_UNIT);"
+    right = "command = drive->ramped / (int32_t)RAMP_UNIT;"
+    wrong = "command = (drive->ramped > 3800 * (int32_t)RAMP_UNIT) ? 0 : drive->ramped / (int32_t)RAMP_UNIT;"
     assert text.count(right) == 1
     assert drive.edited("dz_drive.c", text.replace(right, wrong).encode()).check(prepared).faults > 0
 
 
 def test_a_wrong_drive_is_named_by_field_and_sample(full):
-    text = full.sources["dz_drive.c"].replace("command > LEAVE_ZERO", "command >= LEAVE_ZERO")
+    text = full.sources["dz_drive.c"].replace("command > leave)", "command >= leave)")
     found = full._drive.edited("dz_drive.c", text.encode()).check(full._drive_samples)
     assert found.faults > 0 and found.first_wrong.split()[0] in FIELDS and "with codes" in found.first_wrong
     assert isinstance(full._drive, CompiledDrive)

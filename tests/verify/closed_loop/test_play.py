@@ -107,9 +107,10 @@ def test_a_core_without_its_zero_band_is_seen_by_the_zero_command_that_is_read_t
     compensator = design(example_valve, options_of({}, target_named("f28335").inputs()))
 
     def edit(files):
-        files["core/dz_comp.c"] = files["core/dz_comp.c"].replace("#define ZERO_BAND 19u", "#define ZERO_BAND 1u")
-        text = files["core/dz_drive.c"].replace("#define ZERO_BAND INT32_C(19)", "#define ZERO_BAND INT32_C(1)")
-        files["core/dz_drive.c"] = text.replace("#define LEAVE_ZERO INT32_C(24)", "#define LEAVE_ZERO INT32_C(2)")
+        for old, new in ((".zero_band = 19u", ".zero_band = 1u"), (".leave_zero = 24u", ".leave_zero = 2u"),
+                         (".band_end = 19u", ".band_end = 1u")):  # fmt: skip
+            assert old in files["core/dz_valve.h"]
+            files["core/dz_valve.h"] = files["core/dz_valve.h"].replace(old, new)
         return files
 
     leaks = {}

@@ -48,7 +48,7 @@ def test_what_was_declared_is_required_and_said(verified, compensator):
     above = [each for each in found.evidence.scenarios if "above the tests" in each.name]
     assert {each.not_required for each in above} == {"not certified above 5.00 MPa"}
     assert any(found.startswith("not certified above 5.00 MPa: ") for found in check.not_required)
-    header = " ".join(made.files["core/dz_comp.h"].replace(" * ", " ").split())
+    header = " ".join(made.files["core/dz_valve.h"].replace(" * ", " ").split())
     assert "up to 0.35 L/min may flow, a leak included: the declared zero flow" in header
     assert compensator.positive.certificate.zero_flow_L_min == pytest.approx(0.35)
 

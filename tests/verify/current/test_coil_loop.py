@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.codegen.core.current_files import current_texts
 from dzdesign.design.current.choosing import sensor_line
 from dzdesign.design.current.circuit import Corner
 from dzdesign.design.current.responses import run_loop
 from dzdesign.verify.current.coil_simulation import CoilLoop, CoilSimulation
 from dzdesign.verify.current.exact_controller import OPEN, OVER, SHORT
+from tests.support.current_loops import current_texts
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
 from tests.support.synthetic import needs_compiler
 

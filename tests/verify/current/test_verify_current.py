@@ -81,21 +81,21 @@ def test_a_drive_by_duty_has_no_such_requirement(example_compensator, tmp_path):
 #: What is edited in dz_current.c, and the requirements that must see it (the comparison of the files always does).
 EDITS = {
     "a gain a thousandth too large": (
-        ("(error * PROPORTIONAL)", "(error * (PROPORTIONAL + 6u))"),
+        ("(error * numbers->proportional)", "(error * (numbers->proportional + 6u))"),
         {"current-controller"},
     ),
     "twice the gain": (
-        ("(error * PROPORTIONAL)", "(error * (2u * PROPORTIONAL))"),
+        ("(error * numbers->proportional)", "(error * (2u * numbers->proportional))"),
         {"current-controller", "current-step"},
     ),
     "feed-forward and integral swapped": (
-        ("#define FEED_FORWARD", "#define FEED_FORWARD INTEGRAL\n#define UNUSED"),
+        ("aim * numbers->feed_forward", "aim * numbers->integral"),
         {"current-controller"},
     ),
     "no anti-windup": ((" & ~past_end", ""), {"current-controller"}),
-    "an offset that is not rounded": (("+ OFFSET_HALF", ""), {"current-controller"}),
+    "an offset that is not rounded": (("+ half_of(shift)", ""), {"current-controller"}),
     "an offset that is not calibrated": (
-        ("loop->offset = offset;", "loop->offset = OFFSET_NOMINAL;"),
+        ("loop->offset = offset;", "loop->offset = numbers->offset_nominal;"),
         {"current-controller", "current-settles"},
     ),
     "an open load that is not seen": (("* DZ_CURRENT_OPEN)", "* 0u)"), {"current-controller", "current-faults"}),
@@ -126,7 +126,7 @@ def test_an_edited_controller_is_seen(fault, controlled, tmp_path):
 
 def test_one_code_too_many_in_one_of_a_million_states_is_seen(controlled, tmp_path):
     """With the states that every verification compares."""
-    right = "smaller(counts, COMPARE_LIMIT) & on"
+    right = "smaller(counts, limit) & on"
     mixed = "(asked * 0x9E3779B1u) ^ (((uint32_t)sum + loop->offset) * 0x85EBCA6Bu) ^ (aim * 0xC2B2AE35u)"
     wrong = f"({right}) + ((((({mixed}) * 0x27D4EB2Fu) >> 8) % 1000000u) == 0u)"
 
@@ -204,9 +204,9 @@ def test_other_machines_are_checked_and_a_wrong_one_is_seen(machine, why, contro
     assert right.holds, right.text
     # What another compiler alone sees.
     mark = "__arm__" if machine is CORTEX_M4 else "__AVR__"
-    edit = f"#ifdef {mark}\n#undef GAIN_HALF\n#define GAIN_HALF UINT32_C(7)\n#endif\n\nstatic uint32_t smaller("
+    edit = f"#ifdef {mark}\n#define half_of(shift) UINT32_C(7)\n#endif\n\nvoid dz_current_init("
     folder = firmware_of(
-        controlled, tmp_path / "wrong", lambda text: text.replace("static uint32_t smaller(", edit, 1)
+        controlled, tmp_path / "wrong", lambda text: text.replace("void dz_current_init(", edit, 1)
     )
     assert checks.controller_on_machine(folder, controlled, machine, 50_000).holds is False
 

@@ -68,7 +68,7 @@ def exact_law(folder, sign: int = 1) -> ExactLaw:
 
 def wrapped(core: CompiledCore, statement: str, function: str = "dz_comp") -> CompiledCore:
     """The core with a statement that may change `compare`, the right value, before it is returned."""
-    name = "dz_comp_negative.c" if function == "dz_comp_negative" else "dz_comp.c"
+    name = "dz_comp.c"
     text = core.sources[name].decode()
     head = f"uint16_t {function}{SIGNATURE}\n{{"
     assert text.count(head) == 1
@@ -124,17 +124,16 @@ def test_a_pair_of_pressures_that_is_not_its_difference_is_odd_and_not_wrong(pla
 @pytest.mark.parametrize("sign", [1, -1])
 def test_what_is_shown_is_checked_on_both_sides(full, sign):
     prepared, core = PreparedInputs(exact_law(full, sign)), CompiledCore(full, sign)
-    name = ("dz_comp.c", "dz_comp_negative.c")[sign < 0]
+    name = "dz_comp.c"
     text = core.sources[name].decode()
     for old, new, count in (
-        ("WORD_TOP) * DZ_STATUS_COMMAND", "WORD_TOP) * DZ_STATUS_ABOVE", "bad_status"),
-        ("(uint32_t)(TESTED_TO - difference)", "(uint32_t)(0u - difference)", "bad_status"),
-        ("(scaled.high >> (BETA_SHIFT - 32u))", "(scaled.high >> (BETA_SHIFT - 32u)) + 1u", "bad_betas"),
-        ("* BETA_FACTOR) >> BETA_SHIFT", "* BETA_FACTOR) >> 34u", "bad_betas"),
+        ("invalid_command(block, u) & DZ_STATUS_COMMAND", "invalid_command(block, u) & DZ_STATUS_ABOVE", "bad_status"),
+        ("tested_to - difference", "tested_to * 0u - difference", "bad_status"),
+        ("side->beta_shift & LARGEST_WIDE_SHIFT", "34u", "bad_betas"),
     ):
-        if old in text:
-            found = core.edited(name, text.replace(old, new).encode()).check(prepared.sample(), sample=True)
-            assert getattr(found, count) > 0 and found.faults == getattr(found, count)
+        assert old in text
+        found = core.edited(name, text.replace(old, new).encode()).check(prepared.sample(), sample=True)
+        assert getattr(found, count) > 0 and found.faults == getattr(found, count)
 
 
 @pytest.mark.slow
@@ -277,7 +276,7 @@ def test_the_machine_code_of_the_cortex_m4_gives_what_the_host_gives_at_every_in
 @pytest.mark.slow
 @needs(AVR)
 def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp_path):
-    folder = copy_of(GOLDENS, "avr", tmp_path / "fw")
+    folder = copy_of(GOLDENS, "host", tmp_path / "fw")
     done = check_on_machine(folder, AVR, check_all_inputs(folder))
     assert done.holds and done.found.inputs > 5000
 
@@ -286,7 +285,7 @@ def test_the_machine_code_of_the_avr_gives_what_the_host_gives_at_the_sample(tmp
 @needs(AVR)
 def test_an_int_of_16_bits_is_seen_on_the_avr_alone(tmp_path):
     """A product that needs a longer int, which no PC shows."""
-    folder = copy_of(GOLDENS, "avr", tmp_path / "fw")
+    folder = copy_of(GOLDENS, "host", tmp_path / "fw")
     core = folder / "core" / "dz_comp.c"
     text, count = re.subn(r"const uint16_t p_a = p_a_adc;", "const uint16_t p_a = (uint16_t)((p_a_adc * 17) / 17);",
                           core.read_text())  # fmt: skip

@@ -25,8 +25,8 @@ FORMAT_AND_CRC, FIRMWARE = 0b10, 0b100
 def lot(tmp_path_factory):
     """A firmware folder in block form, and folders with block and compensator.json of two valves of its kind."""
     folder = tmp_path_factory.mktemp("lot")
-    first = variant("default", "wide")
-    other = variant("no transition", "wide")
+    first = variant("default")
+    other = variant("no transition")
     for name, compensator in {"one": first, "other": other}.items():
         block_folder(compensator, folder / name)
     firmware = generate(first, "f28335", "block")

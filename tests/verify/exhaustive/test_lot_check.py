@@ -308,7 +308,7 @@ def test_firmware_and_report_say_first_that_they_are_of_a_lot(common, batch, tmp
     said = f"LOT SETTING of 4 valves, lot SHA-256 {document['lot_sha256']}."
     for name, text in made.files.items():
         assert name in (*made.manifest.board, "compensator.json") or said in "\n".join(text.splitlines()[:4]), name
-    header, readme = made.files["core/dz_comp.h"], made.files["f28335/README.md"]
+    header, readme = made.files["core/dz_valve.h"], made.files["f28335/README.md"]
     assert f"/* Valve {common.carrier} identified from: " in header
     words = " ".join(header.replace(" * ", " ").split())
     assert f"of one of the 4 valves of this lot setting, valve {common.carrier}; of the others" in words

@@ -21,7 +21,7 @@ HEADER = ("magic", "layout", "length", "shape", "code_max", "compare_max", "samp
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    compensator = variant("bipolar, all options", "wide")
+    compensator = variant("bipolar, all options")
     firmware = generate(compensator, "f28335", "block")
     folder = tmp_path_factory.mktemp("made") / "fw"
     write_folder(folder, firmware.contents, firmware.manifest)

@@ -62,7 +62,7 @@ def test_right_ones_hold(fmu, plant_fmu, compensator, prepared):
         ("dz_fmu.c", "(double)dz_comp_negative(codes", "(double)dz_comp(codes", -1),
         ("dz_fmu.c", "(double)dz_status(codes", "1.0 + (double)dz_status(codes", 1),
         ("dz_fmu.c", "dz_beta(codes.a, codes.b) /", "dz_beta(codes.b, codes.a) /", 1),
-        ("dz_comp.c", "return (uint16_t)(law_of(", "return (uint16_t)((u == 4095u) ^ law_of(", 1),
+        ("dz_comp.c", "return (uint16_t)(counts_of(", "return (uint16_t)((u == 4095u) ^ counts_of(", 1),
     ),
     ids=("law", "side", "status", "beta", "core"),
 )

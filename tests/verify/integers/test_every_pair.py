@@ -64,7 +64,7 @@ def test_form_and_text_of_a_block_are_the_exact_law_and_one_another(case):
 @pytest.mark.parametrize("interface", SOME)
 @pytest.mark.parametrize("name", DESIGNS)
 def test_the_block_of_another_design(name, interface):
-    made = variant(name, "wide")
+    made = variant(name)
     text = structured_text(made, "0" * 64, interface)
     assert ("at_rest" in text) == ("no transition" not in name) and ("side" in text.partition("VAR C")[0]) == (
         "bipolar" in name
@@ -75,7 +75,7 @@ def test_the_block_of_another_design(name, interface):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DESIGNS)
 def test_the_functions_of_another_design(name):
-    made = variant(name, "wide")
+    made = variant(name)
     for sign in made.signals.signs:
         text = TextValues(law_function(made, "0" * 64, sign), "m", "f.m").run
         every = EveryPair(made, "codes", (sign,), remembers=False)

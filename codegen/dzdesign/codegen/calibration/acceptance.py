@@ -12,9 +12,6 @@ from dzdesign.codegen.calibration.layout import (
     LENGTH_WORDS,
     MAGIC,
     NO_INTERLOCK,
-    NODE_MASK,
-    PLAY_NODES,
-    SUPPLY_MASK,
     CalibrationBlock,
     CurrentBlock,
     SideBlock,
@@ -63,7 +60,7 @@ def _format(block: CalibrationBlock) -> Rules:
     yield "magic", block.magic == int.from_bytes(MAGIC, "little")
     yield "layout", block.layout == LAYOUT
     yield "length", block.length == LENGTH_WORDS
-    yield "unused words are 0", not (block.reserved or block.spare or any(side.spare for side in block.sides))
+    yield "unused words are 0", not (block.reserved or block.current.spare or any(side.spare for side in block.sides))
 
 
 def _firmware(block: CalibrationBlock, built: BuiltFor) -> Rules:
@@ -100,14 +97,14 @@ def _law(block: CalibrationBlock, built: BuiltFor) -> Rules:
 
 def _side(block: CalibrationBlock, side: SideBlock, built: BuiltFor, rises: bool, drop: int) -> Rules:
     zero, band, codes = block.command_zero, block.zero_band, block.transition_codes
-    law, at_zero = side.nodes[::2], side.nodes[1::2]
-    used = [node for node in range(len(law)) if node < side.node_count or node >= NODE_MASK]
-    yield "nodes", drop // (built.beta_step << WEIGHT_SHIFT) + 2 <= side.node_count <= NODE_MASK
+    law, at_zero, mask = side.nodes[::2], side.nodes[1::2], built.sizes.node_mask
+    used = [node for node in range(len(law)) if node < side.node_count or node >= mask]
+    yield "nodes", drop // (built.beta_step << WEIGHT_SHIFT) + 2 <= side.node_count <= mask
     yield "beta at zero command above the law's", all(low <= high for low, high in zip(at_zero, law, strict=True))
     yield "beta in use is above 0 and no less than the fallback's", all(
-        1 <= at_zero[node] >= at_zero[NODE_MASK] and law[node] >= law[NODE_MASK] for node in used
+        1 <= at_zero[node] >= at_zero[mask] and law[node] >= law[mask] for node in used
     )
-    yield "one fallback", side.nodes[2 * NODE_MASK : 2 * NODE_MASK + 2] == side.nodes[2 * NODE_MASK + 2 :]
+    yield "one fallback", side.nodes[2 * mask : 2 * mask + 2] == side.nodes[2 * mask + 2 :]
     yield "largest node", max(law) <= largest_node(built.beta_step)
     yield "span", 1 <= side.span <= (block.command_high - zero if rises else zero - block.command_low)
     yield "end of the zero band", side.band_end == (zero + band if rises else zero - band)
@@ -147,7 +144,7 @@ def _drive(block: CalibrationBlock, built: BuiltFor) -> Rules:
         yield "noise of the play", block.play_noise <= LARGEST_NOISE
         yield "step of the play", block.play_step_shift <= LARGEST_STEP_SHIFT
         for side in sides:
-            yield "nodes of the play", (side.span >> block.play_step_shift) + 2 <= PLAY_NODES
+            yield "nodes of the play", (side.span >> block.play_step_shift) <= built.sizes.play_mask
             yield "width of the play", max(side.play) * travel <= INT32_MAX
 
 
@@ -166,5 +163,5 @@ def _current(current: CurrentBlock, built: BuiltFor) -> Rules:
     if built.has("SUPPLY"):
         last = ((c.supply_high - c.supply_low) >> c.supply_shift) + 1
         yield "codes of the supply", c.supply_low < c.supply_high
-        yield "correction", c.supply_shift <= LARGEST_STEP_SHIFT and last <= SUPPLY_MASK + 1
+        yield "correction", c.supply_shift <= LARGEST_STEP_SHIFT and last <= built.sizes.supply_mask + 1
         yield "nodes of the correction", all(node >= 1 for node in c.supply[: max(last, 0) + 1])

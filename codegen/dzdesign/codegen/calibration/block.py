@@ -1,4 +1,4 @@
-"""`block_of`: a `Compensator` as the numbers of its calibration block."""
+"""`block_of`: a `Compensator` as the numbers of its calibration block; `numbers_of`: as those of a fixed firmware."""
 
 from fractions import Fraction
 from math import floor
@@ -7,17 +7,16 @@ from typing import Any, TypeVar
 from dzdesign.codegen.calibration.acceptance import refusals
 from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
 from dzdesign.codegen.calibration.layout import (
+    BLOCK_SIZES,
     LENGTH_WORDS,
     NO_INTERLOCK,
     NO_RAMP,
-    NODES,
-    PLAY_NODES,
     RECORD_WORDS,
     SERIAL_WORDS,
-    SUPPLY_NODES,
     CalibrationBlock,
     CurrentBlock,
     SideBlock,
+    Sizes,
     entries,
 )
 from dzdesign.codegen.calibration.packing import octet_words, text_words
@@ -26,12 +25,10 @@ from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.loop import CurrentLoop
-from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT, WEIGHT_UNIT, Signals
+from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT
 
 #: Nodes that stand for pressures that can't be right.
 FALLBACKS = 2
-#: Largest number of 16 bits.
-MOST = 0xFFFF
 ALTERNATIVE = "generate it with --calibration fixed"
 
 Part = TypeVar("Part", SideBlock, CurrentBlock)
@@ -64,8 +61,21 @@ def block_of(
     return block
 
 
+def numbers_of(compensator: Compensator) -> CalibrationBlock:
+    """Return the numbers of a compensator for a firmware that has them as constants: nothing identifies them there.
+
+    Numbers outside the range of the core's arithmetic are an `InputError`.
+    """
+    built = built_for(compensator, fixed=True)
+    numbers = _numbers(compensator, built, "", "", "")
+    if refused := refusals(numbers, built):
+        rules = "; ".join(f"{name}: {', '.join(rules)}" for name, rules in refused.items())
+        raise InputError(f"numbers of this compensator leave the range of the firmware's arithmetic ({rules})")
+    return numbers
+
+
 def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str, record: str) -> CalibrationBlock:
-    """Return the block, whatever its firmware says of it."""
+    """Return the numbers, whatever their firmware says of them."""
     c, signals, functions = compensator, compensator.signals, compensator.drive_functions
     command, a, b = signals.command, signals.pressure_a, signals.pressure_b
     interlock = functions.interlock_codes
@@ -79,9 +89,9 @@ def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str
         compensator_sha256=octet_words(bytes.fromhex(digest)),
         serial=text_words(serial, SERIAL_WORDS, "the serial number"),
         record=text_words(record, RECORD_WORDS, "the record"),
-        u_max_uV=_displayed(float(c.u_max_V), "full command in V"),
-        a_span_Pa=_displayed(float(a.span_MPa), "the span of sensor A in MPa"),
-        b_span_Pa=_displayed(float(b.span_MPa), "the span of sensor B in MPa"),
+        u_max_uV=0 if built.fixed else _displayed(float(c.u_max_V), "full command in V"),
+        a_span_Pa=0 if built.fixed else _displayed(float(a.span_MPa), "the span of sensor A in MPa"),
+        b_span_Pa=0 if built.fixed else _displayed(float(b.span_MPa), "the span of sensor B in MPa"),
         a_full=a.full_code,
         b_full=b.full_code,
         balance=((a.zero_code << WEIGHT_SHIFT) - b.zero_code * signals.weight_b) % 2**32,
@@ -95,7 +105,7 @@ def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str
         b_zero=b.zero_code,
         b_low=b.valid_codes[0],
         b_high=b.valid_codes[1],
-        weight_b=_weight(signals),
+        weight_b=signals.weight_b,
         beta_step=c.beta_step_codes,
         transition_codes=c.transition_codes or 1,
         zero_band=c.zero_band_codes,
@@ -111,13 +121,13 @@ def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str
         play_noise=functions.play_noise_codes if functions.has_play else 0,
         play_step_shift=_shift(functions.play_step_codes) if functions.has_play else 0,
         play_shift=_shift(functions.play_codes * c.transition_codes) if functions.has_play else 0,
-        sides=(_side(c, 1), _side(c, -1) if c.negative is not None else _nothing(SideBlock)),
-        current=_nothing(CurrentBlock) if c.current_drive is None else current_block(c.current_drive.loop),
+        sides=(_side(c, 1, built.sizes), _side(c, -1, built.sizes) if c.negative is not None else _nothing(SideBlock)),
+        current=current_block(c.current_drive.loop, built.sizes) if c.current_drive else _nothing(CurrentBlock),
         crc32=0,
     )
 
 
-def _side(c: Compensator, sign: int) -> SideBlock:
+def _side(c: Compensator, sign: int, sizes: Sizes) -> SideBlock:
     """Return the law of one sign of command."""
     form, side, functions, command = integer_form(c, sign), c.side(sign), c.drive_functions, c.signals.command
     place = 0 if sign > 0 else 1
@@ -135,21 +145,20 @@ def _side(c: Compensator, sign: int) -> SideBlock:
         beta_factor=factor,
         ramp_up=functions.ramp_up[place] or NO_RAMP,
         ramp_down=functions.ramp_down[place] or NO_RAMP,
-        nodes=_beta_nodes(form, SIDE_NAMES[sign]),
+        nodes=_beta_nodes(form, SIDE_NAMES[sign], sizes.node_mask),
         node_count=len(side.beta),
         beta_shift=shift,
         span=command.span(sign),
         room=command.span(sign) - c.zero_band_codes,
         band_end=command.zero_code + command.direction(sign) * c.zero_band_codes,
-        play=_nodes(functions.play_counts[place], PLAY_NODES, "the width of the inverse play"),
+        play=_nodes(functions.play_counts[place], sizes.play_mask, "the width of the inverse play"),
     )
 
 
-def _beta_nodes(form: IntegerForm, side: str) -> tuple[int, ...]:
+def _beta_nodes(form: IntegerForm, side: str, room: int) -> tuple[int, ...]:
     """Return the nodes as pairs, that of the law and that at zero command, and at the end twice the smallest."""
     law, zero = form.table, form.zero_table or form.table
-    room = NODES - FALLBACKS
-    if len(law) > NODES:
+    if len(law) > room + FALLBACKS:
         raise InputError(
             f"beta of {side} commands has {len(law) - FALLBACKS} nodes, of which a calibration block holds {room} at "
             f"most; {ALTERNATIVE}, or give pressure sensors of more alike spans"
@@ -175,16 +184,7 @@ def _division(form: IntegerForm, compare_limit: int) -> dict[str, int]:
             "reciprocal_shift": shift - WORD_BITS}  # fmt: skip
 
 
-def _weight(signals: Signals) -> int:
-    if signals.weight_b > MOST:
-        raise InputError(
-            f"a code of sensor B weighs {signals.weight_b / WEIGHT_UNIT:.3g} of sensor A; a calibration block holds "
-            f"{MOST / WEIGHT_UNIT:.3g} at most; {ALTERNATIVE}"
-        )
-    return signals.weight_b
-
-
-def current_block(loop: CurrentLoop) -> CurrentBlock:
+def current_block(loop: CurrentLoop, sizes: Sizes = BLOCK_SIZES) -> CurrentBlock:
     """Return the current controller."""
     supply = loop.supply
     low, high = supply.valid_codes if supply else (0, 0)
@@ -213,7 +213,7 @@ def current_block(loop: CurrentLoop) -> CurrentBlock:
         supply_low=low,
         supply_high=high,
         supply_shift=_shift(supply.step_codes) if supply else 0,
-        supply=_nodes(supply.nodes if supply else (), SUPPLY_NODES, "the supply's correction"),
+        supply=_nodes(supply.nodes if supply else (), sizes.supply_mask, "the supply's correction"),
     )
 
 
@@ -225,7 +225,8 @@ def _nothing(kind: type[Part]) -> Part:
     return kind(**nothing)
 
 
-def _nodes(numbers: tuple[int, ...], room: int, what: str) -> tuple[int, ...]:
+def _nodes(numbers: tuple[int, ...], mask: int, what: str) -> tuple[int, ...]:
+    room = mask + 2
     if len(numbers) > room:
         raise InputError(
             f"{what} has {len(numbers)} nodes, of which a calibration block holds {room} at most; {ALTERNATIVE}, or "

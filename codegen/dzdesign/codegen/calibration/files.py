@@ -1,20 +1,22 @@
-"""The files of a core in block form: of each its template, and what that prints."""
+"""The files of the core: of each its template, and what that prints.
+
+The law, the drive functions and the current controller are one form of C that reads a `struct dz_calibration`: of a
+firmware in block form the one that its caller passes, else the `static const` one of dz_valve.h, which the compiler
+folds into the code.
+"""
 
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 
-from dzdesign.codegen.calibration.built_for import BuiltFor
+from dzdesign.codegen.calibration.block import numbers_of
+from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
 from dzdesign.codegen.calibration.layout import (
+    INNER,
     LAYOUT,
     LENGTH_WORDS,
     MAGIC,
     NO_INTERLOCK,
-    NODE_MASK,
-    NODES,
-    PLAY_MASK,
-    PLAY_NODES,
     SHAPE_BITS,
-    SUPPLY_MASK,
-    SUPPLY_NODES,
     CalibrationBlock,
     CurrentBlock,
     SideBlock,
@@ -22,21 +24,30 @@ from dzdesign.codegen.calibration.layout import (
     entries,
 )
 from dzdesign.codegen.calibration.limits import LARGEST_CODES, NAMED, OF_CURRENT, crc_steps, largest_node
-from dzdesign.codegen.core.constants import LITERALS, Define, Table, c_comment, defines
-from dzdesign.codegen.core.current_files import current_fault_bits
-from dzdesign.codegen.core.drive_constants import drive_status_constants, status_constants
-from dzdesign.codegen.core.files import CoreFile, Values
+from dzdesign.codegen.calibration.numbers import ValvePage, valve_keys
+from dzdesign.codegen.core.certificate_text import (
+    KAPPA_ROUNDING,
+    U_MIN0_ROUNDING,
+    certificate_lines,
+    equation_of,
+    zero_command,
+)
+from dzdesign.codegen.core.constants import LITERALS, CoreFile, Define, Values, c_comment, defines
 from dzdesign.codegen.core.integer_form import INT32_MAX
 from dzdesign.codegen.core.misra import misra_lines
-from dzdesign.codegen.core.signal_constants import difference_place
+from dzdesign.codegen.core.status_bits import (
+    current_fault_bits,
+    difference_place,
+    drive_status_constants,
+    status_constants,
+)
 from dzdesign.core.strict_templates import strict_templates
+from dzdesign.derivation.law import law
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.loop import CORRECTION_SHIFT
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import WEIGHT_SHIFT
 
-HERE = "codegen/dzdesign/codegen/calibration/files.py"
-LIMITS_FILE = "codegen/dzdesign/codegen/calibration/limits.py"
-LAYOUT_FILE = "codegen/dzdesign/codegen/calibration/layout.py"
 #: Bits of what dz_calibration_check() finds wrong.
 FINDINGS = {
     "FORMAT": "not a calibration block, or one of another layout or length",
@@ -47,53 +58,130 @@ FINDINGS = {
     "DRIVE": "a number of the drive functions outside the range of the arithmetic",
     "CURRENT": "a number of the current controller outside the range of the arithmetic",
 }
-#: Of the drive's status word: the bit of a block that was refused.
-CALIBRATION_PLACE = 8
 #: Structs of the block, in the order in which C needs them, and their names there.
 STRUCTS = {SideBlock: "dz_calibration_side", CurrentBlock: "dz_calibration_current", CalibrationBlock: "dz_calibration"}
+#: Members whose length is a macro of the firmware.
+LENGTHS = {
+    "nodes": "DZ_CALIBRATION_NODES",
+    "play": "DZ_CALIBRATION_PLAY_NODES",
+    "supply": "DZ_CALIBRATION_SUPPLY_NODES",
+}
+#: The numbers of a valve, beside the law.
+VALVE_HEADER = "dz_valve.h"
 
 
 def block_core_files(built: BuiltFor) -> dict[str, CoreFile]:
     """Return every file of the core in block form, by its name: they depend on no valve."""
+    header, *others = _files(built).items()
+    return dict([header, ("dz_calibration.c", _check_file(built)), *others])
+
+
+def fixed_core_files(compensator: Compensator) -> dict[str, CoreFile]:
+    """Return every file of the core with the numbers of a compensator in it, by its name."""
+    built = built_for(compensator, fixed=True)
+    return valve_files(ValvePage(compensator=compensator, block=numbers_of(compensator), built=built))
+
+
+def valve_files(page: ValvePage) -> dict[str, CoreFile]:
+    """Return every file of a core that has these numbers in it."""
+    return {VALVE_HEADER: _valve_header(page), **_files(page.built, page.block)}
+
+
+def _files(built: BuiltFor, numbers: CalibrationBlock | None = None) -> dict[str, CoreFile]:
+    """Return what both forms have; `numbers` are those that stand in the firmware."""
+    return {"dz_calibration.h": calibration_header(built), **_law_files(built), **_drive_files(built, numbers),
+            **_current_files(built, numbers)}  # fmt: skip
+
+
+def core_sources(*, block: bool, current: bool) -> tuple[str, ...]:
+    """Return the sources of the core."""
+    return (*(("dz_calibration.c",) if block else ()), "dz_comp.c", "dz_drive.c",
+            *(("dz_current.c",) if current else ()))  # fmt: skip
+
+
+def core_headers(*, block: bool, current: bool) -> tuple[str, ...]:
+    """Return the headers of the core."""
+    return ("dz_calibration.h", *(() if block else (VALVE_HEADER,)), "dz_comp.h", "dz_drive.h",
+            *(("dz_current.h",) if current else ()))  # fmt: skip
+
+
+def _form(built: BuiltFor) -> Values:
+    """Return how the functions of a form get the numbers: their first parameter, or a line that names them."""
     return {
-        "dz_calibration.h": calibration_header(built),
-        "dz_calibration.c": check_file(built),
-        **block_law_files(built),
-        **block_drive_files(built),
-        **block_current_files(built),
+        "fixed": built.fixed,
+        "parameter": "" if built.fixed else "const struct dz_calibration *block, ",
+        "given": "" if built.fixed else "block, ",
+        "numbers": "const struct dz_calibration *block = &dz_valve;",
+        "bipolar": built.has("BIPOLAR"),
+        "swapped": built.has("SWAPPED"),
     }
+
+
+def _core_file(template: str, values: Values, constants: Sequence[Define]) -> CoreFile:
+    """Return a file that prints these constants."""
+    name = template.removesuffix(".jinja")
+    return CoreFile(
+        template=template,
+        values={**values, "misra_lines": misra_lines(name, fixed=bool(values["fixed"])),
+                "constants": defines(constants)},
+        constants=tuple(each.entry(f"core/{name}") for each in constants),
+    )
 
 
 def calibration_header(built: BuiltFor) -> CoreFile:
     """Return dz_calibration.h: the struct, and what the firmware is compiled for."""
-    constants = [*_interface(built), *_findings()]
+    constants = [*_interface(built), *([] if built.fixed else _findings())]
+    structs = [
+        {"name": name, "members": list(_declarations(kind, built))}
+        for kind, name in STRUCTS.items()
+        if kind is not CurrentBlock or not built.fixed or built.has("CURRENT")
+    ]
+    return _core_file("dz_calibration.h.jinja", {**_form(built), "structs": structs}, constants)
+
+
+def _valve_header(page: ValvePage) -> CoreFile:
+    """Return dz_valve.h: the numbers, and what they are certified for."""
+    c = page.compensator
+    chosen, units = law(c.law), c.valve.recorded_units.of_controller
+    keys, name = valve_keys(c), f"core/{VALVE_HEADER}"
     values: Values = {
-        "misra_lines": misra_lines("dz_calibration.h"),
-        "interface_defines": defines(constants),
-        "structs": [{"name": name, "members": list(_declarations(kind))} for kind, name in STRUCTS.items()],
+        **_form(page.built),
+        "misra_lines": misra_lines(VALVE_HEADER, fixed=True),
+        "u_max": units.text(float(c.u_max_V), "g V"),
+        "law_text": str(chosen.output).replace("**", "^"),
+        "law_equation": equation_of(chosen),
+        "transition_codes": c.transition_codes,
+        "sides": [
+            {
+                "text": "" if c.negative is None else f"{'Positive' if sign > 0 else 'Negative'} commands. ",
+                "kappa": f"{_rational(c.side(sign).drive_range_over_u_max)}, {KAPPA_ROUNDING}",
+                "u_min0": f"{_rational(c.side(sign).u_min0_over_u_max)}, {U_MIN0_ROUNDING}",
+                "at_zero": zero_command(c, sign),
+                "certificate": certificate_lines(c, sign),
+            }
+            for sign in c.signals.signs
+        ],
+        "lines": page.lines(),
     }
-    return CoreFile(template="dz_calibration.h.jinja", values=values, constants=tuple(constants))
+    constants = tuple(number.constant(name, keys) for number in page.numbers())
+    return CoreFile(template=f"{VALVE_HEADER}.jinja", values=values, constants=constants)
 
 
-def block_law_files(built: BuiltFor) -> dict[str, CoreFile]:
+def _rational(value: Fraction) -> str:
+    return f"{value.numerator}/{value.denominator} = {float(value):.6f}"
+
+
+def _law_files(built: BuiltFor) -> dict[str, CoreFile]:
     """Return dz_comp.c and dz_comp.h."""
-    bits, numbers = status_constants(), _law_numbers(built)
-    header: Values = {
-        "misra_lines": misra_lines(),
-        "status_defines": defines(bits),
-        "bipolar": built.has("BIPOLAR"),
-        "swapped": built.has("SWAPPED"),
-    }
-    source: Values = {"misra_lines": misra_lines(), "law_defines": defines(numbers), "sides": _sides(built)}
+    source = {**_form(built), "sides": _sides(built)}
     return {
-        "dz_comp.c": CoreFile(template="dz_comp_block.c.jinja", values=source, constants=tuple(numbers)),
-        "dz_comp.h": CoreFile(template="dz_comp_block.h.jinja", values=header, constants=tuple(bits)),
+        "dz_comp.c": _core_file("dz_comp.c.jinja", source, _law_numbers(built)),
+        "dz_comp.h": _core_file("dz_comp.h.jinja", _form(built), status_constants()),
     }
 
 
-def block_drive_files(built: BuiltFor) -> dict[str, CoreFile]:
+def _drive_files(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, CoreFile]:
     """Return dz_drive.c and dz_drive.h."""
-    outside = _drive_interface(built)
     inside = [
         _limit("RAMP_UNIT", RAMP_UNIT, "uint32", "unit of the ramped command, a code of command"),
         _limit("NO_INTERLOCK", NO_INTERLOCK, "plain", "the drive waits for no zero command"),
@@ -101,48 +189,50 @@ def block_drive_files(built: BuiltFor) -> dict[str, CoreFile]:
         _limit("LARGEST_SHIFT", 31, "plain", "largest shift of a word of 32 bits"),
         _limit("PLAY_SHIFT_MASK", 15, "plain", "mask of play_step_shift"),
     ]
-    words: Values = {"bipolar": built.has("BIPOLAR"), "rises": not built.has("FALLING")}
-    header = {**words, "misra_lines": misra_lines("dz_drive.h, block form"), "interface_defines": defines(outside),
-              "ramp_unit": RAMP_UNIT, "sample_Hz": built.sample_Hz}  # fmt: skip
-    source = {**words, "misra_lines": misra_lines(), "drive_defines": defines(inside)}
+    words = {**_form(built), "rises": not built.has("FALLING")}
+    header = {**words, "ramp_unit": RAMP_UNIT, "sample_Hz": built.sample_Hz}
     return {
-        "dz_drive.c": CoreFile(template="dz_drive_block.c.jinja", values=source, constants=tuple(inside)),
-        "dz_drive.h": CoreFile(template="dz_drive_block.h.jinja", values=header, constants=tuple(outside)),
+        "dz_drive.c": _core_file("dz_drive.c.jinja", words, inside),
+        "dz_drive.h": _core_file("dz_drive.h.jinja", header, _drive_interface(built, numbers)),
     }
 
 
-def _drive_interface(built: BuiltFor) -> list[Define]:
+def _drive_interface(built: BuiltFor, numbers: CalibrationBlock | None) -> list[Define]:
     ticks = built.tick_Hz // built.sample_Hz
+    zero = [] if numbers is None else [
+        Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=numbers.command_zero, equation="code of zero command",
+               engineering="command_zero of dz_valve.h", data=("signals.command.zero_code",))
+    ]  # fmt: skip
     return [
         Define(symbol="DZ_DRIVE_TICKS_PER_SAMPLE", value=ticks, equation="PWM periods from one sample to the next",
-               engineering=f"{built.tick_Hz} periods and {built.sample_Hz} samples a second", generator=HERE),
-        *drive_status_constants(),
-        Define(symbol="DZ_STATUS_CALIBRATION", value=1 << CALIBRATION_PLACE, rounding="a convention", generator=HERE,
-               equation=f"bit {CALIBRATION_PLACE} of the drive's status word",
-               engineering="dz_calibration_check() refused the block: the output is released"),
+               engineering=f"{built.tick_Hz} periods and {built.sample_Hz} samples a second"),
+        *zero,
+        *drive_status_constants(block=not built.fixed),
     ]  # fmt: skip
 
 
-def block_current_files(built: BuiltFor) -> dict[str, CoreFile]:
+def _current_files(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, CoreFile]:
     """Return dz_current.c and dz_current.h; nothing without current control."""
     if not built.has("CURRENT"):
         return {}
-    bits, inside = current_fault_bits(), [_limit("SHIFT_MASK", 15, "plain", "mask of a shift")]
+    outside, inside = current_fault_bits(), [_limit("SHIFT_MASK", 15, "plain", "mask of a shift")]
+    if numbers is not None:
+        outside.insert(0, Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << numbers.current.offset_shift,
+                                 equation="sums that the offset is the mean of", engineering="with the output off",
+                                 data=("current_drive.loop.offset_shift",)))  # fmt: skip
     if built.has("SUPPLY"):
         inside += [
             _limit("CORRECTION_SHIFT", CORRECTION_SHIFT, "plain", "fractional bits of the correction"),
             _limit("CORRECTION_HALF", 1 << (CORRECTION_SHIFT - 1), "plain", "half a PWM count: rounds to nearest"),
         ]
-    words: Values = {"supply": built.has("SUPPLY"), "samples": built.samples}
-    header = {**words, "misra_lines": misra_lines(), "interface_defines": defines(bits)}
-    source = {**words, "misra_lines": misra_lines(), "current_defines": defines(inside)}
+    words = {**_form(built), "supply": built.has("SUPPLY"), "samples": built.samples}
     return {
-        "dz_current.c": CoreFile(template="dz_current_block.c.jinja", values=source, constants=tuple(inside)),
-        "dz_current.h": CoreFile(template="dz_current_block.h.jinja", values=header, constants=tuple(bits)),
+        "dz_current.c": _core_file("dz_current.c.jinja", words, inside),
+        "dz_current.h": _core_file("dz_current.h.jinja", words, outside),
     }
 
 
-def check_file(built: BuiltFor) -> CoreFile:
+def _check_file(built: BuiltFor) -> CoreFile:
     """Return dz_calibration.c, which blocks the core may use."""
     named = NAMED + (OF_CURRENT if built.has("CURRENT") else ())
     limits = [
@@ -150,28 +240,21 @@ def check_file(built: BuiltFor) -> CoreFile:
         _limit("LARGEST_NODE", largest_node(built.beta_step), "uint32", "largest node: times DZ_BETA_STEP below 2^31"),
         *(_limit(*each) for each in named),
     ]
-    equation, of = "four zero bits more of a CRC-32", "polynomial 04C11DB7h, reflected"
-    rows = tuple((step, 0) for step in crc_steps())
-    table = Table(symbol="steps", value=rows, equation=equation, engineering=of, generator=LIMITS_FILE)
-    steps = [LITERALS["uint32"].format(step) for step, _ in table.value]
+    steps = [LITERALS["uint32"].format(step) for step in crc_steps()]
     values: Values = {
-        "misra_lines": misra_lines(),
-        "limit_defines": defines(limits),
+        **_form(built),
         "rises": not built.has("FALLING"),
-        "bipolar": built.has("BIPOLAR"),
-        "swapped": built.has("SWAPPED"),
         "current": built.has("CURRENT"),
         "supply": built.has("SUPPLY"),
         "crc_steps": [", ".join(steps[at : at + 4]) for at in range(0, len(steps), 4)],
         # Of a converter with fewer codes no command is too long for the drive functions.
         "wide_codes": built.code_max > LARGEST_CODES,
     }
-    return CoreFile(template="dz_calibration.c.jinja", values=values, constants=(*limits, table))
+    return _core_file("dz_calibration.c.jinja", values, limits)
 
 
 def _limit(symbol: str, value: int, literal: str, text: str) -> Define:
-    return Define(symbol=symbol, value=value, literal=literal, equation=text, engineering=f"{value}",
-                  generator=LIMITS_FILE)  # fmt: skip
+    return Define(symbol=symbol, value=value, literal=literal, equation=text, engineering=f"{value}")
 
 
 def _sides(built: BuiltFor) -> list[Values]:
@@ -187,52 +270,50 @@ def _sides(built: BuiltFor) -> list[Values]:
 def _law_numbers(built: BuiltFor) -> list[Define]:
     return [
         *_shifts(built),
-        _limit("LARGEST_NUMBER", INT32_MAX, "uint32", "largest word that stands for a number above zero"),
-        Define(symbol="LARGEST_SHIFT", value=31, equation="largest shift of a word of 32 bits", engineering="all ones",
-               generator=HERE),
-        Define(symbol="LARGEST_WIDE_SHIFT", value=63, equation="largest shift of 64 bits", engineering="all ones",
-               generator=HERE),
+        _limit("TOP_BIT", INT32_MAX + 1, "int64", "the top bit of a word, set where it stands for a negative number"),
+        _limit("LARGEST_SHIFT", 31, "plain", "largest shift of a word of 32 bits"),
+        _limit("LARGEST_WIDE_SHIFT", 63, "plain", "largest shift of 64 bits"),
         difference_place(),
-    ]  # fmt: skip
+    ]
 
 
 def _shifts(built: BuiltFor) -> list[Define]:
     """Return from weighted codes to codes, and from these to nodes."""
     return [
         Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of sensor A",
-               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down", generator=HERE),
-        Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1, generator=HERE,
+               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down"),
+        Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1,
                equation="the power of two in DZ_BETA_STEP", engineering=f"1/{built.beta_step}"),
     ]  # fmt: skip
 
 
 def texts(files: dict[str, CoreFile], banner: Sequence[str] = ()) -> dict[str, str]:
     """Return the text of each file, by name, without a firmware around it."""
-    templates = strict_templates("dzdesign.codegen.calibration", autoescape=False)
+    templates = strict_templates("dzdesign.codegen.core", "dzdesign.codegen", autoescape=False)
     return {name: templates.get_template(file.template).render(banner=banner, **file.values) for name, file in
             files.items()}  # fmt: skip
 
 
-def _declarations(kind: type) -> Iterator[str]:
+def _declarations(kind: type, built: BuiltFor) -> Iterator[str]:
     """Yield the lines of a struct's members, each with its comment."""
     own = entries(kind)
     for name in kind.__dataclass_fields__:  # type: ignore[attr-defined]
-        if name in own:
+        if name in own and not (built.fixed and own[name].of_block):
             yield from c_comment(_comment(own[name]))
             yield f"{_declared(name, own[name])};"
         elif name == "sides":
             yield from c_comment("Of positive, then of negative commands; all zero where there are none.")
-            yield "struct dz_calibration_side sides[2];"
-        else:
+            yield "struct dz_calibration_side sides[DZ_CALIBRATION_SIDES];"
+        elif name in INNER and (not built.fixed or built.has("CURRENT")):
             yield from c_comment("All zero without current control.")
             yield "struct dz_calibration_current current;"
 
 
 def _declared(name: str, entry: Words) -> str:
-    if entry.pairs:
-        return f"struct dz_calibration_node {name}[{entry.count // 2}]"
+    kind = "struct dz_calibration_node" if entry.pairs else "uint16_t" if entry.bits == 16 else "uint32_t"
     count = entry.count * max(entry.bits // 32, 1)
-    return f"{'uint16_t' if entry.bits == 16 else 'uint32_t'} {name}{f'[{count}]' if count > 1 else ''}"
+    length = LENGTHS.get(name, str(count) if count > 1 else "")
+    return f"{kind} {name}{f'[{length}]' if length else ''}"
 
 
 def _comment(entry: Words) -> str:
@@ -244,34 +325,47 @@ def _interface(built: BuiltFor) -> list[Define]:
     """Return what the firmware is compiled for, and the numbers of the layout."""
 
     def define(symbol: str, value: int, equation: str, engineering: str, literal: str = "plain") -> Define:
-        return Define(symbol=symbol, value=value, equation=equation, engineering=engineering, literal=literal,
-                      generator=LAYOUT_FILE)  # fmt: skip
+        return Define(symbol=symbol, value=value, equation=equation, engineering=engineering, literal=literal)
 
-    magic = int.from_bytes(MAGIC, "little")
+    magic, sizes = int.from_bytes(MAGIC, "little"), built.sizes
     shape = ", ".join(text for name, text in SHAPE_BITS.items() if built.has(name)) or "one solenoid"
-    return [
+    found = [
         define("DZ_COMPARE_MAX", built.compare_max, "PWM compare value of u_max", "100 % duty"),
         define("DZ_ADC_CODE_MAX", built.code_max, "largest code of the converter", "the top of its range"),
         define("DZ_SAMPLE_HZ", built.sample_Hz, "samples per second", "of the firmware's timer"),
         define("DZ_TICK_HZ", built.tick_Hz, "PWM periods per second", "of the firmware's timer"),
         define("DZ_BETA_STEP", built.beta_step, "codes of pressure drop between two nodes of beta", "a power of two"),
-        define("DZ_CURRENT_SAMPLES", built.samples, "samples of the current in a sum", "0 without current control"),
-        define("DZ_CALIBRATION_SHAPE", built.shape, "what this firmware is compiled for", shape),
-        define("DZ_CALIBRATION_MAGIC", magic, "first 32 bits of a block", f"octets {MAGIC.decode()}", "uint32"),
-        define("DZ_CALIBRATION_LAYOUT", LAYOUT, "version of the block's layout", "a convention"),
-        define("DZ_CALIBRATION_WORDS", LENGTH_WORDS, "words of 16 bits in a block", f"{2 * LENGTH_WORDS} octets"),
-        define("DZ_CALIBRATION_NODES", NODES, "room for nodes of beta", "the fallback and those of the table"),
-        define("DZ_CALIBRATION_NODE_MASK", NODE_MASK, "largest index of a node that has a successor", "all ones"),
-        define("DZ_CALIBRATION_PLAY_NODES", PLAY_NODES, "room for nodes of the play's width", "each side"),
-        define("DZ_CALIBRATION_PLAY_MASK", PLAY_MASK, "largest index of a node that has a successor", "all ones"),
-        define("DZ_CALIBRATION_SUPPLY_NODES", SUPPLY_NODES, "room for nodes of the supply's correction", "one table"),
-        define("DZ_CALIBRATION_SUPPLY_MASK", SUPPLY_MASK, "largest index of a node that has a successor", "all ones"),
-    ]  # fmt: skip
+    ]
+    if not built.fixed:
+        found += [
+            define("DZ_CALIBRATION_SHAPE", built.shape, "what this firmware is compiled for", shape),
+            define("DZ_CALIBRATION_MAGIC", magic, "first 32 bits of a block", f"octets {MAGIC.decode()}", "uint32"),
+            define("DZ_CALIBRATION_LAYOUT", LAYOUT, "version of the block's layout", "a convention"),
+            define("DZ_CALIBRATION_WORDS", LENGTH_WORDS, "words of 16 bits in a block", f"{2 * LENGTH_WORDS} octets"),
+        ]
+    if not built.fixed or built.has("CURRENT"):
+        found.append(
+            define("DZ_CURRENT_SAMPLES", built.samples, "samples of the current in a sum", "0 without current control")
+        )
+    found.append(define("DZ_CALIBRATION_SIDES", sizes.sides, "room for signs of command", "positive, negative"))
+    for name, mask, what in (
+        ("NODE", sizes.node_mask, "nodes of beta"),
+        ("PLAY", sizes.play_mask, "nodes of the play's width"),
+        ("SUPPLY", sizes.supply_mask, "nodes of the supply's correction"),
+    ):
+        if name == "SUPPLY" and built.fixed and not built.has("CURRENT"):
+            continue
+        nodes = "DZ_CALIBRATION_NODES" if name == "NODE" else f"DZ_CALIBRATION_{name}_NODES"
+        found += [
+            define(nodes, mask + 2, f"room for {what}", "two more than the mask"),
+            define(f"DZ_CALIBRATION_{name}_MASK", mask, "largest index of a node that has a successor", "all ones"),
+        ]
+    return found
 
 
 def _findings() -> list[Define]:
     return [
         Define(symbol=f"DZ_CALIBRATION_{name}", value=1 << place, equation=f"bit {place} of dz_calibration_check()",
-               engineering=text, rounding="a convention", generator=HERE)
+               engineering=text, rounding="a convention")
         for place, (name, text) in enumerate(FINDINGS.items())
     ]  # fmt: skip

@@ -1,13 +1,22 @@
-"""What dz_comp.h says of zero command: its compare values, and what they are certified for."""
+"""What the files say of the law: where it comes from, its compare values at zero command, their certificate."""
 
 from textwrap import wrap
 
 from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
+from dzdesign.derivation.law import Law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.machine.accounting import taken_off
 from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.design.signals import SIDE_NAMES
+
+#: Of the numerators over a power of two, by design/dzdesign/design/designing.py.
+KAPPA_ROUNDING, U_MIN0_ROUNDING = "rounded to nearest", "rounded down with a margin of half a PWM count"
+
+
+def equation_of(chosen: Law) -> str:
+    """Return where a law comes from, as a reader looks for it."""
+    return f"Eq. {chosen.equation}" if chosen.equation.startswith("(") else chosen.equation.replace("(", "Eq. (")
 
 
 def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:

@@ -10,13 +10,13 @@ beyond it, together E max(c - Z, 0) + Z r; without a transition it is c. Times t
 integer; cancelling powers of two leaves
 ``total / (divisor 2^shift)`` with an integer `total` of 64 bits, so one shift and one division by a small constant give
 the exactly rounded law. The division is a multiplication by a reciprocal that is proved exact for every dividend that
-can occur; where the target has 32-bit arithmetic only, it is an estimate and a proved number of corrections.
+can occur.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil, lcm
+from math import lcm
 from typing import NamedTuple
 
 from dzdesign.core.errors import InputError
@@ -27,19 +27,8 @@ from dzdesign.design.compensator import Compensator
 
 INT32_MAX = 2**31 - 1
 INT64_MAX = 2**63 - 1
-#: Bits of the estimate's dividend and of its fraction.
-ESTIMATE_BITS = 16
 WORD_BITS = 32
 RECIPROCALS_TRIED = 128
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
-    """Division without 64-bit arithmetic: ``((n >> shift) * factor) >> 16``, never too large, then `corrections`."""
-
-    shift: int
-    factor: int
-    corrections: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +65,7 @@ class IntegerForm:
     - (B_law - B) * transition * (E - r)``
     with B_law and B the tables interpolated without rounding;
     ``compare = min(total >> shift, largest) / divisor``, so that no compare value exceeds the limit; the division is
-    ``(quotient * reciprocal) >> reciprocal_shift`` or the `estimate`.
+    ``(quotient * reciprocal) >> reciprocal_shift``.
     """
 
     #: `scale_beta` times the numerators of the law's beta, then twice the smallest of them.
@@ -100,7 +89,6 @@ class IntegerForm:
     exceeds: bool
     reciprocal: int
     reciprocal_shift: int
-    estimate: Estimate
 
 
 def integer_form(compensator: Compensator, sign: int = 1, scaling: Scaling | None = None) -> IntegerForm:
@@ -137,7 +125,6 @@ def integer_form(compensator: Compensator, sign: int = 1, scaling: Scaling | Non
         exceeds=asked > largest,
         reciprocal=reciprocal,
         reciprocal_shift=reciprocal_shift,
-        estimate=_estimate(divisor, largest),
     )
     _prove_widths(form, compensator.beta_step_codes, units)
     return form
@@ -258,19 +245,6 @@ def exact_reciprocal(divisor: int, largest: int) -> tuple[int, int]:
 def _signed_digits(value: int) -> int:
     """Return how many digits of a number are not zero in the signed binary form that has fewest of them."""
     return (value ^ 3 * value).bit_count()
-
-
-def _estimate(divisor: int, largest: int) -> Estimate:
-    """Return the division by products of 32 bits.
-
-    With h = n >> s and m = floor(2^(16+s) / d), h m >> 16 is at most n/d, and less than it by under 2^s/d for the bits
-    of n that are dropped, h/2^16 < 1 for those of m, and 1 for the last shift.
-    """
-    shift = max(0, largest.bit_length() - ESTIMATE_BITS)
-    factor = (1 << (ESTIMATE_BITS + shift)) // divisor
-    if (largest >> shift) * factor >= 1 << 32:
-        raise InputError(f"a quotient of {largest} by {divisor} needs more than 32-bit arithmetic")
-    return Estimate(shift=shift, factor=factor, corrections=ceil((1 << shift) / divisor + 2) - 1)
 
 
 def _prove_widths(form: IntegerForm, step: int, units: Scaling) -> None:

@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 
-from dzdesign.codegen.core.constants import Define
-from dzdesign.codegen.core.files import CORE_HEADERS, CORE_SOURCES, core_files
+from dzdesign.codegen.calibration.files import core_headers, core_sources
 from dzdesign.codegen.fmu.description import Causality, Model, Variable
 from dzdesign.codegen.project import generate
 from dzdesign.design.compensator import Compensator
@@ -86,21 +85,13 @@ def full_output(compensator: Compensator) -> tuple[str, float]:
 def compensator_core(compensator: Compensator) -> dict[str, bytes]:
     """Return the files of the core, as `codegen --target host` writes them."""
     made = generate(compensator, TARGET).files
-    names = (*CORE_HEADERS, *(CORE_SOURCES[sign] for sign in compensator.signals.signs), "dz_drive.c")
+    names = (*core_headers(block=False, current=False), *core_sources(block=False, current=False))
     return {name: made[f"core/{name}"].encode() for name in names}
 
 
 def compensator_values(compensator: Compensator) -> Mapping[str, object]:
     """Return what the template prints."""
     signals, command = compensator.signals, compensator.signals.command
-    files = core_files(compensator, "wide")
-    symbols = {
-        name: [each.symbol for each in file.constants if isinstance(each, Define)] for name, file in files.items()
-    }
-    shared = {symbol for name in CORE_HEADERS for symbol in symbols[name]}
-
-    def own(name: str) -> list[str]:
-        return [symbol for symbol in symbols.get(name, []) if symbol not in shared]
 
     def codes(sign: int) -> str:
         return repr(float(sign * command.direction(sign) * (command.span(sign) + 1)))
@@ -112,8 +103,6 @@ def compensator_values(compensator: Compensator) -> Mapping[str, object]:
     return {
         "suffixes": ["" if sign > 0 else "_negative" for sign in signals.signs],
         "bipolar": len(signals.signs) == 2,
-        "undefined_before_negative": own(CORE_SOURCES[1]),
-        "undefined_before_drive": own(CORE_SOURCES[-1]),
         "tick_Hz": signals.tick_Hz,
         "ticks_per_sample": signals.tick_Hz // signals.sample_Hz,
         "code_max": signals.code_max,

@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 
 from dzdesign.codegen.banner import banner_of
-from dzdesign.codegen.core.certificate_text import certificate_lines, zero_command
-from dzdesign.codegen.core.files import CORE_SOURCES
-from dzdesign.codegen.core.law_constants import equation_of
+from dzdesign.codegen.core.certificate_text import certificate_lines, equation_of, zero_command
 from dzdesign.codegen.integers.law import FUNCTIONS, function_form
 from dzdesign.codegen.integers.plc import left_out_of
 from dzdesign.codegen.integers.text import matlab_body, matlab_constants
@@ -37,7 +35,7 @@ def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Map
     files = {f"{FUNCTIONS[sign]}.m": law_function(compensator, digest, sign).encode() for sign in signs}
     files[SETUP] = _setup(compensator, digest).encode()
     made = generate(compensator, TARGET).files
-    names = ("core/dz_comp.h", *(f"core/{CORE_SOURCES[sign]}" for sign in signs))
+    names = ("core/dz_comp.h", "core/dz_calibration.h", "core/dz_valve.h", "core/dz_comp.c")
     return {**files, **{name: made[name].encode() for name in names}}
 
 
@@ -94,6 +92,6 @@ def _setup(compensator: Compensator, digest: str) -> str:
             bipolar=len(signs) == 2,
             names=names,
             names_text=" and ".join(f"{name}()" for name in names),
-            sources=[CORE_SOURCES[sign] for sign in signs],
+            sources=["dz_comp.c"],
         )
     )

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from textwrap import wrap
 
 from dzdesign.codegen.banner import banner_of, lot_in_words
-from dzdesign.codegen.core.law_constants import equation_of
+from dzdesign.codegen.core.certificate_text import equation_of
 from dzdesign.codegen.integers.form import Form
 from dzdesign.codegen.integers.interface import Interface, interface_named
 from dzdesign.codegen.integers.law import block_form

@@ -14,7 +14,7 @@ LOAD_FILES = (*SOURCES, *HEADERS, *STORE)
 
 def load_texts(tick_Hz: int, banner: Callable[[str], Sequence[str]]) -> dict[str, str]:
     """Return the text of each file by name, for a tick of so many a second; `banner` gives a file's first lines."""
-    templates = strict_templates("dzdesign.codegen.loading", autoescape=False)
+    templates = strict_templates("dzdesign.codegen.loading", "dzdesign.codegen", autoescape=False)
     values = protocol_context(tick_Hz)
     texts = {}
     for name in LOAD_FILES:

@@ -75,7 +75,7 @@ def constants_table(firmware: FirmwareManifest) -> Table:
         ("value", _value),
         ("in engineering units", lambda one: Cell(text=one.engineering, more=f"rounding: {one.rounding}")),
         ("what it is", lambda one: one.equation),
-        ("where it comes from", lambda one: Cell(text="", more=f"{_origin(one)}; by {one.generator}")),
+        ("where it comes from", lambda one: Cell(text="", more=_origin(one))),
         csv=csv_text(
             ("file", "symbol", "row", "value", "engineering", "rounding"),
             (

@@ -2,117 +2,277 @@
 /* Compensator SHA-256: a15dd28ff1e1d2cfea52135ac6be9297f558f03a4ce9ed3b316348aafbe4fb34 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The drive functions around the law: which solenoid is driven, rest at zero command.
+ * The drive functions around the law: which solenoid is driven, rest at zero command, inverse play, ramps, dither. The
+ * valve's numbers say which of them are on.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
 
 #include "dz_drive.h"
 
-/* Valid samples in a row that end a fault: 4 ms (exact). */
-#define FAULT_SAMPLES 5u
-/* Codes of command up to which it counts as the zero command that the interlock waits for: 0.46% of command, 0.0464
- * V (exact). */
-#define INTERLOCK INT32_C(19)
-/* Eq. (29), code of zero command: 0 V (the converter's code, rounded down). */
-#define COMMAND_ZERO INT32_C(0)
-/* Codes of command up to which the drive comes to rest, the law's zero band: 0.46% of command, 0.0464 V (exact). */
-#define ZERO_BAND INT32_C(19)
-/* Codes by which the command must pass zero before the drive leaves its rest: 0.59% of command, 0.05861 V; a zero
- * command with twice its noise stays within (exact). */
-#define LEAVE_ZERO INT32_C(24)
+#include "dz_valve.h"
 
+/* Unit of the ramped command, a code of command: 65536 (exact). */
+#define RAMP_UNIT UINT32_C(65536)
+/* The drive waits for no zero command: 65535 (exact). */
+#define NO_INTERLOCK 65535u
+/* Largest word that stands for a number above zero: 2147483647 (exact). */
+#define LARGEST_NUMBER UINT32_C(2147483647)
+/* Largest shift of a word of 32 bits: 31 (exact). */
+#define LARGEST_SHIFT 31u
+/* Mask of play_step_shift: 15 (exact). */
+#define PLAY_SHIFT_MASK 15u
+
+/* ---- ramps: commands in words, positive ones above zero; a negative one is stored 2^32 higher ---- */
+
+/* All ones if the signed value of a word is negative, else 0. */
+static uint32_t is_negative(uint32_t x)
+{
+    return 0u - (x >> 31);
+}
+
+static uint32_t lesser(uint32_t left, uint32_t right)
+{
+    return (left < right) ? left : right;
+}
+
+/* The signed value of a word. */
+static int32_t command_number(uint32_t word)
+{
+    const uint32_t others = ~word;
+
+    return (word <= LARGEST_NUMBER) ? (int32_t)word : (-1 - (int32_t)others);
+}
+
+/* One step from `at` towards `to`; `at` is 0 or more, and `to` below zero asks for zero. */
+static uint32_t step_towards(uint32_t at, uint32_t to, uint32_t up, uint32_t down)
+{
+    const uint32_t aim = to & ~is_negative(to);
+
+    return (aim > at) ? (at + lesser(aim - at, up)) : (at - lesser(at - aim, down));
+}
+
+/* The command after the ramps. */
+static uint32_t ramp(const struct dz_calibration *block, uint32_t at, uint32_t to)
+{
+    return step_towards(at, to, block->sides[0].ramp_up, block->sides[0].ramp_down);
+}
+
+/* ---- inverse play ---- */
+
+static int32_t within(int32_t value, int32_t low, int32_t high)
+{
+    const int32_t raised = (value < low) ? low : value;
+
+    return (raised > high) ? high : raised;
+}
+
+/* From zero command: the next travel is a rise. */
+static void reset_play(const struct dz_calibration *block, struct dz_drive *drive)
+{
+    drive->rising = block->play_codes;
+    drive->played = 0;
+}
+
+/* Counts of the valve's hysteresis at a command. */
+static uint32_t play_width(const struct dz_calibration *block, const struct dz_calibration_side *side, uint32_t place)
+{
+    const uint32_t shift = block->play_step_shift & PLAY_SHIFT_MASK;
+    const uint32_t step = UINT32_C(1) << shift;
+    const uint32_t node = (place >> shift) & DZ_CALIBRATION_PLAY_MASK;
+    const uint32_t beyond = place & (step - 1u);
+
+    return ((side->play[node] * (step - beyond)) + (side->play[node + 1u] * beyond)) >> shift;
+}
+
+/* The law, lowered for a falling command by the valve's hysteresis. That begins with the transition, is 0 in the zero
+ * band, and follows the travel of the command without its noise. */
+static uint16_t with_play(const struct dz_calibration *block, const struct dz_calibration_side *side,
+                          struct dz_drive *drive, int32_t towards, uint16_t law)
+{
+    const uint32_t place = (uint32_t)within(towards, 0, (int32_t)side->span);
+    const int32_t codes = (int32_t)block->play_codes;
+    const int32_t noise = (int32_t)block->play_noise;
+    const int32_t at = within((int32_t)drive->played, towards - noise, towards + noise);
+    const int32_t rising = within((int32_t)drive->rising + (at - (int32_t)drive->played), 0, codes);
+    const int32_t reached = within(towards - (int32_t)block->zero_band, 0, (int32_t)block->transition_codes);
+    const int32_t fallen = codes - rising;
+    const uint32_t share = play_width(block, side, place) * (uint32_t)fallen * (uint32_t)reached;
+    const uint32_t lowered = share >> (block->play_shift & LARGEST_SHIFT);
+
+    drive->played = (int16_t)at;
+    drive->rising = (uint16_t)rising;
+    return (lowered < law) ? (uint16_t)(law - lowered) : 0u;
+}
+
+/* ---- faults: all ones for yes and 0 for no ---- */
 
 /* All ones unless x is 0; x is below 2^31. */
 static uint32_t all_ones(uint32_t x)
 {
-    return 0u - ((0u - x) >> 31);
+    return is_negative(0u - x);
 }
 
-/* Samples in a row without a fault, this one included, up to FAULT_SAMPLES; `fault` is all ones or 0. */
-static uint32_t valid_samples(uint32_t valid, uint32_t fault)
+/* Samples in a row without a fault, this one included, up to fault_samples; `fault` is all ones or 0. */
+static uint32_t valid_samples(const struct dz_calibration *block, uint32_t valid, uint32_t fault)
 {
-    return (valid + ((valid - FAULT_SAMPLES) >> 31)) & ~fault;
+    return (valid + ((valid - block->fault_samples) >> 31)) & ~fault;
 }
 
-/* All ones until there have been FAULT_SAMPLES of them. */
-static uint32_t too_few(uint32_t valid)
+/* All ones until there have been fault_samples of them. */
+static uint32_t too_few(const struct dz_calibration *block, uint32_t valid)
 {
-    return 0u - ((valid - FAULT_SAMPLES) >> 31);
+    return is_negative(valid - block->fault_samples);
+}
+
+/* Faults since the last one ended, up to fault_samples; 0 where none is latched. */
+static uint32_t faulty_samples(const struct dz_calibration *block, uint32_t faulty, uint32_t fault)
+{
+    return (faulty + (fault & ((faulty - block->fault_samples) >> 31))) & all_ones(block->fault_latch);
+}
+
+/* All ones once there have been fault_samples of them: such a fault stays until dz_drive_init(). */
+static uint32_t latched(const struct dz_calibration *block, uint32_t faulty)
+{
+    return is_negative((block->fault_samples - (uint32_t)1u) - faulty);
 }
 
 /* All ones while the pressures must not be used, from the status of a new sample. */
-static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
+static uint32_t held_pressures(const struct dz_calibration *block, struct dz_drive *drive, uint32_t status)
 {
     const uint32_t wrong = status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE);
-    const uint32_t fault = ((wrong - 1u) >> 31) - 1u; /* all ones, or 0 */
-    const uint32_t valid = valid_samples(drive->valid_pressures, fault);
-    const uint32_t held = too_few(valid);
+    const uint32_t fault = all_ones(wrong);
+    const uint32_t faulty = faulty_samples(block, drive->faulty_pressures, fault);
+    const uint32_t valid = valid_samples(block, drive->valid_pressures, fault | latched(block, faulty));
+    const uint32_t held = too_few(block, valid);
 
+    drive->faulty_pressures = (uint16_t)(faulty & held);
     drive->valid_pressures = (uint16_t)valid;
     return held;
 }
 
-/* 1 if the command counts as zero, `towards` being its codes from zero. Between the band's two ends the drive stays
- * as it was; without a command it is at rest. */
-static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
+/* All ones without a command to follow: de-energise at once, and start from rest when it returns. */
+static uint32_t no_command(const struct dz_calibration *block, struct dz_drive *drive, uint32_t invalid, int32_t asked)
 {
-    const uint32_t in_band = (uint32_t)(towards - (ZERO_BAND + 1)) >> 31; /* 1: not beyond the band's inner end */
-    const uint32_t stays = (uint32_t)(towards - (LEAVE_ZERO + 1)) >> 31;  /* 1: not beyond its outer end */
+    const uint32_t codes = (uint32_t)asked;
+    /* A command while the drive waits for zero command. */
+    const uint32_t early = too_few(block, drive->valid_commands) &
+                           is_negative(block->interlock - codes);
+    const uint32_t faulty = faulty_samples(block, drive->faulty_commands, invalid);
+    const uint32_t valid = valid_samples(block, drive->valid_commands, invalid | early | latched(block, faulty));
+    const uint32_t gone = too_few(block, valid);
 
-    return ((at_rest | in_band) & stays) | (gone & 1u);
+    drive->valid_commands = (uint16_t)valid;
+    drive->faulty_commands = (uint16_t)(faulty & gone);
+    return gone;
+}
+
+/* ---- rest ---- */
+
+/* 1 if the command counts as zero, `towards` being its codes from zero; 0 without a zero band. Between the band's two
+ * ends the drive stays as it was; without a command it is at rest. */
+static uint32_t rest(const struct dz_calibration *block, uint16_t at_rest, int32_t towards, uint32_t gone)
+{
+    const uint32_t codes = (uint32_t)towards;
+    const uint32_t in_band = ((codes - block->zero_band) - 1u) >> 31; /* 1: not beyond its inner end */
+    const uint32_t stays = ((codes - block->leave_zero) - 1u) >> 31;  /* 1: not beyond its outer end */
+
+    return (((at_rest | in_band) & stays) | (gone & 1u)) & all_ones(block->zero_band);
 }
 
 /* The command that enters the law: codes past the zero band, 0 at rest. */
-static uint32_t past_band(uint32_t at_rest, int32_t towards)
+static uint32_t past_band(const struct dz_calibration *block, uint32_t at_rest, int32_t towards)
 {
-    return (uint32_t)(towards - ZERO_BAND) & (at_rest - 1u);
+    const uint32_t past = (uint32_t)towards - block->zero_band;
+
+    return past & ~is_negative(past) & (at_rest - 1u);
 }
+
+/* ---- what is called ---- */
 
 void dz_drive_init(struct dz_drive *drive)
 {
+    const struct dz_calibration *block = &dz_valve;
     drive->compare_a = 0u;
     drive->compare_b = 0u;
     drive->status = 0u;
     drive->law = 0u;
     drive->side = 1;
     drive->ticks = 0u;
-    drive->at_rest = 1u;
-    drive->rising = 0u;
-    drive->played = 0;
+    drive->at_rest = (uint16_t)(all_ones(block->zero_band) & 1u);
+    reset_play(block, drive);
     drive->ramped = 0;
-    drive->valid_commands = 0u; /* zero command must be seen first */
-    drive->valid_pressures = FAULT_SAMPLES;
+    /* With an interlock zero command must be seen first. */
+    drive->valid_commands = (block->interlock == NO_INTERLOCK) ? block->fault_samples : 0u;
+    drive->valid_pressures = block->fault_samples;
     drive->faulty_commands = 0u;
     drive->faulty_pressures = 0u;
 }
 
-void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+/* The command in codes from zero, positive ones above, after the ramps. */
+static int32_t command_of(const struct dz_calibration *block, struct dz_drive *drive, int32_t asked, uint32_t gone)
 {
-    const uint32_t status = dz_status(u_adc, p_a_adc, p_b_adc);
-    const uint32_t invalid = all_ones(status & DZ_STATUS_COMMAND);
-    const int32_t asked = (int32_t)u_adc - COMMAND_ZERO; /* codes from zero, positive ones above */
-    /* A command while the drive waits for zero command. */
-    const uint32_t early = too_few(drive->valid_commands) &
-                           (0u - ((uint32_t)(INTERLOCK - asked) >> 31));
-    const uint32_t valid = valid_samples(drive->valid_commands, invalid | early);
-    /* All ones without a command to follow: de-energise at once, and start from rest when it returns. */
-    const uint32_t gone = too_few(valid);
-    const int32_t command = asked;
-    const uint32_t at_rest = rest(drive->at_rest, command, gone);
-    const uint32_t past = past_band(at_rest, command);
-    uint32_t held;
+    int32_t command = asked;
 
-    drive->valid_commands = (uint16_t)valid;
+    if (block->ramps != 0u) {
+        const uint32_t to = (uint32_t)asked * RAMP_UNIT;
+
+        drive->ramped = command_number(ramp(block, (uint32_t)drive->ramped, to) & ~gone);
+        command = drive->ramped / (int32_t)RAMP_UNIT;
+    }
+    return command;
+}
+
+void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
+                     uint16_t p_b_adc)
+{
+    const struct dz_calibration *block = &dz_valve;
+    const uint32_t status = dz_status(u_adc, p_a_adc, p_b_adc);
+    const int32_t asked = (int32_t)u_adc - (int32_t)block->command_zero;
+    const uint32_t gone = no_command(block, drive, all_ones(status & DZ_STATUS_COMMAND), asked);
+    const int32_t command = command_of(block, drive, asked, gone);
+    const int32_t away = command;
+    const struct dz_calibration_side *side = &block->sides[0];
+    uint32_t at_rest;
+    uint32_t held;
+    uint32_t past;
+
+    at_rest = rest(block, drive->at_rest, away, gone);
+    past = past_band(block, at_rest, away);
     drive->at_rest = (uint16_t)at_rest;
-    held = held_pressures(drive, status);
-    drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD));
-    drive->law = (uint16_t)(dz_comp_checked(past, p_a_adc, p_b_adc, held) & ~(gone >> 16)); /* of 16 bits */
+    if ((block->play_codes != 0u) && (at_rest != 0u)) {
+        reset_play(block, drive);
+    }
+    held = held_pressures(block, drive, status);
+    drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD) |
+                               ((latched(block, drive->faulty_commands) | latched(block, drive->faulty_pressures)) &
+                                DZ_STATUS_LATCHED));
+    drive->law = (uint16_t)(dz_comp_checked(past, p_a_adc, p_b_adc, held) & ~gone);
+    if ((block->play_codes != 0u) && (at_rest == 0u)) {
+        drive->law = with_play(block, side, drive, away, drive->law);
+    }
 }
 
 void dz_drive_tick(struct dz_drive *drive)
 {
+    const struct dz_calibration *block = &dz_valve;
     uint32_t compare = drive->law;
 
+    if (block->dither_counts != 0u) {
+        drive->ticks++;
+        if (drive->ticks >= (2u * (uint32_t)block->dither_ticks)) {
+            drive->ticks = 0u;
+        }
+        if (compare == 0u) {
+            /* de-energised: nothing to dither */
+        } else if (drive->ticks < block->dither_ticks) {
+            compare += block->dither_counts;
+        } else if (compare > block->dither_counts) {
+            compare -= block->dither_counts;
+        } else {
+            compare = 0u;
+        }
+        compare = lesser(compare, block->compare_limit);
+    }
     drive->compare_a = (uint16_t)compare; /* compare_b stays 0 */
 }

@@ -2,33 +2,26 @@
 /* Compensator SHA-256: b7f53a1ae6009cbd37ed9151657dedd1d87505c4797f94af87abf484b10ce19b */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The compensation law of a proportional valve's dead zone: its functions, inputs and outputs.
+ * The compensation law of a proportional valve's dead zone: its functions, inputs and outputs. Its numbers are
+ * those of dz_valve.h.
  *
- *     u_i      command, 0 to u_max; full command is 10 V
+ *     u_i      command, 0 to u_max
  *     u_O      drive of the valve, 0 to u_max; the PWM's duty is u_O/u_max
  *     dP       pressure drop across the metering edge
- *     u_min0   offset at the reference pressure drop, near where the valve opens; zero command gives less (transition)
- *     beta     how that offset changes with dP, 1 at the reference; read from a table
- *     k x_max  span of u_O from that offset to full opening
+ *     beta     how the offset of u_O changes with dP, 1 at the reference; read from a table
  *
- * Numbers of equations are those of Wu et al. 2022, doi:10.11916/j.issn.1005-9113.20063; manifest.json lists the
- * origin of every constant.
- *
- * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file but for
- *   deviation from rule 2.5 (advisory) in DZ_COMPARE_MAX, DZ_COMPARE_LIMIT, DZ_ADC_CODE_MAX: the interface's limits
- *   are for those who call the core; not every firmware needs all of them.
+ * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
 #ifndef DZ_COMP_H
 #define DZ_COMP_H
 
 #include <stdint.h>
 
-/* Eq. (32), PWM compare value of u_max: 10 V, 100 % duty (exact). */
-#define DZ_COMPARE_MAX 40000u
-/* Largest compare value that is put out: 10 V, 100.0% duty (rounded down). */
-#define DZ_COMPARE_LIMIT 40000u
-/* Largest code of the converter: the top of its range, right-justified (exact). */
-#define DZ_ADC_CODE_MAX 4095u
+#include "dz_calibration.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* Status bits of dz_status(). DZ_STATUS_ABOVE is not a fault: the recordings end there. */
 /* Bit 0 of the status word: command outside its valid codes, so the valve is let go (a convention). */
@@ -44,45 +37,32 @@
  * convention). */
 #define DZ_STATUS_ABOVE 16u
 
-/* Returns the PWM compare value, 0 to DZ_COMPARE_LIMIT, of the law Eq. (18)
- *     u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)
- * rounded to the nearest count (a half goes up) and limited to the range. No state, no hardware, integers only.
+/* Returns the PWM compare value, 0 to the valve's compare_limit, of the law rounded to the nearest count (a half goes
+ * up) and limited to the range. No state, no hardware, integers only.
  *
- * u_adc    code of the command
- *              0: zero command, as are the 19 codes next to it (zero band)
- *              4095: full command, 10 V
- *              0 to 4095: valid; any other de-energises the valve (returns 0)
- * p_a_adc  code of the pressure upstream of the metering edge
- *              764: zero pressure
- *              3822: 20 MPa
- *              688 to 4014: valid; any other gives the smallest beta, the safe one
- * p_b_adc  code of the pressure downstream of it
- *              764: zero pressure
- *              3822: 20 MPa
- *              688 to 4014: valid; any other gives the smallest beta
+ * u_adc    code of the command: outside the valid codes the valve is de-energised (returns 0)
+ * p_a_adc  code of the pressure upstream of the metering edge: outside the valid codes it gives the smallest beta, the
+ *          safe one
+ * p_b_adc  code of the pressure downstream of it: likewise
  *
- * A pressure drop, A minus B, below -0.196 MPa means a failed sensor and gives the smallest beta too.
- *
- * At zero command it is 14636 to 20628, depending on the pressure drop.
- * Certificate of the valve as recorded: from 1.00 to 5.00 MPa, this value lies below the 99% lower bound of the closing
- * threshold (between the tests: premise smooth, declared, untested). The least margin is 0.0182 mV, in addition to the
- * rounding of readings to codes and of the drive to counts. The flow is less than 0.13 L/min, which is less than the
- * recordings can show. Above 5.00 MPa the offset falls with the continued bound. Up to 21.8 MPa this offset is
- * certified if the threshold continues from the last tests' value and slope, with curvature at most M = 0 mV/MPa^2.
- * Below 1.00 MPa the offset of the lowest test is held and nothing is certified. A threshold that keeps rising towards
- * zero pressure drop stays above this offset. No machine was declared: the certificate does not cover coil temperature,
- * supply voltage, pressure sensors, converters beyond rounding, oil or ageing.
+ * A pressure drop, A minus B, of less than minus `reverse` means a failed sensor and gives the smallest beta
+ * too.
  */
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* For dz_drive.c, which checks the inputs itself: the law for a command in codes past the zero band, 0
  * below; `failed` is all ones for pressures that must not be used, else 0. */
-uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed);
+uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc,
+                         uint32_t failed);
 
 /* Returns the status of the inputs, an OR of DZ_STATUS_...; 0: all are valid, no pressure drop is above the tests. */
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
 
 /* Returns the beta that dz_comp() uses at these pressures, times 2^15, rounded down: for a display, not for control. */
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -8,6 +8,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* DEVICE_SYSCLK_FREQ of TI's device.h must be this. */
 #define DZ_SYSCLK_HZ 100000000
 
@@ -50,5 +54,9 @@ void dz_interrupt_init(void);
 
 /* From here on SysCtl_serviceWatchdog() must come within 13.1 ms. */
 void dz_watchdog_start(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

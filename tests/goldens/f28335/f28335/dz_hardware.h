@@ -9,6 +9,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* SYSCLKOUT = 30 MHz * 10 / 2 = 150 MHz; set by InitSysCtrl(). */
 #define DZ_PLL_DIV 10u
 #define DZ_PLL_DIVSEL 2u
@@ -59,5 +63,9 @@ void dz_interrupt_init(void);
 
 /* From here on ServiceDog() must be called within 4.37 ms. */
 void dz_watchdog_start(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -8,6 +8,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Written by the interrupt only. Watch `dz_state` in the debugger; halting the processor freezes the PWM pin. */
 struct dz_state
 {
@@ -30,5 +34,9 @@ extern volatile struct dz_state dz_state;
 void dz_isr_init(uint16_t faults);
 
 interrupt void dz_isr(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -10,6 +10,10 @@
 
 #include "dz_frame.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* LSPCLK = 150 MHz / (2 * 1) = 75 MHz, limit 75 MHz. The line has
  * LSPCLK / (8 * (80 + 1)) = 115741 bit/s: +0.47 % from 115200. */
 #define DZ_SCI_LOSPCP 1u
@@ -44,5 +48,9 @@ void dz_telemetry_init(void);
 /* One pass: fills the transmitter, and packs the next frame if it is due. Never waits. Call it
  * from the main loop, at least once in 65535 PWM periods. */
 void dz_telemetry_poll(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -2,326 +2,200 @@
 /* Compensator SHA-256: a15dd28ff1e1d2cfea52135ac6be9297f558f03a4ce9ed3b316348aafbe4fb34 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 /*
- * The compensation law, an integer function of three converter codes.
+ * The compensation law, an integer function of a valve's numbers and three converter codes.
  * No division, no floating point, no state, and no branch: every input takes the same instructions.
- * Every constant has a comment: what it is, its engineering value, and in brackets how it was rounded.
- * manifest.json lists the origin of each under "constants", down to the ramp tests.
+ * Words are unsigned, every shift and every place in a table is limited: no block makes this undefined. That no sum
+ * wraps, that the output stays within its limit and rises with the command, holds for what dz_calibration_check()
+ * accepts.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
 
 #include "dz_comp.h"
 
-/* The law, Eq. (18):
- *     u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)
- *     k x_max/u_max = 475/1024 = 0.463867, rounded to nearest
- *     u_min0/u_max  = 8783/16384 = 0.536072, rounded down with a margin of half a PWM count
- *     beta(dP): linear in 52 segments of 64 codes of the pressure difference (0.4186 MPa)
- * Zero band: up to u_z, 19 codes of command, u_O is the certified offset beta_zero * u_min0, below the
- * closing threshold. Transition: over the next 32 codes (0.78%), to u_t, it runs straight to the law above,
- *     u_O(u) - (beta - beta_zero) * u_min0 * (1 - r),  r = (u_i - u_z)/(u_t - u_z), u = r * u_t.
- *
- * In counts of the PWM this is sum / (273 * 2^35) with the 64-bit integer
- *     sum = B * (-14640 * c + 1918207200) + 125 * 2^35 * c + 4690104287232
- *           - (B - B_zero) * 59943975 * (32 - t)
- * c: command that enters the law, in codes from zero times 32: of k codes past the zero band
- *    32 k + 19 t, t being those of k in the transition.
- * B: the table's value at dP, beta * 157286400; B_zero: the same of the certified beta.
- * Nothing is rounded before the one shift and the one division.
+#include "dz_valve.h"
+
+/* In counts of the PWM the law is sum / (divisor * 2^shift), both of the reciprocal, with the integer of 64 bits
+ *     sum = B * (slope * X + offset) + linear * X + half - (B - B_zero) * transition * missing
+ * X: command that enters the law. Of k codes past the zero band it is k * transition_codes + zero_band * t, t being
+ *    those of k in the transition; `missing` are the codes that are missing to its end.
+ * B: the table's value at dP; B_zero: the same of the certified beta at zero command.
+ * Nothing is rounded before the one shift and the one division, which is a product with a reciprocal.
  */
 
-/* ---- codes of the signals ---- */
-
-/* Eq. (29), code of zero command: 0 V (the converter's code, rounded down). */
-#define COMMAND_ZERO 0u
-/* Eq. (29), lowest valid code of the command: 0 V (the converter's code, rounded down). */
-#define COMMAND_LOW 0u
-/* Eq. (29), highest valid code of the command: 10 V (the converter's code, rounded down). */
-#define COMMAND_HIGH 4095u
-/* Text below Eq. (29), code at zero pressure of sensor A, 0.00654022 MPa a code: 0 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_A_ZERO 764u
-/* Text below Eq. (29), lowest valid code of sensor A, 0.00654022 MPa a code: -0.4971 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_A_LOW 688u
-/* Text below Eq. (29), highest valid code of sensor A, 0.00654022 MPa a code: 21.26 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_A_HIGH 4014u
-/* Text below Eq. (29), code at zero pressure of sensor B, 0.00654022 MPa a code: 0 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_B_ZERO 764u
-/* Text below Eq. (29), lowest valid code of sensor B, 0.00654022 MPa a code: -0.4971 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_B_LOW 688u
-/* Text below Eq. (29), highest valid code of sensor B, 0.00654022 MPa a code: 21.26 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_B_HIGH 4014u
-/* A pressure drop less than minus this means that a sensor has failed: 0.196 MPa in codes of sensor A (a hundredth
- * of the span, rounded down to a code). */
-#define REVERSE 30u
-/* A pressure drop of more than this lies above the tests: 5 MPa in codes of sensor A (rounded down to a code). */
-#define TESTED_TO 764u
-/* Place of the top bit of a word, which is set after a subtraction below zero: bit 31 of 32 (exact). */
-#define WORD_TOP 31u
+/* From weighted codes to codes of sensor A: 1/2^12 (the difference is rounded down). */
+#define WEIGHT_SHIFT 12u
+/* The power of two in DZ_BETA_STEP: 1/64 (exact). */
+#define BETA_STEP_SHIFT 6u
+/* The top bit of a word, set where it stands for a negative number: 2147483648 (exact). */
+#define TOP_BIT INT64_C(2147483648)
+/* Largest shift of a word of 32 bits: 31 (exact). */
+#define LARGEST_SHIFT 31u
+/* Largest shift of 64 bits: 63 (exact). */
+#define LARGEST_WIDE_SHIFT 63u
 /* Place of DZ_STATUS_DIFFERENCE in the status word: bit 3 (a convention). */
 #define DIFFERENCE_PLACE 3u
 
-/* ---- the segments of beta, zero band and transition ---- */
-
-/* Width of a segment of beta, codes of sensor A: 0.4186 MPa (exact). */
-#define STEP_CODES 64u
-/* From codes to segments: 1/64 segment a code (the segment is rounded down). */
-#define STEP_SHIFT 6u
-/* Codes of command that count as zero, u_z: 0.46% of command, 0.0464 V; error of a zero command, 15 + 4 codes
- * (exact). */
-#define ZERO_BAND 19u
-/* Codes of command that the transition takes, u_t - u_z: 0.78% of command, 0.07814 V (a power of two). */
-#define TRANSITION_CODES 32u
-/* From codes to the unit of the law's command: 1/32 code (exact). */
-#define TRANSITION_SHIFT 5u
-
-/* ---- the law's integers ---- */
-
-/* Eq. (18), coefficient of beta * u_i in u_O: k x_max/u_max - 1 = -0.536133 (exact from k x_max/u_max = 475/1024,
- * rounded to nearest). */
-#define FACTOR_SLOPE (-INT32_C(14640))
-/* Eq. (18), coefficient of beta in u_O: u_min0 = 5.360718 V (exact from u_min0/u_max = 8783/16384; that fraction was
- * rounded down with a margin of half a PWM count). */
-#define FACTOR_OFFSET INT32_C(1918207200)
-/* Transition, coefficient of (beta - beta_zero) in u_O, for each code of command missing to its end: u_min0/32 =
- * 0.167522 V (exact from u_min0/u_max = 8783/16384; that fraction was rounded down with a margin of half a PWM
- * count). */
-#define TRANSITION_FACTOR INT32_C(59943975)
-/* Eq. (18), coefficient of u_i alone in u_O, over 2^32: 1.000000 (exact). */
-#define COMMAND_HIGH_WORD UINT32_C(1000)
-/* Eq. (32), half a count, so that shift and division round to the nearest, a half up: 8.33e-05 V (exact). */
-#define HALF UINT64_C(4690104287232)
-/* The sum is u_O in counts times 273 * 2^35: 1/2^35 (rounded down, the half being in it). */
-#define SUM_SHIFT 35u
-/* What the quotient is multiplied by to get counts, times 2^39: 1/273 (one of those above it that are exact for
- * every quotient up to 16380272). */
-#define RECIPROCAL UINT32_C(2013757611)
-/* The power of two in RECIPROCAL: 2^39 (exact). */
-#define RECIPROCAL_SHIFT 39u
-/* From the table's beta to multiples of 2^-15, times 2^40: 2^15/157286400 (rounded up, and proved: dz_beta() is beta
- * * 2^15 rounded down for the whole table). */
-#define BETA_FACTOR UINT32_C(229064923)
-/* The power of two in BETA_FACTOR: 2^40 (exact). */
-#define BETA_SHIFT 40u
-
-/* ---- signals: masks in place of branches, all ones for yes and 0 for no ---- */
+/* ---- words: a negative number is stored 2^32 higher; masks in place of branches, all ones for yes, 0 for no ---- */
 
 /* All ones if the subtraction that gave x went below zero, else 0. */
 static uint32_t below_zero(uint32_t x)
 {
-    return (uint32_t)(0u - (uint32_t)(x >> WORD_TOP));
+    return 0u - (x >> 31);
 }
+
+/* The smaller of two numbers that are less than 2^31 apart. */
+static uint32_t at_most(uint32_t left, uint32_t right)
+{
+    const uint32_t room = left - right;
+
+    return right + (room & below_zero(room));
+}
+
+/* The signed value of a word. */
+static int32_t number(uint32_t word)
+{
+    return (int32_t)(((int64_t)word ^ TOP_BIT) - TOP_BIT);
+}
+
+/* The product of the signed values of two words, modulo 2^64. */
+static uint64_t product(uint32_t left, uint32_t right)
+{
+    const int64_t signed_product = (int64_t)number(left) * number(right);
+
+    return (uint64_t)signed_product;
+}
+
+/* An integer of 64 bits of the block. */
+static uint64_t whole(const uint32_t *halves)
+{
+    return ((uint64_t)halves[1] << 32) | halves[0];
+}
+
+/* ---- signals ---- */
 
 /* All ones if the command is outside its valid range: no working signal produces it. */
-static uint32_t invalid_command(uint32_t u)
+static uint32_t invalid_command(const struct dz_calibration *block, uint32_t u)
 {
-    return below_zero((uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u)));
+    return below_zero((u - block->command_low) | (block->command_high - u));
 }
 
-/* Difference of the pressures; a negative one is stored 2^32 higher. */
-static uint32_t pressure_difference(uint32_t p_a, uint32_t p_b)
+/* Difference of the pressures, A minus B, in codes of sensor A times 4096. */
+static uint32_t pressure_difference(const struct dz_calibration *block, uint32_t p_a, uint32_t p_b)
 {
-    const uint32_t a = (uint32_t)(p_a - PRESSURE_A_ZERO);
-    const uint32_t b = (uint32_t)(p_b - PRESSURE_B_ZERO);
-
-    return (uint32_t)(a - b);
+    return (p_a << WEIGHT_SHIFT) - (p_b * block->weight_b) - block->balance;
 }
 
-/* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -REVERSE. */
-static uint32_t failed_pressures(uint32_t p_a, uint32_t p_b, uint32_t difference)
+/* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -reverse. */
+static uint32_t failed_pressures(const struct dz_calibration *block, uint32_t p_a, uint32_t p_b, uint32_t difference)
 {
-    return below_zero(
-        (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a) |
-                   (uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b) |
-                   (uint32_t)(difference + REVERSE)));
-}
-
-/* Pressure drop in codes of sensor A; 0 below zero, and if the pressures are implausible. */
-static uint32_t pressure_drop(uint32_t difference, uint32_t failed)
-{
-    return (uint32_t)((difference & (uint32_t)~(below_zero(difference) | failed)));
+    return below_zero((p_a - block->a_low) | (block->a_high - p_a) | (p_b - block->b_low) | (block->b_high - p_b) |
+                      (difference + block->reverse));
 }
 
 /* ---- beta ---- */
 
-/* Row of the tables: one more than the segment's number, 0 if the pressures are implausible. */
-static uint32_t row_of(uint32_t dp, uint32_t failed)
+/* The table's values at a pressure drop: beta of the law, and the certified one at zero command. */
+struct betas
 {
-    return (uint32_t)(((uint32_t)(dp + STEP_CODES) >> STEP_SHIFT) & (uint32_t)~failed);
-}
-
-/* A linear segment of beta over dP: start + change * dP. */
-struct segment
-{
-    uint32_t start;
-    int32_t change;
+    uint32_t law;
+    uint32_t zero;
 };
 
-/* Eq. (7), beta of the law times 157286400: start + change * dP modulo 2^32, dP in codes of sensor A; the first row
- * is the smallest beta, for pressures that can't be right: beta 0.720673 to 1.000000 (nodes rounded down to 1/32768,
- * and not again). */
-static uint32_t law_beta(uint32_t row, uint32_t dp)
+/* Linear between the nodes; the smallest of all, at the table's end, if the pressures are implausible. */
+static inline struct betas betas_at(const struct dz_calibration_side *side, uint32_t difference, uint32_t failed)
 {
-    static const struct segment law_segment[53] = {
-        {UINT32_C(113352000), 0}, /* pressures can't be right: beta 0.720673 */
-        {UINT32_C(157286400), 0}, {UINT32_C(157286400), 0}, /* from 0.000 MPa: beta 1.000000 */
-        {UINT32_C(158025600), -5775}, {UINT32_C(158774400), -9675}, /* from 0.837 MPa: beta 1.000000 */
-        {UINT32_C(158774400), -9675}, {UINT32_C(158798400), -9750}, /* from 1.674 MPa: beta 0.993713 */
-        {UINT32_C(158769600), -9675}, {UINT32_C(158702400), -9525}, /* from 2.511 MPa: beta 0.985809 */
-        {UINT32_C(158740800), -9600}, {UINT32_C(158697600), -9525}, /* from 3.349 MPa: beta 0.977997 */
-        {UINT32_C(158745600), -9600}, {UINT32_C(159326400), -10425}, /* from 4.186 MPa: beta 0.970215 */
-        {UINT32_C(170846400), -25425}, {UINT32_C(155745600), -7275}, /* from 5.023 MPa: beta 0.962067 */
-        {UINT32_C(161188800), -13350}, {UINT32_C(161404800), -13575}, /* from 5.860 MPa: beta 0.948761 */
-        {UINT32_C(161635200), -13800}, {UINT32_C(161880000), -14025}, /* from 6.697 MPa: beta 0.937805 */
-        {UINT32_C(161966400), -14100}, {UINT32_C(162148800), -14250}, /* from 7.534 MPa: beta 0.926483 */
-        {UINT32_C(162340800), -14400}, {UINT32_C(162441600), -14475}, /* from 8.371 MPa: beta 0.914948 */
-        {UINT32_C(162547200), -14550}, {UINT32_C(162547200), -14550}, /* from 9.209 MPa: beta 0.903198 */
-        {UINT32_C(162777600), -14700}, {UINT32_C(162777600), -14700}, /* from 10.046 MPa: beta 0.891357 */
-        {UINT32_C(162902400), -14775}, {UINT32_C(162902400), -14775}, /* from 10.883 MPa: beta 0.879395 */
-        {UINT32_C(163036800), -14850}, {UINT32_C(163036800), -14850}, /* from 11.720 MPa: beta 0.867371 */
-        {UINT32_C(163180800), -14925}, {UINT32_C(163180800), -14925}, /* from 12.557 MPa: beta 0.855286 */
-        {UINT32_C(163180800), -14925}, {UINT32_C(163180800), -14925}, /* from 13.394 MPa: beta 0.843140 */
-        {UINT32_C(163344000), -15000}, {UINT32_C(163344000), -15000}, /* from 14.232 MPa: beta 0.830994 */
-        {UINT32_C(163344000), -15000}, {UINT32_C(163344000), -15000}, /* from 15.069 MPa: beta 0.818787 */
-        {UINT32_C(163344000), -15000}, {UINT32_C(163531200), -15075}, /* from 15.906 MPa: beta 0.806580 */
-        {UINT32_C(163531200), -15075}, {UINT32_C(163334400), -15000}, /* from 16.743 MPa: beta 0.794342 */
-        {UINT32_C(163536000), -15075}, {UINT32_C(163536000), -15075}, /* from 17.580 MPa: beta 0.782104 */
-        {UINT32_C(163536000), -15075}, {UINT32_C(163536000), -15075}, /* from 18.417 MPa: beta 0.769836 */
-        {UINT32_C(163756800), -15150}, {UINT32_C(163531200), -15075}, /* from 19.254 MPa: beta 0.757568 */
-        {UINT32_C(163531200), -15075}, {UINT32_C(163766400), -15150}, /* from 20.092 MPa: beta 0.745270 */
-        {UINT32_C(163526400), -15075}, {UINT32_C(163771200), -15150}, /* from 20.929 MPa: beta 0.732971 */
-    };
+    const uint32_t drop = (difference & ~below_zero(difference)) | failed;
+    const uint32_t past = (drop >> WEIGHT_SHIFT) & (DZ_BETA_STEP - 1u);
+    const uint32_t left = DZ_BETA_STEP - past;
+    const struct dz_calibration_node *node =
+        &side->nodes[(drop >> (WEIGHT_SHIFT + BETA_STEP_SHIFT)) & DZ_CALIBRATION_NODE_MASK];
+    struct betas beta;
 
-    return law_segment[row].start + ((uint32_t)law_segment[row].change * dp);
-}
-
-/* Eq. (7), certified beta of the closing threshold times 157286400: start + change * dP modulo 2^32, dP in codes of
- * sensor A; the first row is the smallest beta, for pressures that can't be right: beta 0.682373 to 0.962006 (nodes
- * rounded down to 1/32768, so that the certificate holds, and not again). */
-static uint32_t zero_beta(uint32_t row, uint32_t dp)
-{
-    static const struct segment zero_segment[53] = {
-        {UINT32_C(107328000), 0}, /* pressures can't be right: beta 0.682373 */
-        {UINT32_C(151310400), 0}, {UINT32_C(151310400), 0}, /* from 0.000 MPa: beta 0.962006 */
-        {UINT32_C(152107200), -6225}, {UINT32_C(152755200), -9600}, /* from 0.837 MPa: beta 0.962006 */
-        {UINT32_C(152755200), -9600}, {UINT32_C(152755200), -9600}, /* from 1.674 MPa: beta 0.955566 */
-        {UINT32_C(152755200), -9600}, {UINT32_C(152788800), -9675}, /* from 2.511 MPa: beta 0.947754 */
-        {UINT32_C(152788800), -9675}, {UINT32_C(152788800), -9675}, /* from 3.349 MPa: beta 0.939911 */
-        {UINT32_C(152788800), -9675}, {UINT32_C(153739200), -11025}, /* from 4.186 MPa: beta 0.932037 */
-        {UINT32_C(164740800), -25350}, {UINT32_C(149390400), -6900}, /* from 5.023 MPa: beta 0.923615 */
-        {UINT32_C(155169600), -13350}, {UINT32_C(155457600), -13650}, /* from 5.860 MPa: beta 0.910492 */
-        {UINT32_C(155611200), -13800}, {UINT32_C(155774400), -13950}, /* from 6.697 MPa: beta 0.899506 */
-        {UINT32_C(156033600), -14175}, {UINT32_C(156124800), -14250}, /* from 7.534 MPa: beta 0.888214 */
-        {UINT32_C(156316800), -14400}, {UINT32_C(156316800), -14400}, /* from 8.371 MPa: beta 0.876648 */
-        {UINT32_C(156633600), -14625}, {UINT32_C(156523200), -14550}, /* from 9.209 MPa: beta 0.864929 */
-        {UINT32_C(156753600), -14700}, {UINT32_C(156753600), -14700}, /* from 10.046 MPa: beta 0.853058 */
-        {UINT32_C(156878400), -14775}, {UINT32_C(156878400), -14775}, /* from 10.883 MPa: beta 0.841095 */
-        {UINT32_C(157012800), -14850}, {UINT32_C(157012800), -14850}, /* from 11.720 MPa: beta 0.829071 */
-        {UINT32_C(157156800), -14925}, {UINT32_C(157156800), -14925}, /* from 12.557 MPa: beta 0.816986 */
-        {UINT32_C(157156800), -14925}, {UINT32_C(157156800), -14925}, /* from 13.394 MPa: beta 0.804840 */
-        {UINT32_C(157320000), -15000}, {UINT32_C(157320000), -15000}, /* from 14.232 MPa: beta 0.792694 */
-        {UINT32_C(157320000), -15000}, {UINT32_C(157320000), -15000}, /* from 15.069 MPa: beta 0.780487 */
-        {UINT32_C(157320000), -15000}, {UINT32_C(157507200), -15075}, /* from 15.906 MPa: beta 0.768280 */
-        {UINT32_C(157507200), -15075}, {UINT32_C(157310400), -15000}, /* from 16.743 MPa: beta 0.756042 */
-        {UINT32_C(157512000), -15075}, {UINT32_C(157512000), -15075}, /* from 17.580 MPa: beta 0.743805 */
-        {UINT32_C(157512000), -15075}, {UINT32_C(157728000), -15150}, /* from 18.417 MPa: beta 0.731537 */
-        {UINT32_C(157507200), -15075}, {UINT32_C(157507200), -15075}, /* from 19.254 MPa: beta 0.719238 */
-        {UINT32_C(157507200), -15075}, {UINT32_C(157742400), -15150}, /* from 20.092 MPa: beta 0.706970 */
-        {UINT32_C(157502400), -15075}, {UINT32_C(157747200), -15150}, /* from 20.929 MPa: beta 0.694672 */
-    };
-
-    return zero_segment[row].start + ((uint32_t)zero_segment[row].change * dp);
+    beta.law = (node[0].law * left) + (node[1].law * past);
+    beta.zero = (node[0].zero * left) + (node[1].zero * past);
+    return beta;
 }
 
 /* ---- the law ---- */
 
-/* The law of a command, codes past the zero band; `failed` is all ones for pressures that must
- * not be used, else 0. */
-static inline uint32_t law_of(uint32_t towards, uint32_t difference, uint32_t failed)
+/* The upper 32 bits of the sum, for a command in codes past the zero band. */
+static inline uint32_t sum_of(const struct dz_calibration *block, const struct dz_calibration_side *side,
+                              uint32_t towards, struct betas beta)
 {
-    const uint32_t past = towards;
-    /* Its part within the transition, and the command that enters the law. */
-    const uint32_t from_end = (uint32_t)(past - TRANSITION_CODES);
-    const uint32_t reached = (uint32_t)(TRANSITION_CODES + (from_end & below_zero(from_end)));
-    const uint32_t command = ((uint32_t)past << TRANSITION_SHIFT) + ((uint32_t)ZERO_BAND * reached);
-    /* The pressure drop, and the segment it lies in. */
-    const uint32_t dp = pressure_drop(difference, failed);
-    const uint32_t row = row_of(dp, failed);
-    /* The law. Below 2^31 (proved when this was generated). */
-    const uint32_t beta = law_beta(row, dp);
-    const int32_t factor = (FACTOR_SLOPE * (int32_t)command) + FACTOR_OFFSET;
-    const int64_t scaled = (int64_t)(int32_t)beta * factor;
-    const uint32_t straight = COMMAND_HIGH_WORD * command;
-    const uint64_t law = (uint64_t)scaled + ((uint64_t)straight << 32) + HALF;
-    const uint32_t gap = beta - zero_beta(row, dp);
-    /* Zero or less, and so is its product with the gap. */
-    const int32_t lowering = (TRANSITION_FACTOR * (int32_t)reached) - (TRANSITION_FACTOR * (int32_t)TRANSITION_CODES);
-    const int64_t lowered = (int64_t)(int32_t)gap * lowering;
-    const uint64_t sum = law + (uint64_t)lowered;
-    /* Modulo 2^64, and the whole sum is never negative (proved over the tables' nodes). */
-    const uint32_t unlimited = (uint32_t)(sum >> SUM_SHIFT);
-    const uint32_t quotient = unlimited; /* never above the one of DZ_COMPARE_LIMIT (proved) */
-    /* quotient / 273 */
-    const uint32_t compare = (uint32_t)(((uint64_t)quotient * RECIPROCAL) >> RECIPROCAL_SHIFT);
+    const uint32_t past = at_most(towards, side->room);
+    /* The codes that are missing to the transition's end, with the sign turned; and the command that enters the law. */
+    const uint32_t from_end = past - block->transition_codes;
+    const uint32_t not_missing = from_end & below_zero(from_end);
+    const uint32_t command =
+        (past * block->transition_codes) + (block->zero_band * (block->transition_codes + not_missing));
+    const uint64_t sum = ((whole(side->half) + ((uint64_t)command * side->linear[0])) +
+                          product(beta.law - beta.zero, side->transition * not_missing)) +
+                         product(beta.law, (side->slope * command) + side->offset);
 
-    return (uint32_t)compare;
+    return (uint32_t)(sum >> 32) + (command * side->linear[1]);
 }
+
+/* Counts of a sum: limited to the output's largest, and divided. */
+static inline uint32_t counts_of(const struct dz_calibration_side *side, uint32_t sum)
+{
+    const uint32_t quotient = at_most(sum, side->quotient_limit);
+
+    return (uint32_t)(((uint64_t)quotient * side->reciprocal) >> 32) >> (side->reciprocal_shift & LARGEST_SHIFT);
+}
+
+/* ---- positive commands ---- */
 
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[0];
     const uint32_t u = u_adc;
-    const uint32_t p_a = p_a_adc;
-    const uint32_t p_b = p_b_adc;
-    /* The command, in codes from zero; 0 if it is not valid. */
-    const uint32_t let_go = invalid_command(u);
-    const uint32_t from_zero = (uint32_t)((uint32_t)(u - COMMAND_ZERO) & (uint32_t)~let_go);
-    /* Its part past the zero band; 0 within. */
-    const uint32_t from_band = (uint32_t)(from_zero - ZERO_BAND);
-    const uint32_t towards = (uint32_t)(from_band & (uint32_t)~below_zero(from_band));
-    const uint32_t difference = pressure_difference(p_a, p_b);
-    const uint32_t failed = failed_pressures(p_a, p_b, difference);
+    const uint32_t let_go = invalid_command(block, u);
+    const uint32_t from_band = u - side->band_end;
+    const uint32_t difference = pressure_difference(block, p_a_adc, p_b_adc);
+    const uint32_t failed = failed_pressures(block, p_a_adc, p_b_adc, difference);
+    const struct betas beta = betas_at(side, difference, failed);
 
-    return (uint16_t)(law_of(towards, difference, failed) & (uint32_t)~let_go);
+    return (uint16_t)(counts_of(side, sum_of(block, side, from_band & ~below_zero(from_band), beta)) & ~let_go);
 }
 
-uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed)
+uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc,
+                         uint16_t p_b_adc, uint32_t failed)
 {
-    return law_of((uint32_t)command, pressure_difference(p_a_adc, p_b_adc), (uint32_t)failed);
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[0];
+    const uint32_t difference = pressure_difference(block, p_a_adc, p_b_adc);
+
+    return counts_of(side, sum_of(block, side, command, betas_at(side, difference, failed)));
 }
 
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
+    const struct dz_calibration *block = &dz_valve;
     const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
     /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
-    const uint32_t command = (uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u));
-    const uint32_t a = (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a));
-    const uint32_t b = (uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b));
-    const uint32_t difference = pressure_difference(p_a, p_b);
-    const uint32_t below = (uint32_t)(difference + REVERSE);
-    const uint32_t above = (uint32_t)(TESTED_TO - difference);
-    const uint32_t of_drop = (uint32_t)((below >> WORD_TOP) |
-                                    ((above >> WORD_TOP) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE)));
+    const uint32_t a = (p_a - block->a_low) | (block->a_high - p_a);
+    const uint32_t b = (p_b - block->b_low) | (block->b_high - p_b);
+    const uint32_t difference = pressure_difference(block, p_a, p_b);
+    const uint32_t below = difference + block->reverse;
+    const uint32_t above = block->sides[0].tested_to - difference;
+    const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE));
 
     /* The difference has no meaning if a pressure is outside its valid range. */
-    return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |
-                      ((b >> WORD_TOP) * DZ_STATUS_PRESSURE_B) |
-                      ((of_drop & (uint32_t)~below_zero((uint32_t)(a | b))) * DZ_STATUS_DIFFERENCE));
+    return (uint16_t)((invalid_command(block, u) & DZ_STATUS_COMMAND) | ((a >> 31) * DZ_STATUS_PRESSURE_A) |
+                      ((b >> 31) * DZ_STATUS_PRESSURE_B) | ((of_drop & ~below_zero(a | b)) * DZ_STATUS_DIFFERENCE));
 }
 
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)
 {
-    const uint32_t difference = pressure_difference(p_a_adc, p_b_adc);
-    const uint32_t failed = failed_pressures(p_a_adc, p_b_adc, difference);
-    const uint32_t dp = pressure_drop(difference, failed);
-    const uint32_t row = row_of(dp, failed);
-    const uint64_t beta = law_beta(row, dp);
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[0];
+    const uint32_t difference = pressure_difference(block, p_a_adc, p_b_adc);
+    const uint32_t failed = failed_pressures(block, p_a_adc, p_b_adc, difference);
 
-    return (uint16_t)((beta * BETA_FACTOR) >> BETA_SHIFT);
+    return (uint16_t)(((uint64_t)betas_at(side, difference, failed).law * side->beta_factor) >>
+                      (side->beta_shift & LARGEST_WIDE_SHIFT));
 }

@@ -6,8 +6,8 @@
  * write compare_a and compare_b to the PWM. Inputs are those of dz_comp(), see dz_comp.h.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file but for
- *   deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, DZ_DRIVE_COMMAND_ZERO, DZ_STATUS_LATCHED: they
- *   are for those who call the drive; not every firmware needs all of them.
+ *   deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, DZ_DRIVE_COMMAND_ZERO: they are for those who
+ *   call it; not every firmware needs all of them.
  */
 #ifndef DZ_DRIVE_H
 #define DZ_DRIVE_H
@@ -16,9 +16,13 @@
 
 #include "dz_comp.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* PWM periods from one sample to the next: 2500 periods and 1250 samples a second (exact). */
 #define DZ_DRIVE_TICKS_PER_SAMPLE 2u
-/* Eq. (29), code of zero command: 0 V (the converter's code, rounded down). */
+/* Code of zero command: command_zero of dz_valve.h (exact). */
 #define DZ_DRIVE_COMMAND_ZERO 0u
 /* Bit 5 of the drive's status word: the drive waits: for valid commands, and with the interlock for zero command (a
  * convention). */
@@ -29,10 +33,12 @@
 /* Bit 7 of the drive's status word: a fault that stays until dz_drive_init() (a convention). */
 #define DZ_STATUS_LATCHED 128u
 
-/* State of the compensator: one for each valve, set by dz_drive_init().
- * Options of this firmware: Zero band. Interlock.
+/* State of the compensator: one for each valve, set by dz_drive_init(). Its numbers say which
+ * functions are on: zero band, inverse play, ramps, dither, interlock, latched faults.
+ *
  * A fault acts at once: without a valid command the valve is de-energised; implausible pressures select the smallest
- * beta. It ends after 5 valid samples in a row; a command must be zero in these.
+ * beta. It ends after fault_samples valid samples in a row; with an interlock a command must be zero in these. With
+ * latched faults it stays after as many faulty ones, until dz_drive_init().
  */
 struct dz_drive
 {
@@ -46,19 +52,24 @@ struct dz_drive
     uint16_t rising;    /* how far the command counts as rising, codes of travel; 0 without a play */
     int16_t played;     /* command without its noise, codes from zero; 0 without a play */
     int32_t ramped;     /* command after the ramps, codes from zero times 65536; positive ones above zero */
-    uint16_t valid_commands;   /* valid commands in a row, of zero until the drive follows; from 5 on it follows them */
-    uint16_t valid_pressures;  /* plausible pressures in a row; from 5 on they are used */
+    uint16_t valid_commands;   /* valid commands in a row, of zero with an interlock until the drive follows */
+    uint16_t valid_pressures;  /* plausible pressures in a row; from fault_samples on they are used */
     uint16_t faulty_commands;  /* invalid commands since the drive last followed one; 0 without a latch */
     uint16_t faulty_pressures; /* implausible pressures since they were last used; 0 without a latch */
 };
 
-/* Nothing driven, until zero command has been seen: 5 samples in a row. */
+/* Nothing driven; with an interlock until zero command has been seen for fault_samples samples in a row. */
 void dz_drive_init(struct dz_drive *drive);
 
 /* A new sample: takes effect with the next dz_drive_tick(). Call it 1250 times per second. */
-void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc);
+void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
+                     uint16_t p_b_adc);
 
 /* Once per PWM period: sets compare_a and compare_b. */
 void dz_drive_tick(struct dz_drive *drive);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,11 +9,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "dz_drive.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#include "dz_drive.h" /* inside, because C++ would mangle the names */
 
 /* Largest compare value: full drive. */
 uint16_t dz_compare_max(void);

@@ -15,6 +15,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct dz_selftest_grid
 {
     const char *name;
@@ -52,5 +56,9 @@ void dz_selftest_line(const struct dz_selftest_grid *grid, char line[DZ_SELFTEST
 
 /* Writes `dz_drive walk FNV-1a-32 0123ABCD over 20000 ticks` likewise. */
 void dz_selftest_drive_line(char line[DZ_SELFTEST_LINE]);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

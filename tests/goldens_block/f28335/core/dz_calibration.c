@@ -104,8 +104,8 @@ static uint32_t crc_of(const struct dz_calibration *block)
 static uint16_t format_wrong(const struct dz_calibration *block)
 {
     return (uint16_t)(differs(block->magic, DZ_CALIBRATION_MAGIC) | differs(block->layout, DZ_CALIBRATION_LAYOUT) |
-                      differs(block->length, DZ_CALIBRATION_WORDS) | block->reserved | block->spare |
-                      block->sides[0].spare | block->sides[1].spare);
+                      differs(block->length, DZ_CALIBRATION_WORDS) | block->reserved |
+                      block->sides[0].spare | block->sides[1].spare | block->current.spare);
 }
 
 static uint16_t firmware_wrong(const struct dz_calibration *block)
@@ -137,7 +137,7 @@ static uint16_t signals_wrong(const struct dz_calibration *block)
     return (uint16_t)(codes_wrong(block->command_low, block->command_zero, block->command_high) |
                       codes_wrong(block->a_low, block->a_zero, block->a_high) |
                       codes_wrong(block->b_low, block->b_zero, block->b_high) | differs(block->balance, balance) |
-                      outside(block->weight_b, 1u, 65535u) | above(block->reverse, LARGEST_DROP) |
+                      differs(greater(block->weight_b, 1u), block->weight_b) | above(block->reverse, LARGEST_DROP) |
                       above(largest_drop(block, 0u), LARGEST_DROP) |
                       above(largest_drop(block, 1u), LARGEST_DROP));
 }

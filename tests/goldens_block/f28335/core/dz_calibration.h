@@ -26,8 +26,6 @@
 #define DZ_TICK_HZ 2500u
 /* Codes of pressure drop between two nodes of beta: a power of two (exact). */
 #define DZ_BETA_STEP 64u
-/* Samples of the current in a sum: 0 without current control (exact). */
-#define DZ_CURRENT_SAMPLES 0u
 /* What this firmware is compiled for: two solenoids: a command of both signs, the pressure drop of negative commands
  * is B less A (exact). */
 #define DZ_CALIBRATION_SHAPE 5u
@@ -37,16 +35,20 @@
 #define DZ_CALIBRATION_LAYOUT 1u
 /* Words of 16 bits in a block: 2660 octets (exact). */
 #define DZ_CALIBRATION_WORDS 1330u
-/* Room for nodes of beta: the fallback and those of the table (exact). */
+/* Samples of the current in a sum: 0 without current control (exact). */
+#define DZ_CURRENT_SAMPLES 0u
+/* Room for signs of command: positive, negative (exact). */
+#define DZ_CALIBRATION_SIDES 2u
+/* Room for nodes of beta: two more than the mask (exact). */
 #define DZ_CALIBRATION_NODES 129u
 /* Largest index of a node that has a successor: all ones (exact). */
 #define DZ_CALIBRATION_NODE_MASK 127u
-/* Room for nodes of the play's width: each side (exact). */
+/* Room for nodes of the play's width: two more than the mask (exact). */
 #define DZ_CALIBRATION_PLAY_NODES 17u
 /* Largest index of a node that has a successor: all ones (exact). */
 #define DZ_CALIBRATION_PLAY_MASK 15u
-/* Room for nodes of the supply's correction: one table (exact). */
-#define DZ_CALIBRATION_SUPPLY_NODES 66u
+/* Room for nodes of the supply's correction: two more than the mask (exact). */
+#define DZ_CALIBRATION_SUPPLY_NODES 65u
 /* Largest index of a node that has a successor: all ones (exact). */
 #define DZ_CALIBRATION_SUPPLY_MASK 63u
 /* Bit 0 of dz_calibration_check(): not a calibration block, or one of another layout or length (a convention). */
@@ -77,6 +79,10 @@ struct dz_calibration_node
 
 struct dz_calibration_side
 {
+    /* For each node beta that the law follows, then the certified beta at zero command; a node every beta_step codes
+     * from no pressure drop on, and the last two the smallest of all, used where the pressures can't be right
+     * (1/beta_unit). */
+    struct dz_calibration_node nodes[DZ_CALIBRATION_NODES];
     /* Coefficient of beta in the sum. */
     uint32_t offset;
     /* Coefficient of beta times command in the sum, two's complement. */
@@ -101,10 +107,6 @@ struct dz_calibration_side
     uint32_t ramp_up;
     /* Largest change of the command per sample, towards zero (1/65536 code). */
     uint32_t ramp_down;
-    /* For each node beta that the law follows, then the certified beta at zero command; a node every beta_step codes
-     * from no pressure drop on, and the last two the smallest of all, used where the pressures can't be right
-     * (1/beta_unit). */
-    struct dz_calibration_node nodes[129];
     /* Nodes of the table in use. */
     uint16_t node_count;
     /* Right shift after the product with reciprocal, beyond 32. */
@@ -118,7 +120,7 @@ struct dz_calibration_side
     /* Code at the zero band's end (codes). */
     uint16_t band_end;
     /* Width of the inverse play every 2^play_step_shift codes of command from zero on (counts). */
-    uint16_t play[17];
+    uint16_t play[DZ_CALIBRATION_PLAY_NODES];
     /* 0. */
     uint16_t spare;
 };
@@ -174,7 +176,9 @@ struct dz_calibration_current
     /* Codes between two nodes of the correction, a power of two. */
     uint16_t supply_shift;
     /* Nominal over measured supply times 2^14, from supply_low on. */
-    uint16_t supply[66];
+    uint16_t supply[DZ_CALIBRATION_SUPPLY_NODES];
+    /* 0. */
+    uint16_t spare;
 };
 
 struct dz_calibration
@@ -218,6 +222,8 @@ struct dz_calibration
     uint32_t balance;
     /* A pressure drop less than minus this is a failed sensor (1/4096 code of A). */
     uint32_t reverse;
+    /* Weight of a code of sensor B (1/4096 code of A). */
+    uint32_t weight_b;
     /* Code of zero command (codes). */
     uint16_t command_zero;
     /* Lowest valid code of the command (codes). */
@@ -236,8 +242,6 @@ struct dz_calibration
     uint16_t b_low;
     /* Highest valid code of sensor B (codes). */
     uint16_t b_high;
-    /* Weight of a code of sensor B (1/4096 code of A). */
-    uint16_t weight_b;
     /* Codes of pressure drop between two nodes of beta (codes of A). */
     uint16_t beta_step;
     /* Codes of command of the transition; 1: none (codes). */
@@ -268,18 +272,24 @@ struct dz_calibration
     uint16_t play_step_shift;
     /* Play_codes times the transition's codes, a power of two. */
     uint16_t play_shift;
-    /* 0. */
-    uint16_t spare;
     /* Of positive, then of negative commands; all zero where there are none. */
-    struct dz_calibration_side sides[2];
+    struct dz_calibration_side sides[DZ_CALIBRATION_SIDES];
     /* All zero without current control. */
     struct dz_calibration_current current;
     /* CRC-32 of all octets before it, as zlib.crc32. */
     uint32_t crc32;
 };
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Returns the faults of a block, an OR of DZ_CALIBRATION_..., or 0: the core may use it. It takes some milliseconds,
  * so do not call it from an interrupt. */
 uint16_t dz_calibration_check(const struct dz_calibration *block);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -15,10 +15,18 @@
 
 #include "dz_calibration.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Null: there is no valid block, and the output is held. Written by the main loop, only while the output is held. */
 extern const struct dz_calibration *volatile dz_active;
 
 /* 1: the main loop asks for the output to be held; dz_state.held answers. */
 extern volatile uint16_t dz_hold_wanted;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

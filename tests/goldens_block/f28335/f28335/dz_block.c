@@ -9,233 +9,417 @@
 #pragma DATA_SECTION(dz_block, "dz_calibration")
 #endif
 const struct dz_calibration dz_block = {
+    /* Octets DZC1 (exact). */
     .magic = UINT32_C(826497604),
+    /* Version of this layout (exact). */
     .layout = 1u,
+    /* Length of the block, CRC included (words) (exact). */
     .length = 1330u,
+    /* What the firmware must be compiled for (exact). */
     .shape = 5u,
+    /* Largest code of the converter (codes) (exact). From signals.code_max. */
     .code_max = 4095u,
+    /* PWM compare value of full drive (counts) (exact). From signals.compare_max. */
     .compare_max = 60000u,
+    /* Sampling rate (Hz) (exact). From signals.sample_Hz. */
     .sample_Hz = 1250u,
+    /* PWM frequency (Hz) (exact). From signals.tick_Hz. */
     .tick_Hz = 2500u,
+    /* 0 (exact). */
     .reserved = 0u,
+    /* SHA-256 of compensator.json (exact). */
     .compensator_sha256 = {
-        18464u, 57200u, 26455u, 65304u, 19351u, 53490u, 1606u, 3152u, 14675u, 57499u, 1491u, 42605u, 65040u,
-        62638u, 46957u, 31909u
+        18464u, 57200u, 26455u, 65304u, 19351u, 53490u, 1606u, 3152u, 14675u, 57499u, 1491u, 42605u,
+        65040u, 62638u, 46957u, 31909u
     },
+    /* Serial number, up to 24 octets of UTF-8 (exact). */
     .serial = {
-        0u
+        0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u
     },
+    /* What the valve is filed under, up to 48 octets of UTF-8 (exact). */
     .record = {
-        0u
+        0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u
     },
+    /* Full command, for display (uV) (exact). From u_max_V. */
     .u_max_uV = UINT32_C(10000000),
+    /* Span of sensor A, for display (Pa) (exact). From signals.pressure_a.span_MPa. */
     .a_span_Pa = UINT32_C(25000000),
+    /* Span of sensor B, for display (Pa) (exact). From signals.pressure_b.span_MPa. */
     .b_span_Pa = UINT32_C(16000000),
+    /* Code of sensor A at its span, for display (codes): 25 MPa (exact). From signals.pressure_a.full_code. */
     .a_full = 3795u,
+    /* Code of sensor B at its span, for display (codes): 16 MPa (exact). From signals.pressure_b.full_code. */
     .b_full = 3822u,
+    /* Difference of the codes at zero pressure: a_zero times 4096 minus b_zero times weight_b, modulo 2^32 (1/4096
+     * code of A): codes 759 of A and 764 of B (exact). From signals.pressure_a.zero_code. */
     .balance = UINT32_C(1120172),
+    /* A pressure drop less than minus this is a failed sensor (1/4096 code of A): 0.247 MPa (a hundredth of the
+     * span, rounded down to a code). From reverse_codes. */
     .reverse = UINT32_C(122880),
+    /* Weight of a code of sensor B (1/4096 code of A): 0.00523218 MPa / 0.00823452 MPa = 0.635396 (rounded to
+     * nearest). From signals.pressure_b.span_MPa. */
+    .weight_b = UINT32_C(2603),
+    /* Code of zero command (codes): 0 V (the converter's code, rounded down). From signals.command.zero_code. */
     .command_zero = 2048u,
+    /* Lowest valid code of the command (codes): -10 V (the converter's code, rounded down). From
+     * signals.command.valid_codes. */
     .command_low = 0u,
+    /* Highest valid code of the command (codes): 10 V (the converter's code, rounded down). From
+     * signals.command.valid_codes. */
     .command_high = 4095u,
+    /* Code at zero pressure, sensor A (codes): 0 MPa (exact). From signals.pressure_a.zero_code. */
     .a_zero = 759u,
+    /* Lowest valid code of sensor A (codes): -0.6258 MPa (the converter's code, rounded down). From
+     * signals.pressure_a.valid_codes. */
     .a_low = 683u,
+    /* Highest valid code of sensor A (codes): 26.56 MPa (the converter's code, rounded down). From
+     * signals.pressure_a.valid_codes. */
     .a_high = 3985u,
+    /* Code at zero pressure, sensor B (codes): 0 MPa (exact). From signals.pressure_b.zero_code. */
     .b_zero = 764u,
+    /* Lowest valid code of sensor B (codes): -0.3976 MPa (the converter's code, rounded down). From
+     * signals.pressure_b.valid_codes. */
     .b_low = 688u,
+    /* Highest valid code of sensor B (codes): 17 MPa (the converter's code, rounded down). From
+     * signals.pressure_b.valid_codes. */
     .b_high = 4014u,
-    .weight_b = 2603u,
+    /* Codes of pressure drop between two nodes of beta (codes of A) (exact). From beta_step_codes. */
     .beta_step = 64u,
+    /* Codes of command of the transition; 1: none (codes): 0.78% of command, 0.07816 V (a power of two). From
+     * transition_codes. */
     .transition_codes = 16u,
+    /* Codes of command that count as zero (codes): 1.66% of command, 0.1661 V; error of a zero command, 30 + 4 codes
+     * (exact). From zero_band_codes. */
     .zero_band = 34u,
+    /* Largest compare value (counts): 9.5 V, 95.0% duty (rounded down). From drive_functions.compare_limit. */
     .compare_limit = 57000u,
+    /* Codes beyond which the drive leaves its rest or its side (codes): 1.91% of command, 0.1905 V; a zero command
+     * with twice its noise stays within (exact). From drive_functions.leave_zero_codes. */
     .leave_zero = 39u,
+    /* Valid samples in a row that end a fault (samples): 2.4 ms (exact). From drive_functions.fault_samples. */
     .fault_samples = 3u,
+    /* 1: a fault of as many faulty samples stays until a reset: latched (exact). From drive_functions.fault_latch. */
     .fault_latch = 1u,
+    /* Codes up to which a command is the zero command that the drive waits for; 65535: it does not wait (codes):
+     * 1.66% of command, 0.1661 V (exact). From drive_functions.interlock_codes. */
     .interlock = 34u,
+    /* 1: the command is ramped: ramped (exact). From drive_functions.ramp_up. */
     .ramps = 1u,
+    /* Peak of the dither; 0: none (counts): 1.000% of full drive, 0.1 V (rounded to nearest). From
+     * drive_functions.dither_counts. */
     .dither_counts = 600u,
+    /* Half the dither's period (PWM periods): 3.2 ms, 156.25 Hz (rounded to nearest, 1 or more). From
+     * drive_functions.dither_ticks. */
     .dither_ticks = 8u,
+    /* Codes of travel from one branch to the other; 0: no inverse play (codes) (a power of two). From
+     * drive_functions.play_codes. */
     .play_codes = 0u,
+    /* Codes of fluctuation that do not count as a reversal (codes) (exact). From drive_functions.play_noise_codes. */
     .play_noise = 0u,
+    /* Codes between two nodes of the play's width, a power of two (exact). From drive_functions.play_step_codes. */
     .play_step_shift = 0u,
+    /* Play_codes times the transition's codes, a power of two (exact). From transition_codes. */
     .play_shift = 0u,
-    .spare = 0u,
     .sides = {
-        {
-            .offset = UINT32_C(1658070000),
-            .slope = UINT32_C(4294916671),
-            .transition = UINT32_C(103629375),
-            .linear = {
-                UINT32_C(0), UINT32_C(3750)
-            },
-            .half = {
-                UINT32_C(2147483648), UINT32_C(1023)
-            },
-            .quotient_limit = UINT32_C(116681046),
-            .reciprocal = UINT32_C(134283297),
-            .tested_to = UINT32_C(2490367),
-            .beta_unit = UINT32_C(2711552),
-            .beta_factor = UINT32_C(207611713),
-            .ramp_up = UINT32_C(214644),
-            .ramp_down = UINT32_C(268304),
+        { /* positive commands */
+            /* For each node beta that the law follows, then the certified beta at zero command; a node every
+             * beta_step codes from no pressure drop on, and the last two the smallest of all, used where the
+             * pressures can't be right (1/beta_unit): beta 0.588257 to 1.000000, in 1/8192 (nodes rounded down, so
+             * that the certificate holds, and not again). From sides.positive.beta. */
             .nodes = {
-                {UINT32_C(2711552), UINT32_C(2560285)}, {UINT32_C(2711552), UINT32_C(2560285)}, {UINT32_C(2710228),
-                UINT32_C(2558299)}, {UINT32_C(2696988), UINT32_C(2545390)}, {UINT32_C(2683748), UINT32_C(2532150)},
-                {UINT32_C(2670508), UINT32_C(2519241)}, {UINT32_C(2657268), UINT32_C(2506001)}, {UINT32_C(2644359),
-                UINT32_C(2492761)}, {UINT32_C(2631119), UINT32_C(2479521)}, {UINT32_C(2618210), UINT32_C(2466281)},
-                {UINT32_C(2594378), UINT32_C(2442118)}, {UINT32_C(2577166), UINT32_C(2424906)}, {UINT32_C(2558961),
-                UINT32_C(2407032)}, {UINT32_C(2540425), UINT32_C(2388165)}, {UINT32_C(2521227), UINT32_C(2369298)},
-                {UINT32_C(2502029), UINT32_C(2350100)}, {UINT32_C(2482831), UINT32_C(2330571)}, {UINT32_C(2462971),
-                UINT32_C(2311042)}, {UINT32_C(2443442), UINT32_C(2291182)}, {UINT32_C(2423251), UINT32_C(2271322)},
-                {UINT32_C(2403391), UINT32_C(2251131)}, {UINT32_C(2383200), UINT32_C(2231271)}, {UINT32_C(2363009),
-                UINT32_C(2211080)}, {UINT32_C(2342818), UINT32_C(2190889)}, {UINT32_C(2322627), UINT32_C(2170367)},
-                {UINT32_C(2302436), UINT32_C(2150176)}, {UINT32_C(2281914), UINT32_C(2129985)}, {UINT32_C(2261723),
-                UINT32_C(2109463)}, {UINT32_C(2241201), UINT32_C(2088941)}, {UINT32_C(2220679), UINT32_C(2068750)},
-                {UINT32_C(2200157), UINT32_C(2048228)}, {UINT32_C(2179966), UINT32_C(2027706)}, {UINT32_C(2159444),
-                UINT32_C(2007184)}, {UINT32_C(2138922), UINT32_C(1986662)}, {UINT32_C(2118400), UINT32_C(1966140)},
-                {UINT32_C(2097547), UINT32_C(1945618)}, {UINT32_C(2077025), UINT32_C(1925096)}, {UINT32_C(2056503),
-                UINT32_C(1904243)}, {UINT32_C(2035981), UINT32_C(1883721)}, {UINT32_C(2015459), UINT32_C(1863199)},
-                {UINT32_C(1994937), UINT32_C(1842677)}, {UINT32_C(1974084), UINT32_C(1822155)}, {UINT32_C(1953562),
-                UINT32_C(1801302)}, {UINT32_C(1933040), UINT32_C(1780780)}, {UINT32_C(1912187), UINT32_C(1760258)},
-                {UINT32_C(1891665), UINT32_C(1739405)}, {UINT32_C(1871143), UINT32_C(1718883)}, {UINT32_C(1850290),
-                UINT32_C(1698361)}, {UINT32_C(1829768), UINT32_C(1677508)}, {UINT32_C(1809246), UINT32_C(1656986)},
-                {UINT32_C(1788393), UINT32_C(1636133)}, {UINT32_C(1767871), UINT32_C(1615611)}, {UINT32_C(1747018),
-                UINT32_C(1595089)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(1747018), UINT32_C(1595089)}, {UINT32_C(1747018),
-                UINT32_C(1595089)}
+                {UINT32_C(2711552), UINT32_C(2560285)}, /* 0.000 MPa: beta 1.000000, certified 0.944214 */
+                {UINT32_C(2711552), UINT32_C(2560285)}, /* 0.527 MPa: beta 1.000000, certified 0.944214 */
+                {UINT32_C(2710228), UINT32_C(2558299)}, /* 1.054 MPa: beta 0.999512, certified 0.943481 */
+                {UINT32_C(2696988), UINT32_C(2545390)}, /* 1.581 MPa: beta 0.994629, certified 0.938721 */
+                {UINT32_C(2683748), UINT32_C(2532150)}, /* 2.108 MPa: beta 0.989746, certified 0.933838 */
+                {UINT32_C(2670508), UINT32_C(2519241)}, /* 2.635 MPa: beta 0.984863, certified 0.929077 */
+                {UINT32_C(2657268), UINT32_C(2506001)}, /* 3.162 MPa: beta 0.979980, certified 0.924194 */
+                {UINT32_C(2644359), UINT32_C(2492761)}, /* 3.689 MPa: beta 0.975220, certified 0.919312 */
+                {UINT32_C(2631119), UINT32_C(2479521)}, /* 4.216 MPa: beta 0.970337, certified 0.914429 */
+                {UINT32_C(2618210), UINT32_C(2466281)}, /* 4.743 MPa: beta 0.965576, certified 0.909546 */
+                {UINT32_C(2594378), UINT32_C(2442118)}, /* 5.270 MPa: beta 0.956787, certified 0.900635 */
+                {UINT32_C(2577166), UINT32_C(2424906)}, /* 5.797 MPa: beta 0.950439, certified 0.894287 */
+                {UINT32_C(2558961), UINT32_C(2407032)}, /* 6.324 MPa: beta 0.943726, certified 0.887695 */
+                {UINT32_C(2540425), UINT32_C(2388165)}, /* 6.851 MPa: beta 0.936890, certified 0.880737 */
+                {UINT32_C(2521227), UINT32_C(2369298)}, /* 7.378 MPa: beta 0.929810, certified 0.873779 */
+                {UINT32_C(2502029), UINT32_C(2350100)}, /* 7.905 MPa: beta 0.922729, certified 0.866699 */
+                {UINT32_C(2482831), UINT32_C(2330571)}, /* 8.432 MPa: beta 0.915649, certified 0.859497 */
+                {UINT32_C(2462971), UINT32_C(2311042)}, /* 8.959 MPa: beta 0.908325, certified 0.852295 */
+                {UINT32_C(2443442), UINT32_C(2291182)}, /* 9.486 MPa: beta 0.901123, certified 0.844971 */
+                {UINT32_C(2423251), UINT32_C(2271322)}, /* 10.013 MPa: beta 0.893677, certified 0.837646 */
+                {UINT32_C(2403391), UINT32_C(2251131)}, /* 10.540 MPa: beta 0.886353, certified 0.830200 */
+                {UINT32_C(2383200), UINT32_C(2231271)}, /* 11.067 MPa: beta 0.878906, certified 0.822876 */
+                {UINT32_C(2363009), UINT32_C(2211080)}, /* 11.594 MPa: beta 0.871460, certified 0.815430 */
+                {UINT32_C(2342818), UINT32_C(2190889)}, /* 12.121 MPa: beta 0.864014, certified 0.807983 */
+                {UINT32_C(2322627), UINT32_C(2170367)}, /* 12.648 MPa: beta 0.856567, certified 0.800415 */
+                {UINT32_C(2302436), UINT32_C(2150176)}, /* 13.175 MPa: beta 0.849121, certified 0.792969 */
+                {UINT32_C(2281914), UINT32_C(2129985)}, /* 13.702 MPa: beta 0.841553, certified 0.785522 */
+                {UINT32_C(2261723), UINT32_C(2109463)}, /* 14.229 MPa: beta 0.834106, certified 0.777954 */
+                {UINT32_C(2241201), UINT32_C(2088941)}, /* 14.756 MPa: beta 0.826538, certified 0.770386 */
+                {UINT32_C(2220679), UINT32_C(2068750)}, /* 15.283 MPa: beta 0.818970, certified 0.762939 */
+                {UINT32_C(2200157), UINT32_C(2048228)}, /* 15.810 MPa: beta 0.811401, certified 0.755371 */
+                {UINT32_C(2179966), UINT32_C(2027706)}, /* 16.337 MPa: beta 0.803955, certified 0.747803 */
+                {UINT32_C(2159444), UINT32_C(2007184)}, /* 16.864 MPa: beta 0.796387, certified 0.740234 */
+                {UINT32_C(2138922), UINT32_C(1986662)}, /* 17.391 MPa: beta 0.788818, certified 0.732666 */
+                {UINT32_C(2118400), UINT32_C(1966140)}, /* 17.918 MPa: beta 0.781250, certified 0.725098 */
+                {UINT32_C(2097547), UINT32_C(1945618)}, /* 18.445 MPa: beta 0.773560, certified 0.717529 */
+                {UINT32_C(2077025), UINT32_C(1925096)}, /* 18.972 MPa: beta 0.765991, certified 0.709961 */
+                {UINT32_C(2056503), UINT32_C(1904243)}, /* 19.499 MPa: beta 0.758423, certified 0.702271 */
+                {UINT32_C(2035981), UINT32_C(1883721)}, /* 20.026 MPa: beta 0.750854, certified 0.694702 */
+                {UINT32_C(2015459), UINT32_C(1863199)}, /* 20.553 MPa: beta 0.743286, certified 0.687134 */
+                {UINT32_C(1994937), UINT32_C(1842677)}, /* 21.080 MPa: beta 0.735718, certified 0.679565 */
+                {UINT32_C(1974084), UINT32_C(1822155)}, /* 21.607 MPa: beta 0.728027, certified 0.671997 */
+                {UINT32_C(1953562), UINT32_C(1801302)}, /* 22.134 MPa: beta 0.720459, certified 0.664307 */
+                {UINT32_C(1933040), UINT32_C(1780780)}, /* 22.661 MPa: beta 0.712891, certified 0.656738 */
+                {UINT32_C(1912187), UINT32_C(1760258)}, /* 23.188 MPa: beta 0.705200, certified 0.649170 */
+                {UINT32_C(1891665), UINT32_C(1739405)}, /* 23.715 MPa: beta 0.697632, certified 0.641479 */
+                {UINT32_C(1871143), UINT32_C(1718883)}, /* 24.242 MPa: beta 0.690063, certified 0.633911 */
+                {UINT32_C(1850290), UINT32_C(1698361)}, /* 24.769 MPa: beta 0.682373, certified 0.626343 */
+                {UINT32_C(1829768), UINT32_C(1677508)}, /* 25.296 MPa: beta 0.674805, certified 0.618652 */
+                {UINT32_C(1809246), UINT32_C(1656986)}, /* 25.823 MPa: beta 0.667236, certified 0.611084 */
+                {UINT32_C(1788393), UINT32_C(1636133)}, /* 26.350 MPa: beta 0.659546, certified 0.603394 */
+                {UINT32_C(1767871), UINT32_C(1615611)}, /* 26.877 MPa: beta 0.651978, certified 0.595825 */
+                {UINT32_C(1747018), UINT32_C(1595089)}, /* 27.404 MPa: beta 0.644287, certified 0.588257 */
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u},
+                {UINT32_C(1747018), UINT32_C(1595089)}, /* pressures that can't be right: beta 0.644287 */
+                {UINT32_C(1747018), UINT32_C(1595089)},
             },
+            /* Coefficient of beta in the sum: u_min0 = 5.454712 V, u_min0/u_max = 8937/16384 (exact). From
+             * sides.positive.u_min0_over_u_max. */
+            .offset = UINT32_C(1658070000),
+            /* Coefficient of beta times command in the sum, two's complement: k x_max/u_max - 1 = -0.545471, k
+             * x_max/u_max = 7447/16384 (exact). From sides.positive.drive_range_over_u_max. */
+            .slope = UINT32_C(4294916671),
+            /* Coefficient of (beta - beta at zero command) for each code short of the transition's end: u_min0/16 =
+             * 0.340919 V (exact). From transition_codes. */
+            .transition = UINT32_C(103629375),
+            /* Coefficient of the command alone in the sum: 1.000000 (exact). From
+             * sides.positive.drive_range_over_u_max. */
+            .linear = {UINT32_C(0), UINT32_C(3750)},
+            /* Half a count in the sum: rounds to nearest: 8.33e-05 V (exact). From signals.compare_max. */
+            .half = {UINT32_C(2147483648), UINT32_C(1023)},
+            /* Largest quotient: the one whose compare value is the limit: 9.5 V (exact). From
+             * drive_functions.compare_limit. */
+            .quotient_limit = UINT32_C(116681046),
+            /* Factor from the quotient to counts, over 2^(32 + reciprocal_shift): 1/2047 (above it, and exact for
+             * every quotient up to quotient_limit). */
+            .reciprocal = UINT32_C(134283297),
+            /* Largest tested pressure drop (1/4096 code of A): 5 MPa (rounded down to a code, with all that is
+             * rounded down to that code). From sides.positive.certificate.dp_MPa. */
+            .tested_to = UINT32_C(2490367),
+            /* Value of beta = 1 in a node, for display (exact). From beta_denominator. */
+            .beta_unit = UINT32_C(2711552),
+            /* Factor from interpolated nodes to beta times 2^15, over 2^beta_shift: 2^15/173539328 (rounded up, and
+             * proved: beta is shown rounded down). From beta_denominator. */
+            .beta_factor = UINT32_C(207611713),
+            /* Largest change of the command per sample, away from zero (1/65536 code): full command in 0.5 s
+             * (rounded to nearest, 1 or more). From drive_functions.ramp_up. */
+            .ramp_up = UINT32_C(214644),
+            /* Largest change of the command per sample, towards zero (1/65536 code): full command in 0.4 s (rounded
+             * to nearest, 1 or more). From drive_functions.ramp_down. */
+            .ramp_down = UINT32_C(268304),
+            /* Nodes of the table in use (exact). */
             .node_count = 53u,
+            /* Right shift after the product with reciprocal, beyond 32: 2^38 (exact). */
             .reciprocal_shift = 6u,
+            /* Right shift after the product with beta_factor: 2^40 (exact). */
             .beta_shift = 40u,
+            /* Codes from zero to full command (codes): 10 V (exact). From signals.command. */
             .span = 2047u,
+            /* Codes from the zero band's end to full command (codes): 98.34% of command, 9.834 V (exact). From
+             * signals.command. */
             .room = 2013u,
+            /* Code at the zero band's end (codes): 1.66% of command, 0.1661 V (exact). From zero_band_codes. */
             .band_end = 2082u,
+            /* Width of the inverse play every 2^play_step_shift codes of command from zero on (counts) (rounded to
+             * nearest). From drive_functions.play_counts. */
             .play = {
-                0u
+                0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u
             },
+            /* 0 (exact). */
             .spare = 0u,
         },
-        {
-            .offset = UINT32_C(1633484800),
-            .slope = UINT32_C(4294917441),
-            .transition = UINT32_C(102092800),
-            .linear = {
-                UINT32_C(0), UINT32_C(7500)
-            },
-            .half = {
-                UINT32_C(0), UINT32_C(2048)
-            },
-            .quotient_limit = UINT32_C(233476095),
-            .reciprocal = UINT32_C(1048576),
-            .tested_to = UINT32_C(2490367),
-            .beta_unit = UINT32_C(3072000),
-            .beta_factor = UINT32_C(91625969),
-            .ramp_up = UINT32_C(134218),
-            .ramp_down = UINT32_C(2147483647),
+        { /* negative commands */
+            /* For each node beta that the law follows, then the certified beta at zero command; a node every
+             * beta_step codes from no pressure drop on, and the last two the smallest of all, used where the
+             * pressures can't be right (1/beta_unit): beta 0.000122 to 1.049683, in 1/8192 (nodes rounded down, so
+             * that the certificate holds, and not again). From sides.negative.beta. */
             .nodes = {
-                {UINT32_C(3072000), UINT32_C(2768625)}, {UINT32_C(3072000), UINT32_C(2768625)}, {UINT32_C(3072000),
-                UINT32_C(2768625)}, {UINT32_C(3096000), UINT32_C(2770500)}, {UINT32_C(3117375), UINT32_C(2790000)},
-                {UINT32_C(3139125), UINT32_C(2819625)}, {UINT32_C(3160875), UINT32_C(2847000)}, {UINT32_C(3182250),
-                UINT32_C(2856000)}, {UINT32_C(3203625), UINT32_C(2875875)}, {UINT32_C(3224625), UINT32_C(2907000)},
-                {UINT32_C(3201750), UINT32_C(2893875)}, {UINT32_C(3160125), UINT32_C(2851500)}, {UINT32_C(3106125),
-                UINT32_C(2797500)}, {UINT32_C(3038625), UINT32_C(2729625)}, {UINT32_C(2959875), UINT32_C(2649750)},
-                {UINT32_C(2870250), UINT32_C(2559375)}, {UINT32_C(2771250), UINT32_C(2460375)}, {UINT32_C(2655000),
-                UINT32_C(2343750)}, {UINT32_C(2531625), UINT32_C(2219250)}, {UINT32_C(2395500), UINT32_C(2083125)},
-                {UINT32_C(2247000), UINT32_C(1933500)}, {UINT32_C(2089875), UINT32_C(1776750)}, {UINT32_C(1918125),
-                UINT32_C(1603500)}, {UINT32_C(1737750), UINT32_C(1423500)}, {UINT32_C(1545000), UINT32_C(1229250)},
-                {UINT32_C(1339500), UINT32_C(1023750)}, {UINT32_C(1129500), UINT32_C(812625)}, {UINT32_C(896250),
-                UINT32_C(579375)}, {UINT32_C(663375), UINT32_C(346500)}, {UINT32_C(204750), UINT32_C(375)},
-                {UINT32_C(204750), UINT32_C(375)}, {UINT32_C(204750), UINT32_C(375)}, {UINT32_C(204750), UINT32_C(375)},
-                {UINT32_C(204750), UINT32_C(375)}, {UINT32_C(204750), UINT32_C(375)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0),
-                UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)}, {UINT32_C(0), UINT32_C(0)},
-                {UINT32_C(204750), UINT32_C(375)}, {UINT32_C(204750), UINT32_C(375)}
+                {UINT32_C(3072000), UINT32_C(2768625)}, /* 0.000 MPa: beta 1.000000, certified 0.901245 */
+                {UINT32_C(3072000), UINT32_C(2768625)}, /* 0.527 MPa: beta 1.000000, certified 0.901245 */
+                {UINT32_C(3072000), UINT32_C(2768625)}, /* 1.054 MPa: beta 1.000000, certified 0.901245 */
+                {UINT32_C(3096000), UINT32_C(2770500)}, /* 1.581 MPa: beta 1.007812, certified 0.901855 */
+                {UINT32_C(3117375), UINT32_C(2790000)}, /* 2.108 MPa: beta 1.014771, certified 0.908203 */
+                {UINT32_C(3139125), UINT32_C(2819625)}, /* 2.635 MPa: beta 1.021851, certified 0.917847 */
+                {UINT32_C(3160875), UINT32_C(2847000)}, /* 3.162 MPa: beta 1.028931, certified 0.926758 */
+                {UINT32_C(3182250), UINT32_C(2856000)}, /* 3.689 MPa: beta 1.035889, certified 0.929688 */
+                {UINT32_C(3203625), UINT32_C(2875875)}, /* 4.216 MPa: beta 1.042847, certified 0.936157 */
+                {UINT32_C(3224625), UINT32_C(2907000)}, /* 4.743 MPa: beta 1.049683, certified 0.946289 */
+                {UINT32_C(3201750), UINT32_C(2893875)}, /* 5.270 MPa: beta 1.042236, certified 0.942017 */
+                {UINT32_C(3160125), UINT32_C(2851500)}, /* 5.797 MPa: beta 1.028687, certified 0.928223 */
+                {UINT32_C(3106125), UINT32_C(2797500)}, /* 6.324 MPa: beta 1.011108, certified 0.910645 */
+                {UINT32_C(3038625), UINT32_C(2729625)}, /* 6.851 MPa: beta 0.989136, certified 0.888550 */
+                {UINT32_C(2959875), UINT32_C(2649750)}, /* 7.378 MPa: beta 0.963501, certified 0.862549 */
+                {UINT32_C(2870250), UINT32_C(2559375)}, /* 7.905 MPa: beta 0.934326, certified 0.833130 */
+                {UINT32_C(2771250), UINT32_C(2460375)}, /* 8.432 MPa: beta 0.902100, certified 0.800903 */
+                {UINT32_C(2655000), UINT32_C(2343750)}, /* 8.959 MPa: beta 0.864258, certified 0.762939 */
+                {UINT32_C(2531625), UINT32_C(2219250)}, /* 9.486 MPa: beta 0.824097, certified 0.722412 */
+                {UINT32_C(2395500), UINT32_C(2083125)}, /* 10.013 MPa: beta 0.779785, certified 0.678101 */
+                {UINT32_C(2247000), UINT32_C(1933500)}, /* 10.540 MPa: beta 0.731445, certified 0.629395 */
+                {UINT32_C(2089875), UINT32_C(1776750)}, /* 11.067 MPa: beta 0.680298, certified 0.578369 */
+                {UINT32_C(1918125), UINT32_C(1603500)}, /* 11.594 MPa: beta 0.624390, certified 0.521973 */
+                {UINT32_C(1737750), UINT32_C(1423500)}, /* 12.121 MPa: beta 0.565674, certified 0.463379 */
+                {UINT32_C(1545000), UINT32_C(1229250)}, /* 12.648 MPa: beta 0.502930, certified 0.400146 */
+                {UINT32_C(1339500), UINT32_C(1023750)}, /* 13.175 MPa: beta 0.436035, certified 0.333252 */
+                {UINT32_C(1129500), UINT32_C(812625)}, /* 13.702 MPa: beta 0.367676, certified 0.264526 */
+                {UINT32_C(896250), UINT32_C(579375)}, /* 14.229 MPa: beta 0.291748, certified 0.188599 */
+                {UINT32_C(663375), UINT32_C(346500)}, /* 14.756 MPa: beta 0.215942, certified 0.112793 */
+                {UINT32_C(204750), UINT32_C(375)}, /* 15.283 MPa: beta 0.066650, certified 0.000122 */
+                {UINT32_C(204750), UINT32_C(375)}, /* 15.810 MPa: beta 0.066650, certified 0.000122 */
+                {UINT32_C(204750), UINT32_C(375)}, /* 16.337 MPa: beta 0.066650, certified 0.000122 */
+                {UINT32_C(204750), UINT32_C(375)}, /* 16.864 MPa: beta 0.066650, certified 0.000122 */
+                {UINT32_C(204750), UINT32_C(375)}, /* 17.391 MPa: beta 0.066650, certified 0.000122 */
+                {UINT32_C(204750), UINT32_C(375)}, /* 17.918 MPa: beta 0.066650, certified 0.000122 */
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u}, {0u, 0u},
+                {0u, 0u}, {0u, 0u},
+                {UINT32_C(204750), UINT32_C(375)}, /* pressures that can't be right: beta 0.066650 */
+                {UINT32_C(204750), UINT32_C(375)},
             },
+            /* Coefficient of beta in the sum: u_min0 = 3.042603 V, u_min0/u_max = 4985/16384 (exact). From
+             * sides.negative.u_min0_over_u_max. */
+            .offset = UINT32_C(1633484800),
+            /* Coefficient of beta times command in the sum, two's complement: k x_max/u_max - 1 = -0.304291, k
+             * x_max/u_max = 22797/32768 (exact). From sides.negative.drive_range_over_u_max. */
+            .slope = UINT32_C(4294917441),
+            /* Coefficient of (beta - beta at zero command) for each code short of the transition's end: u_min0/16 =
+             * 0.190163 V (exact). From transition_codes. */
+            .transition = UINT32_C(102092800),
+            /* Coefficient of the command alone in the sum: 1.000000 (exact). From
+             * sides.negative.drive_range_over_u_max. */
+            .linear = {UINT32_C(0), UINT32_C(7500)},
+            /* Half a count in the sum: rounds to nearest: 8.33e-05 V (exact). From signals.compare_max. */
+            .half = {UINT32_C(0), UINT32_C(2048)},
+            /* Largest quotient: the one whose compare value is the limit: 9.5 V (exact). From
+             * drive_functions.compare_limit. */
+            .quotient_limit = UINT32_C(233476095),
+            /* Factor from the quotient to counts, over 2^(32 + reciprocal_shift): 1/4096 (above it, and exact for
+             * every quotient up to quotient_limit). */
+            .reciprocal = UINT32_C(1048576),
+            /* Largest tested pressure drop (1/4096 code of A): 5 MPa (rounded down to a code, with all that is
+             * rounded down to that code). From sides.negative.certificate.dp_MPa. */
+            .tested_to = UINT32_C(2490367),
+            /* Value of beta = 1 in a node, for display (exact). From beta_denominator. */
+            .beta_unit = UINT32_C(3072000),
+            /* Factor from interpolated nodes to beta times 2^15, over 2^beta_shift: 2^15/196608000 (rounded up, and
+             * proved: beta is shown rounded down). From beta_denominator. */
+            .beta_factor = UINT32_C(91625969),
+            /* Largest change of the command per sample, away from zero (1/65536 code): full command in 0.8 s
+             * (rounded to nearest, 1 or more). From drive_functions.ramp_up. */
+            .ramp_up = UINT32_C(134218),
+            /* Largest change of the command per sample, towards zero (1/65536 code): no limit (rounded to nearest, 1
+             * or more). From drive_functions.ramp_down. */
+            .ramp_down = UINT32_C(2147483647),
+            /* Nodes of the table in use (exact). */
             .node_count = 35u,
+            /* Right shift after the product with reciprocal, beyond 32: 2^32 (exact). */
             .reciprocal_shift = 0u,
+            /* Right shift after the product with beta_factor: 2^39 (exact). */
             .beta_shift = 39u,
+            /* Codes from zero to full command (codes): -10 V (exact). From signals.command. */
             .span = 2048u,
+            /* Codes from the zero band's end to full command (codes): 98.34% of command, 9.834 V (exact). From
+             * signals.command. */
             .room = 2014u,
+            /* Code at the zero band's end (codes): 1.66% of command, 0.166 V (exact). From zero_band_codes. */
             .band_end = 2014u,
+            /* Width of the inverse play every 2^play_step_shift codes of command from zero on (counts) (rounded to
+             * nearest). From drive_functions.play_counts. */
             .play = {
-                0u
+                0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u
             },
+            /* 0 (exact). */
             .spare = 0u,
         },
     },
     .current = {
+        /* Largest magnitude of the integral (counts / 2^gain_shift) (exact). From current_drive.loop.integral_limit. */
         .integral_limit = UINT32_C(0),
+        /* Output below the integral by (counts / 2^gain_shift) (exact). From current_drive.loop.release. */
         .release = UINT32_C(0),
+        /* Largest compare value (counts) (exact). From current_drive.loop.compare_limit. */
         .compare_limit = 0u,
+        /* Largest change of the set point per PWM period (counts) (exact). From current_drive.loop.rate. */
         .rate = 0u,
+        /* Samples of the current in a sum (exact). From current_drive.loop.samples. */
         .samples = 0u,
+        /* Counts of current per code of the sum, times 2^current_shift (exact). From
+         * current_drive.loop.current_gain. */
         .current_gain = 0u,
+        /* Fractional bits of current_gain (exact). From current_drive.loop.current_shift. */
         .current_shift = 0u,
+        /* Fractional bits of the three gains (exact). From current_drive.loop.gain_shift. */
         .gain_shift = 0u,
+        /* PWM counts per count of error, times 2^gain_shift (exact). From current_drive.loop.proportional. */
         .proportional = 0u,
+        /* PWM counts per count of error and PWM period, times 2^gain_shift (exact). From
+         * current_drive.loop.integral. */
         .integral = 0u,
+        /* PWM counts per count of set point, times 2^gain_shift (exact). From current_drive.loop.feed_forward. */
         .feed_forward = 0u,
+        /* Sum without current, as designed (codes) (exact). From current_drive.loop.offset_nominal. */
         .offset_nominal = 0u,
+        /* Lowest plausible sum without current (codes) (exact). From current_drive.loop.offset_tolerance. */
         .offset_low = 0u,
+        /* Highest plausible sum without current (codes) (exact). From current_drive.loop.offset_tolerance. */
         .offset_high = 0u,
+        /* The offset is the mean of 2^offset_shift sums (exact). From current_drive.loop.offset_shift. */
         .offset_shift = 0u,
+        /* Sum from which the load counts as shorted (codes) (exact). From current_drive.loop.short_sum. */
         .short_sum = 0u,
+        /* Sum minus offset from which the current is too high (codes) (exact). From current_drive.loop.over_sum. */
         .over_sum = 0u,
+        /* Such PWM periods in a row that are a fault (exact). From current_drive.loop.over_ticks. */
         .over_ticks = 0u,
+        /* Sum minus offset below which no current flows (codes) (exact). From current_drive.loop.open_sum. */
         .open_sum = 0u,
+        /* Compare value from which current must flow (counts) (exact). From current_drive.loop.open_compare. */
         .open_compare = 0u,
+        /* Such PWM periods in a row that are a fault (exact). From current_drive.loop.open_ticks. */
         .open_ticks = 0u,
+        /* Lowest code of the supply (codes) (exact). From current_drive.loop.supply.valid_codes. */
         .supply_low = 0u,
+        /* Highest code of the supply (codes) (exact). From current_drive.loop.supply.valid_codes. */
         .supply_high = 0u,
+        /* Codes between two nodes of the correction, a power of two (exact). From
+         * current_drive.loop.supply.step_codes. */
         .supply_shift = 0u,
+        /* Nominal over measured supply times 2^14, from supply_low on (rounded to nearest). From
+         * current_drive.loop.supply.nodes. */
         .supply = {
-            0u
+            0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u,
+            0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u,
+            0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u
         },
+        /* 0 (exact). */
+        .spare = 0u,
     },
-    .crc32 = UINT32_C(2922360004),
+    /* CRC-32 of all octets before it, as zlib.crc32 (exact). */
+    .crc32 = UINT32_C(2202348198),
 };

@@ -9,6 +9,14 @@
 
 #include "dz_calibration.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 extern const struct dz_calibration dz_block;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

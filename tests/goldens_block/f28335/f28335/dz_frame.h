@@ -26,6 +26,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define DZ_FRAME_OCTETS 26u
 
 struct dz_frame
@@ -46,5 +50,9 @@ void dz_frame_pack(const struct dz_frame *frame, uint16_t octets[DZ_FRAME_OCTETS
 
 /* The CRC of octets[from] to octets[to - 1]. */
 uint16_t dz_frame_crc(const uint16_t *octets, uint16_t from, uint16_t to);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -18,6 +18,10 @@
 #include "dz_load_frame.h"
 #include "dz_slots.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Reason why a request was refused. */
 #define DZ_LOAD_REASON_DONE 0u /* done */
 #define DZ_LOAD_REASON_BUSY 1u /* the request before this one is still being done */
@@ -88,5 +92,9 @@ uint16_t dz_load_hold(uint16_t hold);
 
 /* From here on the drive uses this block; called while the output is held. */
 void dz_load_use(const struct dz_calibration *block);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

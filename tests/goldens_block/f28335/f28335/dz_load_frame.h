@@ -48,6 +48,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define DZ_LOAD_BEGIN 1u
 #define DZ_LOAD_DATA 2u
 #define DZ_LOAD_COMMIT 3u
@@ -95,5 +99,9 @@ uint16_t dz_load_put_32(uint16_t *octets, uint16_t at, uint32_t value);
 /* Begins a reply and returns where its payload begins; ends one behind its last octet, and returns its octets. */
 uint16_t dz_load_reply_begin(uint16_t octets[DZ_LOAD_FRAME_OCTETS], uint16_t type, uint16_t sequence);
 uint16_t dz_load_reply_end(uint16_t octets[DZ_LOAD_FRAME_OCTETS], uint16_t at);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

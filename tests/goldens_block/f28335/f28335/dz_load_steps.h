@@ -7,6 +7,10 @@
 
 #include "dz_load.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Steps of a load. */
 #define DZ_LOAD_STEP_IDLE 0u
 #define DZ_LOAD_STEP_HOLDING 1u   /* the interrupt is to hold the output */
@@ -32,5 +36,9 @@ uint32_t dz_load_origin(const struct dz_calibration *block);
 void dz_load_answer(struct dz_load *load, uint16_t type, uint16_t sequence, uint16_t reason, uint16_t detail);
 void dz_load_answer_last(struct dz_load *load, uint16_t reason, uint16_t detail);
 void dz_load_answer_query(struct dz_load *load, uint16_t sequence);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -13,6 +13,10 @@
 
 #include "dz_store.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define DZ_SLOTS_NONE 0xFFFFu
 
 /* Word of a slot that its mark is. */
@@ -27,5 +31,9 @@ uint16_t dz_slots_are_marked(void);
 /* The slot that a new block is written to if `used` is in use, and the mark that makes it the newest there. */
 uint16_t dz_slots_next(uint16_t used);
 uint16_t dz_slots_next_mark(uint16_t next);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -31,6 +31,10 @@
 
 #include "dz_calibration.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define DZ_STORE_SLOTS 2u
 
 #define DZ_STORE_DONE 0u
@@ -57,5 +61,9 @@ uint16_t dz_store_erase(uint16_t slot);
 
 /* Writes `count` words, 1 to 32, from word `at` of the slot on. */
 uint16_t dz_store_write(uint16_t slot, uint16_t at, const uint16_t *words, uint16_t count);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

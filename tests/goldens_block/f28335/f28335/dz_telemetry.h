@@ -12,6 +12,10 @@
 #include "dz_frame.h"
 #include "dz_load.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* LSPCLK = 150 MHz / (2 * 1) = 75 MHz, limit 75 MHz. The line has
  * LSPCLK / (8 * (80 + 1)) = 115741 bit/s: +0.47 % from 115200. */
 #define DZ_SCI_LOSPCP 1u
@@ -52,5 +56,9 @@ void dz_telemetry_init(void);
  * if it is due. Never waits, except in dz_store.c. Call it from the main loop: the receiver holds
  * 1.38 ms of octets. */
 void dz_telemetry_poll(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

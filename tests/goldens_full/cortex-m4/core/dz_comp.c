@@ -2,338 +2,256 @@
 /* Compensator SHA-256: 204870df576718ff974bf2d04606500c53399be0d3056da610feaef46db7a57c */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 /*
- * The compensation law for positive commands, an integer function of three converter codes.
+ * The compensation law, an integer function of a valve's numbers and three converter codes.
  * No division, no floating point, no state, and no branch: every input takes the same instructions.
- * Every constant has a comment: what it is, its engineering value, and in brackets how it was rounded.
- * manifest.json lists the origin of each under "constants", down to the ramp tests.
+ * Words are unsigned, every shift and every place in a table is limited: no block makes this undefined. That no sum
+ * wraps, that the output stays within its limit and rises with the command, holds for what dz_calibration_check()
+ * accepts.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
 
 #include "dz_comp.h"
 
-/* The law, Eq. (18):
- *     u_O = beta*u_min0 + u_i*(beta*(k*x_max/u_max - 1) + 1)
- *     k x_max/u_max = 7447/16384 = 0.454529, rounded to nearest
- *     u_min0/u_max  = 8937/16384 = 0.545471, rounded down with a margin of half a PWM count
- *     beta(dP): linear in 52 segments of 64 codes of the pressure difference (0.5270 MPa)
- * Zero band: up to u_z, 34 codes of command, u_O is the certified offset beta_zero * u_min0, below the
- * closing threshold. Transition: over the next 16 codes (0.78%), to u_t, it runs straight to the law above,
- *     u_O(u) - (beta - beta_zero) * u_min0 * (1 - r),  r = (u_i - u_z)/(u_t - u_z), u = r * u_t.
- *
- * In counts of the PWM this is sum / (2047 * 2^32) with the 64-bit integer
- *     sum = B * (-50625 * c + 1658070000) + 1875 * 2^33 * c + 4395899027456
- *           - (B - B_zero) * 103629375 * (16 - t)
- * c: command that enters the law, in codes from zero times 16: of k codes past the zero band
- *    16 k + 34 t, t being those of k in the transition.
- * B: the table's value at dP, beta * 173539328; B_zero: the same of the certified beta.
- * Nothing is rounded before the one shift and the one division.
+#include "dz_valve.h"
+
+/* In counts of the PWM the law is sum / (divisor * 2^shift), both of the reciprocal, with the integer of 64 bits
+ *     sum = B * (slope * X + offset) + linear * X + half - (B - B_zero) * transition * missing
+ * X: command that enters the law. Of k codes past the zero band it is k * transition_codes + zero_band * t, t being
+ *    those of k in the transition; `missing` are the codes that are missing to its end.
+ * B: the table's value at dP; B_zero: the same of the certified beta at zero command.
+ * Nothing is rounded before the one shift and the one division, which is a product with a reciprocal.
  */
 
-/* ---- codes of the signals ---- */
-
-/* Eq. (29), code of zero command: 0 V (the converter's code, rounded down). */
-#define COMMAND_ZERO 2048u
-/* Eq. (29), lowest valid code of the command: -10 V (the converter's code, rounded down). */
-#define COMMAND_LOW 0u
-/* Eq. (29), highest valid code of the command: 10 V (the converter's code, rounded down). */
-#define COMMAND_HIGH 4095u
-/* Text below Eq. (29), code at zero pressure of sensor A, 0.00823452 MPa a code: 0 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_A_ZERO 759u
-/* Text below Eq. (29), lowest valid code of sensor A, 0.00823452 MPa a code: -0.6258 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_A_LOW 683u
-/* Text below Eq. (29), highest valid code of sensor A, 0.00823452 MPa a code: 26.56 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_A_HIGH 3985u
-/* Text below Eq. (29), code at zero pressure of sensor B, 0.00523218 MPa a code: 0 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_B_ZERO 764u
-/* Text below Eq. (29), lowest valid code of sensor B, 0.00523218 MPa a code: -0.3976 MPa (the converter's code,
- * rounded down). */
-#define PRESSURE_B_LOW 688u
-/* Text below Eq. (29), highest valid code of sensor B, 0.00523218 MPa a code: 17 MPa (the converter's code, rounded
- * down). */
-#define PRESSURE_B_HIGH 4014u
-/* Weight of a code of sensor A, in codes of sensor A: one code, times 4096 (exact). */
-#define PRESSURE_A_WEIGHT 4096u
-/* Weight of a code of sensor B, in codes of A: 0.00523218 MPa / 0.00823452 MPa = 0.635396, times 4096 (rounded to
- * nearest). */
-#define PRESSURE_B_WEIGHT 2603u
 /* From weighted codes to codes of sensor A: 1/2^12 (the difference is rounded down). */
 #define WEIGHT_SHIFT 12u
-/* A pressure drop less than minus this means that a sensor has failed: 0.247 MPa in codes of sensor A, times 4096 (a
- * hundredth of the span, rounded down to a code). */
-#define REVERSE 122880u
-/* A pressure drop of more than this lies above the tests: 5 MPa in codes of sensor A, times 4096 (rounded down to a
- * code, with all that is rounded down to that code). */
-#define TESTED_TO 2490367u
-/* Place of the top bit of a word, which is set after a subtraction below zero: bit 31 of 32 (exact). */
-#define WORD_TOP 31u
+/* The power of two in DZ_BETA_STEP: 1/64 (exact). */
+#define BETA_STEP_SHIFT 6u
+/* The top bit of a word, set where it stands for a negative number: 2147483648 (exact). */
+#define TOP_BIT INT64_C(2147483648)
+/* Largest shift of a word of 32 bits: 31 (exact). */
+#define LARGEST_SHIFT 31u
+/* Largest shift of 64 bits: 63 (exact). */
+#define LARGEST_WIDE_SHIFT 63u
 /* Place of DZ_STATUS_DIFFERENCE in the status word: bit 3 (a convention). */
 #define DIFFERENCE_PLACE 3u
 
-/* ---- the segments of beta, zero band and transition ---- */
-
-/* Width of a segment of beta, codes of sensor A: 0.5270 MPa (exact). */
-#define STEP_CODES 64u
-/* From codes to segments: 1/64 segment a code (the segment is rounded down). */
-#define STEP_SHIFT 6u
-/* Codes of command that count as zero, u_z: 1.66% of command, 0.1661 V; error of a zero command, 30 + 4 codes
- * (exact). */
-#define ZERO_BAND 34u
-/* Codes of command that the transition takes, u_t - u_z: 0.78% of command, 0.07816 V (a power of two). */
-#define TRANSITION_CODES 16u
-/* From codes to the unit of the law's command: 1/16 code (exact). */
-#define TRANSITION_SHIFT 4u
-
-/* ---- the law's integers ---- */
-
-/* Eq. (18), coefficient of beta * u_i in u_O: k x_max/u_max - 1 = -0.545471 (exact from k x_max/u_max = 7447/16384,
- * rounded to nearest). */
-#define FACTOR_SLOPE (-INT32_C(50625))
-/* Eq. (18), coefficient of beta in u_O: u_min0 = 5.454712 V (exact from u_min0/u_max = 8937/16384; that fraction was
- * rounded down with a margin of half a PWM count). */
-#define FACTOR_OFFSET INT32_C(1658070000)
-/* Transition, coefficient of (beta - beta_zero) in u_O, for each code of command missing to its end: u_min0/16 =
- * 0.340919 V (exact from u_min0/u_max = 8937/16384; that fraction was rounded down with a margin of half a PWM
- * count). */
-#define TRANSITION_FACTOR INT32_C(103629375)
-/* Eq. (18), coefficient of u_i alone in u_O, over 2^32: 1.000000 (exact). */
-#define COMMAND_HIGH_WORD UINT32_C(3750)
-/* Eq. (32), half a count, so that shift and division round to the nearest, a half up: 8.33e-05 V (exact). */
-#define HALF UINT64_C(4395899027456)
-/* The sum is u_O in counts times 2047 * 2^32: 1/2^32 (rounded down, the half being in it). */
-#define SUM_SHIFT 32u
-/* Largest quotient whose compare value is DZ_COMPARE_LIMIT, (57000 + 1) * 2047 - 1: 9.5 V (exact). */
-#define QUOTIENT_LIMIT UINT32_C(116681046)
-/* What the quotient is multiplied by to get counts, times 2^42: 1/2047 (one of those above it that are exact for
- * every quotient up to 116681046). */
-#define RECIPROCAL UINT32_C(2148532747)
-/* The power of two in RECIPROCAL: 2^42 (exact). */
-#define RECIPROCAL_SHIFT 42u
-/* From the table's beta to multiples of 2^-15, times 2^40: 2^15/173539328 (rounded up, and proved: dz_beta() is beta
- * * 2^15 rounded down for the whole table). */
-#define BETA_FACTOR UINT32_C(207611713)
-/* The power of two in BETA_FACTOR: 2^40 (exact). */
-#define BETA_SHIFT 40u
-
-/* ---- signals: masks in place of branches, all ones for yes and 0 for no ---- */
+/* ---- words: a negative number is stored 2^32 higher; masks in place of branches, all ones for yes, 0 for no ---- */
 
 /* All ones if the subtraction that gave x went below zero, else 0. */
 static uint32_t below_zero(uint32_t x)
 {
-    return (uint32_t)(0u - (uint32_t)(x >> WORD_TOP));
+    return 0u - (x >> 31);
 }
+
+/* The smaller of two numbers that are less than 2^31 apart. */
+static uint32_t at_most(uint32_t left, uint32_t right)
+{
+    const uint32_t room = left - right;
+
+    return right + (room & below_zero(room));
+}
+
+/* The signed value of a word. */
+static int32_t number(uint32_t word)
+{
+    return (int32_t)(((int64_t)word ^ TOP_BIT) - TOP_BIT);
+}
+
+/* The product of the signed values of two words, modulo 2^64. */
+static uint64_t product(uint32_t left, uint32_t right)
+{
+    const int64_t signed_product = (int64_t)number(left) * number(right);
+
+    return (uint64_t)signed_product;
+}
+
+/* An integer of 64 bits of the block. */
+static uint64_t whole(const uint32_t *halves)
+{
+    return ((uint64_t)halves[1] << 32) | halves[0];
+}
+
+/* ---- signals ---- */
 
 /* All ones if the command is outside its valid range: no working signal produces it. */
-static uint32_t invalid_command(uint32_t u)
+static uint32_t invalid_command(const struct dz_calibration *block, uint32_t u)
 {
-    return below_zero((uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u)));
+    return below_zero((u - block->command_low) | (block->command_high - u));
 }
 
-/* Difference of the pressures in codes of sensor A times 4096; a negative one is stored 2^32 higher. */
-static uint32_t pressure_difference(uint32_t p_a, uint32_t p_b)
+/* Difference of the pressures, A minus B, in codes of sensor A times 4096. */
+static uint32_t pressure_difference(const struct dz_calibration *block, uint32_t p_a, uint32_t p_b)
 {
-    const uint32_t a = (uint32_t)((p_a - PRESSURE_A_ZERO) * PRESSURE_A_WEIGHT);
-    const uint32_t b = (uint32_t)((p_b - PRESSURE_B_ZERO) * PRESSURE_B_WEIGHT);
-
-    return (uint32_t)(a - b);
+    return (p_a << WEIGHT_SHIFT) - (p_b * block->weight_b) - block->balance;
 }
 
-/* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -REVERSE. */
-static uint32_t failed_pressures(uint32_t p_a, uint32_t p_b, uint32_t difference)
+/* All ones if the pressures are implausible: one is outside its valid range, or the drop is below -reverse. */
+static uint32_t failed_pressures(const struct dz_calibration *block, uint32_t p_a, uint32_t p_b, uint32_t difference)
 {
-    return below_zero(
-        (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a) |
-                   (uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b) |
-                   (uint32_t)(difference + REVERSE)));
-}
-
-/* Pressure drop in codes of sensor A; 0 below zero, and if the pressures are implausible. */
-static uint32_t pressure_drop(uint32_t difference, uint32_t failed)
-{
-    return (uint32_t)((difference & (uint32_t)~(below_zero(difference) | failed)) >> WEIGHT_SHIFT);
+    return below_zero((p_a - block->a_low) | (block->a_high - p_a) | (p_b - block->b_low) | (block->b_high - p_b) |
+                      (difference + block->reverse));
 }
 
 /* ---- beta ---- */
 
-/* Row of the tables: one more than the segment's number, 0 if the pressures are implausible. */
-static uint32_t row_of(uint32_t dp, uint32_t failed)
+/* The table's values at a pressure drop: beta of the law, and the certified one at zero command. */
+struct betas
 {
-    return (uint32_t)(((uint32_t)(dp + STEP_CODES) >> STEP_SHIFT) & (uint32_t)~failed);
-}
-
-/* A linear segment of beta over dP: start + change * dP. */
-struct segment
-{
-    uint32_t start;
-    int32_t change;
+    uint32_t law;
+    uint32_t zero;
 };
 
-/* Eq. (7), beta of the law times 173539328: start + change * dP modulo 2^32, dP in codes of sensor A; the first row
- * is the smallest beta, for pressures that can't be right: beta 0.644287 to 1.000000 (nodes rounded down to 1/8192,
- * and not again). */
-static uint32_t law_beta(uint32_t row, uint32_t dp)
+/* Linear between the nodes; the smallest of all, at the table's end, if the pressures are implausible. */
+static inline struct betas betas_at(const struct dz_calibration_side *side, uint32_t difference, uint32_t failed)
 {
-    static const struct segment law_segment[53] = {
-        {UINT32_C(111809152), 0}, /* pressures can't be right: beta 0.644287 */
-        {UINT32_C(173539328), 0}, {UINT32_C(173624064), -1324}, /* from 0.000 MPa: beta 1.000000 */
-        {UINT32_C(175149312), -13240}, {UINT32_C(175149312), -13240}, /* from 1.054 MPa: beta 0.999512 */
-        {UINT32_C(175149312), -13240}, {UINT32_C(175149312), -13240}, /* from 2.108 MPa: beta 0.989746 */
-        {UINT32_C(175022208), -12909}, {UINT32_C(175170496), -13240}, /* from 3.162 MPa: beta 0.979980 */
-        {UINT32_C(175001024), -12909}, {UINT32_C(181292672), -23832}, /* from 4.216 MPa: beta 0.970337 */
-        {UINT32_C(177055872), -17212}, {UINT32_C(177754944), -18205}, /* from 5.270 MPa: beta 0.956787 */
-        {UINT32_C(178009152), -18536}, {UINT32_C(178559936), -19198}, /* from 6.324 MPa: beta 0.943726 */
-        {UINT32_C(178559936), -19198}, {UINT32_C(178559936), -19198}, /* from 7.378 MPa: beta 0.929810 */
-        {UINT32_C(179237824), -19860}, {UINT32_C(178877696), -19529}, /* from 8.432 MPa: beta 0.915649 */
-        {UINT32_C(179640320), -20191}, {UINT32_C(179237824), -19860}, /* from 9.486 MPa: beta 0.901123 */
-        {UINT32_C(179661504), -20191}, {UINT32_C(179661504), -20191}, /* from 10.540 MPa: beta 0.886353 */
-        {UINT32_C(179661504), -20191}, {UINT32_C(179661504), -20191}, /* from 11.594 MPa: beta 0.871460 */
-        {UINT32_C(179661504), -20191}, {UINT32_C(180191104), -20522}, /* from 12.648 MPa: beta 0.856567 */
-        {UINT32_C(179640320), -20191}, {UINT32_C(180212288), -20522}, /* from 13.702 MPa: beta 0.841553 */
-        {UINT32_C(180212288), -20522}, {UINT32_C(180212288), -20522}, /* from 14.756 MPa: beta 0.826538 */
-        {UINT32_C(179576768), -20191}, {UINT32_C(180233472), -20522}, /* from 15.810 MPa: beta 0.811401 */
-        {UINT32_C(180233472), -20522}, {UINT32_C(180233472), -20522}, /* from 16.864 MPa: beta 0.796387 */
-        {UINT32_C(180953728), -20853}, {UINT32_C(180212288), -20522}, /* from 17.918 MPa: beta 0.781250 */
-        {UINT32_C(180212288), -20522}, {UINT32_C(180212288), -20522}, /* from 18.972 MPa: beta 0.765991 */
-        {UINT32_C(180212288), -20522}, {UINT32_C(180212288), -20522}, /* from 20.026 MPa: beta 0.750854 */
-        {UINT32_C(181059648), -20853}, {UINT32_C(180191104), -20522}, /* from 21.080 MPa: beta 0.735718 */
-        {UINT32_C(180191104), -20522}, {UINT32_C(181102016), -20853}, /* from 22.134 MPa: beta 0.720459 */
-        {UINT32_C(180169920), -20522}, {UINT32_C(180169920), -20522}, /* from 23.188 MPa: beta 0.705200 */
-        {UINT32_C(181144384), -20853}, {UINT32_C(180148736), -20522}, /* from 24.242 MPa: beta 0.690063 */
-        {UINT32_C(180148736), -20522}, {UINT32_C(181186752), -20853}, /* from 25.296 MPa: beta 0.674805 */
-        {UINT32_C(180127552), -20522}, {UINT32_C(181207936), -20853}, /* from 26.350 MPa: beta 0.659546 */
-    };
+    const uint32_t drop = (difference & ~below_zero(difference)) | failed;
+    const uint32_t past = (drop >> WEIGHT_SHIFT) & (DZ_BETA_STEP - 1u);
+    const uint32_t left = DZ_BETA_STEP - past;
+    const struct dz_calibration_node *node =
+        &side->nodes[(drop >> (WEIGHT_SHIFT + BETA_STEP_SHIFT)) & DZ_CALIBRATION_NODE_MASK];
+    struct betas beta;
 
-    return law_segment[row].start + ((uint32_t)law_segment[row].change * dp);
-}
-
-/* Eq. (7), certified beta of the closing threshold times 173539328: start + change * dP modulo 2^32, dP in codes of
- * sensor A; the first row is the smallest beta, for pressures that can't be right: beta 0.588257 to 0.944214 (nodes
- * rounded down to 1/8192, so that the certificate holds, and not again). */
-static uint32_t zero_beta(uint32_t row, uint32_t dp)
-{
-    static const struct segment zero_segment[53] = {
-        {UINT32_C(102085696), 0}, /* pressures can't be right: beta 0.588257 */
-        {UINT32_C(163858240), 0}, {UINT32_C(163985344), -1986}, /* from 0.000 MPa: beta 0.944214 */
-        {UINT32_C(165383488), -12909}, {UINT32_C(165447040), -13240}, /* from 1.054 MPa: beta 0.943481 */
-        {UINT32_C(165362304), -12909}, {UINT32_C(165468224), -13240}, /* from 2.108 MPa: beta 0.933838 */
-        {UINT32_C(165468224), -13240}, {UINT32_C(165468224), -13240}, /* from 3.162 MPa: beta 0.924194 */
-        {UINT32_C(165468224), -13240}, {UINT32_C(171759872), -24163}, /* from 4.216 MPa: beta 0.914429 */
-        {UINT32_C(167311232), -17212}, {UINT32_C(167777280), -17874}, /* from 5.270 MPa: beta 0.900635 */
-        {UINT32_C(168539904), -18867}, {UINT32_C(168539904), -18867}, /* from 6.324 MPa: beta 0.887695 */
-        {UINT32_C(168836480), -19198}, {UINT32_C(169154240), -19529}, /* from 7.378 MPa: beta 0.873779 */
-        {UINT32_C(169154240), -19529}, {UINT32_C(169514368), -19860}, /* from 8.432 MPa: beta 0.859497 */
-        {UINT32_C(169514368), -19860}, {UINT32_C(169916864), -20191}, /* from 9.486 MPa: beta 0.844971 */
-        {UINT32_C(169493184), -19860}, {UINT32_C(169938048), -20191}, /* from 10.540 MPa: beta 0.830200 */
-        {UINT32_C(169938048), -20191}, {UINT32_C(170425280), -20522}, /* from 11.594 MPa: beta 0.815430 */
-        {UINT32_C(169916864), -20191}, {UINT32_C(169916864), -20191}, /* from 12.648 MPa: beta 0.800415 */
-        {UINT32_C(170467648), -20522}, {UINT32_C(170467648), -20522}, /* from 13.702 MPa: beta 0.785522 */
-        {UINT32_C(169874496), -20191}, {UINT32_C(170488832), -20522}, /* from 14.756 MPa: beta 0.770386 */
-        {UINT32_C(170488832), -20522}, {UINT32_C(170488832), -20522}, /* from 15.810 MPa: beta 0.755371 */
-        {UINT32_C(170488832), -20522}, {UINT32_C(170488832), -20522}, /* from 16.864 MPa: beta 0.740234 */
-        {UINT32_C(170488832), -20522}, {UINT32_C(170488832), -20522}, /* from 17.918 MPa: beta 0.725098 */
-        {UINT32_C(171251456), -20853}, {UINT32_C(170467648), -20522}, /* from 18.972 MPa: beta 0.709961 */
-        {UINT32_C(170467648), -20522}, {UINT32_C(170467648), -20522}, /* from 20.026 MPa: beta 0.694702 */
-        {UINT32_C(170467648), -20522}, {UINT32_C(171336192), -20853}, /* from 21.080 MPa: beta 0.679565 */
-        {UINT32_C(170446464), -20522}, {UINT32_C(170446464), -20522}, /* from 22.134 MPa: beta 0.664307 */
-        {UINT32_C(171378560), -20853}, {UINT32_C(170425280), -20522}, /* from 23.188 MPa: beta 0.649170 */
-        {UINT32_C(170425280), -20522}, {UINT32_C(171420928), -20853}, /* from 24.242 MPa: beta 0.633911 */
-        {UINT32_C(170404096), -20522}, {UINT32_C(171442112), -20853}, /* from 25.296 MPa: beta 0.618652 */
-        {UINT32_C(170382912), -20522}, {UINT32_C(170382912), -20522}, /* from 26.350 MPa: beta 0.603394 */
-    };
-
-    return zero_segment[row].start + ((uint32_t)zero_segment[row].change * dp);
+    beta.law = (node[0].law * left) + (node[1].law * past);
+    beta.zero = (node[0].zero * left) + (node[1].zero * past);
+    return beta;
 }
 
 /* ---- the law ---- */
 
-/* The law of a command, codes past the zero band; `failed` is all ones for pressures that must
- * not be used, else 0. */
-static inline uint32_t law_of(uint32_t towards, uint32_t difference, uint32_t failed)
+/* The upper 32 bits of the sum, for a command in codes past the zero band. */
+static inline uint32_t sum_of(const struct dz_calibration *block, const struct dz_calibration_side *side,
+                              uint32_t towards, struct betas beta)
 {
-    const uint32_t past = towards;
-    /* Its part within the transition, and the command that enters the law. */
-    const uint32_t from_end = (uint32_t)(past - TRANSITION_CODES);
-    const uint32_t reached = (uint32_t)(TRANSITION_CODES + (from_end & below_zero(from_end)));
-    const uint32_t command = ((uint32_t)past << TRANSITION_SHIFT) + ((uint32_t)ZERO_BAND * reached);
-    /* The pressure drop, and the segment it lies in. */
-    const uint32_t dp = pressure_drop(difference, failed);
-    const uint32_t row = row_of(dp, failed);
-    /* The law. Below 2^31 (proved when this was generated). */
-    const uint32_t beta = law_beta(row, dp);
-    const int32_t factor = (FACTOR_SLOPE * (int32_t)command) + FACTOR_OFFSET;
-    const int64_t scaled = (int64_t)(int32_t)beta * factor;
-    const uint32_t straight = COMMAND_HIGH_WORD * command;
-    const uint64_t law = (uint64_t)scaled + ((uint64_t)straight << 32) + HALF;
-    const uint32_t gap = beta - zero_beta(row, dp);
-    /* Zero or less, and so is its product with the gap. */
-    const int32_t lowering = (TRANSITION_FACTOR * (int32_t)reached) - (TRANSITION_FACTOR * (int32_t)TRANSITION_CODES);
-    const int64_t lowered = (int64_t)(int32_t)gap * lowering;
-    const uint64_t sum = law + (uint64_t)lowered;
-    /* Modulo 2^64, and the whole sum is never negative (proved over the tables' nodes). */
-    const uint32_t unlimited = (uint32_t)(sum >> SUM_SHIFT);
-    /* Limited to the output's largest; both are below 2^31. */
-    const uint32_t excess = unlimited - QUOTIENT_LIMIT;
-    const uint32_t quotient = unlimited - (excess & ((excess >> 31) - 1u));
-    /* quotient / 2047 */
-    const uint32_t compare = (uint32_t)(((uint64_t)quotient * RECIPROCAL) >> RECIPROCAL_SHIFT);
+    const uint32_t past = at_most(towards, side->room);
+    /* The codes that are missing to the transition's end, with the sign turned; and the command that enters the law. */
+    const uint32_t from_end = past - block->transition_codes;
+    const uint32_t not_missing = from_end & below_zero(from_end);
+    const uint32_t command =
+        (past * block->transition_codes) + (block->zero_band * (block->transition_codes + not_missing));
+    const uint64_t sum = ((whole(side->half) + ((uint64_t)command * side->linear[0])) +
+                          product(beta.law - beta.zero, side->transition * not_missing)) +
+                         product(beta.law, (side->slope * command) + side->offset);
 
-    return (uint32_t)compare;
+    return (uint32_t)(sum >> 32) + (command * side->linear[1]);
 }
+
+/* Counts of a sum: limited to the output's largest, and divided. */
+static inline uint32_t counts_of(const struct dz_calibration_side *side, uint32_t sum)
+{
+    const uint32_t quotient = at_most(sum, side->quotient_limit);
+
+    return (uint32_t)(((uint64_t)quotient * side->reciprocal) >> 32) >> (side->reciprocal_shift & LARGEST_SHIFT);
+}
+
+/* ---- positive commands ---- */
 
 uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[0];
     const uint32_t u = u_adc;
-    const uint32_t p_a = p_a_adc;
-    const uint32_t p_b = p_b_adc;
-    /* The command, in codes from zero; 0 if it is not valid. */
-    const uint32_t let_go = invalid_command(u);
-    const uint32_t from_zero = (uint32_t)((uint32_t)(u - COMMAND_ZERO) & (uint32_t)~let_go);
-    /* Its part past the zero band; 0 within. */
-    const uint32_t from_band = (uint32_t)(from_zero - ZERO_BAND);
-    const uint32_t towards = (uint32_t)(from_band & (uint32_t)~below_zero(from_band));
-    const uint32_t difference = pressure_difference(p_a, p_b);
-    const uint32_t failed = failed_pressures(p_a, p_b, difference);
+    const uint32_t let_go = invalid_command(block, u);
+    const uint32_t from_band = u - side->band_end;
+    const uint32_t difference = pressure_difference(block, p_a_adc, p_b_adc);
+    const uint32_t failed = failed_pressures(block, p_a_adc, p_b_adc, difference);
+    const struct betas beta = betas_at(side, difference, failed);
 
-    return (uint16_t)(law_of(towards, difference, failed) & (uint32_t)~let_go);
+    return (uint16_t)(counts_of(side, sum_of(block, side, from_band & ~below_zero(from_band), beta)) & ~let_go);
 }
 
-uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc, uint16_t p_b_adc, uint32_t failed)
+uint32_t dz_comp_checked(uint32_t command, uint16_t p_a_adc,
+                         uint16_t p_b_adc, uint32_t failed)
 {
-    return law_of((uint32_t)command, pressure_difference(p_a_adc, p_b_adc), (uint32_t)failed);
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[0];
+    const uint32_t difference = pressure_difference(block, p_a_adc, p_b_adc);
+
+    return counts_of(side, sum_of(block, side, command, betas_at(side, difference, failed)));
 }
 
 uint16_t dz_status(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 {
+    const struct dz_calibration *block = &dz_valve;
     const uint32_t u = u_adc;
     const uint32_t p_a = p_a_adc;
     const uint32_t p_b = p_b_adc;
     /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
-    const uint32_t command = (uint32_t)((uint32_t)(u - COMMAND_LOW) | (uint32_t)(COMMAND_HIGH - u));
-    const uint32_t a = (uint32_t)((uint32_t)(p_a - PRESSURE_A_LOW) | (uint32_t)(PRESSURE_A_HIGH - p_a));
-    const uint32_t b = (uint32_t)((uint32_t)(p_b - PRESSURE_B_LOW) | (uint32_t)(PRESSURE_B_HIGH - p_b));
-    const uint32_t difference = pressure_difference(p_a, p_b);
-    const uint32_t below = (uint32_t)(difference + REVERSE);
-    const uint32_t above = (uint32_t)(TESTED_TO - difference);
-    const uint32_t of_drop = (uint32_t)((below >> WORD_TOP) |
-                                    ((above >> WORD_TOP) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE)));
+    const uint32_t a = (p_a - block->a_low) | (block->a_high - p_a);
+    const uint32_t b = (p_b - block->b_low) | (block->b_high - p_b);
+    const uint32_t difference = pressure_difference(block, p_a, p_b);
+    const uint32_t below = difference + block->reverse;
+    const uint32_t above = block->sides[0].tested_to - difference;
+    const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE));
 
     /* The difference has no meaning if a pressure is outside its valid range. */
-    return (uint16_t)(((command >> WORD_TOP) * DZ_STATUS_COMMAND) | ((a >> WORD_TOP) * DZ_STATUS_PRESSURE_A) |
-                      ((b >> WORD_TOP) * DZ_STATUS_PRESSURE_B) |
-                      ((of_drop & (uint32_t)~below_zero((uint32_t)(a | b))) * DZ_STATUS_DIFFERENCE));
+    return (uint16_t)((invalid_command(block, u) & DZ_STATUS_COMMAND) | ((a >> 31) * DZ_STATUS_PRESSURE_A) |
+                      ((b >> 31) * DZ_STATUS_PRESSURE_B) | ((of_drop & ~below_zero(a | b)) * DZ_STATUS_DIFFERENCE));
 }
 
 uint16_t dz_beta(uint16_t p_a_adc, uint16_t p_b_adc)
 {
-    const uint32_t difference = pressure_difference(p_a_adc, p_b_adc);
-    const uint32_t failed = failed_pressures(p_a_adc, p_b_adc, difference);
-    const uint32_t dp = pressure_drop(difference, failed);
-    const uint32_t row = row_of(dp, failed);
-    const uint64_t beta = law_beta(row, dp);
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[0];
+    const uint32_t difference = pressure_difference(block, p_a_adc, p_b_adc);
+    const uint32_t failed = failed_pressures(block, p_a_adc, p_b_adc, difference);
 
-    return (uint16_t)((beta * BETA_FACTOR) >> BETA_SHIFT);
+    return (uint16_t)(((uint64_t)betas_at(side, difference, failed).law * side->beta_factor) >>
+                      (side->beta_shift & LARGEST_WIDE_SHIFT));
+}
+
+/* ---- negative commands ---- */
+
+uint16_t dz_comp_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[1];
+    const uint32_t u = u_adc;
+    const uint32_t let_go = invalid_command(block, u);
+    const uint32_t from_band = side->band_end - u;
+    const uint32_t difference = 0u - pressure_difference(block, p_a_adc, p_b_adc);
+    const uint32_t failed = failed_pressures(block, p_a_adc, p_b_adc, difference);
+    const struct betas beta = betas_at(side, difference, failed);
+
+    return (uint16_t)(counts_of(side, sum_of(block, side, from_band & ~below_zero(from_band), beta)) & ~let_go);
+}
+
+uint32_t dz_comp_checked_negative(uint32_t command, uint16_t p_a_adc,
+                                  uint16_t p_b_adc, uint32_t failed)
+{
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[1];
+    const uint32_t difference = 0u - pressure_difference(block, p_a_adc, p_b_adc);
+
+    return counts_of(side, sum_of(block, side, command, betas_at(side, difference, failed)));
+}
+
+uint16_t dz_status_negative(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    const struct dz_calibration *block = &dz_valve;
+    const uint32_t u = u_adc;
+    const uint32_t p_a = p_a_adc;
+    const uint32_t p_b = p_b_adc;
+    /* The top bit is set if a code is outside its valid range, or the difference beyond its limits. */
+    const uint32_t a = (p_a - block->a_low) | (block->a_high - p_a);
+    const uint32_t b = (p_b - block->b_low) | (block->b_high - p_b);
+    const uint32_t difference = 0u - pressure_difference(block, p_a, p_b);
+    const uint32_t below = difference + block->reverse;
+    const uint32_t above = block->sides[1].tested_to - difference;
+    const uint32_t of_drop = (below >> 31) | ((above >> 31) * (DZ_STATUS_ABOVE >> DIFFERENCE_PLACE));
+
+    /* The difference has no meaning if a pressure is outside its valid range. */
+    return (uint16_t)((invalid_command(block, u) & DZ_STATUS_COMMAND) | ((a >> 31) * DZ_STATUS_PRESSURE_A) |
+                      ((b >> 31) * DZ_STATUS_PRESSURE_B) | ((of_drop & ~below_zero(a | b)) * DZ_STATUS_DIFFERENCE));
+}
+
+uint16_t dz_beta_negative(uint16_t p_a_adc, uint16_t p_b_adc)
+{
+    const struct dz_calibration *block = &dz_valve;
+    const struct dz_calibration_side *side = &block->sides[1];
+    const uint32_t difference = 0u - pressure_difference(block, p_a_adc, p_b_adc);
+    const uint32_t failed = failed_pressures(block, p_a_adc, p_b_adc, difference);
+
+    return (uint16_t)(((uint64_t)betas_at(side, difference, failed).law * side->beta_factor) >>
+                      (side->beta_shift & LARGEST_WIDE_SHIFT));
 }

@@ -8,6 +8,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Return this instead of a code when there is no valid reading: dz_comp() then de-energises the valve
  * (command), or takes the smallest beta (pressure). */
 #define DZ_NO_CODE UINT16_C(0xFFFF)
@@ -22,5 +26,9 @@ uint16_t dz_board_read_pressure_b(void);
 /* Compare values 0 to DZ_COMPARE_MAX of solenoids A and B to the PWM, in its shadow registers; 0 must be a pin that stays
  * low. One of the two is always 0; without a second solenoid it is compare_b. */
 void dz_board_write_compare(uint16_t compare_a, uint16_t compare_b);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -7,6 +7,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* 25000000 Hz / 2500 Hz = 10000 counts: SysTick runs from 9999 to 0. Change it with the clock. */
 #define DZ_TICK_RELOAD UINT32_C(9999)
 
@@ -28,5 +32,9 @@ void dz_tick_start(void);
 
 /* SysTick's handler, in the vector table of startup.c. */
 void dz_tick(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -2,191 +2,274 @@
 /* Compensator SHA-256: 204870df576718ff974bf2d04606500c53399be0d3056da610feaef46db7a57c */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv, synthetic_minus_1.csv and 2 more */
 /*
- * The drive functions around the law: which solenoid is driven, rest at zero command, ramps, dither.
+ * The drive functions around the law: which solenoid is driven, rest at zero command, inverse play, ramps, dither. The
+ * valve's numbers say which of them are on.
  *
  * MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file.
  */
 
 #include "dz_drive.h"
 
-/* Valid samples in a row that end a fault: 2.4 ms (exact). */
-#define FAULT_SAMPLES 3u
-/* Codes of command up to which it counts as the zero command that the interlock waits for: 1.66% of command, 0.1661
- * V (exact). */
-#define INTERLOCK INT32_C(34)
-/* Eq. (29), code of zero command: 0 V (the converter's code, rounded down). */
-#define COMMAND_ZERO INT32_C(2048)
-/* Codes of command up to which the drive comes to rest, the law's zero band: 1.66% of command, 0.1661 V (exact). */
-#define ZERO_BAND INT32_C(34)
-/* Codes by which the command must pass zero before the drive leaves its rest or drives the other solenoid: 1.91% of
- * command, 0.1905 V; a zero command with twice its noise stays within (exact). */
-#define LEAVE_ZERO INT32_C(39)
-/* Unit of the ramped command: 1/65536 code of command (exact). */
-#define RAMP_UNIT INT32_C(65536)
-/* Largest change of a positive command away from zero in a sample, over RAMP_UNIT: full command in 0.5 s (rounded to
- * nearest, 1 or more). */
-#define RAMP_UP_POSITIVE INT32_C(214644)
-/* Largest change of a negative command away from zero in a sample, over RAMP_UNIT: full command in 0.8 s (rounded to
- * nearest, 1 or more). */
-#define RAMP_UP_NEGATIVE INT32_C(134218)
-/* Largest change of a positive command to zero in a sample, over RAMP_UNIT: full command in 0.4 s (rounded to
- * nearest, 1 or more). */
-#define RAMP_DOWN_POSITIVE INT32_C(268304)
-/* Largest change of a negative command to zero in a sample, over RAMP_UNIT: no limit (larger than any change). */
-#define RAMP_DOWN_NEGATIVE INT32_C(2147483647)
-/* Half the height of the dither's square wave: 1.000% of full drive, 0.1 V (rounded to nearest). */
-#define DITHER_COUNTS 600u
-/* Half the dither's period, PWM periods: 3.2 ms (rounded to nearest, 1 or more). */
-#define DITHER_TICKS 8u
-/* The dither's period, PWM periods: 156.25 Hz (exact). */
-#define DITHER_PERIOD 16u
+#include "dz_valve.h"
 
-static int32_t smaller(int32_t left, int32_t right)
+/* Unit of the ramped command, a code of command: 65536 (exact). */
+#define RAMP_UNIT UINT32_C(65536)
+/* The drive waits for no zero command: 65535 (exact). */
+#define NO_INTERLOCK 65535u
+/* Largest word that stands for a number above zero: 2147483647 (exact). */
+#define LARGEST_NUMBER UINT32_C(2147483647)
+/* Largest shift of a word of 32 bits: 31 (exact). */
+#define LARGEST_SHIFT 31u
+/* Mask of play_step_shift: 15 (exact). */
+#define PLAY_SHIFT_MASK 15u
+
+/* ---- ramps: commands in words, positive ones above zero; a negative one is stored 2^32 higher ---- */
+
+/* All ones if the signed value of a word is negative, else 0. */
+static uint32_t is_negative(uint32_t x)
+{
+    return 0u - (x >> 31);
+}
+
+static uint32_t lesser(uint32_t left, uint32_t right)
 {
     return (left < right) ? left : right;
 }
 
-/* One step from `at` towards `to`, both 0 or more; `to` below zero asks for zero. */
-static int32_t step_towards(int32_t at, int32_t to, int32_t up, int32_t down)
+/* The signed value of a word. */
+static int32_t command_number(uint32_t word)
 {
-    const int32_t aim = (to > 0) ? to : 0;
+    const uint32_t others = ~word;
 
-    return (aim > at) ? (at + smaller(aim - at, up)) : (at - smaller(at - aim, down));
+    return (word <= LARGEST_NUMBER) ? (int32_t)word : (-1 - (int32_t)others);
+}
+
+/* One step from `at` towards `to`; `at` is 0 or more, and `to` below zero asks for zero. */
+static uint32_t step_towards(uint32_t at, uint32_t to, uint32_t up, uint32_t down)
+{
+    const uint32_t aim = to & ~is_negative(to);
+
+    return (aim > at) ? (at + lesser(aim - at, up)) : (at - lesser(at - aim, down));
 }
 
 /* The command after the ramps; it stops at zero for a sample where it changes its sign. */
-static int32_t ramp(int32_t at, int32_t to)
+static uint32_t ramp(const struct dz_calibration *block, uint32_t at, uint32_t to)
 {
-    int32_t next;
+    uint32_t next;
 
-    if ((at < 0) || ((at == 0) && (to < 0))) {
-        next = -step_towards(-at, -to, RAMP_UP_NEGATIVE, RAMP_DOWN_NEGATIVE);
+    if ((is_negative(at) != 0u) || ((at == 0u) && (is_negative(to) != 0u))) {
+        next = 0u - step_towards(0u - at, 0u - to, block->sides[1].ramp_up, block->sides[1].ramp_down);
     } else {
-        next = step_towards(at, to, RAMP_UP_POSITIVE, RAMP_DOWN_POSITIVE);
+        next = step_towards(at, to, block->sides[0].ramp_up, block->sides[0].ramp_down);
     }
     return next;
 }
 
+/* ---- inverse play ---- */
+
+static int32_t within(int32_t value, int32_t low, int32_t high)
+{
+    const int32_t raised = (value < low) ? low : value;
+
+    return (raised > high) ? high : raised;
+}
+
+/* From zero command: the next travel is a rise. */
+static void reset_play(const struct dz_calibration *block, struct dz_drive *drive)
+{
+    drive->rising = block->play_codes;
+    drive->played = 0;
+}
+
+/* Counts of the valve's hysteresis at a command. */
+static uint32_t play_width(const struct dz_calibration *block, const struct dz_calibration_side *side, uint32_t place)
+{
+    const uint32_t shift = block->play_step_shift & PLAY_SHIFT_MASK;
+    const uint32_t step = UINT32_C(1) << shift;
+    const uint32_t node = (place >> shift) & DZ_CALIBRATION_PLAY_MASK;
+    const uint32_t beyond = place & (step - 1u);
+
+    return ((side->play[node] * (step - beyond)) + (side->play[node + 1u] * beyond)) >> shift;
+}
+
+/* The law, lowered for a falling command by the valve's hysteresis. That begins with the transition, is 0 in the zero
+ * band, and follows the travel of the command without its noise. */
+static uint16_t with_play(const struct dz_calibration *block, const struct dz_calibration_side *side,
+                          struct dz_drive *drive, int32_t towards, uint16_t law)
+{
+    const uint32_t place = (uint32_t)within(towards, 0, (int32_t)side->span);
+    const int32_t codes = (int32_t)block->play_codes;
+    const int32_t noise = (int32_t)block->play_noise;
+    const int32_t at = within((int32_t)drive->played, towards - noise, towards + noise);
+    const int32_t rising = within((int32_t)drive->rising + (at - (int32_t)drive->played), 0, codes);
+    const int32_t reached = within(towards - (int32_t)block->zero_band, 0, (int32_t)block->transition_codes);
+    const int32_t fallen = codes - rising;
+    const uint32_t share = play_width(block, side, place) * (uint32_t)fallen * (uint32_t)reached;
+    const uint32_t lowered = share >> (block->play_shift & LARGEST_SHIFT);
+
+    drive->played = (int16_t)at;
+    drive->rising = (uint16_t)rising;
+    return (lowered < law) ? (uint16_t)(law - lowered) : 0u;
+}
+
+/* ---- faults: all ones for yes and 0 for no ---- */
 
 /* All ones unless x is 0; x is below 2^31. */
 static uint32_t all_ones(uint32_t x)
 {
-    return 0u - ((0u - x) >> 31);
+    return is_negative(0u - x);
 }
 
-/* Samples in a row without a fault, this one included, up to FAULT_SAMPLES; `fault` is all ones or 0. */
-static uint32_t valid_samples(uint32_t valid, uint32_t fault)
+/* Samples in a row without a fault, this one included, up to fault_samples; `fault` is all ones or 0. */
+static uint32_t valid_samples(const struct dz_calibration *block, uint32_t valid, uint32_t fault)
 {
-    return (valid + ((valid - FAULT_SAMPLES) >> 31)) & ~fault;
+    return (valid + ((valid - block->fault_samples) >> 31)) & ~fault;
 }
 
-/* All ones until there have been FAULT_SAMPLES of them. */
-static uint32_t too_few(uint32_t valid)
+/* All ones until there have been fault_samples of them. */
+static uint32_t too_few(const struct dz_calibration *block, uint32_t valid)
 {
-    return 0u - ((valid - FAULT_SAMPLES) >> 31);
+    return is_negative(valid - block->fault_samples);
 }
 
-/* Faults since the last one ended, up to FAULT_SAMPLES. */
-static uint32_t faulty_samples(uint32_t faulty, uint32_t fault)
+/* Faults since the last one ended, up to fault_samples; 0 where none is latched. */
+static uint32_t faulty_samples(const struct dz_calibration *block, uint32_t faulty, uint32_t fault)
 {
-    return faulty + (fault & ((faulty - FAULT_SAMPLES) >> 31));
+    return (faulty + (fault & ((faulty - block->fault_samples) >> 31))) & all_ones(block->fault_latch);
 }
 
-/* All ones once there have been FAULT_SAMPLES of them: such a fault stays until dz_drive_init(). */
-static uint32_t latched(uint32_t faulty)
+/* All ones once there have been fault_samples of them: such a fault stays until dz_drive_init(). */
+static uint32_t latched(const struct dz_calibration *block, uint32_t faulty)
 {
-    return 0u - (((FAULT_SAMPLES - 1u) - faulty) >> 31);
+    return is_negative((block->fault_samples - (uint32_t)1u) - faulty);
 }
 
 /* All ones while the pressures must not be used, from the status of a new sample. */
-static uint32_t held_pressures(struct dz_drive *drive, uint32_t status)
+static uint32_t held_pressures(const struct dz_calibration *block, struct dz_drive *drive, uint32_t status)
 {
     const uint32_t wrong = status & (DZ_STATUS_PRESSURE_A | DZ_STATUS_PRESSURE_B | DZ_STATUS_DIFFERENCE);
-    const uint32_t fault = ((wrong - 1u) >> 31) - 1u; /* all ones, or 0 */
-    const uint32_t faulty = faulty_samples(drive->faulty_pressures, fault);
-    const uint32_t valid = valid_samples(drive->valid_pressures, fault | latched(faulty));
-    const uint32_t held = too_few(valid);
+    const uint32_t fault = all_ones(wrong);
+    const uint32_t faulty = faulty_samples(block, drive->faulty_pressures, fault);
+    const uint32_t valid = valid_samples(block, drive->valid_pressures, fault | latched(block, faulty));
+    const uint32_t held = too_few(block, valid);
 
     drive->faulty_pressures = (uint16_t)(faulty & held);
     drive->valid_pressures = (uint16_t)valid;
     return held;
 }
 
-/* 1 if the command counts as zero, `towards` being its codes from zero. Between the band's two ends the drive stays
- * as it was; without a command it is at rest. */
-static uint32_t rest(uint16_t at_rest, int32_t towards, uint32_t gone)
+/* All ones without a command to follow: de-energise at once, and start from rest when it returns. */
+static uint32_t no_command(const struct dz_calibration *block, struct dz_drive *drive, uint32_t invalid, int32_t asked)
 {
-    const uint32_t in_band = (uint32_t)(towards - (ZERO_BAND + 1)) >> 31; /* 1: not beyond the band's inner end */
-    const uint32_t stays = (uint32_t)(towards - (LEAVE_ZERO + 1)) >> 31;  /* 1: not beyond its outer end */
+    const uint32_t codes = (uint32_t)asked;
+    /* A command while the drive waits for zero command. */
+    const uint32_t early = too_few(block, drive->valid_commands) &
+                           is_negative((block->interlock - codes) | (block->interlock + codes));
+    const uint32_t faulty = faulty_samples(block, drive->faulty_commands, invalid);
+    const uint32_t valid = valid_samples(block, drive->valid_commands, invalid | early | latched(block, faulty));
+    const uint32_t gone = too_few(block, valid);
 
-    return ((at_rest | in_band) & stays) | (gone & 1u);
+    drive->valid_commands = (uint16_t)valid;
+    drive->faulty_commands = (uint16_t)(faulty & gone);
+    return gone;
+}
+
+/* ---- rest ---- */
+
+/* 1 if the command counts as zero, `towards` being its codes from zero; 0 without a zero band. Between the band's two
+ * ends the drive stays as it was; without a command it is at rest. */
+static uint32_t rest(const struct dz_calibration *block, uint16_t at_rest, int32_t towards, uint32_t gone)
+{
+    const uint32_t codes = (uint32_t)towards;
+    const uint32_t in_band = ((codes - block->zero_band) - 1u) >> 31; /* 1: not beyond its inner end */
+    const uint32_t stays = ((codes - block->leave_zero) - 1u) >> 31;  /* 1: not beyond its outer end */
+
+    return (((at_rest | in_band) & stays) | (gone & 1u)) & all_ones(block->zero_band);
 }
 
 /* The command that enters the law: codes past the zero band, 0 at rest. */
-static uint32_t past_band(uint32_t at_rest, int32_t towards)
+static uint32_t past_band(const struct dz_calibration *block, uint32_t at_rest, int32_t towards)
 {
-    return (uint32_t)(towards - ZERO_BAND) & (at_rest - 1u);
+    const uint32_t past = (uint32_t)towards - block->zero_band;
+
+    return past & ~is_negative(past) & (at_rest - 1u);
 }
+
+/* ---- what is called ---- */
 
 void dz_drive_init(struct dz_drive *drive)
 {
+    const struct dz_calibration *block = &dz_valve;
     drive->compare_a = 0u;
     drive->compare_b = 0u;
     drive->status = 0u;
     drive->law = 0u;
     drive->side = 0;
     drive->ticks = 0u;
-    drive->at_rest = 1u;
-    drive->rising = 0u;
-    drive->played = 0;
+    drive->at_rest = (uint16_t)(all_ones(block->zero_band) & 1u);
+    reset_play(block, drive);
     drive->ramped = 0;
-    drive->valid_commands = 0u; /* zero command must be seen first */
-    drive->valid_pressures = FAULT_SAMPLES;
+    /* With an interlock zero command must be seen first. */
+    drive->valid_commands = (block->interlock == NO_INTERLOCK) ? block->fault_samples : 0u;
+    drive->valid_pressures = block->fault_samples;
     drive->faulty_commands = 0u;
     drive->faulty_pressures = 0u;
 }
 
-void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
+/* The command in codes from zero, positive ones above, after the ramps. */
+static int32_t command_of(const struct dz_calibration *block, struct dz_drive *drive, int32_t asked, uint32_t gone)
 {
-    uint32_t status = dz_status(u_adc, p_a_adc, p_b_adc);
-    const uint32_t invalid = all_ones(status & DZ_STATUS_COMMAND);
-    const int32_t asked = (int32_t)u_adc - COMMAND_ZERO; /* codes from zero, positive ones above */
-    /* A command while the drive waits for zero command. */
-    const uint32_t early = too_few(drive->valid_commands) &
-                           (0u - (((uint32_t)(INTERLOCK - asked) | (uint32_t)(INTERLOCK + asked)) >> 31));
-    const uint32_t faulty = faulty_samples(drive->faulty_commands, invalid);
-    const uint32_t valid = valid_samples(drive->valid_commands, invalid | early | latched(faulty));
-    /* All ones without a command to follow: de-energise at once, and start from rest when it returns. */
-    const uint32_t gone = too_few(valid);
-    const int32_t ramped = (gone != 0u) ? 0 : ramp(drive->ramped, asked * RAMP_UNIT);
-    const int32_t command = ramped / RAMP_UNIT;
+    int32_t command = asked;
+
+    if (block->ramps != 0u) {
+        const uint32_t to = (uint32_t)asked * RAMP_UNIT;
+
+        drive->ramped = command_number(ramp(block, (uint32_t)drive->ramped, to) & ~gone);
+        command = drive->ramped / (int32_t)RAMP_UNIT;
+    }
+    return command;
+}
+
+void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc,
+                     uint16_t p_b_adc)
+{
+    const struct dz_calibration *block = &dz_valve;
+    const uint32_t sensed = dz_status(u_adc, p_a_adc, p_b_adc);
+    const int32_t asked = (int32_t)u_adc - (int32_t)block->command_zero;
+    const uint32_t gone = no_command(block, drive, all_ones(sensed & DZ_STATUS_COMMAND), asked);
+    const int32_t command = command_of(block, drive, asked, gone);
+    const int16_t driven = drive->side;
+    const int32_t leave = (int32_t)block->leave_zero;
+    const struct dz_calibration_side *side;
+    uint32_t status = sensed;
     int32_t away;
-    uint32_t past;
     uint32_t at_rest;
     uint32_t held;
+    uint32_t past;
 
-    drive->valid_commands = (uint16_t)valid;
-    drive->faulty_commands = (uint16_t)(faulty & gone);
-    drive->ramped = ramped;
     if (gone != 0u) {
         drive->side = 0;
-    } else if (command > LEAVE_ZERO) {
+    } else if (command > leave) {
         drive->side = 1;
-    } else if (command < -LEAVE_ZERO) {
+    } else if (command < -leave) {
         drive->side = -1;
     } else {
         /* near zero: the side stays, so that noise does not move the spool back and forth */
     }
     away = (drive->side < 0) ? -command : command;
-    at_rest = rest(drive->at_rest, away, gone);
-    past = past_band(at_rest, away);
+    side = (drive->side < 0) ? &block->sides[1] : &block->sides[0];
+    at_rest = rest(block, drive->at_rest, away, gone);
+    past = past_band(block, at_rest, away);
     drive->at_rest = (uint16_t)at_rest;
+    if ((block->play_codes != 0u) && ((at_rest != 0u) || (drive->side != driven))) {
+        reset_play(block, drive);
+    }
     if (drive->side < 0) {
         status = dz_status_negative(u_adc, p_a_adc, p_b_adc);
     }
-    held = held_pressures(drive, status);
+    held = held_pressures(block, drive, status);
     drive->status = (uint16_t)(status | (gone & DZ_STATUS_WAITING) | (held & DZ_STATUS_HELD) |
-                               ((latched(drive->faulty_commands) | latched(drive->faulty_pressures)) &
+                               ((latched(block, drive->faulty_commands) | latched(block, drive->faulty_pressures)) &
                                 DZ_STATUS_LATCHED));
     if (drive->side > 0) {
         drive->law = (uint16_t)dz_comp_checked(past, p_a_adc, p_b_adc, held);
@@ -195,27 +278,31 @@ void dz_drive_sample(struct dz_drive *drive, uint16_t u_adc, uint16_t p_a_adc, u
     } else {
         drive->law = 0u;
     }
+    if ((block->play_codes != 0u) && (at_rest == 0u) && (drive->side != 0)) {
+        drive->law = with_play(block, side, drive, away, drive->law);
+    }
 }
 
 void dz_drive_tick(struct dz_drive *drive)
 {
+    const struct dz_calibration *block = &dz_valve;
     uint32_t compare = drive->law;
 
-    drive->ticks++;
-    if (drive->ticks >= DITHER_PERIOD) {
-        drive->ticks = 0u;
-    }
-    if (compare == 0u) {
-        /* de-energised: nothing to dither */
-    } else if (drive->ticks < DITHER_TICKS) {
-        compare += DITHER_COUNTS;
-    } else if (compare > DITHER_COUNTS) {
-        compare -= DITHER_COUNTS;
-    } else {
-        compare = 0u;
-    }
-    if (compare > DZ_COMPARE_LIMIT) {
-        compare = DZ_COMPARE_LIMIT;
+    if (block->dither_counts != 0u) {
+        drive->ticks++;
+        if (drive->ticks >= (2u * (uint32_t)block->dither_ticks)) {
+            drive->ticks = 0u;
+        }
+        if (compare == 0u) {
+            /* de-energised: nothing to dither */
+        } else if (drive->ticks < block->dither_ticks) {
+            compare += block->dither_counts;
+        } else if (compare > block->dither_counts) {
+            compare -= block->dither_counts;
+        } else {
+            compare = 0u;
+        }
+        compare = lesser(compare, block->compare_limit);
     }
     drive->compare_a = (drive->side > 0) ? (uint16_t)compare : 0u;
     drive->compare_b = (drive->side < 0) ? (uint16_t)compare : 0u;

@@ -26,6 +26,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define DZ_FRAME_OCTETS 26u
 
 struct dz_frame
@@ -43,5 +47,9 @@ struct dz_frame
 
 /* Writes the frame, one octet (0 to 255) per element: a byte of the C28x has 16 bits. */
 void dz_frame_pack(const struct dz_frame *frame, uint16_t octets[DZ_FRAME_OCTETS]);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -15,7 +15,7 @@ from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, PROGRAMS, Machine
 
 PROGRAM = "core_cost.c"
 #: Sources of law and drive, and of the check of a block.
-FILES = ("dz_comp*.[ch]", "dz_drive.[ch]", "dz_calibration.[ch]")
+FILES = ("dz_comp.[ch]", "dz_drive.[ch]", "dz_calibration.[ch]", "dz_valve.h")
 CHECK = "dz_calibration.c"
 #: What is called, in the order of the program's numbers.
 CALLS = ("dz_comp", "dz_drive_sample", "dz_drive_tick")

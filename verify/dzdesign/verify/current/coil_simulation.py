@@ -114,9 +114,8 @@ class CoilSimulation:
         self.around = around
         names = ("coil.h", "coil_loop.c", "coil_loop.h")
         sources = {name: (PROGRAMS / name).read_text("utf-8") for name in names}
-        own = {name: core[name] for name in ("dz_current.c", "dz_current.h")}
         self._library = CompiledLibrary(
-            sources | own | {"tick.h": tick_macro(around.loop)}, [COIL_LOOP], "the coil's loop"
+            sources | dict(core) | {"tick.h": tick_macro(around.loop)}, [COIL_LOOP], "the coil's loop"
         )
 
     def run(

@@ -31,7 +31,7 @@ from dzdesign.verify.requirements import (
     MACHINE_CODE,
     Check,
 )
-from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, bound_files
+from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, VALVE_HEADER, bound_files
 from dzdesign.verify.toolchain.machines import Machine
 
 #: States that every verification compares: a second's work.
@@ -61,9 +61,9 @@ def read_controller(folder: Path) -> dict[str, str]:
     """Return the C code of a firmware's current controller, by file; one that is not there is a `RequirementError`."""
     try:
         core = {name: (folder / "core" / name).read_text(encoding="utf-8") for name in CORE}
-        if bound := bound_files(folder):
-            core |= {BLOCK_HEADER: (folder / "core" / BLOCK_HEADER).read_text(encoding="utf-8"), **bound}
-        return core
+        bound = bound_files(folder)
+        headers = [BLOCK_HEADER, *([] if bound else [VALVE_HEADER])]
+        return core | {name: (folder / "core" / name).read_text(encoding="utf-8") for name in headers} | bound
     except (OSError, UnicodeDecodeError) as error:
         raise RequirementError(f"the current controller's C can't be read: {error}; run codegen again") from error
 

@@ -18,13 +18,11 @@ from dzdesign.verify.exhaustive.lot_check import lot_checked
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.loop_results import about
 from dzdesign.verify.requirements import CALIBRATION_BLOCK, Check
-from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER
+from dzdesign.verify.toolchain.bound_block import ACCEPTANCE, BLOCK_HEADER
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import discard
 
-#: The C code that decides which blocks the core may use.
-ACCEPTANCE = "dz_calibration.c"
 #: Octets of a block, and what is wrong with one.
 FUNCTIONS = (Function("dz_size", (), "uint32_t"), Function("dz_calibration_check", ("in",), "uint16_t"))
 

@@ -9,10 +9,10 @@ from dzdesign.core.artefact_files import read_bytes, sha256_of
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.firmware_manifest import BLOCK_FILE, FirmwareManifest
 from dzdesign.verify.requirements import OWN_BLOCK, Check
-from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of
+from dzdesign.verify.toolchain.bound_block import ACCEPTANCE, BLOCK_HEADER, block_of
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, discard, stored
 
-ACCEPTANCE, PROGRAM = "dz_calibration.c", "own_block.c"
+PROGRAM = "own_block.c"
 #: Files of a target with the block as C, which are compiled here too.
 BLOCK_SOURCE, LINKED_HEADER = "dz_block.c", "dz_block.h"
 
@@ -35,7 +35,7 @@ def _tried(folder: Path, manifest: FirmwareManifest) -> tuple[str, str]:
     """Return what was found, and the first fault in words or an empty text."""
     block = block_of(folder)
     if block is None:
-        return "", f"core/ has no {BLOCK_HEADER}, which every core in block form has"
+        return "", f"core/ has no {ACCEPTANCE}, which every core in block form has"
     sizes, found, damaged, digest = _numbers(folder, manifest, block)
     (size, _), (refused, linked_refused, differ) = sizes, found
     if len(block) != size:

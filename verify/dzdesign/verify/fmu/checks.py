@@ -30,7 +30,7 @@ from dzdesign.verify.fmu.importer import binary_here, run_in_child
 from dzdesign.verify.loop_results import Side
 from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
 from dzdesign.verify.requirements import Check
-from dzdesign.verify.toolchain.compiled_core import SOURCES, CompiledCore
+from dzdesign.verify.toolchain.compiled_core import ENDINGS, CompiledCore
 from dzdesign.verify.toolchain.machines import HOST, Machine, stored
 
 Say = Callable[[str], None]
@@ -130,7 +130,7 @@ class FmuCore(CompiledCore):
     """One side of the law behind the getters of an FMU's binary, called as the check of every input calls a core."""
 
     def __init__(self, fmu: Unpacked, sign: int, binary: bytes) -> None:
-        _, self._ending = SOURCES[sign]
+        self._ending = ENDINGS[sign]
         self.name, self.block, self._binary = "core_of_fmu.c", None, binary
         program = Path(str(files("dzdesign.verify.fmu"))) / "programs" / self.name
         self.sources = {self.name: program.read_bytes()}
@@ -236,7 +236,7 @@ def _physical_faults(fmu: Unpacked, compensator: Compensator) -> Iterator[str]:
     rows[::7, 1] = np.minimum(rows[::7, 1], spans[0])
     rows[:5, 0] = 0.0
     pairs = [(row, codes) for row in rows.tolist() if (codes := _codes(compensator, row))]
-    outputs = [f"{name}{SOURCES[sign][1]}" for sign in signals.signs for name in ("compare", "u_O")]
+    outputs = [f"{name}{ENDINGS[sign]}" for sign in signals.signs for name in ("compare", "u_O")]
     of_values, of_codes = (
         np.array(run_in_child(
             "stepped", f"the law of {fmu.name}", folder=str(fmu.folder), names=names, rows=given, codes=names == CODES,

@@ -6,8 +6,9 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.verify.toolchain.machines import PROGRAMS
 
-#: The core's header of its block, and the block in the firmware's folder.
-BLOCK_HEADER = "dz_calibration.h"
+#: The struct of the valve's numbers; the numbers themselves, where they stand in the core; and the check of a block,
+#: which only a core has that takes one.
+BLOCK_HEADER, VALVE_HEADER, ACCEPTANCE = "dz_calibration.h", "dz_valve.h", "dz_calibration.c"
 BOUND_HEADER, BOUND_SOURCE = "bound.h", "dz_bound.c"
 WORDS_A_LINE = 12
 
@@ -17,7 +18,7 @@ def block_of(folder: Path) -> bytes | None:
 
     A firmware in block form without one is a `RequirementError`: nothing says what its core computes.
     """
-    if not (folder / "core" / BLOCK_HEADER).exists():
+    if not (folder / "core" / ACCEPTANCE).exists():
         return None
     path = folder / BLOCK_FILE
     try:

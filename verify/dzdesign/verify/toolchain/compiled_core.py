@@ -10,15 +10,14 @@ import numpy as np
 from dzdesign.core.artefact_files import sha256_of, sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
-from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, block_of, bound_files
+from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, VALVE_HEADER, block_of, bound_files
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
 
-#: Source of each sign of command, and what its functions' names end with.
-SOURCES = {1: ("dz_comp.c", ""), -1: ("dz_comp_negative.c", "_negative")}
-
-#: Of a core in block form: the source of both signs, and in programs/ what binds it to a block.
-BLOCK_SOURCE, BOUND = "dz_comp.c", "bound_block.c"
+#: Source of the law, and what the names of its functions end with, by the sign of command.
+SOURCE, ENDINGS = "dz_comp.c", {1: "", -1: "_negative"}
+#: In programs/, what binds a core in block form to a block.
+BOUND = "bound_block.c"
 #: The core's functions that a check calls, dz_comp() and so on.
 CALLED = ("comp", "status", "beta")
 #: The check in C, of programs/.
@@ -52,13 +51,10 @@ class CompiledCore:
     """One side of the core."""
 
     def __init__(self, folder: Path, sign: int = 1, block: bytes | None = None) -> None:
-        self.name, self._ending = SOURCES[sign]
+        self.name, self._ending = SOURCE, ENDINGS[sign]
         #: Octets of the calibration block, by default the folder's own; None of a core with its valve's numbers in it.
         self.block = block_of(folder) if block is None else block
-        headers = ["dz_comp.h"]
-        if self.block is not None:
-            self.name = BLOCK_SOURCE
-            headers.append(BLOCK_HEADER)
+        headers = ["dz_comp.h", BLOCK_HEADER, *([VALVE_HEADER] if self.block is None else [])]
         self.sources = {name: _read(folder / "core" / name) for name in (self.name, *headers)}
 
     @property
@@ -115,7 +111,7 @@ class CompiledCore:
 
 def core_answers(folder: Path, sign: int, codes: np.ndarray) -> np.ndarray:
     """Return compare value and status word of one side, (N, 2), at codes of command and sensors A and B, (N, 3)."""
-    core, (_, ending) = CompiledCore(folder, sign), SOURCES[sign]
+    core, ending = CompiledCore(folder, sign), ENDINGS[sign]
     sources = {**core.sources, f"{ANSWERS.name}.c": _read(PROGRAMS / f"{ANSWERS.name}.c")}
     texts = {name: text.decode(errors="surrogateescape") for name, text in sources.items()} | bound_files(folder)
     called = _defines(held=False, macros=("DZ_COMP", "DZ_STATUS"), names=[f"dz_{name}{ending}" for name in CALLED[:2]])

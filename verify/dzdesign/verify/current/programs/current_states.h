@@ -6,7 +6,7 @@
 
 #include "dz_current.h"
 
-#ifdef DZ_CALIBRATION_H
+#ifdef DZ_CALIBRATION_WORDS
 #include "bound.h"
 #endif
 

@@ -2,7 +2,7 @@
  * DZ_COMP and DZ_STATUS are its functions. */
 #include "dz_comp.h"
 
-#ifdef DZ_CALIBRATION_H
+#ifdef DZ_CALIBRATION_WORDS
 #include "bound.h"
 #endif
 

@@ -6,7 +6,7 @@
 
 #include "dz_drive.h"
 
-#ifdef DZ_CALIBRATION_H
+#ifdef DZ_CALIBRATION_WORDS
 #include "bound.h"
 #endif
 

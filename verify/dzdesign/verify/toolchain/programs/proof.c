@@ -1,109 +1,116 @@
-/* What Frama-C's Eva is asked: entry points that give the core every input, in pieces whose intervals tell enough.
- * pieces.h, written beside this file, names the functions of one side and where its pieces end.
- *
- * Eva knows an interval a variable, and not that two variables hang together. So `commands` splits the command where
- * something begins or ends, and `pressures` the pressures at the places where their difference changes sign or becomes
- * that of a failed sensor: code by code of sensor B. What is shown of a place in the C by one of them is shown. */
+/* What Frama-C's Eva is asked of a core: no codes and no state of drive or current controller make any of it undefined;
+ * and IN_BLOCK_FORM no octets of a block either, whatever dz_calibration_check() says. */
 #include <stdint.h>
 
 #include "__fc_builtin.h"
 #include "dz_drive.h"
-
-#ifdef DZ_CALIBRATION_H
-#include "bound.h"
+#ifdef WITH_CURRENT
+#include "dz_current.h"
 #endif
-#include "pieces.h"
 
-static uint16_t from_to(uint32_t first, uint32_t end)
+#ifdef IN_BLOCK_FORM
+static struct dz_calibration block;
+#define BLOCK &block,
+#else
+#define BLOCK
+#endif
+
+static void any_block(void)
 {
-    return (uint16_t)Frama_C_unsigned_long_interval(first, end - 1u);
+#ifdef IN_BLOCK_FORM
+    Frama_C_make_unknown((char *)&block, sizeof block);
+#endif
 }
 
 static uint16_t anything(void)
 {
-    return from_to(0u, UINT32_C(65536));
+    return (uint16_t)Frama_C_unsigned_long_interval(0u, 65535u);
 }
 
-static void core(uint16_t u, uint16_t a, uint16_t b)
+static uint32_t any_word(void)
 {
-    const uint16_t compare = COMP(u, a, b);
-    const uint16_t beta = BETA(a, b);
-    const uint16_t status = STATUS(u, a, b);
+    return ((uint32_t)anything() << 16) | anything();
+}
 
+void law(void)
+{
+    const uint16_t u = anything(), a = anything(), b = anything();
+    uint16_t status;
+
+    any_block();
+    (void)dz_comp(BLOCK u, a, b);
+    (void)dz_comp_checked(BLOCK any_word(), a, b, any_word());
+    (void)dz_beta(BLOCK a, b);
+    status = dz_status(BLOCK u, a, b);
     /*@ assert status: status <= 31; */
-    (void)compare;
-    (void)beta;
-    (void)status;
+#ifdef BIPOLAR
+    (void)dz_comp_negative(BLOCK u, a, b);
+    (void)dz_comp_checked_negative(BLOCK any_word(), a, b, any_word());
+    (void)dz_beta_negative(BLOCK a, b);
+    status = dz_status_negative(BLOCK u, a, b);
+    /*@ assert status_negative: status <= 31; */
+#endif
 }
 
-/* Any code, in its pieces one at a time. */
-static uint16_t command(void)
+#ifdef IN_BLOCK_FORM
+void check(void)
 {
-    static const uint32_t ends[] = COMMAND_ENDS;
-    const int piece = Frama_C_interval(0, (int)(sizeof ends / sizeof ends[0]) - 2);
-
-    /*@ split piece; */
-    return from_to(ends[piece], ends[piece + 1]);
+    any_block();
+    (void)dz_calibration_check(&block);
 }
+#endif
 
-void commands(void)
-{
-    core(command(), anything(), anything());
-}
-
-static const uint32_t pressure_ends[][5] = PRESSURE_ENDS;
-
-/* With sensor B at a code of PART, sensor A in its pieces. */
-void pressures(void)
-{
-    /*@ loop unroll 65536; */
-    for (uint32_t row = PART_FIRST; row < PART_END; row++) {
-        const uint16_t b = (uint16_t)(SOUND_B + row);
-
-        /*@ loop unroll 4; */
-        for (int piece = 0; piece < 4; piece++) {
-            if (pressure_ends[row][piece] < pressure_ends[row][piece + 1]) {
-                core(anything(), from_to(pressure_ends[row][piece], pressure_ends[row][piece + 1]), b);
-            }
-        }
-    }
-}
-
-/* With codes that one of the sensors can't give. */
-void no_pressures(void)
-{
-    static const uint32_t a_ends[][2] = NOT_OF_A;
-    static const uint32_t b_ends[][2] = NOT_OF_B;
-
-    /*@ loop unroll 4; */
-    for (uint16_t piece = 0; piece < sizeof a_ends / sizeof a_ends[0]; piece++) {
-        core(anything(), from_to(a_ends[piece][0], a_ends[piece][1]), anything());
-    }
-    /*@ loop unroll 4; */
-    for (uint16_t piece = 0; piece < sizeof b_ends / sizeof b_ends[0]; piece++) {
-        core(anything(), anything(), from_to(b_ends[piece][0], b_ends[piece][1]));
-    }
-}
-
-/* One sample and one tick of the drive, from any state whose command is one between full and full. */
 void drive(void)
 {
     struct dz_drive drive;
 
-    dz_drive_init(&drive);
+    any_block();
+    dz_drive_init(BLOCK &drive);
     drive.compare_a = anything();
     drive.compare_b = anything();
     drive.status = anything();
     drive.law = anything();
-    drive.side = (int16_t)Frama_C_interval(-1, 1);
+    drive.side = (int16_t)Frama_C_interval(-32767, 32767);
     drive.ticks = anything();
-    drive.at_rest = (uint16_t)Frama_C_interval(0, 1);
-    drive.rising = (uint16_t)Frama_C_interval(0, TRAVEL);
-    drive.played = (int16_t)Frama_C_interval(-(FURTHEST), FURTHEST);
-    drive.ramped = Frama_C_long_interval(-(RAMPED), RAMPED);
+    drive.at_rest = anything();
+    drive.rising = anything();
+    drive.played = (int16_t)Frama_C_interval(-32767, 32767);
+    drive.ramped = (int32_t)Frama_C_interval(-32767, 32767) * INT32_C(65536) + (int32_t)anything();
+    drive.valid_commands = anything();
+    drive.valid_pressures = anything();
+    drive.faulty_commands = anything();
+    drive.faulty_pressures = anything();
     if (Frama_C_interval(0, 1)) {
-        dz_drive_sample(&drive, command(), anything(), anything());
+        dz_drive_sample(BLOCK &drive, anything(), anything(), anything());
     } else {
-        dz_drive_tick(&drive);
+        dz_drive_tick(BLOCK &drive);
     }
 }
+#ifdef WITH_CURRENT
+
+void current(void)
+{
+    struct dz_current loop;
+
+    any_block();
+    dz_current_init(BLOCK &loop);
+    loop.integral = any_word();
+    loop.offset_total = any_word();
+    loop.offset_ticks = any_word();
+    loop.offset = any_word();
+    loop.compare = any_word();
+    loop.faults = any_word();
+    loop.over_ticks = any_word();
+    loop.open_ticks = any_word();
+    loop.ramped = any_word();
+    if (Frama_C_interval(0, 1)) {
+        dz_current_calibrate(BLOCK &loop, anything());
+    } else {
+#ifdef WITH_SUPPLY
+        dz_current_tick(BLOCK &loop, anything(), anything(), anything());
+#else
+        dz_current_tick(BLOCK &loop, anything(), anything());
+#endif
+    }
+}
+#endif

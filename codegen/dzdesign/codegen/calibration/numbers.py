@@ -1,0 +1,310 @@
+"""The numbers of a valve as a C initialiser, the page that an engineer reads: of each what it is, its value in
+engineering units, how it was rounded, and where it comes from. The manifest lists the same.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from textwrap import wrap
+
+from dzdesign.codegen.calibration.built_for import BuiltFor
+from dzdesign.codegen.calibration.layout import INNER, NO_INTERLOCK, NO_RAMP, CalibrationBlock, Words, entries
+from dzdesign.codegen.calibration.packing import text_of
+from dzdesign.codegen.core.command_shares import in_unit, share_of_command
+from dzdesign.codegen.core.constants import COLUMNS, c_comment
+from dzdesign.codegen.core.integer_form import integer_form
+from dzdesign.derivation.law import law
+from dzdesign.derivation.presentation.formulas import to_text
+from dzdesign.design.compensator import Compensator
+from dzdesign.design.drive_functions import RAMP_UNIT
+from dzdesign.design.firmware_manifest import FirmwareConstant
+from dzdesign.design.signals import SIDE_NAMES
+
+SIGNS = (1, -1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Number:
+    """One member of the struct: its path, what it is and holds, and its value in engineering units."""
+
+    path: str
+    entry: Words
+    value: int | tuple[int, ...]
+    engineering: str
+    #: Key of compensator.json, with the side's name; empty for what no single key holds.
+    key: str
+
+    def comment(self, indent: int) -> list[str]:
+        """Return the comment in C that says what the number is, for lines that begin with so many blanks."""
+        unit = f" ({self.entry.unit})" if self.entry.unit else ""
+        value = f": {self.engineering}" if self.engineering else ""
+        origin = f" From {self.key}." if self.key else ""
+        text = f"{self.entry.text}{unit}{value} ({self.entry.rounding}).{origin}"
+        return c_comment((text[0].upper() + text[1:]).replace("²", "^2"), COLUMNS - indent)
+
+    def constant(self, file: str, valve_keys: Mapping[str, tuple[str, ...]]) -> FirmwareConstant:
+        """Return the manifest's entry; an array is a table, of pairs or of single numbers."""
+        value: int | tuple[tuple[int, int], ...]
+        if isinstance(self.value, int):
+            value = self.value
+        elif self.entry.pairs:
+            value = tuple(zip(self.value[::2], self.value[1::2], strict=True))
+        else:
+            value = tuple((number, 0) for number in self.value)
+        return FirmwareConstant(
+            file=file,
+            symbol=self.path,
+            value=value,
+            equation=self.entry.text,
+            engineering=self.engineering or "as it is",
+            rounding=self.entry.rounding,
+            compensator_json=(self.key,) if self.key else (),
+            valve_json=valve_keys.get(self.key, ()),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValvePage:
+    """The members that the struct of a firmware has, with the numbers of a compensator."""
+
+    compensator: Compensator
+    block: CalibrationBlock
+    built: BuiltFor
+
+    def lines(self) -> list[str]:
+        """Return what stands between the braces of a `struct dz_calibration`."""
+        return list(self._lines(self.block, "", ""))
+
+    def numbers(self) -> Iterator[Number]:
+        """Yield every member in the order of the struct."""
+        yield from self._numbers(self.block, "")
+
+    def _parts(self, value: object) -> tuple[object, ...]:
+        """Return the structs of a member that is one itself, or an array of them."""
+        if isinstance(value, tuple):
+            return value[: len(self.compensator.signals.signs)]  # what is not set C makes zero
+        return (value,) if not self.built.fixed or self.built.has("CURRENT") else ()
+
+    def _numbers(self, part: object, path: str) -> Iterator[Number]:
+        for name, entry in self._members(part):
+            value = getattr(part, name)
+            if entry:
+                yield self._number(path, name, entry, value)
+                continue
+            for index, each in enumerate(self._parts(value)):
+                yield from self._numbers(each, f"{path}{name}{f'[{index}]' if INNER[name][1] > 1 else ''}.")
+
+    def _lines(self, part: object, path: str, indent: str) -> Iterator[str]:
+        for name, entry in self._members(part):
+            value = getattr(part, name)
+            if entry:
+                number = self._number(path, name, entry, value)
+                yield from (f"{indent}{line}" for line in number.comment(len(indent) + 4))
+                yield from (f"{indent}{line}" for line in self._assigned(name, number, path))
+                continue
+            parts = self._parts(value)
+            if INNER[name][1] == 1:
+                for each in parts:
+                    yield f"{indent}.{name} = {{"
+                    yield from self._lines(each, f"{name}.", f"{indent}    ")
+                    yield f"{indent}}},"
+                continue
+            yield f"{indent}.{name} = {{"
+            for index, each in enumerate(parts):
+                yield f"{indent}    {{ /* {SIDE_NAMES[SIGNS[index]]} commands */"
+                yield from self._lines(each, f"{name}[{index}].", f"{indent}        ")
+                yield f"{indent}    }},"
+            yield f"{indent}}},"
+
+    def _members(self, part: object) -> Iterator[tuple[str, Words | None]]:
+        """Yield the members of a struct that this firmware has; None of one that is a struct."""
+        own = entries(type(part))
+        for each in fields(part):  # type: ignore[arg-type]
+            entry = own.get(each.name)
+            if not (entry and entry.of_block and self.built.fixed):
+                yield each.name, entry
+
+    def _number(self, path: str, name: str, entry: Words, value: int | tuple[int, ...]) -> Number:
+        key = entry.key
+        if path.startswith("sides"):
+            sign = SIGNS[path.startswith("sides[1]")]
+            key = key.replace("*", SIDE_NAMES[sign])
+            known = self._sides[sign] if sign in self.compensator.signals.signs else {}
+        else:
+            known = self._current if path else self._own
+        return Number(path=path + name, entry=entry, value=value, engineering=known.get(name, ""), key=key)
+
+    def _assigned(self, name: str, number: Number, path: str) -> Iterator[str]:
+        """Yield one member with its value: two halves of a number of 64 bits, pairs in braces, a table's rows."""
+        value, entry = number.value, number.entry
+        if isinstance(value, int):
+            words = (value % 2**32, value >> 32) if entry.bits == 64 else (value,)
+            printed = [f"{word}u" if entry.bits == 16 else f"UINT32_C({word})" for word in words]
+            yield f".{name} = {printed[0]}," if len(printed) == 1 else f".{name} = {{{', '.join(printed)}}},"
+            return
+        yield f".{name} = {{"
+        if entry.pairs:
+            yield from (f"    {line}" for line in self._rows(value, SIGNS[path.startswith("sides[1]")]))
+        else:
+            texts = ", ".join(f"{each}u" for each in value)
+            yield from (f"    {line}" for line in wrap(texts, COLUMNS - 24))
+        yield "},"
+
+    def _rows(self, value: tuple[int, ...], sign: int) -> Iterator[str]:
+        """Yield the nodes of beta, the pressure drop from which each line goes, and what stands for no pressure."""
+        c = self.compensator
+        unit, units = integer_form(c, sign).scale_beta * c.beta_denominator, c.valve.recorded_units
+        pairs = [f"{{UINT32_C({law}), UINT32_C({zero})}}," for law, zero in zip(value[::2], value[1::2], strict=True)]
+        for node in range(len(c.side(sign).beta)):
+            place = units.text(float(c.signals.dp_MPa(node * c.beta_step_codes)), ".3f MPa")
+            law_beta, zero_beta = (number / unit for number in value[2 * node : 2 * node + 2])
+            certified = f", certified {zero_beta:.6f}" if law_beta != zero_beta else ""
+            yield f"{pairs[node]} /* {place}: beta {law_beta:.6f}{certified} */"
+        mask = self.built.sizes.node_mask
+        unused = " ".join(["{0u,0u},"] * (mask - len(c.side(sign).beta)))
+        yield from (line.replace(",0u", ", 0u") for line in wrap(unused, COLUMNS - 40))
+        yield f"{pairs[mask]} /* pressures that can't be right: beta {value[-2] / unit:.6f} */"
+        yield pairs[mask + 1]
+
+    # ---- engineering values, by the member's name ----
+
+    @cached_property
+    def _own(self) -> dict[str, str]:
+        c, signals, functions = self.compensator, self.compensator.signals, self.compensator.drive_functions
+        units, u_max_V = c.valve.recorded_units, float(c.u_max_V)
+        command, controller, a, b = signals.command, units.of_controller, signals.pressure_a, signals.pressure_b
+        share, limit = self._share, functions.compare_limit / signals.compare_max
+        found = {"magic": "", "serial": text_of(self.block.serial), "record": text_of(self.block.record)}
+
+        def reading(code: int) -> str:
+            codes = command.direction(1) * (code - command.zero_code)
+            sign = 1 if codes >= 0 or len(signals.signs) == 1 else -1
+            return controller.text(codes / command.span(sign) * u_max_V + 0.0, ".4g V")
+
+        for name, code in zip(("zero", "low", "high"), (command.zero_code, *command.valid_codes), strict=True):
+            found[f"command_{name}"] = reading(code)
+        for name, sensor in (("a", a), ("b", b)):
+            for end, code in zip(("zero", "low", "high", "full"),
+                                 (sensor.zero_code, *sensor.valid_codes, sensor.full_code), strict=True):  # fmt: skip
+                pressure = float((code - sensor.zero_code) * sensor.per_code_MPa)
+                found[f"{name}_{end}"] = units.text(pressure, ".4g MPa")
+        a_MPa, b_MPa = (float(sensor.per_code_MPa) for sensor in (a, b))
+        found |= {
+            "balance": f"codes {a.zero_code} of A and {b.zero_code} of B",
+            "reverse": units.text(float(signals.dp_MPa(c.reverse_codes)), ".3f MPa"),
+            "weight_b": f"{units.text(b_MPa, '.6g MPa')} / {units.text(a_MPa, '.6g MPa')} = {b_MPa / a_MPa:.6g}",
+            "transition_codes": share(c.transition_codes) if c.transition_codes else "none",
+            "zero_band": f"{share(c.zero_band_codes)}; error of a zero command, {c.command_error.offset_codes} + "
+            f"{c.command_error.noise_codes} codes",
+            "compare_limit": f"{units.text(limit * u_max_V, '.4g V')}, {limit:.1%} duty",
+            "leave_zero": f"{share(functions.leave_zero_codes)}; a zero command with twice its noise stays within",
+            "fault_samples": f"{1e3 * functions.fault_samples / signals.sample_Hz:.4g} ms",
+            "fault_latch": "latched" if functions.fault_latch else "not latched",
+            "interlock": "it does not wait" if self.block.interlock == NO_INTERLOCK else share(self.block.interlock),
+            "ramps": "ramped" if functions.has_ramp else "not ramped",
+        }
+        if functions.dither_counts:
+            peak = functions.dither_counts / signals.compare_max
+            found["dither_counts"] = f"{peak:.3%} of full drive{in_unit(c, peak)}"
+            half_s = functions.dither_ticks / signals.tick_Hz
+            found["dither_ticks"] = f"{1e3 * half_s:.4g} ms, {1 / (2 * half_s):g} Hz"
+        if functions.has_play:
+            found |= {
+                "play_codes": share(functions.play_codes),
+                "play_noise": share(functions.play_noise_codes),
+                "play_step_shift": f"{functions.play_step_codes} codes, {share(functions.play_step_codes)}",
+                "play_shift": f"{functions.play_codes} * {c.transition_codes}",
+            }
+        return found
+
+    @cached_property
+    def _sides(self) -> dict[int, dict[str, str]]:
+        return {sign: self._side(sign) for sign in self.compensator.signals.signs}
+
+    def _side(self, sign: int) -> dict[str, str]:
+        c, side, form = self.compensator, self.compensator.side(sign), integer_form(self.compensator, sign)
+        signals, functions, numbers = c.signals, c.drive_functions, self.block.sides[sign < 0]
+        units, u_max_V, place = c.valve.recorded_units.of_side(SIDE_NAMES[sign]), float(c.u_max_V), int(sign < 0)
+        span, chosen, unit = signals.command.span(sign), law(c.law), form.scale_beta * c.beta_denominator
+        divisor, whole = form.divisor << form.shift, unit * c.beta_step_codes
+
+        def volts(count: float, text: str) -> str:
+            return units.text(count / divisor / signals.compare_max * u_max_V, text)
+
+        def per_volt(count: int) -> float:
+            return count * span * (c.transition_codes or 1) / divisor / signals.compare_max
+
+        def ramp(step: int) -> str:
+            if not functions.has_ramp or step == NO_RAMP:
+                return "no limit"
+            return f"full command in {span * RAMP_UNIT / (step * signals.sample_Hz):.4g} s"
+
+        factor = to_text(chosen.gain_by_beta(1)).replace("*", " ")
+        low, high = min(side.beta) / c.beta_denominator, max(side.law_beta) / c.beta_denominator
+        found = {
+            "offset": f"u_min0 = {volts(form.offset * whole, '.6f V')}, u_min0/u_max = {side.u_min0_over_u_max}",
+            "slope": f"{factor} = {per_volt(form.slope * whole):.6f}, k x_max/u_max = {side.drive_range_over_u_max}"
+            if form.slope
+            else "beta does not change the gain",
+            "transition": f"u_min0/{c.transition_codes} = {volts(form.transition * whole, '.6g dV')}"
+            if form.transition
+            else "none",
+            "linear": f"{per_volt(form.linear << form.linear_shift):.6f}",
+            "half": volts(form.half, ".3g dV"),
+            "quotient_limit": units.text(self.block.compare_limit / signals.compare_max * u_max_V, ".4g V"),
+            "reciprocal": f"1/{form.divisor << (form.shift - 32)}",
+            "reciprocal_shift": f"2^{32 + numbers.reciprocal_shift}",
+            "tested_to": c.valve.recorded_units.text(float(side.certificate.dp_MPa[1]), ".4g MPa"),
+            "beta_factor": f"2^15/{whole}",
+            "beta_shift": f"2^{numbers.beta_shift}",
+            "ramp_up": ramp(numbers.ramp_up),
+            "ramp_down": ramp(numbers.ramp_down),
+            "nodes": f"beta {low:.6f} to {high:.6f}, in 1/{c.beta_denominator}",
+            "span": c.valve.recorded_units.of_controller.text(sign * u_max_V, "g V"),
+            "room": self._share(numbers.room, sign),
+            "band_end": self._share(c.zero_band_codes, sign),
+        }
+        if functions.has_play:
+            widths = [u_max_V * end(functions.play_counts[place]) / signals.compare_max for end in (min, max)]
+            controller = c.valve.recorded_units.of_controller
+            ends = f"{controller.number(widths[0], '.4g dV')} to {controller.text(widths[1], '.4g dV')}"
+            found["play"] = f"the recorded hysteresis, {ends}"
+        return found
+
+    @cached_property
+    def _current(self) -> dict[str, str]:
+        if self.compensator.current_drive is None:
+            return {}
+        loop = self.compensator.current_drive.loop
+        unit = 1 << loop.gain_shift
+        return {
+            "integral_limit": f"{loop.integral_limit} PWM counts",
+            "release": f"{loop.release} PWM counts: the current does not overshoot on release",
+            "current_gain": f"{loop.current_gain / (1 << loop.current_shift):.6g}",
+            "proportional": f"{loop.proportional / unit:.6g}",
+            "integral": f"{loop.integral / unit:.6g}",
+            "feed_forward": f"{loop.feed_forward / unit:.6g}: R i over the supply",
+            "offset_shift": f"{1 << loop.offset_shift} sums",
+            "supply_shift": f"{loop.supply.step_codes} codes" if loop.supply else "not measured",
+        }
+
+    def _share(self, codes: int, sign: int = 1) -> str:
+        return share_of_command(self.compensator, codes, sign)
+
+
+def valve_keys(compensator: Compensator) -> dict[str, tuple[str, ...]]:
+    """Return which keys of valve.json `design` read for each key of compensator.json; all else are its options."""
+    found: dict[str, tuple[str, ...]] = {"u_max_V": ("u_max_V",)}
+    for sign in compensator.signals.signs:
+        side = f"sides.{SIDE_NAMES[sign]}"
+        curve = f"{side}.certified.{compensator.side(sign).certificate.guard}"
+        offset, bounds = f"{curve}.u_min0_V", (f"{curve}.offset_V", f"{curve}.u_lower_V", f"{curve}.curvature_V_MPa2")
+        # With a transition the law's offset is that of the opening threshold.
+        opening = (f"{side}.opening_curve",) if compensator.transition_codes else ()
+        found |= {
+            f"{side}.u_min0_over_u_max": opening or (offset,),
+            f"{side}.drive_range_over_u_max": (f"{side}.k_x_max_over_u_max", f"{side}.tests", *(opening or (offset,))),
+            f"{side}.certificate.dp_MPa": (f"{curve}.dp_MPa",),
+            f"{side}.beta": (offset, *bounds, f"{side}.trend", *opening),
+        }
+    return found
