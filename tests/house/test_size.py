@@ -14,9 +14,9 @@ ROOM_SIZES = {
     "core": (3500, 29, 0),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 55500, 23500, 10000
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 52000, 23500, 9152
 #: Options of all commands together; an option of two commands counts twice.
-OPTIONS = 400
+OPTIONS = 304
 #: What a number may be above what is there, before it is to be lowered.
 SLACK = 0.02
 TEXTS = {".jinja", ".c", ".h", ".m", ".ld", ".toml", ".html", ".css", ".js", ".svg", ".md", ".txt"}
