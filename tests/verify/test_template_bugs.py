@@ -18,13 +18,13 @@ from tests.support.core_variants import variant
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
-LAW, DRIVE = "dz_comp_block.c.jinja", "dz_drive_block.c.jinja"
+LAW, DRIVE = "dz_comp.c.jinja", "dz_drive.c.jinja"
 #: Template, what stands there, what somebody wrote instead, and the check that sees it.
 BUGS = {
     "wrong shift": (LAW, ">> (side->reciprocal_shift", ">> 1 >> (side->reciprocal_shift", "exact-law"),
     "swapped channels": (LAW, "{{ side.turn }}pressure_difference(block, p_a_adc, p_b_adc)",
                          "{{ side.turn }}pressure_difference(block, p_b_adc, p_a_adc)", "exact-law"),
-    "off by one in the table": (LAW, "[node + 1u].law * past", "[node + 2u].law * past", "exact-law"),
+    "off by one in the table": (LAW, "node[1].law * past", "node[2].law * past", "exact-law"),
     "sign of the negative side": (
         LAW, "from_band = {{ side.from_band }}", "from_band = {{ sides[0].from_band }}", "exact-law",
     ),
