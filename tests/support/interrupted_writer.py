@@ -8,6 +8,7 @@ import ctypes
 import json
 import os
 import shutil
+import signal
 import sys
 from pathlib import Path
 
@@ -98,6 +99,8 @@ def said(job, place: Path, at: int, how: int) -> int:
 
 
 def main() -> None:
+    # A shell that starts the tests in the background has them ignore an interrupt.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     scratch = Path(sys.argv[1])
     place = scratch / "place"
     for name, (old, new) in JOBS.items():
