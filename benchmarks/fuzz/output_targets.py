@@ -19,7 +19,6 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import dead_zones
 from dzdesign.verify.amplifier.checks import checks as amplifier_checks
 from dzdesign.verify.amplifier.readers import READERS
-from dzdesign.verify.integers.text_values import TextValues
 
 TESTS = Path(__file__).parents[2] / "tests"
 #: Codes that a function in MATLAB is tried with, and numbers that a function block is.
@@ -49,16 +48,6 @@ def _output(target: str) -> Mapping[str, bytes]:
 def output_manifest() -> bytes:
     """Return the manifest of an output."""
     return to_json_bytes(_made("iec61131").manifest)
-
-
-def _structured_text(data: bytes) -> None:
-    given = dict.fromkeys(("command", "pressure_a", "pressure_b"), NUMBERS)
-    TextValues(data.decode("ascii", "replace"), "st", "FB_DeadZone.st").run(given | {"at_rest": np.array(True)})
-
-
-def _matlab(data: bytes) -> None:
-    function = TextValues(data.decode("ascii", "replace"), "m", "dz_comp.m")
-    function.run(dict(zip(("u", "p_a", "p_b"), CODES.T, strict=True)))
 
 
 def _amplifier(data: bytes) -> None:
@@ -99,7 +88,5 @@ def _of_output(target: str, *names: str) -> Callable[[], list[bytes]]:
 
 
 TARGETS = {
-    "structured-text": Target(run=_structured_text, seeds=_of_output("iec61131", "FB_DeadZone.st"), refusals=REFUSALS),
-    "matlab": Target(run=_matlab, seeds=_of_output("matlab", "dz_comp.m"), refusals=REFUSALS),
     "amplifier": Target(run=_amplifier, seeds=lambda: list(_amplifier_seeds())),
 }
