@@ -25,7 +25,7 @@ FOUND_INPUTS = [
 def test_every_target_is_run():
     assert tuple(TARGETS) == NAMES
     assert {path.parent.name for path in FOUND.glob("*/*")} <= set(TARGETS)
-    assert len(FOUND_INPUTS) > 15 and found_inputs("amplifier")
+    assert len(FOUND_INPUTS) >= 3 and found_inputs("amplifier")
 
 
 @pytest.mark.parametrize("name", NAMES)
