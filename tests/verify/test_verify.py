@@ -165,7 +165,7 @@ def test_a_manifest_that_names_no_file_is_no_evidence(firmware_folder, wording):
 
 
 def test_a_core_that_does_not_compile_fails_the_verification(firmware_folder):
-    mutate(firmware_folder, r"const uint64_t sum = law\b", "const uint64_t sum = lav")
+    mutate(firmware_folder, r"const uint64_t sum = \(\(whole\b", "const uint64_t sum = ((whale")
     result = verify(firmware_folder, sequence=QUICK)
     assert not result.holds and result.evidence.inputs == ()
 

@@ -12,7 +12,7 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_files import to_json
+from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
@@ -23,7 +23,7 @@ from dzdesign.identify.data_quality.catalogue import catalogue, most_serious_fir
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.valve.model import Warning_
-from dzdesign.report.artefacts import Chain
+from dzdesign.report.artefacts import Chain, Place
 from dzdesign.report.summary import headline
 from dzdesign.report.valve_report import make_report
 from tests.conftest import default_options
@@ -38,6 +38,13 @@ MARK = "SIMULATED by somebody"
 
 def warned(valve, code):
     return [warning for warning in valve.warnings if warning.code == code]
+
+
+def chain_of(valve, compensator):
+    """Return what a report is made of, as it is read from files."""
+    found = {"valve": valve, "compensator": compensator}
+    places = {role: Place(each.FILE_NAME, sha256_of(to_json_bytes(each))) for role, each in found.items()}
+    return Chain(**found, places=places)
 
 
 def valve_at(dp_MPa, **changes):
@@ -89,8 +96,8 @@ class TestSimulated:
             compensator = design(valve)
             firmware = generate(compensator, "host")
             for name, text in firmware.files.items():
-                assert ("SIMULATED" in text) is simulated or name == "compensator.json", name
-            shelf = Chain(valve=valve, compensator=compensator)
+                assert ("SIMULATED" in text) is simulated or name in ("compensator.json", ".gitattributes"), name
+            shelf = chain_of(valve, compensator)
             of_recording, *others = headline(shelf).cautions
             assert of_recording == reach_of_certificate(compensator)
             assert [text.startswith("SIMULATED") for text in others] == [True] * simulated
@@ -143,7 +150,7 @@ class TestBranchOrder:
         """The warning was written before anybody accepted it."""
         options = options_of({"accept": "branch-order"}, target_named("f28335").inputs())
         for valve, accepted in ((crossed, True), (identify([valve_at(dp) for dp in PRESSURES]), False)):
-            shelf = Chain(valve=valve, compensator=design(valve, options))
+            shelf = chain_of(valve, design(valve, options))
             said = [line for line in headline(shelf).cautions if line.startswith("ACCEPTED warning, branch-")]
             html = make_report(shelf).html
             words = re.sub("<[^>]*>|`", "", html)
@@ -190,7 +197,7 @@ def test_a_side_that_the_firmware_leaves_out_is_said_from_identify_to_the_report
     assert not warned(one, "two-sides")
     wording.of_test(warning.text)
     for valve, said in ((both, True), (one, False)):
-        shelf = Chain(valve=valve, compensator=design(valve))
+        shelf = chain_of(valve, design(valve))
         assert any("negative side" in text for text in headline(shelf).cautions) is said
 
 

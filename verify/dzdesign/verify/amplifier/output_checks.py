@@ -21,6 +21,8 @@ from dzdesign.verify.output_evidence import OutputChecks
 from dzdesign.verify.requirements import Check, Requirement
 
 Say = Callable[[str], None]
+#: It keeps git from rewriting line ends, and stands in every folder.
+LINE_ENDS = ".gitattributes"
 TABLE, HEADER = "dead_zones.csv", "side,dp_MPa,branch,dead_zone_fixed,dead_zone_law"
 #: A line of it; no command opens the valve where a share is infinite.
 LINE = re.compile(r"([a-z]+),(\d{1,9}\.\d{6}),([a-z]+),(\d{1,9}\.\d{6}|inf),(\d{1,9}\.\d{6}|inf)", re.ASCII)
@@ -69,8 +71,8 @@ def checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say
 
 
 def _file_for(folder: Path, manifest: OutputManifest, device: str) -> bytes:
-    """Return the one file beside the table and the compensator; it is named after its device."""
-    names = sorted(manifest.files.keys() - {Compensator.FILE_NAME, TABLE})
+    """Return the one file beside the table, the compensator and git's; it is named after its device."""
+    names = sorted(manifest.files.keys() - {Compensator.FILE_NAME, TABLE, LINE_ENDS})
     if len(names) != 1 or names[0].partition(".")[0] != device:
         raise InputError(f"the manifest names {len(names)} files for {quoted(device)}, expected one of its name")
     return read_bytes(folder / names[0], f"file for {device}")
