@@ -139,8 +139,9 @@ def test_core_has_no_floating_point_no_division_and_no_state(example_firmware):
 def test_generated_files_carry_the_hash_of_their_compensator_and_no_date(example_firmware):
     """But for the user's to fill in: kept through the next generation, theirs would be the hash of another."""
     digest = example_firmware.manifest.made_from[0].sha256
+    assert example_firmware.files[".gitattributes"] == "* -text\n"
     for name, text in example_firmware.files.items():
-        if name != "compensator.json":
+        if name not in ("compensator.json", ".gitattributes"):
             board = name in example_firmware.manifest.board
             assert (digest in text) is not board and ("Do not edit" in text) is not board, name
             assert ("Yours to edit" in text[:300]) is board, name

@@ -228,8 +228,9 @@ def test_a_hostile_name_changes_nothing_but_a_harmless_comment(target, name):
     firmware = generate(hostile_compensator(target, [name]), target)
     files = firmware.files
     assert files.keys() == honest.keys()
+    assert files[".gitattributes"] == honest[".gitattributes"] == "* -text\n"
     for path, text in files.items():
-        if path != "compensator.json":
+        if path not in ("compensator.json", ".gitattributes"):
             assert without_banner(text) == without_banner(honest[path]), path
             named = any(printable_name(name) in line for line in text.splitlines())
             assert text.isascii() and (named or path in firmware.manifest.board)

@@ -86,7 +86,7 @@ def in_c(name, old, new):
 
 #: Target, edit, exit status, and what is printed of it.
 SEEDED = {
-    "a number": ("f28335", in_c("core/dz_comp.c", "UINT32_C(", "1u + UINT32_C("), 1, "core/dz_comp.c, line"),
+    "a number": ("f28335", in_c("core/dz_valve.h", "UINT32_C(", "1u + UINT32_C("), 1, "core/dz_valve.h, line"),
     "half a file": ("host", cut_short("core/dz_comp.c"), 1, "core/dz_comp.c, line"),
     "no file": ("cortex-m4", lambda folder: (folder / "core/dz_comp.h").unlink(), 1, "core/dz_comp.h is missing"),
     "a file more in the core": ("cortex-m4", lambda f: add(f, "core/dz_old.c", "int x;\n"), 1, "core/dz_old.c"),

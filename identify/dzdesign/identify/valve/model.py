@@ -161,7 +161,7 @@ class ValveModel(ShownInNotebooks, Artefact):
         object.__setattr__(self, "untested_sides", tuple(name for name in SIDES if name not in self.sides))
         names = (each.name for each in fields(self) if each.name != "content_sha256")
         content = {name: value for name in names if (value := getattr(self, name)) is not UNSET}
-        object.__setattr__(self, "content_sha256", sha256_of(to_json(as_document(content)).encode()))
+        object.__setattr__(self, "content_sha256", sha256_of(to_json(as_document(content)).encode(errors="replace")))
 
     @property
     def dither(self) -> Dither | None:
