@@ -219,7 +219,7 @@ def test_the_report_of_the_lot_lists_them_and_sees_another_manifest(made, tmp_pa
         read_lot(out)
     block.write_bytes(text)
     path = out / "valves" / "V0000" / "plc" / MANIFEST_NAME
-    path.write_bytes(path.read_bytes() + b" ")
+    path.write_bytes(path.read_bytes().replace(b"{", b'{"added": 0, ', 1))
     with pytest.raises(InputError, match=r"V0000/plc/manifest\.json"):
         read_lot(out)
 
