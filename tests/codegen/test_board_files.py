@@ -20,7 +20,7 @@ from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.firmware import compilation
 from dzdesign.verify.firmware.compilation import BoardCompiled, board_compiles
 from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.firmware.reproduced import reproduced
+from dzdesign.verify.firmware.reproduced import changed_board_files, reproduced, user_files
 from dzdesign.verify.untried import not_tried
 from dzdesign.verify.verification import evidence_manifest, verify
 from tests.conftest import default_options
@@ -100,7 +100,9 @@ def test_what_was_filled_in_is_kept_and_said(compensator, cortex, tmp_path, caps
     wording.of_test(capsys.readouterr().err)
     assert (cortex / "cortex_m4/dz_board.c").read_bytes() == mine and (cortex / "cortex_m4/main.c").is_file()
     assert unchanged(cortex).holds
-    wording.of_test(unchanged(cortex).text)  # known as changed again
+    wording.of_test(unchanged(cortex).text)
+    manifest = read_firmware_manifest(cortex)
+    assert changed_board_files(cortex, manifest) == ("cortex_m4/dz_board.c",)  # known as changed again
     (cortex / "cortex_m4/dz_board.c").unlink()
     firmware = api.generate(path, target="cortex-m4", output=cortex)
     assert firmware.note.count("kept") == 0
@@ -260,6 +262,8 @@ def test_files_in_the_folder_for_them_are_named_kept_and_not_checked(compensator
     check = unchanged(cortex)
     assert check.holds
     wording.of_test(check.text)
+    found = user_files(cortex, read_firmware_manifest(cortex).files)
+    assert sorted(found) == ["board/adc.c", "board/my_chip.ld"]
     write_firmware(generate(compensator, "cortex-m4"), cortex)
     assert (cortex / "board/adc.c").read_text() == "this is no C"
     evidence = evidence_with(user_files=("board/adc.c",))
@@ -340,3 +344,4 @@ def test_a_project_file_of_code_composer_studio_is_the_users(compensator, tmp_pa
     check = unchanged(tmp_path)
     assert check.holds
     wording.of_test(check.text)
+    assert changed_board_files(tmp_path, read_firmware_manifest(tmp_path)) == (PROJECT,)

@@ -18,7 +18,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
-from dzdesign.core.documents import sha256_of
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.recorded_units import CommandUnit, PressureUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot_valves import LotValve
@@ -114,7 +114,12 @@ def test_a_firmware_folder_stands_for_its_compensator(written, tmp_path, capsys)
 def test_another_compensator_and_a_changed_number_are_found(written, tmp_path, block, capsys):
     other = tmp_path / "compensator.json"
     text = (written / "compensator.json").read_bytes()
-    other.write_bytes(text + b"\n")
+    other.write_bytes(text.replace(b"\n", b"\r\n") + b"\r\n")  # of the same content
+    assert main(["calibration", "--read", str(written / "valve.hex"), str(other)]) == 0
+    assert "Is the block of" in capsys.readouterr().out
+    document = json.loads(text)
+    document["made_from"][0]["sha256"] = "0" * 64
+    other.write_bytes(to_json(document).encode())
     assert main(["calibration", "--read", str(written / "valve.hex"), str(other)]) == 1
     assert "IS NOT THE BLOCK" in capsys.readouterr().out
     # A number changed on the way, and the CRC made right: what the SHA-256 alone would not show.

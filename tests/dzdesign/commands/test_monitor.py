@@ -21,7 +21,7 @@ from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_CALIBRATION, S
 from dzdesign.codegen.telemetry.recording import COLUMNS, Recording, scalings_of
 from dzdesign.codegen.telemetry.recording_file import recording_file
 from dzdesign.commands.monitor import _other_firmware
-from dzdesign.core.documents import sha256_of
+from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.serial_port import open_port
@@ -419,9 +419,10 @@ def test_a_firmware_without_telemetry_is_refused(bench, monkeypatch):
 
 
 def test_a_loaded_block_has_the_scalings_of_its_own_compensator(bench, tmp_path):
-    text = (bench.firmware / "compensator.json").read_text("utf-8")
+    document = json.loads((bench.firmware / "compensator.json").read_text("utf-8"))
+    document["made_from"][0]["sha256"] = "0" * 64
     other = tmp_path / "other.json"
-    other.write_text(text + "\n", encoding="utf-8")
+    other.write_bytes(to_json(document).encode())
     found = scalings_of(bench.firmware, other)
     assert found.origin != bench.origin and found.origin == int(sha256_of(other.read_bytes())[:4], 16)
     assert found.link == scalings_of(bench.firmware).link

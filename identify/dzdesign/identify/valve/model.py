@@ -147,9 +147,9 @@ class ValveModel(ShownInNotebooks, Artefact):
             "characteristics are those of the dithered valve. Omitted if there was none."
         ),
     ] = UNSET
-    content_sha256: Annotated[
-        str, Meta(description="SHA-256 of all other keys, which reveals an accidental edit.")
-    ] = field(init=False)
+    content_sha256: Annotated[str, Meta(description="SHA-256 of all other keys, which reveals an accidental edit.")] = (
+        field(init=False)
+    )
 
     def __post_init__(self) -> None:
         if not self.sides or not set(self.sides) <= set(SIDES):
