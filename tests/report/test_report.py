@@ -20,6 +20,7 @@ from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.loop_results import PressureResult
 from dzdesign.verify.requirements import AS_STATED
+from tests.support.attacked_firmware import sealed
 from tests.support.html_pages import HOSTILE, Page
 from tests.support.reported import change_evidence, change_json
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
@@ -203,6 +204,7 @@ def test_nobodys_text_becomes_markup(copied):
     shutil.copy(copied / "valve.json", folder)
     clean_valve = Page(report_of_folder(folder).html)
     change_json(folder / "valve.json", poison_valve)
+    change_json(folder / "valve.json", sealed)
     valve = Page(report_of_folder(folder).html)
     for dirty, before in ((page, clean), (valve, clean_valve)):
         words, expected = ([tag for tag, given in each.tags if not is_of_the_number_of_texts(tag, given)] for each in (
@@ -254,7 +256,7 @@ def test_an_assumed_repeatability_stands_beside_the_certificate(html, tmp_path):
     one = identify([synthetic_ramp(1.0, Truth(), seed=7, rate_Hz=10.0)])
     valve_json = to_json_bytes(one)
     (tmp_path / "valve.json").write_bytes(valve_json)
-    (tmp_path / "compensator.json").write_bytes(to_json_bytes(design(one, None, valve_json)))
+    (tmp_path / "compensator.json").write_bytes(to_json_bytes(design(one)))
     page = report_of_folder(tmp_path).html
     heads = [text[: text.index('<section id="data">')] for text in (page, html)]
     certificate, of_repeats = (head[head.index("Certificate") :] for head in heads)

@@ -81,6 +81,6 @@ MEASURED = {
     ),
 }
 #: The most that dz_calibration_check() takes there, of two solenoids with an inverse play.
-CHECK_INSTRUCTIONS = 36_200
+CHECK_INSTRUCTIONS = 35_500
 #: What stands in for a target without figures of its own.
 STAND_IN = "cortex-m4"

@@ -66,7 +66,7 @@ def test_coil_and_supply_do_not_move_the_opening(example_valve, plant, tmp_path)
 
 @pytest.mark.parametrize(
     ("right", "wrong"),
-    [("* INTEGRAL)", "* 0u)"), ("current = ((above * CURRENT_GAIN)", "current = ((above * (CURRENT_GAIN - 2700u))")],
+    [("* numbers->integral)", "* 0u)"), ("current = ((above * numbers->current_gain)", "current = ((above * (numbers->current_gain - 2700u))")],
     ids=["no integral", "a current read 6 % too low"],
 )
 def test_a_controller_that_lets_the_current_go_is_seen(right, wrong, example_valve, tmp_path):
@@ -84,8 +84,8 @@ def test_a_controller_that_begins_at_its_integral_opens_the_valve_as_it_is_relea
     """From zero the current went past the set point, and past the opening threshold just above it, for 40 ms."""
 
     def edit(text: str) -> str:
-        assert text.count(" - RELEASE;") == 1
-        return text.replace(" - RELEASE;", ";")
+        assert text.count(" - numbers->release;") == 1
+        return text.replace(" - numbers->release;", ";")
 
     right, wrong = (
         valve_at_corners(scenes(example_valve, MEASURED | ACCURATE, tmp_path / name, edit=each)[1], COIL)

@@ -187,10 +187,10 @@ def test_a_core_that_takes_a_failed_sensor_for_sound_fails(firmware, example_com
     core.mkdir(parents=True)
     for path in (firmware / "core").iterdir():
         text, seeded = path.read_text(), 0
-        for limit, code in (("REVERSE", 5000), ("PRESSURE_[AB]_LOW", 0), ("PRESSURE_[AB]_HIGH", 4095)):
-            text, count = re.subn(rf"(?m)^(#define {limit}) \d+u", rf"\1 {code}u", text)
+        for limit, code in (("reverse", 5000 << 12), ("[ab]_low", 0), ("[ab]_high", 4095)):
+            text, count = re.subn(rf"(\.{limit} =) [\w(]+\)?,", rf"\1 {code}u,", text)
             seeded += count
-        assert (seeded > 2) == (path.name == "dz_comp.c")
+        assert (seeded > 2) == (path.name == "dz_valve.h")
         (core / path.name).write_text(text)
     scene = scenes_of(core.parent, example_compensator, None)[-1]
     failed = [each for each in sensor_failures(scene) if each.must_shut and each.q_zero_L_min > 0]
