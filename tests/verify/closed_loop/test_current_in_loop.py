@@ -66,7 +66,10 @@ def test_coil_and_supply_do_not_move_the_opening(example_valve, plant, tmp_path)
 
 @pytest.mark.parametrize(
     ("right", "wrong"),
-    [("* numbers->integral)", "* 0u)"), ("current = ((above * numbers->current_gain)", "current = ((above * (numbers->current_gain - 2700u))")],
+    [
+        ("* numbers->integral)", "* 0u)"),
+        ("current = ((above * numbers->current_gain)", "current = ((above * (numbers->current_gain - 2700u))"),
+    ],
     ids=["no integral", "a current read 6 % too low"],
 )
 def test_a_controller_that_lets_the_current_go_is_seen(right, wrong, example_valve, tmp_path):
