@@ -73,6 +73,7 @@ def test_every_form_of_the_core_is_clean(name, tmp_path):
 SEEDED = {
     "5.9": ("dz_drive.c", "is_negative", "below_zero"),
     "7.2": ("dz_comp.c", "#define LARGEST_SHIFT 31u", "#define LARGEST_SHIFT 0xFFFF"),
+    "10.8": ("dz_comp.c", "(int64_t)number(left) * number(right)", "(int64_t)(left * right)"),
     "15.6": ("dz_drive.c", "    drive->faulty_pressures = 0u;\n}", "    if (drive->law == 0u) drive->side = 0;\n}"),
     "2.5": ("dz_comp.c", "#define LARGEST_SHIFT", "#define NOBODY 1u\n#define LARGEST_SHIFT"),
 }
