@@ -90,11 +90,6 @@ class PublishedValve:
     displacement_dead_zone0_percent: str = ""
     displacement_dead_zone_rises_percent: str = ""
 
-    def __post_init__(self) -> None:
-        for name in self.__slots__[3:]:
-            if getattr(self, name) and name != "zero_flow_without_beta":  # not always printed with the others
-                _printed(getattr(self, name), self.section)
-
     @property
     def stroke1_mm(self) -> str:
         """The largest displacement at dP1, mm."""
@@ -175,6 +170,10 @@ SECOND = PublishedValve(
     residual_percent="1",
 )
 VALVES = (SIMULATION, FIRST, SECOND)
+for _valve in VALVES:
+    for _name in PublishedValve.__slots__[3:]:
+        if getattr(_valve, _name) and _name != "zero_flow_without_beta":  # not always printed with the others
+            _printed(getattr(_valve, _name), _valve.section)
 
 #: Accuracy of the flow meter, of its range.
 METER_ACCURACY_L_MIN = sympy.Rational(METER_RANGE_L_MIN) * sympy.Rational(METER_ACCURACY_PERCENT) / 100
