@@ -1,7 +1,7 @@
 """`verify` of an output: what is checked of each, and which room checks the rest of its kind."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -33,9 +33,6 @@ class OutputKind:
     #: Module with a `CheckOutput`, and its name there; one with a name of its own takes the generator's forms, too.
     module: str
     checks: str = ""
-    #: Options of `verify`, as flags such as --machine-code, that make sense for it beside --output and --ramps, to the
-    #: module with the ``checks`` that are made where one is given.
-    options: Mapping[str, str] = field(default_factory=dict)
 
 
 #: Target, as the manifest names it, to its checks.
@@ -75,14 +72,11 @@ def kind_of(manifest: OutputManifest, source: str) -> OutputKind:
 
 
 def kind_for(folder: Path, options: Sequence[str] = ()) -> OutputKind:
-    """Return how the output in a folder is checked; an option that makes no sense for its kind is an `InputError`."""
+    """Return how the output in a folder is checked; options that make sense for a C firmware alone are `InputError`."""
     manifest = read_output_manifest(folder)
     kind = kind_of(manifest, f"'{folder / MANIFEST_NAME}'")
-    for flag in (flag for flag in options if flag not in kind.options):
-        others = "".join(f" or an output for {name}" for name, other in KINDS.items() if flag in other.options)
-        raise InputError(
-            f"{flag} is for a C firmware{others}, and '{folder}' is an output for {manifest.target}; leave it out"
-        )
+    for flag in options:
+        raise InputError(f"{flag} is for a C firmware, and '{folder}' is an output for {manifest.target}; leave it out")
     return kind
 
 
@@ -96,8 +90,8 @@ def verify_output(
 ) -> OutputVerification:
     """Verify the folder of an output, made by `dzdesign codegen`.
 
-    `options` are the flags that were given; one that makes no sense for this kind is an `InputError`, and so is a
-    folder that is no output. `again` is the output as it is generated now; of a folder that differs nothing else is
+    `options` are the flags that were given for a C firmware alone; any is an `InputError`, and so is a folder that is
+    no output. `again` is the output as it is generated now; of a folder that differs nothing else is
     tried, and without it the folder is not compared. What is read, compiled and run is taken from `code`, by default
     the folder itself. `say` is told each stage before it begins. `forms` are the generator's evaluations of
     an output's texts, by the names of their files: functions of arrays of inputs.
@@ -105,12 +99,11 @@ def verify_output(
     kind, manifest = kind_for(folder, options), read_output_manifest(folder)
     compensator = read_compensator(folder)
     same = None if again is None else reproduced(folder, again)
-    rooms: list[CheckOutput] = []
+    found: list[OutputChecks] = []
     if again is None or same is None or (again.files and same.holds is not False):
-        first = getattr(import_module(kind.module), kind.checks or "checks")
-        rooms = [partial(first, forms=forms) if kind.checks else first]
-        rooms += [import_module(kind.options[flag]).checks for flag in options]
-    found = [check(code or folder, manifest, compensator, say) for check in rooms]
+        room = getattr(import_module(kind.module), kind.checks or "checks")
+        check: CheckOutput = partial(room, forms=forms) if kind.checks else room
+        found.append(check(code or folder, manifest, compensator, say))
     digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
     return OutputVerification(
         evidence=OutputEvidence(
