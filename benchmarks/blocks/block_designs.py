@@ -15,7 +15,8 @@ from random_designs import random_designs
 from scoreboard import Row, print_rows, say
 from two_forms import TwoForms, two_forms
 
-from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
+from dzdesign.codegen.calibration.block import built_for
+from dzdesign.codegen.calibration.layout import BuiltFor
 from dzdesign.codegen.project import generate
 from dzdesign.core.errors import DzdesignError
 from dzdesign.design.compensator import Compensator

@@ -14,8 +14,7 @@ from random_designs import random_designs
 from scoreboard import Row, print_rows, say
 from two_forms import AROUND, TwoForms, block_as_c, two_forms
 
-from dzdesign.codegen.calibration.block import block_of, current_block
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for, current_block
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import CalibrationBlock
 from dzdesign.codegen.calibration.packing import pack

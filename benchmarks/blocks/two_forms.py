@@ -9,8 +9,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))  # for the valve and options that the tests share
 
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import NODE_MASK
 from dzdesign.codegen.calibration.packing import pack

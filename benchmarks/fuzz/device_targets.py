@@ -10,9 +10,7 @@ from output_targets import compensator
 from target import Target
 
 from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.block_files import FORMATS, image_of, placed_in_file
-from dzdesign.codegen.calibration.packing import CRC_OCTETS, OCTETS, pack, unpack
-from dzdesign.codegen.calibration.place_text import place_in_words
+from dzdesign.codegen.calibration.packing import CRC_OCTETS, FORMATS, OCTETS, image_of, pack, read_block_file, unpack
 from dzdesign.codegen.calibration.reading import reading_of
 from dzdesign.codegen.loading.protocol import HEADER_OCTETS, MOST_PAYLOAD, REPLY, Frame, FrameReader, reason_text
 from dzdesign.codegen.loading.session import LoadSession
@@ -92,9 +90,9 @@ def _calibration_file(data: bytes) -> None:
     sectors = {target.name: target.block_place for target in targets() if target.sector}
     for form in FORMATS:
         try:
-            octets, place = placed_in_file(path, form)
+            octets, place = read_block_file(path, form)
             if place is not None:
-                place_in_words(place, sectors)
+                place.in_words(sectors)
             unpack(octets)
         except InputError:
             continue

@@ -143,10 +143,9 @@ def other_numbers(block: "CalibrationBlock", compensator: "Compensator", digest:
 
 def _given_block(path: Path, beside: dict[Path, Mapping[str, Path]]) -> GivenBlock:
     """Return a block, and the compensator beside it whose hash it names; `beside` keeps the hashes of a folder."""
-    from dzdesign.codegen.calibration.block_files import octets_in_file
-    from dzdesign.codegen.calibration.packing import octets_of, unpack
+    from dzdesign.codegen.calibration.packing import octets_of, read_block_file, unpack
 
-    octets = octets_in_file(path)
+    octets = read_block_file(path)[0]
     digest = octets_of(unpack(octets, f"'{path}'").compensator_sha256).hex()
     folder = path.absolute().parent
     if folder not in beside:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import pytest
 
 from dzdesign.codegen.calibration.layout import LENGTH_WORDS
-from dzdesign.codegen.calibration.places import Place
+from dzdesign.codegen.calibration.packing import Place
 from dzdesign.codegen.project import generate, target_named, targets
 from tests.support.golden_firmware import golden_compensator
 from tests.support.paths import ROOT

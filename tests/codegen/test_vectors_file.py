@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from dzdesign.codegen.project import generate
-from dzdesign.codegen.vectors.choosing import required_codes
+from dzdesign.codegen.vectors import required_codes
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.side_law import Sides

@@ -4,9 +4,8 @@ import importlib.util
 import re
 
 from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.block_files import FORMATS
 from dzdesign.codegen.calibration.layout import members
-from dzdesign.codegen.calibration.packing import OCTETS, pack
+from dzdesign.codegen.calibration.packing import FORMATS, OCTETS, pack
 from tests.support.core_variants import variant
 from tests.support.paths import ROOT
 

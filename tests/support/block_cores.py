@@ -3,9 +3,9 @@
 import ctypes
 from pathlib import Path
 
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
+from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import FINDINGS, block_core_files, texts
+from dzdesign.codegen.calibration.layout import BuiltFor
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.documents import sha256_of

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from dzdesign.codegen.calibration.acceptance import refusals
+from dzdesign.codegen.calibration.acceptance import LARGEST_DROP, largest_node, refusals
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import NODE_MASK, PLAY_NODES
-from dzdesign.codegen.calibration.limits import LARGEST_DROP, largest_node
 from dzdesign.codegen.calibration.packing import pack
 from tests.support.c_library import load_library
 from tests.support.paths import TESTS

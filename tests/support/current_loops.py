@@ -4,8 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dzdesign.codegen.calibration.block import current_block, numbers_of
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import built_for, current_block, numbers_of
 from dzdesign.codegen.calibration.files import texts, valve_files
 from dzdesign.codegen.calibration.numbers import ValvePage
 from dzdesign.design.current.loop import CurrentLoop, SupplyCorrection

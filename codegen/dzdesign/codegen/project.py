@@ -10,25 +10,25 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from dzdesign.codegen.banner import Banner, banner_of, board_lines
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
+from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import (
     block_core_files,
+    block_templates,
+    block_values,
     core_headers,
     core_sources,
     fixed_core_files,
 )
-from dzdesign.codegen.calibration.in_project import block_templates, block_values
-from dzdesign.codegen.calibration.layout import CalibrationBlock
+from dzdesign.codegen.calibration.layout import BuiltFor, CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
 from dzdesign.codegen.core.constants import CoreFile, Values
 from dzdesign.codegen.core.status_bits import FAULT_BITS
 from dzdesign.codegen.core_costs import MEASURED, STAND_IN
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
-from dzdesign.codegen.loading.files import LOAD_FILES, STORE, load_texts
+from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_texts
 from dzdesign.codegen.target import Target, folder_of
-from dzdesign.codegen.vectors.vectors_file import vectors_text
+from dzdesign.codegen.vectors import vectors_text
 from dzdesign.codegen.wiring import wiring_of
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
-from dzdesign.codegen.calibration.places import Place
+from dzdesign.codegen.calibration.packing import Place
 from dzdesign.codegen.telemetry.frame import Link
 from dzdesign.core.errors import DzdesignError, InputError
 from dzdesign.design.current.circuit import CurrentSampling

@@ -13,7 +13,7 @@ from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.report.lot.summary import DOES_NOT_HOLD, OK, Status
 
 if TYPE_CHECKING:
-    from dzdesign.codegen.calibration.built_for import BuiltFor
+    from dzdesign.codegen.calibration.layout import BuiltFor
     from dzdesign.design.compensator import Compensator
     from dzdesign.verify.exhaustive.block_check import BlockFirmware
 
@@ -26,10 +26,8 @@ def write_block(compensator: "Compensator", target: str, folder: Path) -> tuple[
 
     A compensator that a block has no room for is an `InputError`.
     """
-    from dzdesign.codegen.calibration.block import block_of
-    from dzdesign.codegen.calibration.block_files import image_of
-    from dzdesign.codegen.calibration.built_for import built_for
-    from dzdesign.codegen.calibration.packing import pack
+    from dzdesign.codegen.calibration.block import block_of, built_for
+    from dzdesign.codegen.calibration.packing import image_of, pack
     from dzdesign.codegen.project import target_named
 
     name = "compensator.json"

@@ -13,7 +13,7 @@ from dzdesign.report.lot.summary import FIRMWARE, LOT_SETTING, LotFirmware
 from dzdesign.report.lot.table import ValveFolder, by_name
 
 if TYPE_CHECKING:
-    from dzdesign.codegen.calibration.built_for import BuiltFor
+    from dzdesign.codegen.calibration.layout import BuiltFor
     from dzdesign.design.compensator import Compensator
 
 #: Folder of what is of all valves together: `output` itself is locked as long as the batch runs.
@@ -29,7 +29,7 @@ class Project(NamedTuple):
 
 def project_of(compensator: "Compensator") -> Project:
     """Return the firmware that a compensator's block needs."""
-    from dzdesign.codegen.calibration.built_for import built_for
+    from dzdesign.codegen.calibration.block import built_for
     from dzdesign.codegen.project import DEFAULT_TARGET
 
     return Project(compensator.target.name if compensator.target else DEFAULT_TARGET, built_for(compensator))

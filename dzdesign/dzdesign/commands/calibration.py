@@ -40,7 +40,7 @@ def run(arguments: Arguments, json: bool) -> int:
         return _read(arguments, json)
     if arguments.compensator is None or arguments.output is None:
         raise InputError("calibration needs a COMPENSATOR.json and -o FILE, or --read FILE; see --help")
-    from dzdesign.codegen.calibration.place_text import elsewhere
+    from dzdesign.codegen.calibration.packing import ELSEWHERE
     from dzdesign.codegen.project import target_named
 
     made = calibration(arguments)
@@ -52,8 +52,8 @@ def run(arguments: Arguments, json: bool) -> int:
     print(one_line(f"Written: {document['file']}, {document['octets']} octets{at}"))
     target = target_named(made.target)
     sector = target.block_place if target.sector else None
-    if made.address is not None and sector and (wrong := elsewhere(made.target, made.address, sector)):
-        print(wrong)
+    if made.address is not None and sector and made.address != sector.address:
+        print(f"NOT {sector.address:#x}, where {made.target}'s firmware has its block: {ELSEWHERE}")
     print(one_line(f"Serial number: {document['serial'] or 'none'}; record: {document['record'] or 'none'}"))
     print(f"CRC-32 {document['crc32']}; SHA-256 of its compensator.json {document['compensator_sha256']}")
     return 0

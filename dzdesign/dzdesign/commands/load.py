@@ -110,10 +110,9 @@ def run(arguments: Arguments, json: bool) -> int:
 
 
 def _block_of(path: Path) -> _Block:
-    from dzdesign.codegen.calibration.block_files import octets_in_file
-    from dzdesign.codegen.calibration.packing import unpack
+    from dzdesign.codegen.calibration.packing import read_block_file, unpack
 
-    octets = octets_in_file(path)
+    octets = read_block_file(path)[0]
     return _Block(source=os.fspath(path), octets=octets, numbers=unpack(octets, f"'{path}'"))
 
 

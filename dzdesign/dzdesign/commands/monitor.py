@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     import serial
 
     from dzdesign.codegen.telemetry.frame import Frame, FrameReader
-    from dzdesign.codegen.telemetry.recording import Recording
-    from dzdesign.codegen.telemetry.recording_file import RecordingFile
+    from dzdesign.codegen.telemetry.recording import Recording, RecordingFile
 
 #: What ends a recording: Ctrl-C, a request to end, a terminal that goes away.
 ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -57,8 +56,7 @@ class Arguments:
 def run(arguments: Arguments, json: bool) -> int:
     """Record the telemetry of a firmware; 1 if the line broke before the time that was asked for."""
     from dzdesign.codegen.telemetry.frame import FrameReader
-    from dzdesign.codegen.telemetry.recording import Recording, scalings_of
-    from dzdesign.codegen.telemetry.recording_file import recording_file
+    from dzdesign.codegen.telemetry.recording import Recording, recording_file, scalings_of
 
     output, read = Path(arguments.output), read_options(arguments, ["seconds", "baud"])
     check_file_may_be_written(output)

@@ -14,13 +14,13 @@ from dzdesign.stages.given_compensator import given_compensator, refuse_underive
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock
-    from dzdesign.codegen.calibration.places import Place
+    from dzdesign.codegen.calibration.packing import Place
     from dzdesign.codegen.calibration.reading import CalibrationReading
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.design.compensator import Compensator
 
 #: Where the names of the formats stand.
-FORMATS = "dzdesign.codegen.calibration.block_files:FORMATS"
+FORMATS = "dzdesign.codegen.calibration.packing:FORMATS"
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,7 @@ def calibration(arguments: CalibrationArguments) -> CalibrationImage:
         file can't be written, or dzdesign did not create it.
     """
     from dzdesign.codegen.calibration.block import block_of
-    from dzdesign.codegen.calibration.block_files import image_of
-    from dzdesign.codegen.calibration.packing import OCTETS, pack, unpack
+    from dzdesign.codegen.calibration.packing import OCTETS, image_of, pack, unpack
 
     output = None if arguments.output is None else Path(arguments.output)
     form = _format_of(output, arguments.format)
@@ -141,17 +140,15 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
         If the file is not a calibration block, is damaged, or holds numbers that every firmware refuses. A block of
         another compensator is not an error: see ``belongs``.
     """
-    from dzdesign.codegen.calibration.block_files import placed_in_file
-    from dzdesign.codegen.calibration.packing import unpack
-    from dzdesign.codegen.calibration.place_text import place_in_words
+    from dzdesign.codegen.calibration.packing import read_block_file, unpack
     from dzdesign.codegen.calibration.reading import reading_of
     from dzdesign.codegen.project import targets
     from dzdesign.core.recorded_units import AS_COMPUTED
 
     path = Path(arguments.file)
-    octets, place = placed_in_file(path, _known_format(arguments.format))
+    octets, place = read_block_file(path, _known_format(arguments.format))
     sectors = {target.name: target.block_place for target in targets() if target.sector}
-    block, placed = unpack(octets, f"'{path}'"), place_in_words(place, sectors) if place else ""
+    block, placed = unpack(octets, f"'{path}'"), place.in_words(sectors) if place else ""
     reading = reading_of(block, f"'{path}'")
     if arguments.compensator is None:
         return ReadCalibration(
@@ -170,7 +167,7 @@ def read_calibration(arguments: ReadCalibrationArguments) -> ReadCalibration:
 
 
 def _known_format(name: str | None) -> str | None:
-    from dzdesign.codegen.calibration.block_files import FORMATS as KNOWN
+    from dzdesign.codegen.calibration.packing import FORMATS as KNOWN
 
     if name is not None and name not in KNOWN:
         raise InputError(f"--format is {quoted(name)}{nearest(name, KNOWN)}, expected {' or '.join(KNOWN)}")
@@ -179,7 +176,7 @@ def _known_format(name: str | None) -> str | None:
 
 def _format_of(output: Path | None, given: str | None) -> str:
     """Return the format that is asked for; a file whose ending says another could not be read back."""
-    from dzdesign.codegen.calibration.block_files import FORMATS as KNOWN
+    from dzdesign.codegen.calibration.packing import FORMATS as KNOWN
 
     ending = output.suffix.lower().removeprefix(".") if output is not None else ""
     if _known_format(given) is None:
@@ -199,14 +196,14 @@ def _format_of(output: Path | None, given: str | None) -> str:
 
 def _check_output(output: Path, form: str) -> None:
     """Refuse to write over what is not a calibration block."""
-    from dzdesign.codegen.calibration.block_files import octets_in_file
     from dzdesign.codegen.calibration.layout import MAGIC
+    from dzdesign.codegen.calibration.packing import read_block_file
 
     check_file_may_be_written(output)
     if not output.exists() or not output.stat().st_size:
         return
     try:
-        is_block = octets_in_file(output, form).startswith(MAGIC)
+        is_block = read_block_file(output, form)[0].startswith(MAGIC)
     except InputError:
         is_block = False
     if not is_block:

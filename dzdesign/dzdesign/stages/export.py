@@ -77,9 +77,8 @@ def export(arguments: ExportArguments) -> AmplifierExport:
     """
     from dzdesign.codegen.amplifier.device import device_named
     from dzdesign.codegen.amplifier.files import amplifier_file
-    from dzdesign.codegen.amplifier.given import given_dp_MPa, given_threshold
-    from dzdesign.codegen.amplifier.notes import notes_of
-    from dzdesign.codegen.amplifier.setting import amplifier_setting
+    from dzdesign.codegen.amplifier.output import notes_of
+    from dzdesign.codegen.amplifier.setting import amplifier_setting, given_dp_MPa, given_threshold
     from dzdesign.design.fixed_offset import dead_zones
 
     device = device_named(arguments.to)

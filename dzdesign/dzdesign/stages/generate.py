@@ -138,7 +138,7 @@ def _other_output(arguments: GenerateArguments, target: str) -> "Output":
 
 def chosen_of_outputs(arguments: OutputChoices) -> "dict[str, str | None]":
     """Return the options that are of one output other than a C firmware alone, as they were given; a plant is read."""
-    from dzdesign.codegen.amplifier.given import given_dp_MPa, given_threshold
+    from dzdesign.codegen.amplifier.setting import given_dp_MPa, given_threshold
     from dzdesign.codegen.other_targets import OTHER_TARGETS
 
     given_dp_MPa(arguments.table_dp), given_threshold(arguments.threshold)  # a wrong one is refused before any file

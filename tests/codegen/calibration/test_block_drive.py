@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.calibration.block import block_of, current_block
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for, current_block
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.verify.current.current_checks import read_controller

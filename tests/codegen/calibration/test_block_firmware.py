@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.calibration.block import block_of, current_block
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for, current_block
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.f28335.target import TARGET

@@ -2,8 +2,7 @@
 
 import pytest
 
-from dzdesign.codegen.calibration.block_files import FORMATS, image_of, octets_in_file
-from dzdesign.codegen.calibration.places import Place
+from dzdesign.codegen.calibration.packing import FORMATS, Place, image_of, read_block_file
 from dzdesign.codegen.project import target_named
 from dzdesign.core.errors import InputError
 from tests.support.block_reader import hex_memory
@@ -24,7 +23,7 @@ PLACES = {
 def test_a_file_gives_the_octets_back(name, place, tmp_path):
     for file in (tmp_path / f"block.{name}", tmp_path / "block.other"):
         file.write_bytes(image_of(OCTETS, name, place))
-        assert octets_in_file(file, None if file.suffix == f".{name}" else name) == OCTETS
+        assert read_block_file(file, None if file.suffix == f".{name}" else name)[0] == OCTETS
 
 
 @pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
@@ -58,13 +57,13 @@ def test_a_hex_file_of_words_with_an_error_is_refused(change, tmp_path):
     rows = image_of(OCTETS, "hex", PLACES["f28335"]).decode().split()
     (tmp_path / "a.hex").write_text("\n".join(change(rows)) + "\n")
     with pytest.raises(InputError, match=r"a\.hex"):
-        octets_in_file(tmp_path / "a.hex")
+        read_block_file(tmp_path / "a.hex")[0]
 
 
 def test_rows_may_come_in_any_order(tmp_path):
     first, *rows, end = image_of(OCTETS, "hex", PLACES["f28335"]).decode().split()
     (tmp_path / "a.hex").write_text("\n".join([first, *reversed(rows), end]) + "\n")
-    assert octets_in_file(tmp_path / "a.hex") == OCTETS
+    assert read_block_file(tmp_path / "a.hex")[0] == OCTETS
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from dzdesign.codegen.calibration.acceptance import refusals
-from dzdesign.codegen.calibration.block import block_of, current_block
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for, current_block
 from dzdesign.codegen.calibration.layout import CurrentBlock, SideBlock, entries
 from dzdesign.codegen.calibration.packing import pack
 from tests.support.block_cores import CompiledCheck

@@ -5,8 +5,7 @@ import ctypes
 import pytest
 
 from dzdesign.codegen.calibration.acceptance import refusals
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import SUPPLY_MASK
 from dzdesign.codegen.calibration.packing import pack

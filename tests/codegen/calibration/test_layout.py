@@ -8,8 +8,7 @@ from fractions import Fraction
 
 import pytest
 
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import STRUCTS, calibration_header, texts
 from dzdesign.codegen.calibration.layout import LENGTH_WORDS, MAGIC, NODE_MASK, CalibrationBlock, members, words_of
 from dzdesign.codegen.calibration.packing import pack, text_of, unpack

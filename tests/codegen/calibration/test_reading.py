@@ -1,11 +1,11 @@
 """A block in engineering units: against the compensator that it was made from, and hostile blocks of a right CRC."""
 
 import random
+import zlib
 from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.calibration import packing
 from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.layout import CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack, unpack
@@ -112,16 +112,11 @@ def test_a_hostile_block_is_read_or_refused():
         for _ in range(rng.choice((1, 1, 4, 40))):
             at = rng.randrange(8, OCTETS - 4)
             wrong[at] = rng.choice((0, 0xFF, rng.randrange(256)))
-        block = unpack(pack(unpack_any(bytes(wrong))))
+        wrong[-4:] = zlib.crc32(wrong[:-4]).to_bytes(4, "little")
+        block = unpack(bytes(wrong))
         try:
             reading_of(block, "block")
         except InputError:
             refused += 1
     assert 50 < refused < 150
 
-
-def unpack_any(octets: bytes) -> CalibrationBlock:
-    """Read a block whatever its CRC is."""
-    block = packing._unpacked(CalibrationBlock, octets)
-    assert isinstance(block, CalibrationBlock)
-    return block

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.core.artefact_files import write_folder

@@ -11,7 +11,7 @@ import pytest
 from dzdesign.codegen.fmu import files
 from dzdesign.codegen.fmu.description import UNITS
 from dzdesign.codegen.fmu.files import archive
-from dzdesign.codegen.fmu.plant import PARAMETERS
+from dzdesign.codegen.fmu.models import PARAMETERS
 from dzdesign.codegen.other_targets import generate_output
 from dzdesign.core.errors import InputError
 from dzdesign.stages.generate import GenerateArguments, generate
@@ -102,8 +102,8 @@ def test_units_of_the_recordings_are_display_units(no_binary):
     compensator = full_compensator()
     units = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0))
     valve = replace(compensator.valve, recorded_units=units)
-    from dzdesign.codegen.fmu.compensator import compensator_model
     from dzdesign.codegen.fmu.description import model_description
+    from dzdesign.codegen.fmu.models import compensator_model
 
     model = replace(compensator_model(compensator), units=valve.recorded_units)
     text = model_description(model, "{token}")
@@ -127,8 +127,7 @@ def displayed(model, name):
 
 def test_the_display_unit_of_a_command_is_that_of_its_side_and_of_no_other_voltage():
     """A reading of 12 mA at zero command falls on the negative side, whose outputs count from zero outwards."""
-    from dzdesign.codegen.fmu.compensator import compensator_model
-    from dzdesign.codegen.fmu.plant import plant_model
+    from dzdesign.codegen.fmu.models import compensator_model, plant_model
     from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
 
     def of(command):
@@ -146,7 +145,7 @@ def test_the_display_unit_of_a_command_is_that_of_its_side_and_of_no_other_volta
 
 
 def test_the_output_of_a_current_controller_is_a_current(no_binary):
-    from dzdesign.codegen.fmu.compensator import compensator_model, compensator_values
+    from dzdesign.codegen.fmu.models import compensator_model
     from dzdesign.codegen.project import target_named
     from tests.support.example_coil import SENSORS, with_current
 
@@ -154,7 +153,8 @@ def test_the_output_of_a_current_controller_is_a_current(no_binary):
     rated_A = made.current_drive.circuit.rated_A
     assert displayed(compensator_model(made), "u_O") == ("A", None)
     assert displayed(compensator_model(made), "u_i")[0] == "V"
-    assert compensator_values(made)["full_output"] == repr(float(rated_A)) != compensator_values(made)["u_max"]
+    values = compensator_model(made).values
+    assert values["full_output"] == repr(float(rated_A)) != values["u_max"]
 
 
 def test_the_plants_parameters_are_those_of_its_file():
@@ -171,7 +171,7 @@ def test_what_is_no_plant_is_refused(setting, no_binary):
 
 
 def test_a_plant_behind_a_current_controller_is_refused(no_binary, monkeypatch):
-    from dzdesign.codegen.fmu.plant import plant_of
+    from dzdesign.codegen.fmu.models import plant_of
 
     class Current:
         current_drive = object()

@@ -5,9 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from dzdesign.codegen.integers.form import Form, truncated
+from dzdesign.codegen.integers.form import RADIX, Form, Limbs, truncated
 from dzdesign.codegen.integers.law import block_form, function_form
-from dzdesign.codegen.integers.limbs import RADIX, Limbs
 from dzdesign.core.errors import DzdesignError, InputError
 from tests.codegen.test_codegen import random_compensators
 from tests.support.octave import compensator_of

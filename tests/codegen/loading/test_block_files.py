@@ -2,7 +2,7 @@
 
 import pytest
 
-from dzdesign.codegen.calibration.block_files import MOST_OCTETS, octets_in_file
+from dzdesign.codegen.calibration.packing import MOST_OCTETS, read_block_file
 from dzdesign.core.errors import InputError
 from tests.support.block_reader import hex_text
 
@@ -19,7 +19,7 @@ OCTETS = bytes(range(256)) * 6 + b"end"
 )
 def test_each_format_gives_the_octets_wherever_they_lie(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
-    assert octets_in_file(tmp_path / name) == OCTETS
+    assert read_block_file(tmp_path / name)[0] == OCTETS
 
 
 @pytest.mark.parametrize(
@@ -38,4 +38,4 @@ def test_each_format_gives_the_octets_wherever_they_lie(tmp_path, name, content)
 def test_a_file_with_an_error_is_refused(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=said):
-        octets_in_file(tmp_path / name)
+        read_block_file(tmp_path / name)[0]

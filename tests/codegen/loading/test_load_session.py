@@ -7,7 +7,6 @@ import pytest
 from dzdesign.codegen.loading.protocol import (
     FRAME_OCTETS,
     MOST_PAYLOAD,
-    REASON_TEXTS,
     REPLY,
     Frame,
     FrameReader,
@@ -103,7 +102,7 @@ def test_a_refusal_ends_the_load_but_a_lost_place_begins_it_anew(reason):
     with pytest.raises(RefusedError) as caught:
         load(lambda frame, count: reply(frame, reason, 8))
     assert (caught.value.reason, caught.value.detail) == (reason, 8)
-    assert str(caught.value) == REASON_TEXTS[reason]
+    assert str(caught.value) == reason.text
 
 
 def test_a_drive_of_another_version_is_told():

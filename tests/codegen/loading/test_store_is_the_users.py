@@ -1,6 +1,6 @@
 """The memory's functions are the user's to fill in: what else a firmware of block form has is generated as it is."""
 
-from dzdesign.codegen.loading.files import LOAD_FILES, STORE
+from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE
 from dzdesign.codegen.project import generate, write_firmware
 from tests.support.loading.files import compensator
 

@@ -12,9 +12,8 @@ import pytest
 from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.lot_firmware import firmware_left
 from dzdesign.block_checks import blocks_checked, given_blocks
-from dzdesign.codegen.calibration.block_files import octets_in_file
-from dzdesign.codegen.calibration.built_for import built_for
-from dzdesign.codegen.calibration.packing import pack, text_of, unpack
+from dzdesign.codegen.calibration.block import built_for
+from dzdesign.codegen.calibration.packing import pack, read_block_file, text_of, unpack
 from dzdesign.codegen.project import block_core, generate
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of
@@ -85,9 +84,9 @@ def test_one_firmware_and_a_block_a_valve(made):
     assert len(core) == 6
     assert all((projects[0] / name).read_text(encoding="utf-8") == text for name, text in core.items())
     for name in ("V0000", "V0001"):
-        folder, octets = valve(output, name), octets_in_file(valve(output, name) / "calibration.bin")
+        folder, octets = valve(output, name), read_block_file(valve(output, name) / "calibration.bin")[0]
         block = unpack(octets)
-        assert octets == octets_in_file(folder / "calibration.hex") and text_of(block.serial) == f"{name}-S"
+        assert octets == read_block_file(folder / "calibration.hex")[0] and text_of(block.serial) == f"{name}-S"
         content = (folder / "compensator.json").read_bytes()
         alone = generate(compensator_of(folder), "host", "block")
         assert replace(unpack(alone.block), serial=block.serial, crc32=block.crc32) == block

@@ -11,8 +11,7 @@ import pytest
 
 from dzdesign import api
 from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.block_files import image_of
-from dzdesign.codegen.calibration.packing import pack
+from dzdesign.codegen.calibration.packing import image_of, pack
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command

@@ -18,8 +18,7 @@ import pytest
 import serial
 
 from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_CALIBRATION, STATUS_RELEASED, Frame
-from dzdesign.codegen.telemetry.recording import COLUMNS, Recording, scalings_of
-from dzdesign.codegen.telemetry.recording_file import recording_file
+from dzdesign.codegen.telemetry.recording import COLUMNS, Recording, recording_file, scalings_of
 from dzdesign.commands.monitor import _other_firmware
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError

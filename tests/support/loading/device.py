@@ -4,8 +4,7 @@ import subprocess
 from pathlib import Path
 
 from dzdesign.codegen.banner import Banner
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files

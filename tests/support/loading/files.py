@@ -6,8 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from dzdesign.codegen.banner import Banner
-from dzdesign.codegen.calibration.block import block_of
-from dzdesign.codegen.calibration.built_for import built_for
+from dzdesign.codegen.calibration.block import block_of, built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import LENGTH_WORDS
 from dzdesign.codegen.calibration.packing import pack

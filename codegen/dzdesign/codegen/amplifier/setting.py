@@ -7,6 +7,7 @@ from math import ceil, floor
 
 from dzdesign.codegen.amplifier.device import Device, Parameter
 from dzdesign.core.errors import InputError
+from dzdesign.core.option_readers import percent, quantity
 from dzdesign.core.worded import errors_in
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import (
@@ -23,6 +24,39 @@ from dzdesign.design.signals import SIDE_NAMES
 
 #: A recorded pressure drop is this near to the one that was meant.
 NEAR = Fraction(1, 100)
+#: A larger share of command is no threshold of a zero command.
+LARGEST_THRESHOLD = 0.3
+PA_IN_MPA = 10**6
+
+
+def given_dp_MPa(text: str | None) -> Fraction | None:
+    """Return the pressure drop of ``--table-dp``, MPa; None where it was not given.
+
+    Examples
+    --------
+    >>> given_dp_MPa("25 bar"), given_dp_MPa(None)
+    (Fraction(5, 2), None)
+    """
+    return None if text is None else Fraction(repr(quantity("pressure")(text, "--table-dp"))) / PA_IN_MPA
+
+
+def given_threshold(text: str | None) -> Fraction | None:
+    """Return the share of command of ``--threshold``; None where it was not given.
+
+    Examples
+    --------
+    >>> given_threshold("0.5 %"), given_threshold(None)
+    (Fraction(1, 200), None)
+    """
+    if text is None:
+        return None
+    threshold = percent("0.5 %")(text, "--threshold")
+    if threshold > LARGEST_THRESHOLD:
+        raise InputError(
+            f"--threshold is '{text}', expected at most {LARGEST_THRESHOLD:.0%}: the valve rests at every command up "
+            "to it"
+        )
+    return Fraction(repr(threshold))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,14 +132,6 @@ def _nominal(dp_MPa: Fraction, offsets: Mapping[int, FixedOffset]) -> Fraction:
     return high if high <= dp_MPa <= high * (1 + NEAR) else dp_MPa
 
 
-def _down(value: Fraction, unit: int) -> Fraction:
-    return Fraction(floor(value * unit), unit)
-
-
-def _up(value: Fraction, unit: int) -> Fraction:
-    return Fraction(ceil(value * unit), unit)
-
-
 def _jump(
     compensator: Compensator, device: Device, offsets: Mapping[int, FixedOffset], rest: Fraction
 ) -> AmplifierSetting:
@@ -151,7 +177,7 @@ def _table(
     unit, characteristics = device.counts_of_full, {}
     for sign, offset in offsets.items():
         exact = pressure_line(compensator, offset, dp_MPa, max(rest, Fraction(1, unit)))
-        nodes = [(_up(command, unit), _down(drive, unit)) for command, drive in exact.nodes]
+        nodes = [(Fraction(ceil(x * unit), unit), Fraction(floor(drive * unit), unit)) for x, drive in exact.nodes]
         for place in range(len(nodes) - 2, 0, -1):  # drives rise from point to point, where the design limits them too
             command, drive = nodes[place]
             nodes[place] = command, min(drive, nodes[place + 1][1] - Fraction(1, unit))
@@ -205,13 +231,11 @@ def _limit(compensator: Compensator) -> Fraction:
 
 
 def _check_range(device: Device, parameter: Parameter, name: str, counts: int, remedy: str) -> None:
-    if counts > parameter.most:
-        raise InputError(
-            f"{device.title} takes at most {device.in_unit(parameter.most)} as {name}, and {device.in_unit(counts)} "
-            f"are needed; {remedy}"
-        )
-    if counts < parameter.least:
-        raise InputError(
-            f"{device.title} takes at least {device.in_unit(parameter.least)} as {name}, and "
-            f"{device.in_unit(counts)} are safe; {remedy}"
-        )
+    if parameter.least <= counts <= parameter.most:
+        return
+    end, limit, verb = ("least", parameter.least, "safe") if counts < parameter.least else (
+        "most", parameter.most, "needed")  # fmt: skip
+    raise InputError(
+        f"{device.title} takes at {end} {device.in_unit(limit)} as {name}, and {device.in_unit(counts)} are {verb}; "
+        f"{remedy}"
+    )

@@ -1,38 +1,68 @@
 """Which blocks a firmware accepts, in integers of any length: what dz_calibration_check() must say of each.
 
 Written from what the arithmetic can handle, not from the C: that differs where 64 bits are few. Every rule is an
-inequality of exact integers, so that a test can compare both on any block.
+inequality of exact integers, so that a test can compare both on any block. The limits of single numbers are those of
+the C too.
 """
 
 from collections.abc import Iterator
 
-from dzdesign.codegen.calibration.built_for import BuiltFor
 from dzdesign.codegen.calibration.layout import (
     LAYOUT,
     LENGTH_WORDS,
     MAGIC,
     NO_INTERLOCK,
+    BuiltFor,
     CalibrationBlock,
     CurrentBlock,
     SideBlock,
 )
-from dzdesign.codegen.calibration.limits import (
-    LARGEST_CODES,
-    LARGEST_CURRENT_SHIFT,
-    LARGEST_DROP,
-    LARGEST_GAIN_SHIFT,
-    LARGEST_NOISE,
-    LARGEST_OFFSET_SHIFT,
-    LARGEST_PLAY,
-    LARGEST_STEP_SHIFT,
-    LARGEST_TESTED,
-    largest_node,
-)
 from dzdesign.codegen.core.integer_form import INT32_MAX, INT64_MAX
 from dzdesign.design.current.loop import LARGEST_ERROR, LARGEST_GAIN
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
-from dzdesign.design.signals import WEIGHT_SHIFT
+from dzdesign.design.signals import LARGEST_DIFFERENCE, WEIGHT_SHIFT
 
+#: Pressure drop in codes of sensor A times 4096: one more would be a code too many.
+LARGEST_DROP = ((LARGEST_DIFFERENCE + 1) << WEIGHT_SHIFT) - 1
+#: Above it a difference from it could leave 31 bits.
+LARGEST_TESTED = 2**30 - 1
+#: Codes of command that the drive functions count with, and ticks of half a dither's wave.
+LARGEST_CODES = 32767
+LARGEST_PLAY, LARGEST_NOISE, LARGEST_STEP_SHIFT = 32, 4095, 12
+LARGEST_GAIN_SHIFT, LARGEST_CURRENT_SHIFT, LARGEST_OFFSET_SHIFT = 13, 15, 12
+
+
+def largest_node(beta_step: int) -> int:
+    """Return the largest node: times the codes between two nodes it stays below 2^31.
+
+    Examples
+    --------
+    >>> largest_node(64)
+    33554431
+    """
+    return INT32_MAX // beta_step
+
+
+#: Limits that the C names; each its value, its literal and what it is.
+NAMED: tuple[tuple[str, int, str, str], ...] = (
+    ("LARGEST_WORD", 2**32 - 1, "uint32", "largest number of 32 bits"),
+    ("LARGEST_INT32", INT32_MAX, "uint32", "largest number of 32 bits with a sign"),
+    ("LARGEST_DROP", LARGEST_DROP, "uint32", "largest pressure drop of valid codes, codes of sensor A times 4096"),
+    ("LARGEST_TESTED", LARGEST_TESTED, "uint32", "largest limit of the tested pressure drops, in the same unit"),
+    ("LARGEST_CODES", LARGEST_CODES, "plain", "largest count of codes, or of ticks, in 16 bits with a sign"),
+    ("LARGEST_PLAY", LARGEST_PLAY, "plain", "most codes of travel between the branches of the play"),
+    ("LARGEST_NOISE", LARGEST_NOISE, "plain", "most codes that a command may stray without turning"),
+    ("LARGEST_STEP_SHIFT", LARGEST_STEP_SHIFT, "plain", "largest distance of nodes, a power of two"),
+    ("MOST_FAULT_SAMPLES", MOST_FAULT_SAMPLES, "plain", "most samples that end a fault"),
+    ("NO_INTERLOCK", NO_INTERLOCK, "plain", "the drive waits for no zero command"),
+)
+#: The same of the current controller.
+OF_CURRENT: tuple[tuple[str, int, str, str], ...] = (
+    ("LARGEST_GAIN", LARGEST_GAIN, "plain", "largest gain"),
+    ("LARGEST_GAIN_SHIFT", LARGEST_GAIN_SHIFT, "plain", "most fractional bits of the gains"),
+    ("LARGEST_ERROR", LARGEST_ERROR, "uint32", "largest current that is no short, counts"),
+    ("LARGEST_OFFSET_SHIFT", LARGEST_OFFSET_SHIFT, "plain", "most sums that the offset is the mean of, a power of two"),
+)
 U16 = 0xFFFF
 #: Rules of one group: what each is, and whether it holds.
 Rules = Iterator[tuple[str, bool]]
@@ -101,8 +131,9 @@ def _side(block: CalibrationBlock, side: SideBlock, built: BuiltFor, rises: bool
     used = [node for node in range(len(law)) if node < side.node_count or node >= mask]
     yield "nodes", drop // (built.beta_step << WEIGHT_SHIFT) + 2 <= side.node_count <= mask
     yield "beta at zero command above the law's", all(low <= high for low, high in zip(at_zero, law, strict=True))
-    yield "beta in use is above 0 and no less than the fallback's", all(
-        1 <= at_zero[node] >= at_zero[mask] and law[node] >= law[mask] for node in used
+    yield (
+        "beta in use is above 0 and no less than the fallback's",
+        all(1 <= at_zero[node] >= at_zero[mask] and law[node] >= law[mask] for node in used),
     )
     yield "one fallback", side.nodes[2 * mask : 2 * mask + 2] == side.nodes[2 * mask + 2 :]
     yield "largest node", max(law) <= largest_node(built.beta_step)

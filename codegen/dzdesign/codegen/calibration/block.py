@@ -1,11 +1,10 @@
-"""`block_of`: a `Compensator` as the numbers of its calibration block; `numbers_of`: as those of a fixed firmware."""
+"""A `Compensator` as the numbers of its calibration block or of a fixed firmware, and what that is compiled for."""
 
 from fractions import Fraction
 from math import floor
 from typing import Any, TypeVar
 
 from dzdesign.codegen.calibration.acceptance import refusals
-from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
 from dzdesign.codegen.calibration.layout import (
     BLOCK_SIZES,
     LENGTH_WORDS,
@@ -13,6 +12,8 @@ from dzdesign.codegen.calibration.layout import (
     NO_RAMP,
     RECORD_WORDS,
     SERIAL_WORDS,
+    SHAPE_BITS,
+    BuiltFor,
     CalibrationBlock,
     CurrentBlock,
     SideBlock,
@@ -32,6 +33,48 @@ FALLBACKS = 2
 ALTERNATIVE = "generate it with --calibration fixed"
 
 Part = TypeVar("Part", SideBlock, CurrentBlock)
+
+
+def built_for(compensator: Compensator, *, fixed: bool = False) -> BuiltFor:
+    """Return what the firmware of a compensator's block is compiled for, or the one with its numbers in it."""
+    signals, drive = compensator.signals, compensator.current_drive
+    holds = {
+        "BIPOLAR": compensator.negative is not None,
+        "FALLING": signals.command.direction(1) < 0,
+        "SWAPPED": signals.swapped and compensator.negative is not None,
+        "CURRENT": drive is not None,
+        "SUPPLY": drive is not None and drive.loop.supply is not None,
+    }
+    return BuiltFor(
+        shape=sum(holds[name] << place for place, name in enumerate(SHAPE_BITS)),
+        code_max=signals.code_max,
+        compare_max=signals.compare_max,
+        sample_Hz=signals.sample_Hz,
+        tick_Hz=signals.tick_Hz,
+        beta_step=compensator.beta_step_codes,
+        samples=drive.loop.samples if drive else 0,
+        sizes=_sizes_for(compensator) if fixed else BLOCK_SIZES,
+        fixed=fixed,
+    )
+
+
+def _sizes_for(compensator: Compensator) -> Sizes:
+    """Return the arrays that the numbers of a compensator take."""
+    functions, drive, signs = compensator.drive_functions, compensator.current_drive, compensator.signals.signs
+    play = max(len(functions.play_counts[place]) for place in range(len(signs))) if functions.has_play else 0
+    supply = len(drive.loop.supply.nodes) if drive and drive.loop.supply else 0
+    return Sizes(
+        sides=len(signs),
+        # The fallback stands at the mask, behind every node of the table.
+        node_mask=_all_ones(max(len(compensator.side(sign).beta) for sign in signs)),
+        play_mask=_all_ones(play - 2),
+        supply_mask=_all_ones(supply - 2),
+    )
+
+
+def _all_ones(least: int) -> int:
+    """Return the smallest mask, all ones, that is no less; 0 of a negative number."""
+    return (1 << max(least, 0).bit_length()) - 1
 
 
 def entry_of_record(compensator: Compensator, name: str) -> str:
@@ -55,9 +98,8 @@ def block_of(
         for name, given in (("serial", serial), ("record", record))
     )
     block = _numbers(compensator, built, digest, serial, record)
-    if refused := refusals(block, built):
-        rules = "; ".join(f"{name}: {', '.join(rules)}" for name, rules in refused.items())
-        raise InputError(f"the firmware would refuse this compensator's calibration block ({rules}); {ALTERNATIVE}")
+    if refused := _refused(block, built):
+        raise InputError(f"the firmware would refuse this compensator's calibration block ({refused}); {ALTERNATIVE}")
     return block
 
 
@@ -68,10 +110,13 @@ def numbers_of(compensator: Compensator) -> CalibrationBlock:
     """
     built = built_for(compensator, fixed=True)
     numbers = _numbers(compensator, built, "", "", "")
-    if refused := refusals(numbers, built):
-        rules = "; ".join(f"{name}: {', '.join(rules)}" for name, rules in refused.items())
-        raise InputError(f"numbers of this compensator leave the range of the firmware's arithmetic ({rules})")
+    if refused := _refused(numbers, built):
+        raise InputError(f"numbers of this compensator leave the range of the firmware's arithmetic ({refused})")
     return numbers
+
+
+def _refused(block: CalibrationBlock, built: BuiltFor) -> str:
+    return "; ".join(f"{name}: {', '.join(rules)}" for name, rules in refusals(block, built).items())
 
 
 def _numbers(compensator: Compensator, built: BuiltFor, digest: str, serial: str, record: str) -> CalibrationBlock:
@@ -185,36 +230,21 @@ def _division(form: IntegerForm, compare_limit: int) -> dict[str, int]:
 
 
 def current_block(loop: CurrentLoop, sizes: Sizes = BLOCK_SIZES) -> CurrentBlock:
-    """Return the current controller."""
+    """Return the current controller; what is not named here has its name, and its number, from the loop."""
     supply = loop.supply
     low, high = supply.valid_codes if supply else (0, 0)
-    return CurrentBlock(
-        integral_limit=loop.integral_limit << loop.gain_shift,
-        release=loop.release << loop.gain_shift,
-        compare_limit=loop.compare_limit,
-        rate=loop.rate,
-        samples=loop.samples,
-        current_gain=loop.current_gain,
-        current_shift=loop.current_shift,
-        gain_shift=loop.gain_shift,
-        proportional=loop.proportional,
-        integral=loop.integral,
-        feed_forward=loop.feed_forward,
-        offset_nominal=loop.offset_nominal,
-        offset_low=max(loop.offset_nominal - loop.offset_tolerance, 0),
-        offset_high=loop.offset_nominal + loop.offset_tolerance,
-        offset_shift=loop.offset_shift,
-        short_sum=loop.short_sum,
-        over_sum=loop.over_sum,
-        over_ticks=loop.over_ticks,
-        open_sum=loop.open_sum,
-        open_compare=loop.open_compare,
-        open_ticks=loop.open_ticks,
-        supply_low=low,
-        supply_high=high,
-        supply_shift=_shift(supply.step_codes) if supply else 0,
-        supply=_nodes(supply.nodes if supply else (), sizes.supply_mask, "the supply's correction"),
-    )
+    numbers: dict[str, Any] = {name: getattr(loop, name) for name in entries(CurrentBlock) if hasattr(loop, name)}
+    numbers |= {
+        "integral_limit": loop.integral_limit << loop.gain_shift,
+        "release": loop.release << loop.gain_shift,
+        "offset_low": max(loop.offset_nominal - loop.offset_tolerance, 0),
+        "offset_high": loop.offset_nominal + loop.offset_tolerance,
+        "supply_low": low,
+        "supply_high": high,
+        "supply_shift": _shift(supply.step_codes) if supply else 0,
+        "supply": _nodes(supply.nodes if supply else (), sizes.supply_mask, "the supply's correction"),
+    }
+    return CurrentBlock(**numbers)
 
 
 def _nothing(kind: type[Part]) -> Part:

@@ -5,11 +5,12 @@ firmware in block form the one that its caller passes, else the `static const` o
 folds into the code.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
-from dzdesign.codegen.calibration.block import numbers_of
-from dzdesign.codegen.calibration.built_for import BuiltFor, built_for
+from dzdesign.codegen.calibration.acceptance import LARGEST_CODES, NAMED, OF_CURRENT, largest_node
+from dzdesign.codegen.calibration.block import built_for, numbers_of
 from dzdesign.codegen.calibration.layout import (
     INNER,
     LAYOUT,
@@ -17,14 +18,15 @@ from dzdesign.codegen.calibration.layout import (
     MAGIC,
     NO_INTERLOCK,
     SHAPE_BITS,
+    BuiltFor,
     CalibrationBlock,
     CurrentBlock,
     SideBlock,
     Words,
     entries,
 )
-from dzdesign.codegen.calibration.limits import LARGEST_CODES, NAMED, OF_CURRENT, crc_steps, largest_node
 from dzdesign.codegen.calibration.numbers import ValvePage, valve_keys
+from dzdesign.codegen.calibration.packing import pack, unpack
 from dzdesign.codegen.core.certificate_text import (
     KAPPA_ROUNDING,
     U_MIN0_ROUNDING,
@@ -41,6 +43,7 @@ from dzdesign.codegen.core.status_bits import (
     drive_status_constants,
     status_constants,
 )
+from dzdesign.codegen.target import Target
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
@@ -68,6 +71,10 @@ LENGTHS = {
 }
 #: The numbers of a valve, beside the law.
 VALVE_HEADER = "dz_valve.h"
+#: What holds a block in a target's folder, and gives it a flash sector of its own.
+BLOCK_SOURCE, BLOCK_HEADER, LINKER_FILE = "dz_block.c", "dz_block.h", "dz_calibration.cmd"
+#: 04C11DB7h, reflected.
+CRC_POLYNOMIAL = 0xEDB88320
 
 
 def block_core_files(built: BuiltFor) -> dict[str, CoreFile]:
@@ -122,8 +129,11 @@ def _core_file(template: str, values: Values, constants: Sequence[Define]) -> Co
     name = template.removesuffix(".jinja")
     return CoreFile(
         template=template,
-        values={**values, "misra_lines": misra_lines(name, fixed=bool(values["fixed"])),
-                "constants": defines(constants)},
+        values={
+            **values,
+            "misra_lines": misra_lines(name, fixed=bool(values["fixed"])),
+            "constants": defines(constants),
+        },
         constants=tuple(each.entry(f"core/{name}") for each in constants),
     )
 
@@ -240,7 +250,7 @@ def _check_file(built: BuiltFor) -> CoreFile:
         _limit("LARGEST_NODE", largest_node(built.beta_step), "uint32", "largest node: times DZ_BETA_STEP below 2^31"),
         *(_limit(*each) for each in named),
     ]
-    steps = [LITERALS["uint32"].format(step) for step in crc_steps()]
+    steps = [LITERALS["uint32"].format(step) for step in _crc_steps()]
     values: Values = {
         **_form(built),
         "rises": not built.has("FALLING"),
@@ -251,6 +261,20 @@ def _check_file(built: BuiltFor) -> CoreFile:
         "wide_codes": built.code_max > LARGEST_CODES,
     }
     return _core_file("dz_calibration.c.jinja", values, limits)
+
+
+def _crc_steps() -> tuple[int, ...]:
+    """Return what four zero bits more make of the CRC-32 of four bits, for each value of these.
+
+    Examples
+    --------
+    >>> [f"{step:08X}" for step in _crc_steps()[:3]]
+    ['00000000', '1DB71064', '3B6E20C8']
+    """
+    found = list(range(16))
+    for _ in range(4):
+        found = [step >> 1 ^ (CRC_POLYNOMIAL if step & 1 else 0) for step in found]
+    return tuple(found)
 
 
 def _limit(symbol: str, value: int, literal: str, text: str) -> Define:
@@ -369,3 +393,34 @@ def _findings() -> list[Define]:
                engineering=text, rounding="a convention")
         for place, (name, text) in enumerate(FINDINGS.items())
     ]  # fmt: skip
+
+
+def block_templates(target: Target, block: CalibrationBlock | None) -> Mapping[str, str]:
+    """Return the files that hold the block in a target's folder, path to template."""
+    return {f"{target.folder}/{name}": f"{name}.jinja" for name in _files_of_block(target, block)}
+
+
+def _files_of_block(target: Target, block: CalibrationBlock | None) -> tuple[str, ...]:
+    return (BLOCK_SOURCE, BLOCK_HEADER, *([LINKER_FILE] if target.sector else [])) if block else ()
+
+
+def block_values(compensator: Compensator, block: CalibrationBlock | None, target: Target) -> Values:
+    """Return what the templates around the core print of the block; `block` is its calls' first argument."""
+    current, lines, sector = compensator.current_drive, list[str](), target.sector
+    if block:
+        with_crc = replace(block, crc32=unpack(pack(block)).crc32)
+        lines = ValvePage(compensator=compensator, block=with_crc, built=built_for(compensator)).lines()
+    values: Values = {
+        "block": "&dz_block, " if block else "",
+        "block_files": _files_of_block(target, block),
+        "block_sources": (BLOCK_SOURCE,) if block else (),
+        "block_headers": (BLOCK_HEADER,) if block else (),
+        "block_lines": lines,
+        "command_zero": "dz_block.command_zero" if block else "DZ_DRIVE_COMMAND_ZERO",
+        "offset_ticks": f"{1 << current.loop.offset_shift}u" if block and current else "DZ_CURRENT_OFFSET_TICKS",
+        "sector": sector is not None,
+    }
+    if sector:
+        place = {"block_address": f"{sector.address:#x}", "block_words": LENGTH_WORDS}
+        return {**values, **place, "region": sector.region, "region_page": sector.page, "region_file": sector.file}
+    return values

@@ -3,12 +3,11 @@ engineering units, how it was rounded, and where it comes from. The manifest lis
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from textwrap import wrap
 
-from dzdesign.codegen.calibration.built_for import BuiltFor
-from dzdesign.codegen.calibration.layout import INNER, NO_INTERLOCK, NO_RAMP, CalibrationBlock, Words, entries
+from dzdesign.codegen.calibration.layout import NO_INTERLOCK, NO_RAMP, BuiltFor, CalibrationBlock, Words, members
 from dzdesign.codegen.calibration.packing import text_of
 from dzdesign.codegen.core.command_shares import in_unit, share_of_command
 from dzdesign.codegen.core.constants import COLUMNS, c_comment
@@ -21,6 +20,15 @@ from dzdesign.design.firmware_manifest import FirmwareConstant
 from dzdesign.design.signals import SIDE_NAMES
 
 SIGNS = (1, -1)
+#: Before the first member of each struct in the block's, and behind its last one.
+OPENS = {
+    "": (),
+    "sides[0]": (".sides = {", "    { /* positive commands */"),
+    "sides[1]": ("    { /* negative commands */",),
+    "current": (".current = {",),
+}
+CLOSES = {"": (), "sides[0]": ("    },", "},"), "sides[1]": ("    },", "},"), "current": ("},",)}
+INDENTS = {"": "", "sides[0]": " " * 8, "sides[1]": " " * 8, "current": " " * 4}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,72 +79,46 @@ class ValvePage:
     block: CalibrationBlock
     built: BuiltFor
 
+    def numbers(self) -> Iterator[Number]:
+        """Yield every member that this firmware has, in the order of the struct."""
+        parts: dict[str, object] = {"": self.block, "current": self.block.current}
+        # What is not set C makes zero.
+        parts |= {f"sides[{place}]": self.block.sides[place] for place in range(len(self.compensator.signals.signs))}
+        if self.built.fixed and not self.built.has("CURRENT"):
+            del parts["current"]
+        for path, _, entry in members():
+            place, _, name = path.rpartition(".")
+            if place not in parts or (entry.of_block and self.built.fixed):
+                continue
+            key, sign = entry.key, self._sign(path)
+            known = self._current if place == "current" else self._own
+            if sign:
+                key = key.replace("*", SIDE_NAMES[sign])
+                known = self._sides[sign]
+            value = getattr(parts[place], name)
+            yield Number(path=path, entry=entry, value=value, engineering=known.get(name, ""), key=key)
+
     def lines(self) -> list[str]:
         """Return what stands between the braces of a `struct dz_calibration`."""
-        return list(self._lines(self.block, "", ""))
+        lines: list[str] = []
+        within = ""
+        for number in self.numbers():
+            place = number.path.rpartition(".")[0]
+            if place != within:
+                lines += [*CLOSES[within][: 1 if place == "sides[1]" else None], *OPENS[place]]
+                within = place
+            indent = INDENTS[place]
+            lines += [f"{indent}{line}" for line in (*number.comment(len(indent) + 4), *self._assigned(number))]
+        return [*lines, *CLOSES[within]]
 
-    def numbers(self) -> Iterator[Number]:
-        """Yield every member in the order of the struct."""
-        yield from self._numbers(self.block, "")
+    @staticmethod
+    def _sign(path: str) -> int:
+        """Return the sign of command whose side a member is of; 0 of no side."""
+        return SIGNS[path.startswith("sides[1]")] if path.startswith("sides") else 0
 
-    def _parts(self, value: object) -> tuple[object, ...]:
-        """Return the structs of a member that is one itself, or an array of them."""
-        if isinstance(value, tuple):
-            return value[: len(self.compensator.signals.signs)]  # what is not set C makes zero
-        return (value,) if not self.built.fixed or self.built.has("CURRENT") else ()
-
-    def _numbers(self, part: object, path: str) -> Iterator[Number]:
-        for name, entry in self._members(part):
-            value = getattr(part, name)
-            if entry:
-                yield self._number(path, name, entry, value)
-                continue
-            for index, each in enumerate(self._parts(value)):
-                yield from self._numbers(each, f"{path}{name}{f'[{index}]' if INNER[name][1] > 1 else ''}.")
-
-    def _lines(self, part: object, path: str, indent: str) -> Iterator[str]:
-        for name, entry in self._members(part):
-            value = getattr(part, name)
-            if entry:
-                number = self._number(path, name, entry, value)
-                yield from (f"{indent}{line}" for line in number.comment(len(indent) + 4))
-                yield from (f"{indent}{line}" for line in self._assigned(name, number, path))
-                continue
-            parts = self._parts(value)
-            if INNER[name][1] == 1:
-                for each in parts:
-                    yield f"{indent}.{name} = {{"
-                    yield from self._lines(each, f"{name}.", f"{indent}    ")
-                    yield f"{indent}}},"
-                continue
-            yield f"{indent}.{name} = {{"
-            for index, each in enumerate(parts):
-                yield f"{indent}    {{ /* {SIDE_NAMES[SIGNS[index]]} commands */"
-                yield from self._lines(each, f"{name}[{index}].", f"{indent}        ")
-                yield f"{indent}    }},"
-            yield f"{indent}}},"
-
-    def _members(self, part: object) -> Iterator[tuple[str, Words | None]]:
-        """Yield the members of a struct that this firmware has; None of one that is a struct."""
-        own = entries(type(part))
-        for each in fields(part):  # type: ignore[arg-type]
-            entry = own.get(each.name)
-            if not (entry and entry.of_block and self.built.fixed):
-                yield each.name, entry
-
-    def _number(self, path: str, name: str, entry: Words, value: int | tuple[int, ...]) -> Number:
-        key = entry.key
-        if path.startswith("sides"):
-            sign = SIGNS[path.startswith("sides[1]")]
-            key = key.replace("*", SIDE_NAMES[sign])
-            known = self._sides[sign] if sign in self.compensator.signals.signs else {}
-        else:
-            known = self._current if path else self._own
-        return Number(path=path + name, entry=entry, value=value, engineering=known.get(name, ""), key=key)
-
-    def _assigned(self, name: str, number: Number, path: str) -> Iterator[str]:
+    def _assigned(self, number: Number) -> Iterator[str]:
         """Yield one member with its value: two halves of a number of 64 bits, pairs in braces, a table's rows."""
-        value, entry = number.value, number.entry
+        name, value, entry = number.path.rpartition(".")[2], number.value, number.entry
         if isinstance(value, int):
             words = (value % 2**32, value >> 32) if entry.bits == 64 else (value,)
             printed = [f"{word}u" if entry.bits == 16 else f"UINT32_C({word})" for word in words]
@@ -144,7 +126,7 @@ class ValvePage:
             return
         yield f".{name} = {{"
         if entry.pairs:
-            yield from (f"    {line}" for line in self._rows(value, SIGNS[path.startswith("sides[1]")]))
+            yield from (f"    {line}" for line in self._rows(value, self._sign(number.path)))
         else:
             texts = ", ".join(f"{each}u" for each in value)
             yield from (f"    {line}" for line in wrap(texts, COLUMNS - 24))

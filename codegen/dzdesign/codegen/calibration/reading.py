@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from dzdesign.codegen.calibration.acceptance import refusals
-from dzdesign.codegen.calibration.built_for import BuiltFor
-from dzdesign.codegen.calibration.layout import NO_INTERLOCK, NO_RAMP, SHAPE_BITS, CalibrationBlock, SideBlock
+from dzdesign.codegen.calibration.layout import NO_INTERLOCK, NO_RAMP, SHAPE_BITS, BuiltFor, CalibrationBlock, SideBlock
 from dzdesign.codegen.calibration.packing import octets_of, text_of
 from dzdesign.core.errors import InputError
 from dzdesign.design.drive_functions import RAMP_UNIT

@@ -98,6 +98,12 @@ class Model:
     description: str
     #: In the order of their references.
     variables: tuple[Variable, ...]
+    #: Of its C, and what that prints.
+    template: str
+    values: Mapping[str, object]
+    #: C files of its own, and files of its data, by name.
+    core: Mapping[str, bytes] = field(default_factory=dict)
+    extra: Mapping[str, bytes] = field(default_factory=dict)
     #: Offered for Model Exchange too, and not for Co-Simulation alone.
     exchange: bool = False
     step_s: float

@@ -23,11 +23,9 @@ from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 from zlib import error as ZlibError
 
 from dzdesign.codegen.banner import banner_of
-from dzdesign.codegen.fmu.compensator import compensator_core, compensator_model, compensator_values
 from dzdesign.codegen.fmu.description import SOURCE, Model, model_description
-from dzdesign.codegen.fmu.plant import plant_model, plant_of, plant_values
+from dzdesign.codegen.fmu.models import compensator_model, plant_model, plant_of
 from dzdesign.core.artefact_files import TOOL, sha256_of
-from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import MissingToolError, quoted
 from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import scratch_folder
@@ -83,17 +81,6 @@ PLATFORMS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parts:
-    """What an FMU is made of beside its model: printed values, C files of its own, and the file of its data."""
-
-    model: Model
-    template: str
-    values: Mapping[str, object]
-    core: Mapping[str, bytes]
-    extra: Mapping[str, bytes]
-
-
 def output_files(
     compensator: Compensator, origin: FirmwareOrigin, settings: Mapping[str, str]
 ) -> Mapping[str, bytes]:
@@ -104,26 +91,8 @@ def output_files(
     """
     made_with()
     plant = plant_of(settings.get("plant", ""), compensator)
-    parts = [
-        Parts(
-            model=compensator_model(compensator),
-            template="compensator.c.jinja",
-            values=compensator_values(compensator),
-            core=compensator_core(compensator),
-            extra={Compensator.FILE_NAME: to_json_bytes(compensator)},
-        )
-    ]
-    if plant is not None:
-        parts.append(
-            Parts(
-                model=plant_model(plant, compensator),
-                template="plant.c.jinja",
-                values=plant_values(compensator),
-                core={},
-                extra={"plant.json": (json.dumps(dict(plant), indent=2) + "\n").encode()},
-            )
-        )
-    return {f"{part.model.identifier}.fmu": _fmu(part, compensator, origin) for part in parts}
+    models = [compensator_model(compensator), *([plant_model(plant, compensator)] if plant is not None else [])]
+    return {f"{model.identifier}.fmu": _fmu(model, compensator, origin) for model in models}
 
 
 def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
@@ -163,29 +132,29 @@ def made_by_another_compiler(files: Mapping[str, bytes]) -> str:
     return ""
 
 
-def _fmu(part: Parts, compensator: Compensator, origin: FirmwareOrigin) -> bytes:
+def _fmu(model: Model, compensator: Compensator, origin: FirmwareOrigin) -> bytes:
     """Return one FMU."""
-    model, digest = part.model, origin.compensator_json
+    digest = origin.compensator_json
     # What ties a binary to its modelDescription.xml.
-    made_from = (digest, model.identifier, model.variables, sorted(part.extra.items()), TOOL)
+    made_from = (digest, model.identifier, model.variables, sorted(model.extra.items()), TOOL)
     token = f"{{{uuid.UUID(sha256_of(repr(made_from).encode())[:32])}}}"
     values = {
-        **part.values,
+        **model.values,
         "banner": banner_of(compensator, digest).lines("dz_fmu.c.jinja"),
         "title": model.title.replace("dzdesign ", "").capitalize(),
         "token": token,
         "exchange": model.exchange,
         "variables": model.variables,
-        "model_template": part.template,
+        "model_template": model.template,
     }
     template = strict_templates("dzdesign.codegen.fmu", autoescape=False).get_template("dz_fmu.c.jinja")
-    sources = {SOURCE: str(template.render(values)).encode(), **part.core, **_headers()}
+    sources = {SOURCE: str(template.render(values)).encode(), **model.core, **_headers()}
     manifest = {"schema": SCHEMA, "tool": TOOL, "made_with": made_with(), "compensator_json": digest, "token": token}
     return archive({
         "modelDescription.xml": model_description(model, token).encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
         **binaries_of(model.identifier, sources),
-        **{f"{EXTRA}/{name}": content for name, content in part.extra.items()},
+        **{f"{EXTRA}/{name}": content for name, content in model.extra.items()},
         f"{EXTRA}/manifest.json": (json.dumps(manifest, indent=2) + "\n").encode(),
     })  # fmt: skip
 

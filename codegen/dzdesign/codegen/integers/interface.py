@@ -78,86 +78,53 @@ class Interface:
 
 def interface_named(name: str, compensator: Compensator) -> Interface:
     """Return the scaling of an interface, ``plc`` or ``codes``, for a compensator."""
-    return _of_codes(compensator) if name == "codes" else _of_plc(compensator)
-
-
-def _of_codes(compensator: Compensator) -> Interface:
     signals, functions = compensator.signals, compensator.drive_functions
-    command, (a, b) = signals.command, (signals.pressure_a, signals.pressure_b)
-    like = signals.like_sensors
-    return Interface(
-        name="codes",
-        command_low=command.valid_codes[0],
-        command_high=command.valid_codes[1],
-        command_zero=command.zero_code,
-        command_direction=command.direction(1),
-        a=Pressure(low=a.valid_codes[0], high=a.valid_codes[1], zero=a.zero_code, weight=1 if like else WEIGHT_UNIT),
-        b=Pressure(low=b.valid_codes[0], high=b.valid_codes[1], zero=b.zero_code,
-                   weight=1 if like else signals.weight_b),
-        weight_unit=1 if like else WEIGHT_UNIT,
-        reverse=compensator.reverse_codes,
-        codes_per_unit=Fraction(1),
-        resolution=0,
-        full=signals.compare_max,
-        limit=functions.compare_limit,
-        rounds=True,
-        sides={
-            sign: SideScaling(
-                span=command.span(sign),
-                zero_band=compensator.zero_band_codes,
-                transition=compensator.transition_codes,
-                leave_zero=functions.leave_zero_codes,
-                turn=_turn(compensator, sign),
-                tested_to=floor(compensator.side(sign).certificate.dp_MPa[1] / a.per_code_MPa),
-                last_code=signals.largest_difference(sign),
-            )
-            for sign in signals.signs
-        },
-    )  # fmt: skip
+    command, a, b = signals.command, signals.pressure_a, signals.pressure_b
+    of_codes, full = name == "codes", signals.compare_max if name == "codes" else FULL
+    pressure_unit = a.per_code_MPa if of_codes else PRESSURE_MPa
+    reverse = floor(compensator.reverse_codes * a.per_code_MPa / pressure_unit)
+    weights = (1, 1) if not of_codes or signals.like_sensors else (WEIGHT_UNIT, signals.weight_b)
+    pressures = [
+        Pressure(low=each.valid_codes[0], high=each.valid_codes[1], zero=each.zero_code, weight=weight)
+        if of_codes
+        else _pressure(each, reverse)
+        for each, weight in zip((a, b), weights, strict=True)
+    ]
+    low, high = command.valid_codes if of_codes else (-FULL, FULL)
+    largest = max(pressures[0].high - pressures[1].low, pressures[1].high - pressures[0].low)
 
+    def units(codes: int, sign: int) -> int:
+        """Return codes of command in units of the interface, rounded up."""
+        return codes if of_codes else ceil(Fraction(codes * FULL, command.span(sign)))
 
-def _of_plc(compensator: Compensator) -> Interface:
-    signals, functions = compensator.signals, compensator.drive_functions
-    per_code = signals.pressure_a.per_code_MPa
-    reverse = floor(compensator.reverse_codes * per_code / PRESSURE_MPa)
-    a, b = (_pressure(signal, reverse) for signal in (signals.pressure_a, signals.pressure_b))
     return Interface(
-        name="plc",
-        command_low=-FULL,
-        command_high=FULL,
-        command_zero=0,
-        command_direction=1,
-        a=a,
-        b=b,
-        weight_unit=1,
+        name=name,
+        command_low=low,
+        command_high=high,
+        command_zero=command.zero_code if of_codes else 0,
+        command_direction=command.direction(1) if of_codes else 1,
+        a=pressures[0],
+        b=pressures[1],
+        weight_unit=weights[0],
         reverse=reverse,
-        codes_per_unit=_codes_per_unit(per_code, max(a.high - b.low, b.high - a.low)),
-        resolution=1,
-        full=FULL,
-        limit=FULL * functions.compare_limit // signals.compare_max,
-        rounds=False,
+        codes_per_unit=Fraction(1) if of_codes else _codes_per_unit(a.per_code_MPa, largest),
+        resolution=0 if of_codes else 1,
+        full=full,
+        limit=full * functions.compare_limit // signals.compare_max,
+        rounds=of_codes,
         sides={
             sign: SideScaling(
-                span=FULL,
-                zero_band=_units(compensator.zero_band_codes, signals.command.span(sign)),
-                transition=_units(compensator.transition_codes, signals.command.span(sign)),
-                leave_zero=_units(functions.leave_zero_codes, signals.command.span(sign)),
-                turn=_turn(compensator, sign),
-                tested_to=floor(compensator.side(sign).certificate.dp_MPa[1] / PRESSURE_MPa),
+                span=units(command.span(sign), sign),
+                zero_band=units(compensator.zero_band_codes, sign),
+                transition=units(compensator.transition_codes, sign),
+                leave_zero=units(functions.leave_zero_codes, sign),
+                turn=-1 if sign < 0 and signals.swapped else 1,
+                tested_to=floor(compensator.side(sign).certificate.dp_MPa[1] / pressure_unit),
                 last_code=signals.largest_difference(sign),
             )
             for sign in signals.signs
         },
     )
-
-
-def _turn(compensator: Compensator, sign: int) -> int:
-    return -1 if sign < 0 and compensator.signals.swapped else 1
-
-
-def _units(codes: int, span: int) -> int:
-    """Return codes of command in units of a PLC, rounded up."""
-    return ceil(Fraction(codes * FULL, span))
 
 
 def _pressure(signal: PressureSignal, reverse: int) -> Pressure:

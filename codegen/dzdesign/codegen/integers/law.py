@@ -16,9 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from dzdesign.codegen.core.integer_form import IntegerForm, Scaling, exact_reciprocal, integer_form
-from dzdesign.codegen.integers.form import Form, Node
+from dzdesign.codegen.integers.form import Form, Limbs, Node
 from dzdesign.codegen.integers.interface import Interface, interface_named
-from dzdesign.codegen.integers.limbs import Limbs
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest

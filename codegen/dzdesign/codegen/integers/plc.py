@@ -1,17 +1,25 @@
-"""`output_files`: a compensator in; a function block in Structured Text, and the same as PLC tools import it, out."""
+"""`output_files`: a compensator in; a function block in Structured Text, and the same as PLC tools import it, out.
 
-from collections.abc import Mapping
+PLCopen XML (TC6 2.0) holds the declaration twice: as typed variables, which TwinCAT reads, and as plain text with its
+comments, which CODESYS prefers where it is there. The dates that the format asks for are no date: the same text, the
+same bytes. TwinCAT's own TcPOU holds the text alone.
+"""
+
+from collections.abc import Mapping, Sequence
 from textwrap import wrap
+from uuid import NAMESPACE_URL, uuid5
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
 from dzdesign.codegen.banner import banner_of, lot_in_words
 from dzdesign.codegen.core.certificate_text import equation_of
-from dzdesign.codegen.integers.form import Form
+from dzdesign.codegen.integers.form import Form, Node
 from dzdesign.codegen.integers.interface import Interface, interface_named
 from dzdesign.codegen.integers.law import block_form
-from dzdesign.codegen.integers.plcopen import plcopen_xml, tcpou_xml
 from dzdesign.codegen.integers.text import st_body, st_constants, st_variables
 from dzdesign.core.errors import InputError
 from dzdesign.core.strict_templates import strict_templates
+from dzdesign.core.version import __version__
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
@@ -22,6 +30,13 @@ TEMPLATE = f"{NAME}.st.jinja"
 PACKAGE = "dzdesign.codegen.integers"
 #: Columns of a line, and of a comment's text.
 COLUMNS = 116
+END = "END_FUNCTION_BLOCK\n"
+#: Of what the block remembers.
+FIRST_VALUES = {"side": "0", "at_rest": "TRUE"}
+NAMESPACE = "http://www.plcopen.org/xml/tc6_0200"
+XHTML = "http://www.w3.org/1999/xhtml"
+PLAIN_TEXT = "http://www.3s-software.com/plcopenxml/interfaceasplaintext"
+NO_DATE = "1970-01-01T00:00:00"
 
 
 def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Mapping[str, str]) -> dict[str, bytes]:
@@ -34,10 +49,11 @@ def output_files(compensator: Compensator, origin: FirmwareOrigin, settings: Map
             "the compensator controls the current, which a function block can't at a PLC's cycle; design it again "
             "with --drive duty, or let the PLC's output or the amplifier control the current"
         )
-    text = structured_text(compensator, origin.compensator_json, settings["interface"])
-    files = {f"{NAME}.st": text.encode(), f"{NAME}.xml": plcopen_xml(NAME, text)}
+    form = block_form(compensator, settings["interface"])
+    text = structured_text(compensator, origin.compensator_json, settings["interface"], form)
+    files = {f"{NAME}.st": text.encode(), f"{NAME}.xml": _plcopen_xml(text, form)}
     if settings["dialect"] == "twincat":
-        files[f"{NAME}.TcPOU"] = tcpou_xml(NAME, text)
+        files[f"{NAME}.TcPOU"] = _tcpou_xml(text)
     return files
 
 
@@ -48,9 +64,9 @@ def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
     return f"the function block leaves out, of this design: {left_out}" if left_out else ""
 
 
-def structured_text(compensator: Compensator, digest: str, interface_name: str) -> str:
+def structured_text(compensator: Compensator, digest: str, interface_name: str, form: Form | None = None) -> str:
     """Return the function block of a compensator whose file has this SHA-256."""
-    interface, form = interface_named(interface_name, compensator), block_form(compensator, interface_name)
+    interface, form = interface_named(interface_name, compensator), form or block_form(compensator, interface_name)
     banner = banner_of(compensator, digest).lines(TEMPLATE)
     template = strict_templates(PACKAGE, autoescape=False, lstrip_blocks=True).get_template(TEMPLATE)
     text = str(template.render(banner=banner, **_values(compensator, interface, form)))
@@ -66,6 +82,7 @@ def _values(compensator: Compensator, interface: Interface, form: Form) -> dict[
         "header": _header(compensator, interface),
         "bipolar": len(interface.sides) == 2,
         "has_rest": compensator.zero_band_codes > 0,
+        "first": FIRST_VALUES,
         "command_text": "converter code of the command" if of_codes else "0.01 % of full command, -10000 to 10000",
         "pressure_text": "codes of the pressures" if of_codes else "0.1 bar",
         "output_text": f"compare value, full duty {interface.full}" if of_codes else "0.01 % of full drive",
@@ -120,3 +137,78 @@ def left_out_of(compensator: Compensator) -> list[str]:
         ("interlock", functions.interlock_codes is not None),
     ]
     return [name for name, there in found if there]
+
+
+def _parts_of(text: str) -> tuple[str, str]:
+    """Return declaration and body of a function block, which tools keep apart."""
+    cut = text.rindex("END_VAR\n") + len("END_VAR\n")
+    return text[:cut], text[cut:].removesuffix(END)
+
+
+def _plcopen_xml(text: str, form: Form) -> bytes:
+    """Return a function block as a project of PLCopen XML."""
+    declaration, body = _parts_of(text)
+    project = Element("project", xmlns=NAMESPACE)
+    SubElement(project, "fileHeader", companyName="", productName="dzdesign", productVersion=__version__,
+               creationDateTime=NO_DATE)  # fmt: skip
+    header = SubElement(project, "contentHeader", name=NAME, modificationDateTime=NO_DATE)
+    coordinates = SubElement(header, "coordinateInfo")
+    for language in ("fbd", "ld", "sfc"):
+        SubElement(SubElement(coordinates, language), "scaling", x="1", y="1")
+    types = SubElement(project, "types")
+    SubElement(types, "dataTypes")
+    pou = SubElement(SubElement(types, "pous"), "pou", name=NAME, pouType="functionBlock")
+    interface = SubElement(pou, "interface")
+    for element, variables in _sections(form):
+        section = SubElement(interface, element, {"constant": "true"} if variables is form.constants else {})
+        for each in variables:
+            section.append(_variable(each))
+    SubElement(SubElement(SubElement(pou, "body"), "ST"), "xhtml", xmlns=XHTML).text = body
+    data = SubElement(SubElement(pou, "addData"), "data", name=PLAIN_TEXT, handleUnknown="implementation")
+    SubElement(SubElement(data, "InterfaceAsPlainText"), "xhtml", xmlns=XHTML).text = declaration
+    SubElement(SubElement(project, "instances"), "configurations")
+    return _written(project)
+
+
+def _sections(form: Form) -> list[tuple[str, Sequence[Node]]]:
+    """Return the variables of each section of the declaration, by its element, in the order of the text."""
+    given = [each for each in form.inputs if each not in form.remembered]
+    outputs = [line for name in form.outputs for line in form.lines if line.name == name]
+    local = [*form.remembered, *form.own]
+    return [("inputVars", given), ("outputVars", outputs), ("localVars", local), ("localVars", form.constants)]
+
+
+def _variable(node: Node) -> Element:
+    """Return a variable with its type and, of a constant and of what is remembered, its first value."""
+    variable = Element("variable", name=node.name)
+    place, kind = SubElement(variable, "type"), "BOOL" if node.boolean else "DINT"
+    if len(node.values) > 1:
+        array = SubElement(place, "array")
+        SubElement(array, "dimension", lower="0", upper=str(len(node.values) - 1))
+        SubElement(SubElement(array, "baseType"), kind)
+        values = SubElement(SubElement(variable, "initialValue"), "arrayValue")
+        for value in node.values:
+            SubElement(SubElement(values, "value"), "simpleValue", value=str(value))
+        return variable
+    SubElement(place, kind)
+    start = FIRST_VALUES.get(node.name) if node.operation == "input" else "".join(map(str, node.values))
+    if start:
+        SubElement(SubElement(variable, "initialValue"), "simpleValue", value=start)
+    return variable
+
+
+def _tcpou_xml(text: str) -> bytes:
+    """Return a function block as TwinCAT keeps it, to be added as an existing item."""
+    declaration, body = _parts_of(text)
+    top = Element("TcPlcObject", Version="1.1.0.1", ProductVersion="3.1.4024.0")
+    pou = SubElement(top, "POU", Name=NAME, Id=f"{{{uuid5(NAMESPACE_URL, text)}}}", SpecialFunc="None")
+    SubElement(pou, "Declaration").text = declaration
+    SubElement(SubElement(pou, "Implementation"), "ST").text = body
+    return _written(top)
+
+
+def _written(top: Element) -> bytes:
+    written: bytes = ElementTree.tostring(top, encoding="utf-8", xml_declaration=True)
+    return written + b"\n"
+
+

@@ -72,11 +72,9 @@ def st_constants(form: Form) -> list[str]:
 
 def st_variables(form: Form) -> list[str]:
     """Return the declarations of what the lines assign, beside outputs and what is remembered."""
-    others = {*form.outputs, *(each.name for each in form.inputs)}
-    own = [each for each in form.lines if each.name not in others]
     lines: list[str] = []
     for kind, boolean in (("DINT", False), ("BOOL", True)):
-        names = ", ".join(each.name for each in own if each.boolean is boolean)
+        names = ", ".join(each.name for each in form.own if each.boolean is boolean)
         lines += _wrapped(f"{names} : {kind};")
     return lines
 

@@ -8,13 +8,19 @@ Each request is answered by a reply with the same sequence number; the PC sends 
 """
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Annotated
+from typing import Annotated, Self
 
 from dzdesign.codegen.telemetry.frame import CRC_OCTETS, Number, crc_of
+from dzdesign.core.strict_templates import strict_templates
 
+SOURCES = ("dz_load.c", "dz_load_requests.c", "dz_load_reply.c", "dz_load_frame.c", "dz_slots.c")
+HEADERS = ("dz_load.h", "dz_load_steps.h", "dz_load_frame.h", "dz_slots.h")
+#: Where the blocks are kept: RAM, until the user writes their memory's.
+STORE = ("dz_store.c", "dz_store.h")
+LOAD_FILES = (*SOURCES, *HEADERS, *STORE)
 SYNC = 0xC33C
 HEADER_OCTETS = 5
 #: Type of a reply: that of its request with this bit.
@@ -35,67 +41,52 @@ SERIAL_OCTETS = 24
 _SYNC = struct.pack(">H", SYNC)
 
 
-class Request(IntEnum):
+class _Named(IntEnum):
+    """A number of the protocol, with what it means."""
+
+    text: str
+
+    def __new__(cls, value: int, text: str) -> Self:
+        """Return the number that carries its text."""
+        made = int.__new__(cls, value)
+        made._value_, made.text = value, text
+        return made
+
+
+class Request(_Named):
     """What the PC asks for."""
 
-    BEGIN = 1
-    DATA = 2
-    COMMIT = 3
-    ABORT = 4
-    QUERY = 5
+    BEGIN = 1, "length of the block in words (2), its CRC-32 (4), start of its compensator's SHA-256 (4)"
+    DATA = 2, f"words before these (2), then 1 to {MOST_WORDS} words of the block"
+    COMMIT = 3, "the block's CRC-32 again (4)"
+    ABORT = 4, "nothing; the load under way is given up"
+    QUERY = 5, "nothing; the reply goes on with the drive's block and state"
 
 
-REQUEST_TEXTS = {
-    Request.BEGIN: "length of the block in words (2), its CRC-32 (4), start of its compensator's SHA-256 (4)",
-    Request.DATA: f"words before these (2), then 1 to {MOST_WORDS} words of the block",
-    Request.COMMIT: "the block's CRC-32 again (4)",
-    Request.ABORT: "nothing; the load under way is given up",
-    Request.QUERY: "nothing; the reply goes on with the drive's block and state",
-}
-
-
-class Reason(IntEnum):
+class Reason(_Named):
     """Why a request was not done; DONE if it was."""
 
-    DONE = 0
-    BUSY = 1
-    NO_LOAD = 2
-    SEQUENCE = 3
-    LENGTH = 4
-    DRIVING = 5
-    COMMAND = 6
-    STORE = 7
-    CRC = 8
-    CHECK = 9
-    INCOMPLETE = 10
-    TYPE = 11
-    ORIGIN = 12
-    TIME = 13
-    ABORTED = 14
-
-
-REASON_TEXTS: dict[int, str] = {
-    Reason.DONE: "done",
-    Reason.BUSY: "the request before this one is still being done",
-    Reason.NO_LOAD: "no load is under way",
-    Reason.SEQUENCE: "another sequence number, or another place in the block, was due",
-    Reason.LENGTH: "the length is not that of a block of this firmware, or of this request",
-    Reason.DRIVING: "the amplifier still drives: its ramp has not run out",
-    Reason.COMMAND: "the command is not zero",
-    Reason.STORE: "the memory did not take the words",
-    Reason.CRC: "the block's CRC-32 is not the one that was announced",
-    Reason.CHECK: "dz_calibration_check() refuses the block",
-    Reason.INCOMPLETE: "words of the block are missing",
-    Reason.TYPE: "the type of request is not known",
-    Reason.ORIGIN: "the block belongs to another compensator than was announced",
-    Reason.TIME: "the time was over",
-    Reason.ABORTED: "the load was given up by its sender",
-}
+    DONE = 0, "done"
+    BUSY = 1, "the request before this one is still being done"
+    NO_LOAD = 2, "no load is under way"
+    SEQUENCE = 3, "another sequence number, or another place in the block, was due"
+    LENGTH = 4, "the length is not that of a block of this firmware, or of this request"
+    DRIVING = 5, "the amplifier still drives: its ramp has not run out"
+    COMMAND = 6, "the command is not zero"
+    STORE = 7, "the memory did not take the words"
+    CRC = 8, "the block's CRC-32 is not the one that was announced"
+    CHECK = 9, "dz_calibration_check() refuses the block"
+    INCOMPLETE = 10, "words of the block are missing"
+    TYPE = 11, "the type of request is not known"
+    ORIGIN = 12, "the block belongs to another compensator than was announced"
+    TIME = 13, "the time was over"
+    ABORTED = 14, "the load was given up by its sender"
 
 
 def reason_text(reason: int) -> str:
     """Return what a reason means; a drive's newer firmware may have others."""
-    return REASON_TEXTS.get(reason, f"reason {reason}, which this dzdesign does not know")
+    known = {each.value: each.text for each in Reason}
+    return known.get(reason, f"reason {reason}, which this dzdesign does not know")
 
 
 #: In place of a slot: the block that the firmware was linked with, and none.
@@ -199,11 +190,18 @@ class FrameReader:
             yield frame
 
 
-def protocol_context(tick_Hz: int) -> dict[str, object]:
-    """Return what the C of a drive prints of the protocol, for a tick of so many a second."""
-    puts = []
-    for name, number in STATE_NUMBERS.items():
-        puts.append(f"    at = dz_put_{number.bits}(octets, at, state->{name});")
+def load_texts(tick_Hz: int, banner: Callable[[str], Sequence[str]]) -> dict[str, str]:
+    """Return the C by which a drive takes a block, text of each file by name, for a tick of so many a second.
+
+    `banner` gives a file's first lines.
+    """
+    templates = strict_templates("dzdesign.codegen.loading", "dzdesign.codegen", autoescape=False)
+    values = _context(tick_Hz)
+    return {name: templates.get_template(f"{name}.jinja").render(banner=banner(name), **values) for name in LOAD_FILES}
+
+
+def _context(tick_Hz: int) -> dict[str, object]:
+    """Return what the C prints of the protocol."""
     return {
         "sync_high": f"0x{SYNC >> 8:02X}",
         "sync_low": f"0x{SYNC & 0xFF:02X}",
@@ -213,11 +211,13 @@ def protocol_context(tick_Hz: int) -> dict[str, object]:
         "most_payload": MOST_PAYLOAD,
         "most_words": MOST_WORDS,
         "reply_bit": f"0x{REPLY:02X}",
-        "requests": [(request.name, int(request), REQUEST_TEXTS[request]) for request in Request],
-        "reasons": [(reason.name, int(reason), REASON_TEXTS[reason]) for reason in Reason],
+        "requests": [(request.name, int(request), request.text) for request in Request],
+        "reasons": [(reason.name, int(reason), reason.text) for reason in Reason],
         "reply_numbers": REPLY_NUMBERS,
         "state_numbers": STATE_NUMBERS,
-        "state_puts": "\n".join(puts),
+        "state_puts": "\n".join(
+            f"    at = dz_put_{number.bits}(octets, at, state->{name});" for name, number in STATE_NUMBERS.items()
+        ),
         "octet_ticks": round(OCTET_S * tick_Hz),
         "load_ticks": round(LOAD_S * tick_Hz),
         "hold_ticks": round(HOLD_S * tick_Hz),
