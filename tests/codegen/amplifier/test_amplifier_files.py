@@ -20,16 +20,15 @@ from tests.support.amplifier_readers import StatedBound, dead_zone, over_compens
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 
 DIGEST = "0123456789abcdef" * 4
-#: The RMC100 takes no 5 V; the PAM-190 has one solenoid.
+#: The RMC100 takes no 5 V.
 OF_ONE = tuple(name for name in DEVICE_NAMES if name != "rmc")
-OF_TWO = tuple(name for name in OF_ONE if name != "west-pam190")
 #: By how much an amplifier may be off, and the oil may move the threshold, in the third design.
 BUDGET = {"amplifier": "5 %", "oil": "2 %", "ageing": "0 %"}
 LEAST_FACTOR = 1 / Fraction(105, 100) * Fraction(98, 100)
 CASES = (
     [("one solenoid", name) for name in OF_ONE]
-    + [("two solenoids", name) for name in OF_TWO]
-    + [("a budget", name) for name in ("west", "cia408", "csv")]
+    + [("two solenoids", name) for name in ("west", "cia408", "csv", "rmc75")]
+    + [("a budget", name) for name in ("west", "csv")]
 )
 
 

@@ -1,6 +1,6 @@
 """dz_calibration_check() in C against the same rules in exact integers: every number of a block at its limits."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,12 +10,11 @@ from dzdesign.codegen.calibration.block import block_of, built_for, current_bloc
 from dzdesign.codegen.calibration.layout import CurrentBlock, SideBlock, entries
 from dzdesign.codegen.calibration.packing import pack
 from tests.support.block_cores import CompiledCheck
-from tests.support.core_variants import VARIANTS, variant
+from tests.support.core_variants import variant
 from tests.support.current_loops import PLAIN, SUPPLY
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
-RANDOM_BLOCKS = 300
 
 
 def with_current(compensator):
@@ -44,14 +43,6 @@ def checks():
 def agree(check, built, block) -> bool:
     """Whether both say the same."""
     return check.findings(pack(block)) == set(refusals(block, built))
-
-
-@pytest.mark.parametrize("name", VARIANTS)
-@pytest.mark.slow
-def test_every_block_that_design_makes_is_accepted(name):
-    compensator = variant(name)
-    built, block = built_for(compensator), block_of(compensator, "0" * 64)
-    assert refusals(block, built) == {} and CompiledCheck(built).findings(pack(block)) == set()
 
 
 def near(value: int, bits: int) -> set[int]:
@@ -99,28 +90,10 @@ def test_a_number_at_any_of_its_limits_is_judged_alike(checks, name):
     assert tried > 800 and refused > 200
 
 
-def test_random_numbers_in_a_block_are_judged_alike(checks):
-    built, block, check = checks["bipolar, all options"]
-    rng = np.random.default_rng(4)
-    accepted = 0
-    for _ in range(RANDOM_BLOCKS):
-        each = block
-        for _ in range(int(rng.integers(1, 4))):
-            names = [field.name for field in fields(SideBlock) if field.name not in ("nodes", "play")]
-            name = names[int(rng.integers(len(names)))]
-            bits = entries(SideBlock)[name].bits
-            number = int(rng.integers(0, 1 << int(rng.integers(1, min(bits, 62) + 1))))
-            side = replace(each.sides[0], **{name: number})
-            each = replace(each, sides=(side, each.sides[1]))
-        assert agree(check, built, each), refusals(each, built)
-        accepted += not refusals(each, built)
-    assert accepted
-
-
 def test_any_octets_are_refused_and_a_damaged_block_is(checks):
+    assert not any(check.findings(pack(block)) for _, block, check in checks.values())
     _, block, check = checks["current"]
     octets, rng = pack(block), np.random.default_rng(5)
-    assert check.findings(octets) == set()
     for content in (bytes(len(octets)), b"\xff" * len(octets), rng.bytes(len(octets))):
         assert {"FORMAT", "CRC", "FIRMWARE"} <= check.findings(content)
     for place in (*range(0, len(octets), 97), len(octets) - 1):

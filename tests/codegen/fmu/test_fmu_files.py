@@ -96,20 +96,6 @@ def test_nothing_but_the_functions_of_fmi_leaves_the_one_unit(no_binary, tmp_pat
         assert shown and all(symbol.startswith("fmi2") for symbol in shown)
 
 
-def test_units_of_the_recordings_are_display_units(no_binary):
-    from dzdesign.core.recorded_units import PressureUnit, RecordedUnits
-
-    compensator = full_compensator()
-    units = RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0))
-    valve = replace(compensator.valve, recorded_units=units)
-    from dzdesign.codegen.fmu.description import model_description
-    from dzdesign.codegen.fmu.models import compensator_model
-
-    model = replace(compensator_model(compensator), units=valve.recorded_units)
-    text = model_description(model, "{token}")
-    assert '<DisplayUnit name="bar" factor="10.0"/>' in text and 'displayUnit="bar"' in text
-
-
 def displayed(model, name):
     """Return unit and display unit of a variable, and factor and offset of that."""
     from xml.etree import ElementTree
@@ -128,7 +114,7 @@ def displayed(model, name):
 def test_the_display_unit_of_a_command_is_that_of_its_side_and_of_no_other_voltage():
     """A reading of 12 mA at zero command falls on the negative side, whose outputs count from zero outwards."""
     from dzdesign.codegen.fmu.models import compensator_model, plant_model
-    from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
+    from dzdesign.core.recorded_units import CommandUnit, PressureUnit, RecordedUnits
 
     def of(command):
         made = full_compensator()
@@ -139,6 +125,8 @@ def test_the_display_unit_of_a_command_is_that_of_its_side_and_of_no_other_volta
     assert displayed(model, "u_i") == displayed(model, "u_O") == ("V", "mA", 0.8, 12.0)
     assert displayed(model, "u_O_negative") == ("V", None)
     assert displayed(compensator_model(of(CommandUnit(unit="%", factor=10.0))), "u_O_negative") == ("V", "%", 10.0, 0.0)
+    in_bar = replace(model, units=RecordedUnits(pressure=PressureUnit(unit="bar", factor=10.0)))
+    assert displayed(in_bar, "p_A") == ("MPa", "bar", 10.0, 0.0)
     plant = plant_model(asdict(PLANT), centred)
     for name in ("voltage", "u_max_V", "hysteresis_V"):
         assert displayed(plant, name) == ("V", None)
@@ -181,30 +169,33 @@ def test_a_plant_behind_a_current_controller_is_refused(no_binary, monkeypatch):
     assert plant_of("", Current()) is None
 
 
-def test_without_ziglang_it_is_said_how_to_install_it(monkeypatch):
-    monkeypatch.setattr(files, "find_spec", lambda name: None)
+@pytest.mark.parametrize(
+    ("name", "instead", "named"),
+    [
+        ("find_spec", lambda name: None, "pip install"),
+        ("version", lambda name: "0.13.0", r"0\.13\.0 .* expected 0\.17"),
+    ],
+    ids=["none", "too old"],
+)
+def test_without_a_ziglang_that_will_do_it_is_said_how_to_install_it(name, instead, named, monkeypatch):
+    monkeypatch.setattr(files, name, instead)
     files.made_with.cache_clear()
     try:
-        with pytest.raises(InputError, match="pip install"):
+        with pytest.raises(InputError, match=named):
             fmus_of(full_compensator(), None)
     finally:
         files.made_with.cache_clear()
 
 
-def test_a_ziglang_that_is_too_old_is_refused(monkeypatch):
-    monkeypatch.setattr(files, "version", lambda name: "0.13.0")
-    files.made_with.cache_clear()
-    try:
-        with pytest.raises(InputError, match=r"0\.13\.0 .* expected 0\.17"):
-            fmus_of(full_compensator(), None)
-    finally:
-        files.made_with.cache_clear()
-
-
-def test_c_that_does_not_compile_is_named_with_the_platform(monkeypatch):
-    monkeypatch.setattr(files, "PLATFORMS", host_platforms())
-    with pytest.raises(InputError, match="can't compile"):
-        files.binaries_of("dz_wrong", {"dz_fmu.c": b"int x = ;"})
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [("int x = ;", "can't compile"), ("double sin(double); double x(double y) { return sin(y); }", "sin")],
+    ids=["no C", "a name that nothing defines"],
+)
+def test_c_that_is_none_or_needs_a_library_is_refused(text, named, monkeypatch):
+    monkeypatch.setattr(files, "PLATFORMS", [each for each in files.PLATFORMS if each.folder in ("linux64", "win64")])
+    with pytest.raises(InputError, match=named):
+        files.binaries_of("dz_wrong", {"dz_fmu.c": text.encode()})
 
 
 def test_a_plant_is_of_the_target_fmu_alone(example_compensator, example_folder, tmp_path):
@@ -214,13 +205,6 @@ def test_a_plant_is_of_the_target_fmu_alone(example_compensator, example_folder,
     with pytest.raises(InputError, match="missing"):
         generate(GenerateArguments(example_compensator, target="fmu", plant=tmp_path / "missing.toml"))
     assert not (tmp_path / "made").exists()
-
-
-def test_a_name_that_nothing_defines_is_refused(monkeypatch):
-    """So no binary needs a library."""
-    monkeypatch.setattr(files, "PLATFORMS", [each for each in files.PLATFORMS if each.folder in ("linux64", "win64")])
-    with pytest.raises(InputError, match="sin"):
-        files.binaries_of("dz_wrong", {"dz_fmu.c": b"double sin(double); double x(double y) { return sin(y); }"})
 
 
 @pytest.mark.slow
@@ -239,8 +223,9 @@ def test_units_are_those_of_pint():
     from pint import UnitRegistry
 
     base = {"kilogram": "kg", "meter": "m", "second": "s", "ampere": "A"}
+    registry = UnitRegistry()
     for name, (factor, exponents) in UNITS.items():
         text = name.replace("m3", "m**3").replace("^", "**").replace(" ", "*")
-        whole = UnitRegistry()(f"1.0 * {text}").to_base_units()
+        whole = registry(f"1.0 * {text}").to_base_units()
         assert whole.magnitude == pytest.approx(factor, rel=1e-12), name
         assert {base[unit]: power for unit, power in whole.unit_items()} == dict(exponents), name

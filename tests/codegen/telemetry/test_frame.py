@@ -81,10 +81,8 @@ def test_python_reads_what_the_firmware_packs(firmware):
     assert found == sent and reader.skipped == reader.bad_crc == 0
 
 
-@pytest.mark.slow
 @needs_compiler
-@pytest.mark.parametrize("size", [1, 7, FRAME_OCTETS, 10_000])
-def test_frames_are_found_between_garbage_cuts_and_errors_in_pieces_of_any_size(firmware, size):
+def test_frames_are_found_between_garbage_cuts_and_errors_in_pieces_of_any_size(firmware):
     sent = random_frames(60)
     rng = random.Random(3)
     lines, good = [], []
@@ -98,23 +96,12 @@ def test_frames_are_found_between_garbage_cuts_and_errors_in_pieces_of_any_size(
                      .get(kind, "frame ") + numbers(frame))  # fmt: skip
         good += [frame] if kind < 4 else []
     octets = octets_of(frames_program(firmware), lines)
-    reader = FrameReader()
-    found = [frame for at in range(0, len(octets), size) for frame in reader.feed(octets[at : at + size])]
-    assert found == good
-    assert reader.bad_crc >= 10 and reader.skipped >= 10 * FRAME_OCTETS
-    assert reader.frames * FRAME_OCTETS + reader.skipped <= len(octets)
-
-
-def test_every_single_and_double_bit_error_is_seen():
-    frame = bytes.fromhex("A55A0214") + bytes(range(20))
-    frame += crc_of(frame[2:]).to_bytes(2, "big")
-    assert len(read(frame)[0]) == 1
-    bits = range(16, 8 * FRAME_OCTETS)
-    whole = int.from_bytes(frame, "big")
-    for first in bits:
-        for second in (*range(first + 1, 8 * FRAME_OCTETS), None):
-            flipped = whole ^ 1 << first - 16 ^ (0 if second is None else 1 << second - 16)
-            assert crc_of(flipped.to_bytes(FRAME_OCTETS, "big")[2:]) != 0
+    for size in (1, 7, FRAME_OCTETS, 10_000):
+        reader = FrameReader()
+        found = [frame for at in range(0, len(octets), size) for frame in reader.feed(octets[at : at + size])]
+        assert found == good
+        assert reader.bad_crc >= 10 and reader.skipped >= 10 * FRAME_OCTETS
+        assert reader.frames * FRAME_OCTETS + reader.skipped <= len(octets)
 
 
 def telemetry(program: Path, periods: int, *words: str) -> dict[str, str]:
@@ -192,7 +179,8 @@ def preempted_frames(firmware) -> list[Frame]:
     text = text.replace("dz_state.", "device_state()->")
     text = text.replace("static uint16_t read_state", "volatile struct dz_state *device_state(void);\n$&", 1)
     source.write_text(text.replace("$&", "static uint16_t read_state"), encoding="utf-8")
-    return [f for look in range(2 * looks) for f in read(bytes.fromhex(preempted(build(firmware), look)))[0]]
+    program = build(firmware)
+    return [f for look in range(2 * looks) for f in read(bytes.fromhex(preempted(program, look)))[0]]
 
 
 def preempted(program: Path, look: int) -> str:

@@ -14,7 +14,7 @@ from tests.support.loading.files import COMPILER, DIGEST, compensator, drive_fil
 
 PERIOD_S = 1 / TARGET.tick_Hz
 SOURCES = ("dz_hardware.c", "dz_isr.c", "dz_telemetry.c", "dz_frame.c", "dz_active.c", "dz_calibration.c", "dz_store.c")
-LOADING = ("dz_load.c", "dz_load_requests.c", "dz_load_reply.c", "dz_load_frame.c", "dz_slots.c")
+LOADING = ("dz_load.c", "dz_load_frame.c", "dz_slots.c")
 
 
 def firmware_files(*, real_core: bool = False) -> dict[str, str]:

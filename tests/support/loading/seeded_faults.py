@@ -24,8 +24,8 @@ FAULTS = (
     Fault("dz_load.c", "else if (wrong != 0u)", "else if (wrong == 0xFFFFu)"),
     Fault("dz_load.c", "load->used = load->slot;", ""),
     Fault("dz_load.c", "load->words = (uint16_t)(load->words + load->count);", "load->words = load->count;"),
-    Fault("dz_load_requests.c", "else if (is_repeated(load) != 0u)", "else if (is_repeated(load) > 1u)"),
-    Fault("dz_load_requests.c", "!= COMMIT_OCTETS)", "> 0xFFu)"),
+    Fault("dz_load.c", "else if (is_repeated(load) != 0u)", "else if (is_repeated(load) > 1u)"),
+    Fault("dz_load.c", "!= COMMIT_OCTETS)", "> 0xFFu)"),
     Fault("dz_slots.c", "&& (dz_calibration_check(&dz_store_slot(slot)->block) == 0u)", ""),
 )  # fmt: skip
 

@@ -16,8 +16,8 @@ from typing import Annotated, Self
 from dzdesign.codegen.telemetry.frame import CRC_OCTETS, Number, crc_of
 from dzdesign.core.strict_templates import strict_templates
 
-SOURCES = ("dz_load.c", "dz_load_requests.c", "dz_load_reply.c", "dz_load_frame.c", "dz_slots.c")
-HEADERS = ("dz_load.h", "dz_load_steps.h", "dz_load_frame.h", "dz_slots.h")
+SOURCES = ("dz_load.c", "dz_load_frame.c", "dz_slots.c")
+HEADERS = ("dz_load.h", "dz_load_frame.h", "dz_slots.h")
 #: Where the blocks are kept: RAM, until the user writes their memory's.
 STORE = ("dz_store.c", "dz_store.h")
 LOAD_FILES = (*SOURCES, *HEADERS, *STORE)
@@ -215,9 +215,6 @@ def _context(tick_Hz: int) -> dict[str, object]:
         "reasons": [(reason.name, int(reason), reason.text) for reason in Reason],
         "reply_numbers": REPLY_NUMBERS,
         "state_numbers": STATE_NUMBERS,
-        "state_puts": "\n".join(
-            f"    at = dz_put_{number.bits}(octets, at, state->{name});" for name, number in STATE_NUMBERS.items()
-        ),
         "octet_ticks": round(OCTET_S * tick_Hz),
         "load_ticks": round(LOAD_S * tick_Hz),
         "hold_ticks": round(HOLD_S * tick_Hz),

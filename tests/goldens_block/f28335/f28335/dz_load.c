@@ -4,46 +4,113 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "dz_load_steps.h"
+#include "dz_load.h"
 
-void dz_load_init(struct dz_load *load, const struct dz_calibration *linked)
+/* Steps of a load. */
+#define STEP_IDLE 0u
+#define STEP_HOLDING 1u   /* the interrupt is to hold the output */
+#define STEP_ERASING 2u
+#define STEP_RECEIVING 3u /* the next request is due */
+#define STEP_WRITING 4u
+#define STEP_CHECKING 5u
+#define STEP_MARKING 6u
+
+#define BEGIN_OCTETS 10u
+#define DATA_OCTETS 2u /* before the words */
+#define COMMIT_OCTETS 4u
+#define SEQUENCE_BITS 0xFFu
+
+uint32_t dz_load_origin(const struct dz_calibration *block)
 {
-    const uint16_t newest = dz_slots_newest();
+    uint16_t octets[4];
+    uint16_t i;
 
-    (void)memset(load, 0, sizeof *load);
-    dz_load_receiver_init(&load->receiver);
-    load->step = DZ_LOAD_STEP_IDLE;
-    load->used = DZ_SLOTS_NONE;
-    load->block = NULL;
-    if (newest != DZ_SLOTS_NONE)
+    for (i = 0u; i < 4u; i++)
     {
-        load->used = newest;
-        load->block = &dz_store_slot(newest)->block;
+        const uint16_t word = (block != NULL) ? block->compensator_sha256[i / 2u] : 0u;
+
+        octets[i] = (uint16_t)(((i & 1u) == 0u) ? (word & 0xFFu) : (word >> 8));
     }
-    else if ((dz_slots_are_marked() == 0u) && (dz_calibration_check(linked) == 0u))
-    {
-        load->used = DZ_LOAD_LINKED;
-        load->block = linked;
-    }
-    else
-    {
-        /* a loaded block that became invalid is not replaced by one that may belong to another valve */
-    }
+    return dz_load_get_32(octets, 0u);
 }
 
-void dz_load_go_on(struct dz_load *load, uint16_t step, uint16_t ticks)
+static uint16_t put_reply(struct dz_load *load, uint16_t at, uint16_t reason, uint16_t detail)
+{
+    uint16_t next = dz_load_put_8(load->reply, at, reason);
+
+    next = dz_load_put_8(load->reply, next, load->expected);
+    next = dz_load_put_16(load->reply, next, load->words);
+    return dz_load_put_16(load->reply, next, detail);
+}
+
+/* Answers a request by its type and number. */
+static void answer(struct dz_load *load, uint16_t type, uint16_t sequence, uint16_t reason, uint16_t detail)
+{
+    const uint16_t at = dz_load_reply_begin(load->reply, type, sequence);
+
+    load->reply_octets = dz_load_reply_end(load->reply, put_reply(load, at, reason, detail));
+}
+
+/* Answers the request that was taken last. */
+static void answer_last(struct dz_load *load, uint16_t reason, uint16_t detail)
+{
+    load->last_reason = reason;
+    load->last_detail = detail;
+    answer(load, load->last_type, load->last_sequence, reason, detail);
+}
+
+static void answer_query(struct dz_load *load, uint16_t sequence)
+{
+    const struct dz_calibration *const block = load->block;
+    const uint16_t begin = dz_load_reply_begin(load->reply, DZ_LOAD_QUERY, sequence);
+    uint16_t flags = (DZ_STORE_IS_VOLATILE != 0u) ? DZ_LOAD_VOLATILE : 0u;
+    uint16_t at = put_reply(load, begin, DZ_LOAD_REASON_DONE, 0u);
+    uint16_t i;
+
+    if (load->step != STEP_IDLE)
+    {
+        flags |= DZ_LOAD_LOADING;
+    }
+    at = dz_load_put_16(load->reply, at, load->used);
+    at = dz_load_put_16(load->reply, at, flags);
+    at = dz_load_put_16(load->reply, at, dz_load_refusal(block));
+    at = dz_load_put_16(load->reply, at, load->ended);
+    at = dz_load_put_16(load->reply, at, load->receiver.bad);
+    at = dz_load_put_16(load->reply, at, DZ_CALIBRATION_LAYOUT);
+    at = dz_load_put_16(load->reply, at, DZ_CALIBRATION_WORDS);
+    at = dz_load_put_16(load->reply, at, DZ_CALIBRATION_SHAPE);
+    at = dz_load_put_16(load->reply, at, DZ_ADC_CODE_MAX);
+    at = dz_load_put_16(load->reply, at, DZ_COMPARE_MAX);
+    at = dz_load_put_16(load->reply, at, DZ_SAMPLE_HZ);
+    at = dz_load_put_16(load->reply, at, DZ_TICK_HZ);
+    at = dz_load_put_16(load->reply, at, DZ_BETA_STEP);
+    at = dz_load_put_32(load->reply, at, (block != NULL) ? block->crc32 : 0u);
+    at = dz_load_put_32(load->reply, at, dz_load_origin(block));
+    for (i = 0u; i < (DZ_LOAD_SERIAL_OCTETS / 2u); i++)
+    {
+        const uint16_t word = (block != NULL) ? block->serial[i] : 0u;
+
+        at = dz_load_put_8(load->reply, at, word);
+        at = dz_load_put_8(load->reply, at, (uint16_t)(word >> 8));
+    }
+    load->reply_octets = dz_load_reply_end(load->reply, at);
+}
+
+/* The load goes on with another step, from now on. */
+static void go_on(struct dz_load *load, uint16_t step, uint16_t ticks)
 {
     load->step = step;
     load->since = ticks;
 }
 
-void dz_load_end(struct dz_load *load, uint16_t reason, uint16_t detail, uint16_t ticks)
+/* The load is over. If a request was being done, it is answered; else what was the last one may come anew. */
+static void end(struct dz_load *load, uint16_t reason, uint16_t detail, uint16_t ticks)
 {
-    dz_load_go_on(load, DZ_LOAD_STEP_IDLE, ticks);
+    go_on(load, STEP_IDLE, ticks);
     load->ended = reason;
     if (load->last_reason == DZ_LOAD_REASON_BUSY)
     {
-        dz_load_answer_last(load, reason, detail);
+        answer_last(load, reason, detail);
     }
     else
     {
@@ -55,9 +122,9 @@ void dz_load_end(struct dz_load *load, uint16_t reason, uint16_t detail, uint16_
 /* The next request is due, in a time that counts from the next pass on: `ticks` is of before the store was called. */
 static void receive_on(struct dz_load *load, uint16_t ticks)
 {
-    dz_load_go_on(load, DZ_LOAD_STEP_RECEIVING, ticks);
+    go_on(load, STEP_RECEIVING, ticks);
     load->anew = 1u;
-    dz_load_answer_last(load, DZ_LOAD_REASON_DONE, 0u);
+    answer_last(load, DZ_LOAD_REASON_DONE, 0u);
 }
 
 static void erase_slot(struct dz_load *load, uint16_t ticks)
@@ -70,7 +137,7 @@ static void erase_slot(struct dz_load *load, uint16_t ticks)
     }
     else if (outcome != DZ_STORE_BUSY)
     {
-        dz_load_end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
+        end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
     }
     else
     {
@@ -95,7 +162,7 @@ static void write_words(struct dz_load *load, uint16_t ticks)
     }
     else
     {
-        dz_load_end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
+        end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
     }
 }
 
@@ -108,23 +175,23 @@ static void check_block(struct dz_load *load, uint16_t ticks)
 
     if (block->crc32 != load->crc)
     {
-        dz_load_end(load, DZ_LOAD_REASON_CRC, 0u, ticks);
+        end(load, DZ_LOAD_REASON_CRC, 0u, ticks);
     }
     else if (wrong != 0u)
     {
-        dz_load_end(load, DZ_LOAD_REASON_CHECK, wrong, ticks);
+        end(load, DZ_LOAD_REASON_CHECK, wrong, ticks);
     }
     else if (dz_load_origin(block) != load->origin)
     {
-        dz_load_end(load, DZ_LOAD_REASON_ORIGIN, 0u, ticks);
+        end(load, DZ_LOAD_REASON_ORIGIN, 0u, ticks);
     }
     else if (dz_load_refusal(block) != 0u)
     {
-        dz_load_end(load, dz_load_refusal(block), 0u, ticks);
+        end(load, dz_load_refusal(block), 0u, ticks);
     }
     else
     {
-        dz_load_go_on(load, DZ_LOAD_STEP_MARKING, ticks);
+        go_on(load, STEP_MARKING, ticks);
     }
 }
 
@@ -144,11 +211,11 @@ static void write_mark(struct dz_load *load, uint16_t ticks)
         load->used = load->slot;
         load->block = &slot->block;
         dz_load_use(load->block);
-        dz_load_end(load, DZ_LOAD_REASON_DONE, 0u, ticks);
+        end(load, DZ_LOAD_REASON_DONE, 0u, ticks);
     }
     else
     {
-        dz_load_end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
+        end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
     }
 }
 
@@ -157,48 +224,244 @@ static void step(struct dz_load *load, uint16_t ticks)
     const uint16_t waited = (uint16_t)(ticks - load->since);
     const uint16_t refusal = dz_load_refusal(load->block);
 
-    if (load->step == DZ_LOAD_STEP_MARKING)
+    if (load->step == STEP_MARKING)
     {
         write_mark(load, ticks); /* no way back: it may be half written */
     }
     else if (refusal != 0u)
     {
-        dz_load_end(load, refusal, 0u, ticks);
+        end(load, refusal, 0u, ticks);
     }
-    else if (load->step == DZ_LOAD_STEP_HOLDING)
+    else if (load->step == STEP_HOLDING)
     {
         if (dz_load_hold(1u) != 0u)
         {
-            dz_load_go_on(load, DZ_LOAD_STEP_ERASING, ticks);
+            go_on(load, STEP_ERASING, ticks);
         }
         else if (waited > DZ_LOAD_HOLD_TICKS)
         {
-            dz_load_end(load, DZ_LOAD_REASON_TIME, 0u, ticks);
+            end(load, DZ_LOAD_REASON_TIME, 0u, ticks);
         }
         else
         {
             /* looked at again at the next pass */
         }
     }
-    else if (load->step == DZ_LOAD_STEP_ERASING)
+    else if (load->step == STEP_ERASING)
     {
         erase_slot(load, ticks);
     }
-    else if (load->step == DZ_LOAD_STEP_WRITING)
+    else if (load->step == STEP_WRITING)
     {
         write_words(load, ticks);
     }
-    else if (load->step == DZ_LOAD_STEP_CHECKING)
+    else if (load->step == STEP_CHECKING)
     {
         check_block(load, ticks);
     }
     else if (waited > DZ_LOAD_TICKS)
     {
-        dz_load_end(load, DZ_LOAD_REASON_TIME, 0u, ticks);
+        end(load, DZ_LOAD_REASON_TIME, 0u, ticks);
     }
     else
     {
         /* RECEIVING: the next request is not there yet */
+    }
+}
+
+/* Takes the request: it is answered when it is done. */
+static void take(struct dz_load *load, uint16_t step, uint16_t ticks)
+{
+    const uint16_t *const octets = load->receiver.octets;
+
+    load->last_type = octets[DZ_LOAD_AT_TYPE];
+    load->last_sequence = octets[DZ_LOAD_AT_SEQUENCE];
+    load->last_crc = dz_load_get_16(octets, (uint16_t)(DZ_LOAD_AT_PAYLOAD + octets[DZ_LOAD_AT_LENGTH]));
+    load->last_reason = DZ_LOAD_REASON_BUSY;
+    load->expected = (uint16_t)((octets[DZ_LOAD_AT_SEQUENCE] + 1u) & SEQUENCE_BITS);
+    go_on(load, step, ticks);
+}
+
+/* The PC sends a request again if it got no reply: it is answered as before, and done once. */
+static uint16_t is_repeated(const struct dz_load *load)
+{
+    const uint16_t *const octets = load->receiver.octets;
+
+    return ((load->last_type != 0u) && (load->last_type == octets[DZ_LOAD_AT_TYPE]) &&
+            (load->last_sequence == octets[DZ_LOAD_AT_SEQUENCE]) &&
+            (load->last_crc == dz_load_get_16(octets, (uint16_t)(DZ_LOAD_AT_PAYLOAD + octets[DZ_LOAD_AT_LENGTH]))))
+               ? 1u
+               : 0u;
+}
+
+/* Each of these returns 0 if the request was taken, else why not. */
+static uint16_t begin(struct dz_load *load, uint16_t ticks)
+{
+    const uint16_t *const octets = load->receiver.octets;
+    const uint16_t refusal = dz_load_refusal(load->block);
+    uint16_t reason = DZ_LOAD_REASON_DONE;
+
+    if ((octets[DZ_LOAD_AT_LENGTH] != BEGIN_OCTETS) ||
+        (dz_load_get_16(octets, DZ_LOAD_AT_PAYLOAD) != DZ_CALIBRATION_WORDS))
+    {
+        reason = DZ_LOAD_REASON_LENGTH;
+    }
+    else if (refusal != 0u)
+    {
+        reason = refusal;
+    }
+    else
+    {
+        load->crc = dz_load_get_32(octets, DZ_LOAD_AT_PAYLOAD + 2u);
+        load->origin = dz_load_get_32(octets, DZ_LOAD_AT_PAYLOAD + 6u);
+        load->slot = dz_slots_next(load->used);
+        load->words = 0u;
+        take(load, STEP_HOLDING, ticks);
+    }
+    return reason;
+}
+
+static uint16_t data(struct dz_load *load, uint16_t ticks)
+{
+    const uint16_t *const octets = load->receiver.octets;
+    const uint16_t length = octets[DZ_LOAD_AT_LENGTH];
+    const uint16_t count = (uint16_t)((uint16_t)(length - DATA_OCTETS) / 2u);
+    uint16_t reason = DZ_LOAD_REASON_DONE;
+    uint16_t i;
+
+    if ((length <= DATA_OCTETS) || ((length & 1u) != 0u) || (count > DZ_LOAD_MOST_WORDS) ||
+        (count > (DZ_CALIBRATION_WORDS - load->words)))
+    {
+        reason = DZ_LOAD_REASON_LENGTH;
+    }
+    else if (dz_load_get_16(octets, DZ_LOAD_AT_PAYLOAD) != load->words)
+    {
+        reason = DZ_LOAD_REASON_SEQUENCE;
+    }
+    else
+    {
+        for (i = 0u; i < count; i++)
+        {
+            const uint16_t at = (uint16_t)(DZ_LOAD_AT_PAYLOAD + DATA_OCTETS + (2u * i));
+
+            load->data[i] = (uint16_t)(octets[at] | (uint16_t)(octets[at + 1u] << 8));
+        }
+        load->count = count;
+        take(load, STEP_WRITING, ticks);
+    }
+    return reason;
+}
+
+static uint16_t commit(struct dz_load *load, uint16_t ticks)
+{
+    const uint16_t *const octets = load->receiver.octets;
+    uint16_t reason = DZ_LOAD_REASON_DONE;
+
+    if (octets[DZ_LOAD_AT_LENGTH] != COMMIT_OCTETS)
+    {
+        reason = DZ_LOAD_REASON_LENGTH;
+    }
+    else if (load->words != DZ_CALIBRATION_WORDS)
+    {
+        reason = DZ_LOAD_REASON_INCOMPLETE;
+    }
+    else if (dz_load_get_32(octets, DZ_LOAD_AT_PAYLOAD) != load->crc)
+    {
+        reason = DZ_LOAD_REASON_CRC;
+    }
+    else
+    {
+        take(load, STEP_CHECKING, ticks);
+    }
+    return reason;
+}
+
+static uint16_t request(struct dz_load *load, uint16_t type, uint16_t ticks)
+{
+    uint16_t reason;
+
+    if ((load->step != STEP_IDLE) && (load->step != STEP_RECEIVING))
+    {
+        reason = DZ_LOAD_REASON_BUSY;
+    }
+    else if (type == DZ_LOAD_BEGIN)
+    {
+        reason = begin(load, ticks);
+    }
+    else if ((type != DZ_LOAD_DATA) && (type != DZ_LOAD_COMMIT))
+    {
+        reason = DZ_LOAD_REASON_TYPE;
+    }
+    else if (load->step == STEP_IDLE)
+    {
+        reason = DZ_LOAD_REASON_NO_LOAD;
+    }
+    else if (load->receiver.octets[DZ_LOAD_AT_SEQUENCE] != load->expected)
+    {
+        reason = DZ_LOAD_REASON_SEQUENCE;
+    }
+    else
+    {
+        reason = (type == DZ_LOAD_DATA) ? data(load, ticks) : commit(load, ticks);
+    }
+    return reason;
+}
+
+/* Does the request that came, or says why not. */
+static void handle(struct dz_load *load, uint16_t ticks)
+{
+    const uint16_t type = load->receiver.octets[DZ_LOAD_AT_TYPE];
+    const uint16_t sequence = load->receiver.octets[DZ_LOAD_AT_SEQUENCE];
+
+    if (type == DZ_LOAD_QUERY)
+    {
+        answer_query(load, sequence);
+    }
+    else if ((type == DZ_LOAD_ABORT) && ((load->step == STEP_IDLE) || (load->step == STEP_RECEIVING)))
+    {
+        if (load->step == STEP_RECEIVING)
+        {
+            end(load, DZ_LOAD_REASON_ABORTED, 0u, ticks);
+        }
+        answer(load, type, sequence, DZ_LOAD_REASON_DONE, 0u);
+    }
+    else if (is_repeated(load) != 0u)
+    {
+        answer(load, type, sequence, load->last_reason, load->last_detail);
+    }
+    else
+    {
+        const uint16_t reason = request(load, type, ticks);
+
+        if (reason != DZ_LOAD_REASON_DONE)
+        {
+            answer(load, type, sequence, reason, 0u);
+        }
+    }
+}
+
+void dz_load_init(struct dz_load *load, const struct dz_calibration *linked)
+{
+    const uint16_t newest = dz_slots_newest();
+
+    (void)memset(load, 0, sizeof *load);
+    dz_load_receiver_init(&load->receiver);
+    load->step = STEP_IDLE;
+    load->used = DZ_SLOTS_NONE;
+    load->block = NULL;
+    if (newest != DZ_SLOTS_NONE)
+    {
+        load->used = newest;
+        load->block = &dz_store_slot(newest)->block;
+    }
+    else if ((dz_slots_are_marked() == 0u) && (dz_calibration_check(linked) == 0u))
+    {
+        load->used = DZ_LOAD_LINKED;
+        load->block = linked;
+    }
+    else
+    {
+        /* a loaded block that became invalid is not replaced by one that may belong to another valve */
     }
 }
 
@@ -211,11 +474,11 @@ void dz_load_poll(struct dz_load *load, uint16_t ticks)
     }
     /* There is one place for a reply: what may fill it waits until the last one is sent. The step comes first, so that
      * no flood of frames keeps a load from its end. */
-    if ((load->step == DZ_LOAD_STEP_RECEIVING) || ((load->step != DZ_LOAD_STEP_IDLE) && (load->reply_octets == 0u)))
+    if ((load->step == STEP_RECEIVING) || ((load->step != STEP_IDLE) && (load->reply_octets == 0u)))
     {
         step(load, ticks);
     }
-    else if ((load->step == DZ_LOAD_STEP_IDLE) && ((uint16_t)(ticks - load->since) > DZ_LOAD_TICKS))
+    else if ((load->step == STEP_IDLE) && ((uint16_t)(ticks - load->since) > DZ_LOAD_TICKS))
     {
         /* A sender that comes later and happens to use the same number asks anew. */
         load->last_type = 0u;
@@ -227,7 +490,7 @@ void dz_load_poll(struct dz_load *load, uint16_t ticks)
     }
     if ((load->receiver.whole != 0u) && (load->reply_octets == 0u))
     {
-        dz_load_handle(load, ticks);
+        handle(load, ticks);
         load->receiver.whole = 0u;
     }
 }

@@ -82,6 +82,9 @@ void dz_load_init(struct dz_load *load, const struct dz_calibration *linked);
 /* One pass of the main loop; octets that came before it go in by dz_load_receive(&load->receiver, ...). */
 void dz_load_poll(struct dz_load *load, uint16_t ticks);
 
+/* First 32 bits of the SHA-256 of a block's compensator, null: 0. */
+uint32_t dz_load_origin(const struct dz_calibration *block);
+
 /* What the firmware around it provides.
  *
  * 0 if the drive is at rest, with the zero command of this block (null: of none), else a DZ_LOAD_REASON_.... */

@@ -9,7 +9,6 @@
 #include "dz_active.h"
 #include "dz_comp.h"
 #include "dz_isr.h"
-#include "dz_load_steps.h"
 #include "dz_telemetry.h"
 
 #define SCI_EIGHT_BITS 0x0007u /* SCICCR: 8 bits, no parity, one stop bit, idle-line mode */

@@ -1,11 +1,11 @@
-"""A block as Intel HEX and as octets: where each octet lies, read by a reader of the format's document alone."""
+"""Files of a block, Intel HEX and octets alone: where each octet lies, what is read back, and what is refused."""
 
 import pytest
 
-from dzdesign.codegen.calibration.packing import FORMATS, Place, image_of, read_block_file
+from dzdesign.codegen.calibration.packing import FORMATS, MOST_OCTETS, Place, image_of, read_block_file
 from dzdesign.codegen.project import target_named
 from dzdesign.core.errors import InputError
-from tests.support.block_reader import hex_memory
+from tests.support.block_reader import hex_memory, hex_text
 
 OCTETS = bytes(range(256)) * 10 + b"last"
 PLACES = {
@@ -57,13 +57,34 @@ def test_a_hex_file_of_words_with_an_error_is_refused(change, tmp_path):
     rows = image_of(OCTETS, "hex", PLACES["f28335"]).decode().split()
     (tmp_path / "a.hex").write_text("\n".join(change(rows)) + "\n")
     with pytest.raises(InputError, match=r"a\.hex"):
-        read_block_file(tmp_path / "a.hex")[0]
+        read_block_file(tmp_path / "a.hex")
 
 
-def test_rows_may_come_in_any_order(tmp_path):
+def test_rows_may_come_in_any_order_and_lie_anywhere(tmp_path):
+    (tmp_path / "b.HEX").write_bytes(hex_text((0x33_0000, OCTETS)).replace("\n", "\r\n").encode())
+    assert read_block_file(tmp_path / "b.HEX")[0] == OCTETS
     first, *rows, end = image_of(OCTETS, "hex", PLACES["f28335"]).decode().split()
     (tmp_path / "a.hex").write_text("\n".join([first, *reversed(rows), end]) + "\n")
     assert read_block_file(tmp_path / "a.hex")[0] == OCTETS
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.s19", b"", "expected a calibration file, .hex, .bin"),
+        ("a.bin", bytes(MOST_OCTETS + 1), "a few KiB"),
+        ("a.hex", b":0100000001FF", "does not end with the record"),
+        ("a.hex", hex_text((0, OCTETS)).replace(":10001000", ":10001001").encode(), "not Intel HEX"),
+        ("a.hex", b"S1\n:00000001FF\n", "not Intel HEX"),
+        ("a.hex", b"\xff\n:00000001FF\n", "no ASCII"),
+        ("a.hex", b":00000001FF\n", "octets in none of its rows"),
+        ("a.hex", hex_text((0, OCTETS), (5000, OCTETS)).encode(), "parts that do not follow each other"),
+    ],
+)
+def test_a_file_with_an_error_is_refused(tmp_path, name, content, said):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=said):
+        read_block_file(tmp_path / name)
 
 
 @pytest.mark.parametrize(
