@@ -69,7 +69,7 @@ OTHER_TARGETS: Mapping[str, OtherTarget] = {
         OtherTarget(
             name="amplifier",
             description="fixed parameters of the amplifier --device, and a table of the dead zones that they leave",
-            module="dzdesign.codegen.amplifier.output",
+            module="dzdesign.codegen.amplifier.files",
             options={"device": DEVICE_NAMES, "table_dp": (), "threshold": ()},
             required=("device",),
         ),

@@ -77,7 +77,7 @@ def export(arguments: ExportArguments) -> AmplifierExport:
     """
     from dzdesign.codegen.amplifier.device import device_named
     from dzdesign.codegen.amplifier.files import amplifier_file
-    from dzdesign.codegen.amplifier.output import notes_of
+    from dzdesign.codegen.amplifier.files import notes_of
     from dzdesign.codegen.amplifier.setting import amplifier_setting, given_dp_MPa, given_threshold
     from dzdesign.design.fixed_offset import dead_zones
 

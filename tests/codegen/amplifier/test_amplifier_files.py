@@ -8,8 +8,7 @@ import pytest
 
 from dzdesign import api
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES, device_named
-from dzdesign.codegen.amplifier.files import amplifier_file, is_file_of
-from dzdesign.codegen.amplifier.output import notes_of
+from dzdesign.codegen.amplifier.files import amplifier_file, is_file_of, notes_of
 from dzdesign.codegen.amplifier.setting import amplifier_setting
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes

@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 
 from dzdesign.codegen.calibration.block import block_of, built_for
-from dzdesign.codegen.calibration.files import STRUCTS, calibration_header, texts
+from dzdesign.codegen.calibration.files import STRUCTS, block_core_files, texts
 from dzdesign.codegen.calibration.layout import LENGTH_WORDS, MAGIC, NODE_MASK, CalibrationBlock, members, words_of
 from dzdesign.codegen.calibration.packing import pack, text_of, unpack
 from dzdesign.core.errors import DzdesignError, InputError
@@ -53,7 +53,7 @@ def test_no_compiler_pads_the_struct():
 def test_the_c_struct_is_the_layout(compiler, tmp_path):
     if not shutil.which(compiler):
         pytest.skip(f"{compiler} not found")
-    header = texts({"dz_calibration.h": calibration_header(built_for(variant("default")))})
+    header = texts(block_core_files(built_for(variant("default"))))
     (tmp_path / "dz_calibration.h").write_text(header["dz_calibration.h"])
     source = ["#include <stddef.h>", '#include "dz_calibration.h"', "static const struct dz_calibration block;"]
     for number, member in enumerate(members()):

@@ -7,8 +7,7 @@ import pytest
 
 from dzdesign import api
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES, device_named
-from dzdesign.codegen.amplifier.files import amplifier_file
-from dzdesign.codegen.amplifier.output import notes_of
+from dzdesign.codegen.amplifier.files import amplifier_file, notes_of
 from dzdesign.codegen.amplifier.setting import amplifier_setting
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import RequirementError

@@ -79,8 +79,7 @@ CRC_POLYNOMIAL = 0xEDB88320
 
 def block_core_files(built: BuiltFor) -> dict[str, CoreFile]:
     """Return every file of the core in block form, by its name: they depend on no valve."""
-    header, *others = _files(built).items()
-    return dict([header, ("dz_calibration.c", _check_file(built)), *others])
+    return _files(built)
 
 
 def fixed_core_files(compensator: Compensator) -> dict[str, CoreFile]:
@@ -96,8 +95,8 @@ def valve_files(page: ValvePage) -> dict[str, CoreFile]:
 
 def _files(built: BuiltFor, numbers: CalibrationBlock | None = None) -> dict[str, CoreFile]:
     """Return what both forms have; `numbers` are those that stand in the firmware."""
-    return {"dz_calibration.h": calibration_header(built), **_law_files(built), **_drive_files(built, numbers),
-            **_current_files(built, numbers)}  # fmt: skip
+    plan = _plan(built)
+    return {name: _core_file(name, plan, constants) for name, constants in _constants(built, numbers).items()}
 
 
 def core_sources(*, block: bool, current: bool) -> tuple[str, ...]:
@@ -124,29 +123,37 @@ def _form(built: BuiltFor) -> Values:
     }
 
 
-def _core_file(template: str, values: Values, constants: Sequence[Define]) -> CoreFile:
+def _plan(built: BuiltFor) -> Values:
+    """Return what the templates print of wiring, outputs, converter and rates."""
+    steps = [LITERALS["uint32"].format(step) for step in _crc_steps()]
+    return {
+        **_form(built),
+        "rises": not built.has("FALLING"),
+        "current": built.has("CURRENT"),
+        "supply": built.has("SUPPLY"),
+        "samples": built.samples,
+        "sample_Hz": built.sample_Hz,
+        "ramp_unit": RAMP_UNIT,
+        "sides": _sides(built),
+        "structs": [
+            {"name": name, "members": list(_declarations(kind, built))}
+            for kind, name in STRUCTS.items()
+            if kind is not CurrentBlock or not built.fixed or built.has("CURRENT")
+        ],
+        "crc_steps": [", ".join(steps[at : at + 4]) for at in range(0, len(steps), 4)],
+        # Of a converter with fewer codes no command is too long for the drive functions.
+        "wide_codes": built.code_max > LARGEST_CODES,
+    }
+
+
+def _core_file(name: str, values: Values, constants: Sequence[Define]) -> CoreFile:
     """Return a file that prints these constants."""
-    name = template.removesuffix(".jinja")
     return CoreFile(
-        template=template,
-        values={
-            **values,
-            "misra_lines": misra_lines(name, fixed=bool(values["fixed"])),
-            "constants": defines(constants),
-        },
+        template=f"{name}.jinja",
+        values={**values, "misra_lines": misra_lines(name, fixed=bool(values["fixed"])),
+                "constants": defines(constants)},
         constants=tuple(each.entry(f"core/{name}") for each in constants),
-    )
-
-
-def calibration_header(built: BuiltFor) -> CoreFile:
-    """Return dz_calibration.h: the struct, and what the firmware is compiled for."""
-    constants = [*_interface(built), *([] if built.fixed else _findings())]
-    structs = [
-        {"name": name, "members": list(_declarations(kind, built))}
-        for kind, name in STRUCTS.items()
-        if kind is not CurrentBlock or not built.fixed or built.has("CURRENT")
-    ]
-    return _core_file("dz_calibration.h.jinja", {**_form(built), "structs": structs}, constants)
+    )  # fmt: skip
 
 
 def _valve_header(page: ValvePage) -> CoreFile:
@@ -181,86 +188,62 @@ def _rational(value: Fraction) -> str:
     return f"{value.numerator}/{value.denominator} = {float(value):.6f}"
 
 
-def _law_files(built: BuiltFor) -> dict[str, CoreFile]:
-    """Return dz_comp.c and dz_comp.h."""
-    source = {**_form(built), "sides": _sides(built)}
-    return {
-        "dz_comp.c": _core_file("dz_comp.c.jinja", source, _law_numbers(built)),
-        "dz_comp.h": _core_file("dz_comp.h.jinja", _form(built), status_constants()),
-    }
-
-
-def _drive_files(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, CoreFile]:
-    """Return dz_drive.c and dz_drive.h."""
-    inside = [
+def _constants(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, list[Define]]:
+    """Return the constants of each file, in the order of the files."""
+    shifts = [
+        Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of sensor A",
+               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down"),
+        Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1,
+               equation="the power of two in DZ_BETA_STEP", engineering=f"1/{built.beta_step}"),
+    ]  # fmt: skip
+    found = {"dz_calibration.h": _interface(built)}
+    if not built.fixed:
+        node = "largest node: times DZ_BETA_STEP below 2^31"
+        found["dz_calibration.h"] += _findings()
+        found["dz_calibration.c"] = [
+            *shifts,
+            _limit("LARGEST_NODE", largest_node(built.beta_step), "uint32", node),
+            *(_limit(*each) for each in NAMED + (OF_CURRENT if built.has("CURRENT") else ())),
+        ]
+    found["dz_comp.c"] = [
+        *shifts,
+        _limit("TOP_BIT", INT32_MAX + 1, "int64", "the top bit of a word, set where it stands for a negative number"),
+        _limit("LARGEST_SHIFT", 31, "plain", "largest shift of a word of 32 bits"),
+        _limit("LARGEST_WIDE_SHIFT", 63, "plain", "largest shift of 64 bits"),
+        difference_place(),
+    ]
+    found["dz_comp.h"] = status_constants()
+    found["dz_drive.c"] = [
         _limit("RAMP_UNIT", RAMP_UNIT, "uint32", "unit of the ramped command, a code of command"),
         _limit("NO_INTERLOCK", NO_INTERLOCK, "plain", "the drive waits for no zero command"),
         _limit("LARGEST_NUMBER", INT32_MAX, "uint32", "largest word that stands for a number above zero"),
         _limit("LARGEST_SHIFT", 31, "plain", "largest shift of a word of 32 bits"),
         _limit("PLAY_SHIFT_MASK", 15, "plain", "mask of play_step_shift"),
     ]
-    words = {**_form(built), "rises": not built.has("FALLING")}
-    header = {**words, "ramp_unit": RAMP_UNIT, "sample_Hz": built.sample_Hz}
-    return {
-        "dz_drive.c": _core_file("dz_drive.c.jinja", words, inside),
-        "dz_drive.h": _core_file("dz_drive.h.jinja", header, _drive_interface(built, numbers)),
-    }
-
-
-def _drive_interface(built: BuiltFor, numbers: CalibrationBlock | None) -> list[Define]:
     ticks = built.tick_Hz // built.sample_Hz
-    zero = [] if numbers is None else [
-        Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=numbers.command_zero, equation="code of zero command",
-               engineering="command_zero of dz_valve.h", data=("signals.command.zero_code",))
-    ]  # fmt: skip
-    return [
+    found["dz_drive.h"] = [
         Define(symbol="DZ_DRIVE_TICKS_PER_SAMPLE", value=ticks, equation="PWM periods from one sample to the next",
                engineering=f"{built.tick_Hz} periods and {built.sample_Hz} samples a second"),
-        *zero,
+        *([] if numbers is None else [
+            Define(symbol="DZ_DRIVE_COMMAND_ZERO", value=numbers.command_zero, equation="code of zero command",
+                   engineering="command_zero of dz_valve.h", data=("signals.command.zero_code",))
+        ]),
         *drive_status_constants(block=not built.fixed),
     ]  # fmt: skip
-
-
-def _current_files(built: BuiltFor, numbers: CalibrationBlock | None) -> dict[str, CoreFile]:
-    """Return dz_current.c and dz_current.h; nothing without current control."""
-    if not built.has("CURRENT"):
-        return {}
-    outside, inside = current_fault_bits(), [_limit("SHIFT_MASK", 15, "plain", "mask of a shift")]
-    if numbers is not None:
-        outside.insert(0, Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << numbers.current.offset_shift,
-                                 equation="sums that the offset is the mean of", engineering="with the output off",
-                                 data=("current_drive.loop.offset_shift",)))  # fmt: skip
+    if built.has("CURRENT"):
+        found["dz_current.c"] = [_limit("SHIFT_MASK", 15, "plain", "mask of a shift")]
+        found["dz_current.h"] = current_fault_bits()
+    if built.has("CURRENT") and numbers is not None:
+        offset = Define(symbol="DZ_CURRENT_OFFSET_TICKS", value=1 << numbers.current.offset_shift,
+                        equation="sums that the offset is the mean of", engineering="with the output off",
+                        data=("current_drive.loop.offset_shift",))  # fmt: skip
+        found["dz_current.h"].insert(0, offset)
     if built.has("SUPPLY"):
-        inside += [
+        found["dz_current.c"] += [
             _limit("CORRECTION_SHIFT", CORRECTION_SHIFT, "plain", "fractional bits of the correction"),
             _limit("CORRECTION_HALF", 1 << (CORRECTION_SHIFT - 1), "plain", "half a PWM count: rounds to nearest"),
         ]
-    words = {**_form(built), "supply": built.has("SUPPLY"), "samples": built.samples}
-    return {
-        "dz_current.c": _core_file("dz_current.c.jinja", words, inside),
-        "dz_current.h": _core_file("dz_current.h.jinja", words, outside),
-    }
-
-
-def _check_file(built: BuiltFor) -> CoreFile:
-    """Return dz_calibration.c, which blocks the core may use."""
-    named = NAMED + (OF_CURRENT if built.has("CURRENT") else ())
-    limits = [
-        *_shifts(built),
-        _limit("LARGEST_NODE", largest_node(built.beta_step), "uint32", "largest node: times DZ_BETA_STEP below 2^31"),
-        *(_limit(*each) for each in named),
-    ]
-    steps = [LITERALS["uint32"].format(step) for step in _crc_steps()]
-    values: Values = {
-        **_form(built),
-        "rises": not built.has("FALLING"),
-        "current": built.has("CURRENT"),
-        "supply": built.has("SUPPLY"),
-        "crc_steps": [", ".join(steps[at : at + 4]) for at in range(0, len(steps), 4)],
-        # Of a converter with fewer codes no command is too long for the drive functions.
-        "wide_codes": built.code_max > LARGEST_CODES,
-    }
-    return _core_file("dz_calibration.c.jinja", values, limits)
+    return found
 
 
 def _crc_steps() -> tuple[int, ...]:
@@ -289,26 +272,6 @@ def _sides(built: BuiltFor) -> list[Values]:
     positive = {"s": "", "text": "positive", "from_band": forward, "turn": "", "pad": ""}
     negative = {"s": "_negative", "text": "negative", "from_band": back, "turn": swapped, "pad": " " * 9}
     return [positive, negative] if built.has("BIPOLAR") else [positive]
-
-
-def _law_numbers(built: BuiltFor) -> list[Define]:
-    return [
-        *_shifts(built),
-        _limit("TOP_BIT", INT32_MAX + 1, "int64", "the top bit of a word, set where it stands for a negative number"),
-        _limit("LARGEST_SHIFT", 31, "plain", "largest shift of a word of 32 bits"),
-        _limit("LARGEST_WIDE_SHIFT", 63, "plain", "largest shift of 64 bits"),
-        difference_place(),
-    ]
-
-
-def _shifts(built: BuiltFor) -> list[Define]:
-    """Return from weighted codes to codes, and from these to nodes."""
-    return [
-        Define(symbol="WEIGHT_SHIFT", value=WEIGHT_SHIFT, equation="from weighted codes to codes of sensor A",
-               engineering=f"1/2^{WEIGHT_SHIFT}", rounding="the difference is rounded down"),
-        Define(symbol="BETA_STEP_SHIFT", value=built.beta_step.bit_length() - 1,
-               equation="the power of two in DZ_BETA_STEP", engineering=f"1/{built.beta_step}"),
-    ]  # fmt: skip
 
 
 def texts(files: dict[str, CoreFile], banner: Sequence[str] = ()) -> dict[str, str]:

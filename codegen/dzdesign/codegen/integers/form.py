@@ -94,6 +94,16 @@ class Node:
         return self._made("mod", (divisor,), [max(self.low, 1 - divisor) if self.low < 0 else 0,
                                               min(self.high, divisor - 1) if self.high > 0 else 0])  # fmt: skip
 
+    def over(self, power: int) -> "Node":
+        """Return the quotient of a value that is not negative by a power of two: a shift, where the language has it."""
+        return self >> power.bit_length() - 1 if self.bits == 64 else self.quotient(power)
+
+    def past(self, power: int) -> "Node":
+        """Return what `over` leaves."""
+        rest = self - self.over(power) * power if self.bits == 64 else self.remainder(power)
+        # What a division leaves is below its divisor, whatever its operands are by themselves.
+        return replace(rest, low=0, high=power - 1)
+
     def _compared(self, operation: str, other: Given) -> "Node":
         return self._made(operation, (other,), [0, 1], boolean=True)
 

@@ -11,7 +11,6 @@ it is made of limbs.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -146,7 +145,7 @@ class _Law:
         dp = difference.most(0)
         if unit != 1:
             told = "codes of sensor A, rounded down"
-            dp = self.form.let("dp", dp >> unit.bit_length() - 1 if self.form.bits == 64 else dp.quotient(unit), told)
+            dp = self.form.let("dp", dp.over(unit), told)
         return dp, implausible
 
     def betas(self, dp: Node, failed: Node) -> list[Node]:
@@ -171,11 +170,9 @@ class _Law:
         found: dict[str, list[Node]] = {name: [] for name in tables}
         for suffix, code, told in self._codes(dp):
             code = self.form.let(f"code{suffix}", code.least(last), told)
-            row = code >> step.bit_length() - 1 if self.form.bits == 64 else code.quotient(step)
+            row = code.over(step)
             row = self.form.let(f"row{suffix}", row if first is None else row + first, "node of beta")
-            rest = code - (code >> step.bit_length() - 1) * step if self.form.bits == 64 else code.remainder(step)
-            # What a division leaves is below its divisor, whatever its operands are by themselves.
-            past = self.form.let(f"past{suffix}", replace(rest, low=0, high=step - 1), "codes past the node")
+            past = self.form.let(f"past{suffix}", code.past(step), "codes past the node")
             for name, table in nodes.items():
                 found[name].append(table.interpolated(row, past, step))
         betas = []

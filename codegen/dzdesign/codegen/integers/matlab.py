@@ -2,19 +2,15 @@
 
 from collections.abc import Mapping
 
-from dzdesign.codegen.banner import banner_of
-from dzdesign.codegen.core.certificate_text import certificate_lines, equation_of, zero_command
+from dzdesign.codegen.core.certificate_text import certificate_lines, zero_command
 from dzdesign.codegen.integers.law import FUNCTIONS, function_form
 from dzdesign.codegen.integers.plc import left_out_of
-from dzdesign.codegen.integers.text import matlab_body, matlab_constants
+from dzdesign.codegen.integers.text import matlab_body, matlab_constants, rendered
 from dzdesign.codegen.project import generate
 from dzdesign.core.errors import InputError
-from dzdesign.core.strict_templates import strict_templates
-from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 
-PACKAGE = "dzdesign.codegen.integers"
 TEMPLATE, SETUP = "dz_comp.m.jinja", "setup_c_caller.m"
 #: The library for a PC: it takes the scalings of any compensator.
 TARGET = "host"
@@ -48,50 +44,34 @@ def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
 
 def law_function(compensator: Compensator, digest: str, sign: int) -> str:
     """Return the law of one sign of command as a function, of a compensator whose file has this SHA-256."""
-    template = strict_templates(PACKAGE, autoescape=False, lstrip_blocks=True).get_template(TEMPLATE)
-    banner = banner_of(compensator, digest).lines(TEMPLATE)
-    text = str(template.render(banner=banner, **_values(compensator, sign)))
-    return text.replace("²", "^2").encode("ascii", "replace").decode()  # units of recordings stand in comments
-
-
-def _values(compensator: Compensator, sign: int) -> dict[str, object]:
-    """Return what the template prints."""
-    signals, form = compensator.signals, function_form(compensator, sign)
-    command, chosen = signals.command, law(compensator.law)
-    bipolar = len(signals.signs) == 2
-    return {
-        "name": FUNCTIONS[sign],
-        "side_text": "" if not bipolar else f", {'positive' if sign > 0 else 'negative'} commands",
-        "signals": signals,
-        "full_code": command.full_code if sign > 0 else command.negative_full_code,
-        "u_max": compensator.valve.recorded_units.of_controller.text(float(compensator.u_max_V) * sign, "g V"),
-        "limit": compensator.drive_functions.compare_limit,
-        "at_zero": zero_command(compensator, sign),
-        "certificate": certificate_lines(compensator, sign),
-        "law_equation": equation_of(chosen),
-        "law_text": str(chosen.output).replace("**", "^"),
-        "step_codes": compensator.beta_step_codes,
-        "step_text": compensator.valve.recorded_units.text(
-            float(signals.dp_MPa(compensator.beta_step_codes)), ".4f MPa"
-        ),
-        "zero_band": compensator.zero_band_codes,
-        "transition": compensator.transition_codes,
-        "constants": matlab_constants(form),
-        "body": matlab_body(form),
-    }
+    signals, units, form = compensator.signals, compensator.valve.recorded_units, function_form(compensator, sign)
+    side = "" if len(signals.signs) == 1 else f", {'positive' if sign > 0 else 'negative'} commands"
+    return rendered(
+        TEMPLATE,
+        compensator,
+        digest,
+        name=FUNCTIONS[sign],
+        side_text=side,
+        signals=signals,
+        full_code=signals.command.full_code if sign > 0 else signals.command.negative_full_code,
+        u_max=units.of_controller.text(float(compensator.u_max_V) * sign, "g V"),
+        limit=compensator.drive_functions.compare_limit,
+        at_zero=zero_command(compensator, sign),
+        certificate=certificate_lines(compensator, sign),
+        step_codes=compensator.beta_step_codes,
+        step_text=units.text(float(signals.dp_MPa(compensator.beta_step_codes)), ".4f MPa"),
+        zero_band=compensator.zero_band_codes,
+        transition=compensator.transition_codes,
+        constants=matlab_constants(form),
+        body=matlab_body(form),
+    )
 
 
 def _setup(compensator: Compensator, digest: str) -> str:
     """Return the script that sets up a C Caller block."""
-    signs = compensator.signals.signs
-    template = strict_templates(PACKAGE, autoescape=False, lstrip_blocks=True).get_template(f"{SETUP}.jinja")
-    names = [FUNCTIONS[sign] for sign in signs]
-    return str(
-        template.render(
-            banner=banner_of(compensator, digest).lines(f"{SETUP}.jinja"),
-            bipolar=len(signs) == 2,
-            names=names,
-            names_text=" and ".join(f"{name}()" for name in names),
-            sources=["dz_comp.c"],
-        )
-    )
+    names = [FUNCTIONS[sign] for sign in compensator.signals.signs]
+    named = " and ".join(f"{name}()" for name in names)
+    return rendered(
+        f"{SETUP}.jinja", compensator, digest, bipolar=len(names) == 2, names=names, names_text=named,
+        sources=["dz_comp.c"],
+    )  # fmt: skip

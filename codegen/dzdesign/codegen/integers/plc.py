@@ -11,25 +11,19 @@ from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from dzdesign.codegen.banner import banner_of, lot_in_words
-from dzdesign.codegen.core.certificate_text import equation_of
+from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.integers.form import Form, Node
 from dzdesign.codegen.integers.interface import Interface, interface_named
 from dzdesign.codegen.integers.law import block_form
-from dzdesign.codegen.integers.text import st_body, st_constants, st_variables
+from dzdesign.codegen.integers.text import COLUMNS, rendered, st_body, st_constants, st_variables
 from dzdesign.core.errors import InputError
-from dzdesign.core.strict_templates import strict_templates
 from dzdesign.core.version import __version__
-from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.design.signals import SIDE_NAMES
 
 NAME = "FB_DeadZone"
 TEMPLATE = f"{NAME}.st.jinja"
-PACKAGE = "dzdesign.codegen.integers"
-#: Columns of a line, and of a comment's text.
-COLUMNS = 116
 END = "END_FUNCTION_BLOCK\n"
 #: Of what the block remembers.
 FIRST_VALUES = {"side": "0", "at_rest": "TRUE"}
@@ -67,29 +61,22 @@ def note_of(compensator: Compensator, settings: Mapping[str, str]) -> str:
 def structured_text(compensator: Compensator, digest: str, interface_name: str, form: Form | None = None) -> str:
     """Return the function block of a compensator whose file has this SHA-256."""
     interface, form = interface_named(interface_name, compensator), form or block_form(compensator, interface_name)
-    banner = banner_of(compensator, digest).lines(TEMPLATE)
-    template = strict_templates(PACKAGE, autoescape=False, lstrip_blocks=True).get_template(TEMPLATE)
-    text = str(template.render(banner=banner, **_values(compensator, interface, form)))
-    return text.replace("²", "^2").encode("ascii", "replace").decode()  # units of recordings stand in comments
-
-
-def _values(compensator: Compensator, interface: Interface, form: Form) -> dict[str, object]:
-    """Return what the template prints."""
-    of_codes, chosen = interface.name == "codes", law(compensator.law)
-    return {
-        "law_equation": equation_of(chosen),
-        "law_text": str(chosen.output).replace("**", "^"),
-        "header": _header(compensator, interface),
-        "bipolar": len(interface.sides) == 2,
-        "has_rest": compensator.zero_band_codes > 0,
-        "first": FIRST_VALUES,
-        "command_text": "converter code of the command" if of_codes else "0.01 % of full command, -10000 to 10000",
-        "pressure_text": "codes of the pressures" if of_codes else "0.1 bar",
-        "output_text": f"compare value, full duty {interface.full}" if of_codes else "0.01 % of full drive",
-        "constants": st_constants(form),
-        "variables": st_variables(form),
-        "body": st_body(form),
-    }
+    of_codes = interface.name == "codes"
+    return rendered(
+        TEMPLATE,
+        compensator,
+        digest,
+        header=_header(compensator, interface),
+        bipolar=len(interface.sides) == 2,
+        has_rest=compensator.zero_band_codes > 0,
+        first=FIRST_VALUES,
+        command_text="converter code of the command" if of_codes else "0.01 % of full command, -10000 to 10000",
+        pressure_text="codes of the pressures" if of_codes else "0.1 bar",
+        output_text=f"compare value, full duty {interface.full}" if of_codes else "0.01 % of full drive",
+        constants=st_constants(form),
+        variables=st_variables(form),
+        body=st_body(form),
+    )
 
 
 def _header(compensator: Compensator, interface: Interface) -> list[str]:

@@ -3,9 +3,16 @@
 from collections.abc import Iterable, Mapping
 from textwrap import wrap
 
+from dzdesign.codegen.banner import banner_of
+from dzdesign.codegen.core.certificate_text import equation_of
 from dzdesign.codegen.integers.form import Form, Node
 from dzdesign.core.errors import DzdesignError
+from dzdesign.core.strict_templates import strict_templates
+from dzdesign.derivation.law import law
+from dzdesign.design.compensator import Compensator
 
+PACKAGE = "dzdesign.codegen.integers"
+#: Columns of a line, and of a comment's text.
 COLUMNS = 116
 #: Whole numbers beyond this are not exact where MATLAB reads them, as doubles.
 EXACT_DOUBLE = 2**53
@@ -22,6 +29,19 @@ MATLAB = BOTH | {
     "or": "{} | {}", "and": "{} & {}", "not": "~{}", "*": "{} .* {}", "min": "min({}, {})", "max": "max({}, {})",
     "int": "int64({})", "of": "{}({})", ">>": "bitshift({}, -{})",
 }  # fmt: skip
+
+
+def rendered(template: str, compensator: Compensator, digest: str, **values: object) -> str:
+    """Return the text of a template with its banner and the law, of a compensator whose file has this SHA-256."""
+    chosen = law(compensator.law)
+    templates = strict_templates(PACKAGE, autoescape=False, lstrip_blocks=True)
+    text = templates.get_template(template).render(
+        banner=banner_of(compensator, digest).lines(template),
+        law_equation=equation_of(chosen),
+        law_text=str(chosen.output).replace("**", "^"),
+        **values,
+    )
+    return str(text).replace("²", "^2").encode("ascii", "replace").decode()  # units of recordings stand in comments
 
 
 def expression(node: Node, spelled: Mapping[str, str]) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated, Self
 
-from dzdesign.codegen.telemetry.frame import CRC_OCTETS, Number, crc_of
+from dzdesign.codegen.telemetry.frame import CRC_OCTETS, Number, crc_of, numbers_of, struct_of
 from dzdesign.core.strict_templates import strict_templates
 
 SOURCES = ("dz_load.c", "dz_load_frame.c", "dz_slots.c")
@@ -126,11 +126,8 @@ class DriveState:
     origin: Annotated[int, Number(bits=32, text="start of its compensator's SHA-256")]
 
 
-REPLY_NUMBERS: dict[str, Number] = {name: hint.__metadata__[0] for name, hint in Reply.__annotations__.items()}
-STATE_NUMBERS: dict[str, Number] = {name: hint.__metadata__[0] for name, hint in DriveState.__annotations__.items()}
-_LETTERS = {8: "B", 16: "H", 32: "I"}
-_REPLY = struct.Struct(">" + "".join(_LETTERS[number.bits] for number in REPLY_NUMBERS.values()))
-_STATE = struct.Struct(">" + "".join(_LETTERS[number.bits] for number in STATE_NUMBERS.values()))
+REPLY_NUMBERS, STATE_NUMBERS = numbers_of(Reply), numbers_of(DriveState)
+_REPLY, _STATE = struct_of(REPLY_NUMBERS), struct_of(STATE_NUMBERS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,7 +31,7 @@ TICKS_MODULUS = 1 << 32
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Number:
-    """One number of the payload: its bits (16 or 32), and what it is."""
+    """One number of a payload: its bits (8, 16 or 32), and what it is."""
 
     bits: int
     text: str
@@ -52,7 +52,17 @@ class Frame:
     status: Annotated[int, Number(bits=16, text="bits of the status word")]
 
 
-NUMBERS: Mapping[str, Number] = {name: hint.__metadata__[0] for name, hint in Frame.__annotations__.items()}
+def numbers_of(kind: type) -> Mapping[str, Number]:
+    """Return the numbers of a payload, or of a part of one, by name."""
+    return {name: hint.__metadata__[0] for name, hint in kind.__annotations__.items()}
+
+
+def struct_of(numbers: Mapping[str, Number]) -> struct.Struct:
+    """Return the octets of such numbers, the most significant one of each first."""
+    return struct.Struct(">" + "".join({8: "B", 16: "H", 32: "I"}[number.bits] for number in numbers.values()))
+
+
+NUMBERS = numbers_of(Frame)
 #: The status word: what the hardware reports, in its low octet, and in the high one what dz_status() and the drive
 #: find wrong.
 STATUS_BITS = {
@@ -76,10 +86,10 @@ STATUS_BITS = {
 STATUS_RELEASED = 0x0080
 #: A firmware of block form has no block that it accepts.
 STATUS_CALIBRATION = 0x0040
-PAYLOAD_OCTETS = sum(number.bits // 8 for number in NUMBERS.values())
+PAYLOAD_OCTETS = struct_of(NUMBERS).size
 FRAME_OCTETS = HEADER_OCTETS + PAYLOAD_OCTETS + CRC_OCTETS
 FRAME_BITS = FRAME_OCTETS * BITS_PER_OCTET
-_FORMAT = ">" + "".join({16: "H", 32: "I"}[number.bits] for number in NUMBERS.values())
+_PAYLOAD = struct_of(NUMBERS)
 _START = struct.pack(">HBB", SYNC, VERSION, PAYLOAD_OCTETS)
 _SYNC = _START[:2]
 
@@ -143,7 +153,7 @@ class FrameReader:
                 self.bad_crc += 1
                 self._skip(1)
                 continue
-            numbers = struct.unpack_from(_FORMAT, held, HEADER_OCTETS)
+            numbers = _PAYLOAD.unpack_from(held, HEADER_OCTETS)
             self.frames += 1
             del held[:FRAME_OCTETS]
             yield Frame(**dict(zip(NUMBERS, numbers, strict=True)))
