@@ -76,8 +76,7 @@ def export(arguments: ExportArguments) -> AmplifierExport:
         If the file, read back, is not safe or leaves other dead zones than stated. This is a fault of dzdesign.
     """
     from dzdesign.codegen.amplifier.device import device_named
-    from dzdesign.codegen.amplifier.files import amplifier_file
-    from dzdesign.codegen.amplifier.files import notes_of
+    from dzdesign.codegen.amplifier.files import amplifier_file, notes_of
     from dzdesign.codegen.amplifier.setting import amplifier_setting, given_dp_MPa, given_threshold
     from dzdesign.design.fixed_offset import dead_zones
 

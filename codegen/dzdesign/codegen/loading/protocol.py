@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated, Self
 
-from dzdesign.codegen.telemetry.frame import CRC_OCTETS, Number, crc_of, numbers_of, struct_of
+from dzdesign.codegen.telemetry.frame import CRC_OCTETS, FrameSearch, Number, crc_of, numbers_of, struct_of
 from dzdesign.core.strict_templates import strict_templates
 
 SOURCES = ("dz_load.c", "dz_load_frame.c", "dz_slots.c")
@@ -158,33 +158,22 @@ class Frame:
         return DriveState(**dict(zip(STATE_NUMBERS, numbers, strict=True))), serial
 
 
-class FrameReader:
-    """Finds frames in a stream of octets, whatever lies between them, telemetry too."""
+class FrameReader(FrameSearch):
+    """Finds the protocol's frames in a stream of octets, telemetry too."""
 
     def __init__(self) -> None:
-        self._held = bytearray()
+        super().__init__(_SYNC, self._octets_of)
+
+    @staticmethod
+    def _octets_of(held: bytearray) -> int | None:
+        if len(held) < HEADER_OCTETS:
+            return None
+        return HEADER_OCTETS + held[4] + CRC_OCTETS if held[4] <= MOST_PAYLOAD else 0
 
     def feed(self, octets: bytes) -> Iterator[Frame]:
-        """Yield the frames that are complete with these octets; a bad one is passed over by one octet."""
-        held = self._held
-        held += octets
-        while True:
-            start = held.find(_SYNC)
-            if start < 0:
-                del held[: len(held) - held.endswith(_SYNC[:1])]
-                return
-            del held[:start]
-            if len(held) < HEADER_OCTETS:
-                return
-            end = HEADER_OCTETS + held[4] + CRC_OCTETS
-            if len(held) < end and held[4] <= MOST_PAYLOAD:
-                return
-            if held[4] > MOST_PAYLOAD or crc_of(held[2:end]):
-                del held[:1]
-                continue
-            frame = Frame(type=held[2], sequence=held[3], payload=bytes(held[HEADER_OCTETS : end - CRC_OCTETS]))
-            del held[:end]
-            yield frame
+        """Yield the frames that are complete with these octets."""
+        for frame in self.whole(octets):
+            yield Frame(type=frame[2], sequence=frame[3], payload=frame[HEADER_OCTETS:-CRC_OCTETS])
 
 
 def load_texts(tick_Hz: int, banner: Callable[[str], Sequence[str]]) -> dict[str, str]:

@@ -9,7 +9,7 @@ reflected, nothing added at the end; of the octets of "123456789" it is 29B1h.
 
 import binascii
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated
@@ -114,20 +114,20 @@ def crc_of(octets: bytes | bytearray) -> int:
     return binascii.crc_hqx(octets, CRC_START)
 
 
-class FrameReader:
-    """Finds the frames in a stream of octets, whatever lies between them.
+class FrameSearch:
+    """Finds whole frames in a stream of octets, whatever lies between them.
 
-    Attributes
-    ----------
-    frames, bad_crc, other_version, skipped : int
-        Frames found; frames whose CRC was wrong; headers of another version or length; octets outside good frames.
+    All begin with the octets `sync`. `length` tells of octets that do how many the frame has, CRC included: None if its
+    header is not complete, 0 if no frame begins so.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, sync: bytes, length: Callable[[bytearray], int | None]) -> None:
+        self._sync, self._length = sync, length
         self._held = bytearray()
+        #: Frames found; those whose CRC was wrong; headers of no frame; octets outside good frames.
         self.frames = self.bad_crc = self.other_version = self.skipped = 0
 
-    def feed(self, octets: bytes) -> Iterator[Frame]:
+    def whole(self, octets: bytes) -> Iterator[bytes]:
         """Yield the frames that are complete with these octets.
 
         After a bad frame the search goes on one octet behind its sync word, so that a good frame which begins inside
@@ -136,31 +136,42 @@ class FrameReader:
         held = self._held
         held += octets
         while True:
-            start = held.find(_SYNC)
+            start = held.find(self._sync)
             if start < 0:  # the last octet may be the first half of a sync word
-                self._skip(len(held) - held.endswith(_SYNC[:1]))
+                self._skip(len(held) - held.endswith(self._sync[:1]))
                 return
             self._skip(start)
-            if not held.startswith(_START):
-                if len(held) < HEADER_OCTETS:
-                    return
+            length = self._length(held)
+            if length is None or length > len(held):
+                return
+            if not length:
                 self.other_version += 1
                 self._skip(1)
-                continue
-            if len(held) < FRAME_OCTETS:
-                return
-            if crc_of(held[2:FRAME_OCTETS]):  # with its own CRC behind it, the CRC of sound octets is zero
+            elif crc_of(held[2:length]):  # with its own CRC behind it, the CRC of sound octets is zero
                 self.bad_crc += 1
                 self._skip(1)
-                continue
-            numbers = _PAYLOAD.unpack_from(held, HEADER_OCTETS)
-            self.frames += 1
-            del held[:FRAME_OCTETS]
-            yield Frame(**dict(zip(NUMBERS, numbers, strict=True)))
+            else:
+                self.frames += 1
+                frame = bytes(held[:length])
+                del held[:length]
+                yield frame
 
     def _skip(self, count: int) -> None:
         self.skipped += count
         del self._held[:count]
+
+
+class FrameReader(FrameSearch):
+    """Finds the telemetry's frames in a stream of octets."""
+
+    def __init__(self) -> None:
+        super().__init__(_SYNC, lambda held: FRAME_OCTETS if held.startswith(_START) else
+                         None if len(held) < HEADER_OCTETS else 0)  # fmt: skip
+
+    def feed(self, octets: bytes) -> Iterator[Frame]:
+        """Yield the frames that are complete with these octets."""
+        for frame in self.whole(octets):
+            yield Frame(**dict(zip(NUMBERS, _PAYLOAD.unpack_from(frame, HEADER_OCTETS), strict=True)))
 
 
 def frame_context() -> dict[str, str]:
