@@ -16,7 +16,8 @@ from dzdesign.terminal.progress import say, with_bar
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import CalibrationBlock
-    from dzdesign.codegen.loading.session import Drive, LoadSession
+    from dzdesign.codegen.loading.protocol import DriveState
+    from dzdesign.codegen.loading.session import LoadSession
 
 #: The longest that a look at the line takes: shorter than an answer is waited for.
 LOOK_S = 0.02
@@ -116,7 +117,7 @@ def _block_of(path: Path) -> _Block:
     return _Block(source=os.fspath(path), octets=octets, numbers=unpack(octets, f"'{path}'"))
 
 
-def _asked(session: "LoadSession", port: str, baud: float) -> "Drive":
+def _asked(session: "LoadSession", port: str, baud: float) -> "DriveState":
     from dzdesign.codegen.loading.session import NoReplyError
 
     try:
@@ -128,7 +129,7 @@ def _asked(session: "LoadSession", port: str, baud: float) -> "Drive":
         ) from error
 
 
-def _load(session: "LoadSession", block: _Block, drive: "Drive", port: str) -> "Drive":
+def _load(session: "LoadSession", block: _Block, drive: "DriveState", port: str) -> "DriveState":
     """Load the block and return what the drive says then."""
     from dzdesign.codegen.loading.session import NoReplyError, RefusedError
 
@@ -152,36 +153,36 @@ def _load(session: "LoadSession", block: _Block, drive: "Drive", port: str) -> "
         raise
 
 
-def _check_fit(block: _Block, drive: "Drive") -> None:
+def _check_fit(block: _Block, drive: "DriveState") -> None:
     """Refuse what the drive's firmware is not compiled for, before anything is erased."""
     from dzdesign.codegen.calibration.layout import SHAPE_BITS
 
-    ours, state = block.numbers, drive.state
-    if (ours.layout, ours.length) != (state.layout, state.length):
+    ours = block.numbers
+    if (ours.layout, ours.length) != (drive.layout, drive.length):
         raise InputError(
             f"{block.source} has layout {ours.layout} in {ours.length} words, the amplifier's firmware takes layout "
-            f"{state.layout} in {state.length}; firmware and dzdesign must be of one version"
+            f"{drive.layout} in {drive.length}; firmware and dzdesign must be of one version"
         )
-    if ours.shape != state.shape:
-        differs = [text for place, text in enumerate(SHAPE_BITS.values()) if (ours.shape ^ state.shape) >> place & 1]
+    if ours.shape != drive.shape:
+        differs = [text for place, text in enumerate(SHAPE_BITS.values()) if (ours.shape ^ drive.shape) >> place & 1]
         raise InputError(
             f"{block.source} is for another kind of drive than the firmware was generated for: they differ in "
             f"'{', '.join(differs)}'; generate firmware and block from designs with the same wiring and outputs"
         )
     for name, what in COMPILED_FOR.items():
-        if (block_has := getattr(ours, name)) != (drive_has := getattr(state, name)):
+        if (block_has := getattr(ours, name)) != (drive_has := getattr(drive, name)):
             raise InputError(
                 f"{block.source} is for firmware with {what} {block_has}, the amplifier's has {drive_has}; design it "
                 "again for the amplifier's target with `dzdesign design --target`"
             )
 
 
-def _verified(session: "LoadSession", block: _Block) -> "Drive":
+def _verified(session: "LoadSession", block: _Block) -> "DriveState":
     """Ask the drive what it holds now, which must be the block."""
     drive = session.query()
-    if (drive.state.crc, drive.state.origin) != (block.numbers.crc32, block.origin) or drive.state.block > 1:
+    if (drive.crc, drive.origin) != (block.numbers.crc32, block.origin) or drive.block > 1:
         raise RequirementError(
-            f"after loading the amplifier uses a block of CRC-32 {drive.state.crc:08x}, expected "
+            f"after loading the amplifier uses a block of CRC-32 {drive.crc:08x}, expected "
             f"{block.numbers.crc32:08x} of {block.source}; load it again"
         )
     return drive
@@ -204,27 +205,26 @@ def _advice(error: Any) -> str:
     return "; the amplifier keeps its old block; load it again"
 
 
-def _place(drive: "Drive") -> str:
+def _place(drive: "DriveState") -> str:
     from dzdesign.codegen.loading.protocol import LINKED, NO_BLOCK
 
     places = {LINKED: "linked with the firmware", NO_BLOCK: "none: the output stays off"}
-    return places.get(drive.state.block, f"loaded, copy {drive.state.block}")
+    return places.get(drive.block, f"loaded, copy {drive.block}")
 
 
-def _document(drive: "Drive", session: "LoadSession") -> dict[str, Any]:
+def _document(drive: "DriveState", session: "LoadSession") -> dict[str, Any]:
     from dzdesign.codegen.loading.protocol import NO_BLOCK, VOLATILE
 
-    state = drive.state
     return {
-        "block": None if state.block == NO_BLOCK else _place(drive),
+        "block": None if drive.block == NO_BLOCK else _place(drive),
         "serial": drive.serial,
-        "crc32": f"{state.crc:08x}",
-        "compensator_sha256_begins": f"{state.origin:08x}",
-        "layout": state.layout,
-        "kept_without_supply": not state.flags & VOLATILE,
-        "refuses_now": _reason(state.refusal),
-        "last_load": _reason(state.ended),
-        "bad_frames": state.bad_frames,
+        "crc32": f"{drive.crc:08x}",
+        "compensator_sha256_begins": f"{drive.origin:08x}",
+        "layout": drive.layout,
+        "kept_without_supply": not drive.flags & VOLATILE,
+        "refuses_now": _reason(drive.refusal),
+        "last_load": _reason(drive.ended),
+        "bad_frames": drive.bad_frames,
         "repeated_requests": session.repeats,
     }
 
@@ -235,20 +235,19 @@ def _reason(reason: int) -> str | None:
     return reason_text(reason) if reason else None
 
 
-def _print(block: _Block | None, drive: "Drive", session: "LoadSession") -> None:
+def _print(block: _Block | None, drive: "DriveState", session: "LoadSession") -> None:
     from dzdesign.codegen.loading.protocol import NO_BLOCK, VOLATILE
 
-    state = drive.state
     if block is not None:
         again = f"; {session.repeats} requests were sent again" if session.repeats else ""
         print(one_line(f"Loaded and read back: {block.source}{again}"))
     print(f"Block in use: {_place(drive)}")
-    if state.block != NO_BLOCK:
+    if drive.block != NO_BLOCK:
         print(f"Serial number: {one_line(drive.serial) or 'none'}")
-        print(f"CRC-32 {state.crc:08x}; SHA-256 of its compensator.json begins with {state.origin:08x}")
-    if state.refusal:
-        print(f"A block would be refused now: {_reason(state.refusal)}")
-    if state.ended:
-        print(f"The last load ended early: {_reason(state.ended)}")
-    if state.flags & VOLATILE:
+        print(f"CRC-32 {drive.crc:08x}; SHA-256 of its compensator.json begins with {drive.origin:08x}")
+    if drive.refusal:
+        print(f"A block would be refused now: {_reason(drive.refusal)}")
+    if drive.ended:
+        print(f"The last load ended early: {_reason(drive.ended)}")
+    if drive.flags & VOLATILE:
         print("This firmware keeps loaded blocks in RAM: without supply they are lost (dz_store.h says what to add)")

@@ -46,7 +46,7 @@ def test_the_goldens_of_a_block_firmware():
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cppcheck") is None, reason="no cppcheck on the path")
 def test_misra_finds_nothing_that_is_not_stated(tmp_path):
-    """In block form with all that it may have; core/test_misra.py has the other forms of the same text."""
+    """With all that it may have; tests/codegen/core/test_misra.py has the other forms of the same text."""
     for file, text in core_of_everything().items():
         (tmp_path / file).write_text(text)
     assert findings(tmp_path) == []

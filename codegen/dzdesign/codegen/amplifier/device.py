@@ -8,7 +8,7 @@ from typing import Literal
 
 import msgspec
 
-from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.errors import DzdesignError, InputError, nearest, quoted
 
 FOLDER = Path(__file__).parent / "devices"
 #: What ``--to`` takes: the names of the files.
@@ -85,6 +85,13 @@ class Device:
     def takes_both_signs(self) -> bool:
         """Whether it drives two solenoids."""
         return self.law != "jump" or self.offset is None or bool(self.offset.negative)
+
+    @property
+    def jumps_to(self) -> Parameter:
+        """The parameter of the offset, which all devices but those with a table have."""
+        if self.offset is None:
+            raise DzdesignError(f"the file of device '{self.name}' states no offset, expected a table [offset]")
+        return self.offset
 
     def in_unit(self, counts: int) -> str:
         """Return counts with their unit, volts for a device that counts in millivolts."""

@@ -1,7 +1,7 @@
 """The fixed compensation of a compensator in the steps of a device: rounded to the safe side, its range checked."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor
 
@@ -99,28 +99,34 @@ def amplifier_setting(
         If the device's range does not hold the setting, it has fewer solenoids, or an option is not of it.
     """
     with errors_in(compensator.valve.recorded_units):
-        return replace(_setting(compensator, device, dp_MPa, threshold), threshold=threshold)
-
-
-def _setting(
-    compensator: Compensator, device: Device, dp_MPa: Fraction | None, threshold: Fraction | None
-) -> AmplifierSetting:
-    signs = compensator.signals.signs
-    if len(signs) > 1 and not device.takes_both_signs:
-        raise InputError(f"{device.title} drives one solenoid, but the design has two; choose another device")
-    offsets = {sign: fixed_offset(compensator, sign) for sign in signs}
-    rest = max(zero_band(compensator, sign) for sign in signs) if threshold is None else threshold
-    if device.law == "table":
-        at = Fraction(repr(compensator.valve.sides["positive"].reference.dp_MPa)) if dp_MPa is None else dp_MPa
-        return _table(compensator, device, offsets, _nominal(at, offsets), rest)
-    if dp_MPa is not None:
-        raise InputError(
-            f"--table-dp applies to devices with a table of the characteristic, but {device.title} has none; leave it "
-            "out"
-        )
-    if threshold is not None and device.threshold is None:
-        raise InputError(f"{device.title} has no threshold parameter for --threshold; leave it out")
-    return _jump(compensator, device, offsets, rest) if device.law == "jump" else _added(compensator, device, offsets)
+        signs, is_table, at = compensator.signals.signs, device.law == "table", None
+        if len(signs) > 1 and not device.takes_both_signs:
+            raise InputError(f"{device.title} drives one solenoid, but the design has two; choose another device")
+        offsets = {sign: fixed_offset(compensator, sign) for sign in signs}
+        rest = max(zero_band(compensator, sign) for sign in signs) if threshold is None else threshold
+        if dp_MPa is not None and not is_table:
+            raise InputError(
+                f"--table-dp applies to devices with a table of the characteristic, but {device.title} has none; leave "
+                "it out"
+            )
+        if threshold is not None and device.threshold is None and not is_table:
+            raise InputError(f"{device.title} has no threshold parameter for --threshold; leave it out")
+        if is_table:
+            reference = Fraction(repr(compensator.valve.sides["positive"].reference.dp_MPa))
+            at = _nominal(reference if dp_MPa is None else dp_MPa, offsets)
+            parameters, characteristics = dict[str, int](), _table(compensator, device, offsets, at, rest)
+        elif device.law == "jump":
+            parameters, characteristics = _jump(compensator, device, offsets, rest)
+        else:
+            _refuse_a_limit(compensator, device)
+            # One offset for both signs: the smaller one.
+            set_to = min(_offset_counts(device, offset) for offset in offsets.values())
+            parameters = {device.jumps_to.positive: set_to}
+            characteristics = dict.fromkeys(offsets, added(Fraction(set_to, device.counts_of_full)))
+    return AmplifierSetting(
+        device=device, parameters=parameters, characteristics=characteristics, offsets=offsets, dp_MPa=at,
+        threshold=threshold,
+    )  # fmt: skip
 
 
 def _nominal(dp_MPa: Fraction, offsets: Mapping[int, FixedOffset]) -> Fraction:
@@ -134,7 +140,8 @@ def _nominal(dp_MPa: Fraction, offsets: Mapping[int, FixedOffset]) -> Fraction:
 
 def _jump(
     compensator: Compensator, device: Device, offsets: Mapping[int, FixedOffset], rest: Fraction
-) -> AmplifierSetting:
+) -> tuple[dict[str, int], dict[int, Characteristic]]:
+    """Return the parameters of a jump at the threshold, and the drives that they make."""
     unit, parameters, characteristics = device.counts_of_full, {}, {}
     at_rest = ceil(rest * unit) if device.threshold else 0
     for sign, offset in offsets.items():
@@ -145,34 +152,19 @@ def _jump(
                 f"the largest drive of the design, {device.in_unit(full)}, is not above the offset of "
                 f"{device.in_unit(set_to)}; design it with a larger --output-max"
             )
-        parameters[_parameter(device, device.offset).name(sign)] = set_to
+        parameters[device.jumps_to.name(sign)] = set_to
         if device.full is not None:
             parameters[device.full.name(sign)] = full
         characteristics[sign] = jump(Fraction(set_to, unit), Fraction(full, unit), Fraction(at_rest, unit))
     if device.threshold is not None:
         _check_range(device, device.threshold, device.threshold.positive, at_rest, "choose a smaller --threshold")
         parameters[device.threshold.positive] = at_rest
-    return AmplifierSetting(
-        device=device, parameters=parameters, characteristics=characteristics, offsets=offsets
-    )
-
-
-def _added(compensator: Compensator, device: Device, offsets: Mapping[int, FixedOffset]) -> AmplifierSetting:
-    """Return the setting of a device with one offset for both signs: the smaller one."""
-    _refuse_a_limit(compensator, device)
-    set_to = min(_offset_counts(device, offset) for offset in offsets.values())
-    characteristic = added(Fraction(set_to, device.counts_of_full))
-    return AmplifierSetting(
-        device=device,
-        parameters={_parameter(device, device.offset).positive: set_to},
-        characteristics=dict.fromkeys(offsets, characteristic),
-        offsets=offsets,
-    )
+    return parameters, characteristics
 
 
 def _table(
     compensator: Compensator, device: Device, offsets: Mapping[int, FixedOffset], dp_MPa: Fraction, rest: Fraction
-) -> AmplifierSetting:
+) -> dict[int, Characteristic]:
     """Return points in whole counts: a command is rounded up, a drive down."""
     unit, characteristics = device.counts_of_full, {}
     for sign, offset in offsets.items():
@@ -182,20 +174,12 @@ def _table(
             command, drive = nodes[place]
             nodes[place] = command, min(drive, nodes[place + 1][1] - Fraction(1, unit))
         characteristics[sign] = Characteristic(rest=exact.rest, nodes=tuple(nodes))
-    return AmplifierSetting(
-        device=device, parameters={}, characteristics=characteristics, offsets=offsets, dp_MPa=dp_MPa
-    )
-
-
-def _parameter(device: Device, parameter: Parameter | None) -> Parameter:
-    if parameter is None:
-        raise InputError(f"the file of device '{device.name}' states no offset, expected a table [offset]")
-    return parameter
+    return characteristics
 
 
 def _offset_counts(device: Device, offset: FixedOffset) -> int:
     """Return the offset rounded down to the device's step; one beyond its range is refused."""
-    parameter, counts = _parameter(device, device.offset), floor(offset.share * device.counts_of_full)
+    parameter, counts = device.jumps_to, floor(offset.share * device.counts_of_full)
     instead = device.instead or "a design with PLC or drive needs no such parameter (see codegen --list-targets)"
     _check_range(device, parameter, parameter.name(offset.sign), counts, f"choose another device: {instead}")
     return counts

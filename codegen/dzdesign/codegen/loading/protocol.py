@@ -107,7 +107,7 @@ class Reply:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveState:
-    """What the reply to a query goes on with."""
+    """What the reply to a query goes on with; the serial number of its block stands behind the numbers."""
 
     block: Annotated[int, Number(bits=16, text="in use: slot 0 or 1, 2: the linked one, 65535: none")]
     flags: Annotated[int, Number(bits=16, text="1: a loaded block is lost without supply, 2: a load is under way")]
@@ -124,6 +124,7 @@ class DriveState:
     beta_step: Annotated[int, Number(bits=16, text="the same of codes between two nodes of beta")]
     crc: Annotated[int, Number(bits=32, text="CRC-32 of the block in use")]
     origin: Annotated[int, Number(bits=32, text="start of its compensator's SHA-256")]
+    serial: str
 
 
 REPLY_NUMBERS, STATE_NUMBERS = numbers_of(Reply), numbers_of(DriveState)
@@ -149,13 +150,13 @@ class Frame:
             return None
         return Reply(**dict(zip(REPLY_NUMBERS, _REPLY.unpack_from(self.payload), strict=True)))
 
-    def drive_state(self) -> tuple[DriveState, str] | None:
-        """Return the drive's state and its block's serial number; None if the frame is no reply to a query."""
+    def drive_state(self) -> DriveState | None:
+        """Return what a drive says of itself; None if the frame is no reply to a query."""
         if len(self.payload) != _REPLY.size + _STATE.size + SERIAL_OCTETS:
             return None
         numbers = _STATE.unpack_from(self.payload, _REPLY.size)
         serial = self.payload[-SERIAL_OCTETS:].rstrip(b"\0").decode("utf-8", "replace")
-        return DriveState(**dict(zip(STATE_NUMBERS, numbers, strict=True))), serial
+        return DriveState(**dict(zip(STATE_NUMBERS, numbers, strict=True)), serial=serial)
 
 
 class FrameReader(FrameSearch):

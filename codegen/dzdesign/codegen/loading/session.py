@@ -1,7 +1,6 @@
 """The PC's side of loading a block: each request is sent until its reply comes, a load until it is done or refused."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Protocol
 
 from dzdesign.codegen.calibration.files import FINDINGS
@@ -59,14 +58,6 @@ class RefusedError(RequirementError):
         super().__init__(reason_text(reason))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
-    """What a drive says of itself."""
-
-    state: DriveState
-    serial: str
-
-
 class LoadSession:
     """Requests over one line, numbered from `sequence` on."""
 
@@ -75,7 +66,7 @@ class LoadSession:
         #: Requests that were sent again.
         self.repeats = 0
 
-    def query(self) -> Drive:
+    def query(self) -> DriveState:
         """Return what the drive says of itself."""
         frame = self._exchange(Request.QUERY, b"")
         found = frame.drive_state()
@@ -84,7 +75,7 @@ class LoadSession:
                 f"the amplifier answers {len(frame.payload)} octets that this dzdesign does not know; "
                 "firmware and dzdesign must be of one version"
             )
-        return Drive(state=found[0], serial=found[1])
+        return found
 
     def loading(self, block: bytes, crc: int, origin: int) -> Iterator[Request]:
         """Write a block of whole words, and yield each request that was done.

@@ -12,7 +12,7 @@ import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated
+from typing import Annotated, get_origin, get_type_hints
 
 from dzdesign.codegen.core.integer_form import exact_factors
 from dzdesign.core.errors import InputError
@@ -54,7 +54,8 @@ class Frame:
 
 def numbers_of(kind: type) -> Mapping[str, Number]:
     """Return the numbers of a payload, or of a part of one, by name."""
-    return {name: hint.__metadata__[0] for name, hint in kind.__annotations__.items()}
+    hints = get_type_hints(kind, include_extras=True)
+    return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}
 
 
 def struct_of(numbers: Mapping[str, Number]) -> struct.Struct:
