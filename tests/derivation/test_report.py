@@ -21,10 +21,10 @@ from dzdesign.derivation.account.account import STATEMENTS, verify_statements
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.solving import agree
 from dzdesign.derivation.account.statement import Outcome
-from dzdesign.derivation.presentation import formulas, prose, report, writers
+from dzdesign.derivation.presentation import content, formulas, report, writers
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text
 from dzdesign.derivation.presentation.writers import HtmlWriter, anchor
-from tests.support.account_claims import BY_NUMBER
+from tests.derivation.account.claims import BY_NUMBER
 from tests.support.paths import ROOT
 from tests.support.schema_checks import overlooked, problems
 
@@ -363,7 +363,7 @@ def test_make_docs_builds_the_page_with_the_products_own_command(derive, rendere
 
 
 def test_a_sentence_has_symbols_code_and_references():
-    words = prose.Words("`a` step $u_i' - k*x_max <= 1$ by Eqs. (18) and (19), 8-8.5 V; [[S|the definition of $S$]]")
+    words = content.Words("`a` step $u_i' - k*x_max <= 1$ by Eqs. (18) and (19), 8-8.5 V; [[S|the definition of $S$]]")
     assert str(words) == "`a` step u_i' - k*x_max <= 1 by Eqs. (18) and (19), 8-8.5 V; the definition of S"
     html = HtmlWriter({"(18)", "S"}).words(words)
     for part in ("<code>a</code>", "8–8.5 V", '<a href="#eq-18">(18)</a> and (19)', '<a href="#S">the definition of'):
@@ -379,7 +379,7 @@ def test_every_symbol_in_prose_is_declared():
             assert set(re.findall(r"[A-Za-z]\w*'?", formula)) <= known, text
 
 
-@pytest.mark.parametrize("module", [prose, report, writers, formulas], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("module", [content, report, writers, formulas], ids=lambda one: one.__name__)
 def test_examples_in_the_docstrings_run(module):
     outcome = doctest.testmod(module)
     assert outcome.attempted > 0 and outcome.failed == 0

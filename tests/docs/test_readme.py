@@ -3,7 +3,7 @@
 import re
 import struct
 
-from tests.docs.sentences import words_of
+from tests.docs.prose import words_of
 from tests.support.paths import ROOT, TESTS
 
 README = (ROOT / "README.md").read_text("utf-8")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.account_mutants import WAYS, Tried, score, score_mutations
+from tests.derivation.account.mutants import WAYS, Tried, score, score_mutations
 
 SHARE, SEED = 0.05, 20261123
 
