@@ -3,9 +3,6 @@
 import doctest
 import json
 import re
-import shlex
-import shutil
-import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -25,7 +22,6 @@ from dzdesign.derivation.presentation import content, formulas, report, writers
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text
 from dzdesign.derivation.presentation.writers import HtmlWriter, anchor
 from tests.derivation.account.claims import BY_NUMBER
-from tests.support.paths import ROOT
 from tests.support.schema_checks import overlooked, problems
 
 MARKS = {Outcome.FOLLOWS: "follows", Outcome.FOLLOWS_IF: "follows if", Outcome.DOES_NOT_FOLLOW: "does not follow"}
@@ -236,19 +232,6 @@ def test_json_fits_its_schema_and_can_be_read_back(rendered, rows):
         assert set(re.findall(r"[A-Za-z]\w*", row["statement"])) - listed <= {"sqrt", "log", "Piecewise", "True"}
 
 
-def test_json_says_what_the_text_says(rows):
-    wrong, law, condition = rows["(29)"], rows["(18)"], rows["(27)"]
-    assert (wrong["outcome"], wrong["corrected_by"]) == ("does not follow", "(29c)")
-    assert wrong["figures"][0]["value"] == 13650
-    assert [premise["number"] for premise in law["premises"]] == ["u_O", "(17)"]
-    last = law["derivations"][-1]["lines"][-1]
-    assert last["words"] == "Together:" and last["formula"].removeprefix("u_O = ") in law["statement"]
-    assert law["section"].startswith("1.2") and "T1c" in law["see"] and condition["necessary"] is True
-    simulation, first, second = rows["T3b"]["figures"]
-    assert (simulation["ours"], simulation["paper"]) == ("0.9391 L/min", "0.95 L/min (ours -1.1 %)")
-    assert (first["ours"], second["paper"]) == ("1.12 L/min", "")
-
-
 def test_html_is_one_page_without_scripts_or_network(rendered):
     page = Elements(rendered["html"])
     assert not {tag for tag, _, _ in page.elements} & {"script", "link", "img", "iframe", "object", "base"}
@@ -344,19 +327,6 @@ def test_a_unit_error_is_named(derive, verdicts):
     status, printed = derive("--equation", "9", found=[*{**verdicts, "(9)": mixed}.values()])
     assert status == 1
     assert "but: follows; its units: a sum of m and V." in printed.out
-
-
-@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
-def test_make_docs_builds_the_page_with_the_products_own_command(derive, rendered, tmp_path):
-    command = ["make", "-n", "docs", f"DOCS={tmp_path}"]
-    recipe = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    lines = [shlex.split(line) for line in recipe.splitlines() if "bin/dzdesign derive" in line]
-    for _, derived, *arguments in lines:
-        assert (derived, derive(*arguments)[0]) == ("derive", 0)
-    built = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
-    assert built == {"index.html": rendered["html"], "derivation.json": rendered["json"]}
-    assert "/docs/derivation/" in (ROOT / ".gitignore").read_text().splitlines()
-    assert re.search(r"^clean:\n\t.*\$\(DOCS\)", (ROOT / "Makefile").read_text(), re.MULTILINE)
 
 
 # --- prose --------------------------------------------------------------------------------------------------

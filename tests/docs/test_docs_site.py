@@ -15,14 +15,13 @@ from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
 from dzdesign.core.version import __version__
-from tests.support.paths import ROOMS, ROOT
+from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
 pytest.importorskip("sphinx", reason="the site needs the packages of the extra `docs`")
 pytest.importorskip("myst_parser", reason="the site needs the packages of the extra `docs`")
 
 DOCS = ROOT / "docs"
-FOLDERS = (*ROOMS, "tests", "examples", "docs")
 #: Tag -> attribute by which a page loads something; a link that a reader may follow is not among them.
 LOADS = {"link": "href", "script": "src", "img": "src", "source": "src", "iframe": "src", "object": "data"}
 
@@ -38,7 +37,6 @@ def site(tmp_path_factory):
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stderr) == (0, ""), done.stderr
-    (folder / "said.txt").write_text(done.stdout, encoding="utf-8")
     return folder / "html"
 
 
