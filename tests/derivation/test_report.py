@@ -4,7 +4,6 @@ import doctest
 import json
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import pytest
 import sympy
@@ -22,6 +21,7 @@ from dzdesign.derivation.presentation import content, formulas, report, writers
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text
 from dzdesign.derivation.presentation.writers import HtmlWriter, anchor
 from tests.derivation.account.claims import BY_NUMBER
+from tests.support.html_pages import Page
 from tests.support.schema_checks import overlooked, problems
 
 MARKS = {Outcome.FOLLOWS: "follows", Outcome.FOLLOWS_IF: "follows if", Outcome.DOES_NOT_FOLLOW: "does not follow"}
@@ -118,31 +118,25 @@ def test_what_is_printed_is_what_was_proved(expressions):
     assert not agree(read_back(to_text(law).replace("1 - beta", "1 + beta")), law)
 
 
-class Elements(HTMLParser):
-    """The elements of a page, each with its attributes and the number of elements in it; fails on a mismatch."""
+class Elements(Page):
+    """A page whose elements end where they must, each with the number of elements in it."""
 
     def __init__(self, page):
-        super().__init__()
         self.open, self.elements = [], []
-        self.feed(page)
+        super().__init__(page)
         assert self.open == []
 
     def handle_starttag(self, tag, attrs):
+        super().handle_starttag(tag, attrs)
         assert (tag, "a") != ("a", *(one[0] for one in self.open if one[0] == "a")), "a link within a link"
         if self.open:
-            self.open[-1][2] += 1
-        self.elements.append([tag, dict(attrs), 0])
+            self.open[-1][1] += 1
         if tag != "meta":
-            self.open.append(self.elements[-1])
+            self.open.append([tag, 0])
+            self.elements.append(self.open[-1])
 
     def handle_endtag(self, tag):
         assert self.open.pop()[0] == tag
-
-    def links(self):
-        return {attrs["href"] for tag, attrs, _ in self.elements if tag == "a"}
-
-    def anchors(self):
-        return [attrs["id"] for _, attrs, _ in self.elements if "id" in attrs]
 
 
 def test_mathml_elements_have_the_parts_that_they_need(expressions):
@@ -150,7 +144,7 @@ def test_mathml_elements_have_the_parts_that_they_need(expressions):
     for expression in expressions:
         latex = to_latex(expression)
         page = Elements(f"<math>{to_mathml(latex)}</math>")
-        assert [e for e in page.elements if e[0] in needed and e[2] != needed[e[0]]] == [], expression
+        assert [e for e in page.elements if e[0] in needed and e[1] != needed[e[0]]] == [], expression
         assert latex.count("{") == latex.count("}") and latex.count(r"\left") == latex.count(r"\right")
 
 
@@ -234,10 +228,10 @@ def test_json_fits_its_schema_and_can_be_read_back(rendered, rows):
 
 def test_html_is_one_page_without_scripts_or_network(rendered):
     page = Elements(rendered["html"])
-    assert not {tag for tag, _, _ in page.elements} & {"script", "link", "img", "iframe", "object", "base"}
+    assert not {tag for tag, _ in page.tags} & {"script", "link", "img", "iframe", "object", "base"}
     assert not re.search(r"https?:|url\(|@import|\son\w+=", rendered["html"])
-    assert len(page.anchors()) == len(set(page.anchors()))
-    assert {"#eq-18", "#T3b"} <= page.links() <= {f"#{identifier}" for identifier in page.anchors()}
+    assert len(page.ids()) == len(set(page.ids()))
+    assert {"#eq-18", "#T3b"} <= {*page.links()} <= {f"#{identifier}" for identifier in page.ids()}
     marks = re.findall(r'<span class="mark [^"]*"><span aria-hidden="true">(.)</span> ([a-z: ]+)', rendered["html"])
     words = {"▫": "given", "✓": "follows", "◐": "follows if", "✗": "does not follow"}
     assert len(marks) > len(STATEMENTS)  # a sign and a word, not only a colour
@@ -272,7 +266,7 @@ def test_a_part_of_the_account_reads_like_the_whole(found, format):
     assert "29c" in part  # what it should read, without a link to what is not shown
     if format == "html":
         page = Elements(part)
-        assert page.links() <= {f"#{identifier}" for identifier in page.anchors()}
+        assert {*page.links()} <= {f"#{identifier}" for identifier in page.ids()}
 
 
 def test_several_equations_and_names_with_commas():

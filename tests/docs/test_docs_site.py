@@ -6,7 +6,6 @@ import os
 import re
 import subprocess
 import sys
-from html.parser import HTMLParser
 from urllib.parse import unquote
 
 import pytest
@@ -15,6 +14,7 @@ from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
 from dzdesign.core.version import __version__
+from tests.support.html_pages import Page
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
@@ -40,33 +40,17 @@ def site(tmp_path_factory):
     return folder / "html"
 
 
-class Page(HTMLParser):
-    """What a page loads, where its links lead, and the places that a link may lead to."""
-
-    def __init__(self, path):
-        super().__init__()
-        self.loads, self.links, self.places = [], [], set()
-        self.feed(path.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
-        if given.get("id"):
-            self.places.add(given["id"])
-        if tag == "a" and given.get("href"):
-            self.links.append(given["href"])
-        if tag in LOADS and given.get(LOADS[tag]):
-            self.loads.append(given[LOADS[tag]])
-
-
 @pytest.fixture(scope="module")
 def pages(site):
-    return {path.resolve(): Page(path) for path in site.rglob("*.html") if "derivation" not in path.parts}
+    paths = (path.resolve() for path in site.rglob("*.html") if "derivation" not in path.parts)
+    return {path: Page(path.read_text(encoding="utf-8")) for path in paths}
 
 
 def test_nothing_is_loaded_from_elsewhere(site, pages):
     assert len(pages) > 20
-    loaded = {(path.name, what) for path, page in pages.items() for what in page.loads}
-    assert [each for each in loaded if re.match(r"([a-z]+:)?//", each[1])] == []
+    tags = [(path.name, *tag) for path, page in pages.items() for tag in page.tags]
+    loaded = {(name, given[LOADS[tag]]) for name, tag, given in tags if tag in LOADS and given.get(LOADS[tag])}
+    assert loaded and [each for each in loaded if re.match(r"([a-z]+:)?//", each[1])] == []
     styles = "".join(path.read_text(encoding="utf-8") for path in site.rglob("*.css"))
     assert styles and re.findall(r"@import|url\(\s*['\"]?(?:https?:)?//[^)]*", styles) == []
     assert list(site.rglob("*.woff*")) == [], "no web fonts"
@@ -74,9 +58,10 @@ def test_nothing_is_loaded_from_elsewhere(site, pages):
 
 def test_every_link_leads_somewhere(site, pages):
     broken, tried = [], 0
+    places = {path: {*page.ids()} for path, page in pages.items()}
     account = {"index.html", "derivation.json"}
     for path, page in pages.items():
-        for link in page.links:
+        for link in page.links():
             tried += 1
             target, _, place = unquote(link).partition("#")
             if re.match(r"[a-z]+:", target):
@@ -84,7 +69,7 @@ def test_every_link_leads_somewhere(site, pages):
             where = (path.parent / target).resolve() if target else path
             if where.parent.name == "derivation" and where.name in account:
                 continue
-            if not where.is_file() or (place and where in pages and place not in pages[where].places):
+            if not where.is_file() or (place and where in pages and place not in places[where]):
                 broken.append(f"{path.name}: {link}")
     assert broken == [] and tried > 500
 
@@ -138,17 +123,6 @@ def test_every_note_of_assess_is_documented_and_none_is_invented():
     }
     assert len(made) > 5
     assert set(re.findall(r"^\| `(\S+)` \|", text, re.MULTILINE)) == made
-
-
-def test_every_figure_is_shown_with_words_for_those_who_cannot_see_it(site):
-    sys.path.insert(0, str(DOCS))
-    from figures.draw import FIGURES
-
-    shown = "".join(path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md"))
-    for name in FIGURES:
-        block = shown.partition(f"_made/figures/{name}.svg\n")[2].partition("```")[0]
-        assert len(block.partition(":alt: ")[2].splitlines()[0]) > 40, name
-        assert (site / "_images" / f"{name}.svg").stat().st_size < 400_000
 
 
 def test_every_page_shows_the_version(site, pages):

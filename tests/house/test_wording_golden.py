@@ -28,10 +28,3 @@ def test_every_message_is_of_a_test():
     asked = set(re.findall(r"wording\(\s*f?[\"']([^:\"'{]+): ", "".join(text for _, text in sources)))
     asked |= {name_of_tests(stem) for stem, text in sources if re.search(r"wording\.(refusal|of_test)\(", text)}
     assert groups and groups == asked
-
-
-def test_a_message_is_short_enough_to_be_read():
-    """Under 200 characters where it can be; what is longer names alternatives or several files."""
-    messages = read_messages()
-    long = {name for name, text in messages.items() if len(text) > 400}
-    assert long == set()
