@@ -21,7 +21,7 @@ def test_a_changed_text_is_seen_and_an_update_keeps_it(tmp_path):
         compare(name, f"{text} in FOLDER")
 
 
-def test_every_message_is_of_a_test():
+def test_every_message_is_of_a_test(request):
     """A name is ``group: case``: that of a file of tests and one of them, or a test has it, its group at least."""
     sources = {path: path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py")}
     tests = {
@@ -32,10 +32,14 @@ def test_every_message_is_of_a_test():
     asked = "".join(sources.values())
     groups = set(re.findall(r"f[\"']([^:\"'{]+): [^\"']*{", asked))
     messages = read_messages()
-    assert messages and [
+    of_no_test = {
         name
         for name in messages
         if re.sub(r"( \[.*\])?( \(\d+\))?$", "", name, flags=re.DOTALL) not in tests
         and f'"{name}"' not in asked
         and name.partition(": ")[0] not in groups
-    ] == []
+    }
+    if request.config.getoption("--update-goldens"):
+        write_messages({name: text for name, text in messages.items() if name not in of_no_test})
+    else:
+        assert messages and of_no_test == set()
