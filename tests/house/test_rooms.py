@@ -26,7 +26,6 @@ FLOORS = {
         "constants", "options", "valve", "reading", "ramps", "knees", "fitting", "data_quality", "results", "plots",
     ),
 }  # fmt: skip
-MOST_MODULES = 25
 
 
 def modules(root: Path = ROOT) -> dict[str, Path]:
@@ -158,13 +157,6 @@ def test_there_is_no_import_circle_and_a_seeded_one_is_found(graph):
     source = "if TYPE_CHECKING:\n    from dzdesign.identify.identification import identify"
     errors = "dzdesign.core.errors"
     assert errors in circle({**graph, errors: graph[errors] | set(imports(source, graph))})
-
-
-def test_no_folder_holds_more_modules_than_one_can_look_over():
-    folders: dict[Path, int] = {}
-    for path in modules().values():
-        folders[path.parent] = folders.get(path.parent, 0) + (path.name != "__init__.py")
-    assert {str(folder.relative_to(ROOT)): count for folder, count in folders.items() if count > MOST_MODULES} == {}
 
 
 def public_objects() -> Iterator[tuple[str, object]]:
