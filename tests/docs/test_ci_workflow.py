@@ -52,7 +52,9 @@ def test_no_page_installs_a_name_that_anybody_may_register():
 def repository(tmp_path_factory):
     """A user's repository as the page describes it, and a runner's environment."""
     folder = tmp_path_factory.mktemp("ci")
-    shutil.copytree(EXAMPLE / "ramps", folder / "ramps")
+    (folder / "ramps").mkdir()
+    for ramp in EXAMPLE.glob("ramps/ramp_dP[15]_1.csv.gz"):  # two pressure drops are enough to identify and design
+        shutil.copy(ramp, folder / "ramps")
     shutil.copy(EXAMPLE / "plant.toml", folder)
     (folder / "dzdesign.toml").write_text(OPTIONS, encoding="utf-8")
     for step in steps():
