@@ -159,6 +159,29 @@ def test_there_is_no_import_circle_and_a_seeded_one_is_found(graph):
     assert errors in circle({**graph, errors: graph[errors] | set(imports(source, graph))})
 
 
+def unresolved(source: str) -> Iterator[str]:
+    """Yield the imports of ours in a source, also those that no test runs, that name what is not there."""
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith(("dzdesign.", "tests.")):
+            continue
+        for name in (alias.name for alias in node.names if alias.name != "*"):
+            try:
+                if not hasattr(importlib.import_module(node.module), name):
+                    importlib.import_module(f"{node.module}.{name}")
+            except ImportError:
+                yield f"line {node.lineno}: from {node.module} import {name}"
+
+
+@pytest.mark.slow
+def test_every_import_of_ours_resolves():
+    """In benchmarks too, which no test runs."""
+    paths = [path for folder in (*ROOMS, "benchmarks", "docs", "release") for path in (ROOT / folder).rglob("*.py")]
+    found = {path.relative_to(ROOT).as_posix(): list(unresolved(path.read_text("utf-8"))) for path in paths}
+    assert {path: lines for path, lines in found.items() if lines} == {}
+    seed = "def f():\n    from dzdesign.core.errors import nothing\n    from tests.support.absent import paths"
+    assert len(list(unresolved(seed))) == 2
+
+
 def public_objects() -> Iterator[tuple[str, object]]:
     for name in modules():
         module = importlib.import_module(name)
