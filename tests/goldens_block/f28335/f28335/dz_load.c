@@ -104,7 +104,7 @@ static void go_on(struct dz_load *load, uint16_t step, uint16_t ticks)
 }
 
 /* The load is over. If a request was being done, it is answered; else what was the last one may come anew. */
-static void end(struct dz_load *load, uint16_t reason, uint16_t detail, uint16_t ticks)
+static void end_load(struct dz_load *load, uint16_t reason, uint16_t detail, uint16_t ticks)
 {
     go_on(load, STEP_IDLE, ticks);
     load->ended = reason;
@@ -137,7 +137,7 @@ static void erase_slot(struct dz_load *load, uint16_t ticks)
     }
     else if (outcome != DZ_STORE_BUSY)
     {
-        end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
+        end_load(load, DZ_LOAD_REASON_STORE, 0u, ticks);
     }
     else
     {
@@ -162,7 +162,7 @@ static void write_words(struct dz_load *load, uint16_t ticks)
     }
     else
     {
-        end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
+        end_load(load, DZ_LOAD_REASON_STORE, 0u, ticks);
     }
 }
 
@@ -175,19 +175,19 @@ static void check_block(struct dz_load *load, uint16_t ticks)
 
     if (block->crc32 != load->crc)
     {
-        end(load, DZ_LOAD_REASON_CRC, 0u, ticks);
+        end_load(load, DZ_LOAD_REASON_CRC, 0u, ticks);
     }
     else if (wrong != 0u)
     {
-        end(load, DZ_LOAD_REASON_CHECK, wrong, ticks);
+        end_load(load, DZ_LOAD_REASON_CHECK, wrong, ticks);
     }
     else if (dz_load_origin(block) != load->origin)
     {
-        end(load, DZ_LOAD_REASON_ORIGIN, 0u, ticks);
+        end_load(load, DZ_LOAD_REASON_ORIGIN, 0u, ticks);
     }
     else if (dz_load_refusal(block) != 0u)
     {
-        end(load, dz_load_refusal(block), 0u, ticks);
+        end_load(load, dz_load_refusal(block), 0u, ticks);
     }
     else
     {
@@ -211,11 +211,11 @@ static void write_mark(struct dz_load *load, uint16_t ticks)
         load->used = load->slot;
         load->block = &slot->block;
         dz_load_use(load->block);
-        end(load, DZ_LOAD_REASON_DONE, 0u, ticks);
+        end_load(load, DZ_LOAD_REASON_DONE, 0u, ticks);
     }
     else
     {
-        end(load, DZ_LOAD_REASON_STORE, 0u, ticks);
+        end_load(load, DZ_LOAD_REASON_STORE, 0u, ticks);
     }
 }
 
@@ -230,7 +230,7 @@ static void step(struct dz_load *load, uint16_t ticks)
     }
     else if (refusal != 0u)
     {
-        end(load, refusal, 0u, ticks);
+        end_load(load, refusal, 0u, ticks);
     }
     else if (load->step == STEP_HOLDING)
     {
@@ -240,7 +240,7 @@ static void step(struct dz_load *load, uint16_t ticks)
         }
         else if (waited > DZ_LOAD_HOLD_TICKS)
         {
-            end(load, DZ_LOAD_REASON_TIME, 0u, ticks);
+            end_load(load, DZ_LOAD_REASON_TIME, 0u, ticks);
         }
         else
         {
@@ -261,7 +261,7 @@ static void step(struct dz_load *load, uint16_t ticks)
     }
     else if (waited > DZ_LOAD_TICKS)
     {
-        end(load, DZ_LOAD_REASON_TIME, 0u, ticks);
+        end_load(load, DZ_LOAD_REASON_TIME, 0u, ticks);
     }
     else
     {
@@ -421,7 +421,7 @@ static void handle(struct dz_load *load, uint16_t ticks)
     {
         if (load->step == STEP_RECEIVING)
         {
-            end(load, DZ_LOAD_REASON_ABORTED, 0u, ticks);
+            end_load(load, DZ_LOAD_REASON_ABORTED, 0u, ticks);
         }
         answer(load, type, sequence, DZ_LOAD_REASON_DONE, 0u);
     }
