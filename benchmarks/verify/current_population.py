@@ -8,7 +8,7 @@ from population import FEW, MACHINES, shut_rows, valves
 from scoreboard import Row, print_rows, say
 from small_budgets import designed
 
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
+from dzdesign.verify.closed_loop.scene import scenes_of
 
 
 def print_current_population(*, quick: bool, seed: int) -> list[Row]:

@@ -8,15 +8,23 @@ from time import perf_counter
 
 from example_valve import example_valve
 from scoreboard import Row, print_rows, say
-from small_budgets import DUTY, IN_TURN, LARGEST, LITTLE, called_ten_times_better, designed, right_and_wrong
+from small_budgets import (
+    DUTY,
+    IN_TURN,
+    LARGEST,
+    LITTLE,
+    called_ten_times_better,
+    designed,
+    drawn_alone,
+    right_and_wrong,
+)
 from stand_in_flow import valve_of
 
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop import population as population_module
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.population import run_population
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
-from dzdesign.verify.closed_loop.scene import Scene
+from dzdesign.verify.closed_loop.scene import Scene, scenes_of
 
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
 MACHINES, FEW, IN_A_CASE = 1_000_000, 20_000, 40
@@ -52,7 +60,8 @@ def shut_rows(name: str, scenes: Sequence[Scene], machines: int, seed: int) -> l
     opening = [each.figures["dead_zone_on_opening_percent"] for each in coil]
     corners = f"; dead zone on opening {min(opening):.1f} to {max(opening):.1f} % at the corners" if opening else ""
     found = run_population(scenes, machines, seed)
-    corner = run_population(scenes, 4, seed, drawn=())
+    with drawn_alone(scenes):
+        corner = run_population(scenes, 4, seed)
     return [
         Row(what=f"{name}: required scenarios that flow at zero", value=flowing, limit=0,
             note=f"of {len(results)}{corners}"),
@@ -76,7 +85,7 @@ def _of_valve(name: str, valve: ValveModel, folder: Path, quick: bool, seed: int
 
 def _speed(scenes: Sequence[Scene], seed: int) -> float:
     """Return how many machines are drawn and compared a second, what does not grow with their number left out."""
-    side = population_module.MachinesOfSide(scenes, scenes[0].compensator.machine, seed, population_module.COMPONENTS)
+    side = population_module.MachinesOfSide(scenes, scenes[0].compensator.machine, seed)
     taken = []
     for machines in (TIMED_FROM, TIMED_TO):
         times = []

@@ -9,8 +9,8 @@ from dzdesign.codegen.calibration.block import block_of, current_block
 from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.packing import pack
+from dzdesign.verify.current.controller_states import check_states
 from dzdesign.verify.current.current_checks import read_controller
-from dzdesign.verify.current.state_check import check_states
 from dzdesign.verify.exhaustive.drive_check import drive_follows, drive_samples
 from tests.codegen.core.test_drive import Drive, compensator_named
 from tests.support.block_cores import block_folder
@@ -71,8 +71,8 @@ def test_the_current_controller_is_the_exact_one_in_every_state(loop, tmp_path):
     for name, text in texts(block_core_files(built)).items():
         (tmp_path / "core" / name).write_text(text, encoding="utf-8")
     (tmp_path / "calibration.bin").write_bytes(pack(block))
-    found = check_states(loop, read_controller(tmp_path), 60_000)
-    assert found.wrong == 0 and found.states > 60_000, found.first
+    found, _ = check_states(loop, read_controller(tmp_path), 60_000)
+    assert found.wrong == 0 and found.states > 60_000, found.first_wrong
     gain = replace(block, current=replace(block.current, integral=block.current.integral + 1))
     (tmp_path / "calibration.bin").write_bytes(pack(gain))
-    assert check_states(loop, read_controller(tmp_path), 2_000).wrong
+    assert check_states(loop, read_controller(tmp_path), 2_000)[0].wrong

@@ -107,7 +107,7 @@ def simulate_ramp(
     scatter_N = series.scatter_V * plant.force_per_volt * np.random.default_rng([*stream, 1, number]).standard_normal()
     loop = loop.with_plant(replace(plant, preload_N=max(plant.preload_N + scatter_N, 0.0)))
     run = loop.run(sequence.for_drive(loop).command(), dp_MPa, mode)
-    waves = with_core or loop.has_dither
+    waves = with_core or loop.wave[0] > 0
     share = 1 - np.exp(-RECORD_S / bench.meter_lag_s) if bench.meter_lag_s > 0 else 1.0
     # Of a dither a meter sees the mean.
     metered = lfilter([share], [1, share - 1], run.q_mean_L_min if waves else run.q_L_min)
