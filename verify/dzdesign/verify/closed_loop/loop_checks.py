@@ -31,9 +31,10 @@ TRIED = {
     NO_CORE_CAN_KNOW: "disturbances that the firmware cannot detect",
     NOT_DECLARED: "coil and supply of an undeclared machine",
 }
-#: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp;
-#: and the thresholds of a stand-in.
-SAME_THRESHOLD, SAME_CURVE = 0.03, 0.02
+#: Share of full command by which the opening of a plant may differ from the identified valve's: rounding, a quick ramp.
+SAME_THRESHOLD = 0.03
+#: The same of a stand-in's thresholds, and so many standard errors of the knee more.
+SAME_CURVE, KNEE_ERRORS = 0.01, 5.0
 #: Share of a test's largest flow by which a stand-in's mean flow in a bin of command may differ from the recorded one.
 SAME_FLOW = 0.03
 #: By how much the dead zone on opening may move with coil and supply, of full command, where the current is controlled.
@@ -102,13 +103,14 @@ def stand_in_is_the_recording(ramps: Sequence[PressureResult], valve: ValveModel
     """Tell whether a stand-in is the identified valve: it opens and closes at the thresholds, its flow is recorded."""
     worst = max(ramps, key=lambda ramp: ramp.flow_miss)
     moved_V, what, moved = max((each for ramp in ramps for each in _moved(ramp, valve)), key=lambda each: each[0])
-    if moved_V > SAME_CURVE * valve.u_max_V:
+    if moved_V > 0.0:
         units = valve.recorded_units
         volts = units.of_side(moved.side).text(moved_V, ".2f dV")
         text = (
-            f"the recorded flow of '{_test_of(moved, valve).source}' {what} {volts} from its threshold (at "
-            f"{_at(moved, units)}), expected at most {SAME_CURVE:.0%} of full command; this plant does not represent "
-            "the valve, perhaps because of many outliers: record it again, or give a plant (--plant)"
+            f"the recorded flow of '{_test_of(moved, valve).source}' {what} {volts} further from its threshold (at "
+            f"{_at(moved, units)}) than {SAME_CURVE:.0%} of full command and {KNEE_ERRORS:g} standard errors. So this "
+            "plant does not represent the valve, perhaps because of many outliers: record it again, or give a plant "
+            "(--plant)"
         )
         return PLANT_IS_THE_VALVE.check(holds=False, text=text)
     holds = worst.flow_miss <= SAME_FLOW
@@ -122,14 +124,15 @@ def stand_in_is_the_recording(ramps: Sequence[PressureResult], valve: ValveModel
 
 
 def _moved(ramp: PressureResult, valve: ValveModel) -> Iterator[tuple[float, str, PressureResult]]:
-    """Give by how much a stand-in opens and closes beside its test's onset and knee, V."""
+    """Give by how much a stand-in opens and closes beyond what it may beside its test's onset and knee, V."""
     test = _test_of(ramp, valve)
-    for what, share, known_V in (
-        ("opens", ramp.dead_zone_opening, (test.u_onset_rising_V, test.u_knee_rising_V)),
-        ("closes", ramp.dead_zone_closing, (test.u_onset_falling_V, test.u_knee_falling_V)),
+    for what, share, onset_V, knee_V, se_V in (
+        ("opens", ramp.dead_zone_opening, test.u_onset_rising_V, test.u_knee_rising_V, test.u_knee_rising_se_V),
+        ("closes", ramp.dead_zone_closing, test.u_onset_falling_V, test.u_knee_falling_V, test.u_knee_falling_se_V),
     ):
-        ends_V, at_V = [each for each in known_V if each is not None], share * valve.u_max_V
-        yield (max(min(ends_V) - at_V, at_V - max(ends_V)) if ends_V else 0.0), what, ramp
+        ends_V, at_V = [each for each in (onset_V, knee_V) if each is not None], share * valve.u_max_V
+        allowed_V = SAME_CURVE * valve.u_max_V + KNEE_ERRORS * (se_V or 0.0)
+        yield (max(min(ends_V) - at_V, at_V - max(ends_V)) - allowed_V if ends_V else 0.0), what, ramp
 
 
 def _test_of(ramp: PressureResult, valve: ValveModel) -> TestResult:
