@@ -74,24 +74,23 @@ def plant_opens(ramps: Sequence[PressureResult], units: RecordedUnits) -> Check:
 def plant_is_the_valve(ramps: Sequence[PressureResult], valve: ValveModel) -> Check:
     """Tell whether the plant opens, and closes, where the ramp tests say that the valve does."""
 
-    def opens_V(ramp: PressureResult) -> tuple[float, float]:
-        known = _test_of(ramp, valve).u_knee_rising_V
-        return ramp.dead_zone_opening * valve.u_max_V, _test_of(ramp, valve).u_guard_V if known is None else known
+    def later_V(ramp: PressureResult, share: float, knee_V: float | None) -> float:
+        return share * valve.u_max_V - (_test_of(ramp, valve).u_guard_V if knee_V is None else knee_V)
 
-    def late_V(ramp: PressureResult) -> float:
-        known = _test_of(ramp, valve).u_knee_falling_V
-        return ramp.dead_zone_closing * valve.u_max_V - (_test_of(ramp, valve).u_guard_V if known is None else known)
+    def opens_V(ramp: PressureResult) -> float:
+        return later_V(ramp, ramp.dead_zone_opening, _test_of(ramp, valve).u_knee_rising_V)
 
-    worst = max(ramps, key=lambda ramp: abs(float.__sub__(*opens_V(ramp))))
-    early = max(ramps, key=late_V)  # shut where the valve still passes flow
-    plant_V, valve_V = opens_V(worst)
-    opens, closes = (miss <= SAME_THRESHOLD * valve.u_max_V for miss in (abs(plant_V - valve_V), late_V(early)))
-    holds = opens and closes
-    units = valve.recorded_units
-    plant_at, valve_at = (units.of_side(worst.side).text(opens, ".2f V") for opens in (plant_V, valve_V))
+    def closes_V(ramp: PressureResult) -> float:
+        return later_V(ramp, ramp.dead_zone_closing, _test_of(ramp, valve).u_knee_falling_V)
+
+    worst = max(ramps, key=lambda ramp: abs(opens_V(ramp)))
+    early = max(ramps, key=closes_V)  # shut where the valve still passes flow
+    plant_V, units = worst.dead_zone_opening * valve.u_max_V, valve.recorded_units
+    holds = max(abs(opens_V(worst)), closes_V(early)) <= SAME_THRESHOLD * valve.u_max_V
+    plant_at, valve_at = (units.of_side(worst.side).text(at, ".2f V") for at in (plant_V, plant_V - opens_V(worst)))
     text = f"at {plant_at}, the ramp tests at {valve_at} (worst case, at {_at(worst, units)}); "
-    if not closes:
-        above = units.of_side(early.side).text(late_V(early), ".2f dV")
+    if closes_V(early) > SAME_THRESHOLD * valve.u_max_V:
+        above = units.of_side(early.side).text(closes_V(early), ".2f dV")
         text += f"it closes {above} above the ramp tests (at {_at(early, units)}); "
     text += _miss(max(ramps, key=lambda ramp: ramp.flow_miss), valve)
     if not holds:
