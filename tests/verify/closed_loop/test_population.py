@@ -174,6 +174,12 @@ def test_a_plant_of_equations_is_drawn_too(example_valve, plant, tmp_path):
 # --- a budget that is too small -------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def few_in_loop(monkeypatch):
+    """Run the ten nearest machines in the loop, not the two hundred."""
+    monkeypatch.setattr(population_module, "IN_LOOP", 10)
+
+
 def caught(valve, folder, true, wrong, *drawn, **more):
     """The machines of the true budget with a firmware that was designed for a wrong one; with its own none flows."""
     right, short = right_and_wrong(valve, folder, true, wrong, *drawn, **more)
@@ -191,6 +197,7 @@ def test_the_largest_component_ten_times_too_small_fails_the_population(example_
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_in_loop")
 @pytest.mark.parametrize("component", IN_TURN)
 def test_each_component_ten_times_too_small_fails_with_the_others_at_their_worst(example_valve, tmp_path, component):
     true, wrong = IN_TURN[component]
@@ -198,6 +205,7 @@ def test_each_component_ten_times_too_small_fails_with_the_others_at_their_worst
     assert 0 < found.flowing < 40
 
 
+@pytest.mark.usefixtures("few_in_loop")
 def test_a_recording_that_is_called_ten_times_too_good_fails(example_valve, tmp_path):
     found = caught(example_valve, tmp_path, LITTLE, {}, "recording", machines=40, change=called_ten_times_better)
     assert found.flowing > 0
