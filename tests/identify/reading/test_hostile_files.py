@@ -350,7 +350,7 @@ def test_hostile_plants_and_tolerances(tmp_path, name, value):
 
     path = tmp_path / f"{name}.toml"
     read = {"plant": read_plant, "tolerances": read_tolerances}[name]
-    for key in ("K_a", "plants", "k" * 100_000):
+    for key in ("K_a", "machines", "k" * 100_000):
         path.write_text(f"{key} = {value}")
         line = outcome(read, path)
         assert f"{name}.toml'" in line and len(line) < 800
