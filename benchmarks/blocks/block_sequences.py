@@ -21,8 +21,8 @@ from dzdesign.codegen.calibration.packing import pack
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.loop import CurrentLoop
 from dzdesign.design.firmware_manifest import BLOCK_FILE
+from dzdesign.verify.current.controller_states import check_states, hashes_on
 from dzdesign.verify.current.current_checks import read_controller
-from dzdesign.verify.current.state_check import check_states, hashes_on
 from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, HOST, Machine
 from tests.support.block_cores import block_folder
@@ -209,8 +209,8 @@ def _controller(name: str, compensator: Compensator, loop: CurrentLoop, quick: b
     states = {machine: count // (QUICKER if quick else 1) for machine, count in STATES.items()}
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
         core = _written_controller(compensator, loop, Path(folder))
-        found = check_states(loop, core, states[HOST.name])
-        note = f"{found.states} states{'; ' * bool(found.first)}{found.first}"
+        found, _ = check_states(loop, core, states[HOST.name])
+        note = "; ".join(filter(None, [f"{found.states} states", found.first_wrong]))
         rows.append(Row(what=f"{name}: unlike the exact controller", value=found.wrong, limit=0, note=note))
         for machine in (HOST, CORTEX_M4, AVR):
             if missing_of(machine) or machine.missing():

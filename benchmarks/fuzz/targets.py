@@ -30,9 +30,9 @@ from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.summary import ValveManifest
 from dzdesign.report.lot.table import TABLE, read_table
-from dzdesign.verify.closed_loop.evidence_curves import read_curves
 from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.closed_loop.tolerances import read_tolerances
+from dzdesign.verify.closed_loop.population import read_tolerances
+from dzdesign.verify.closed_loop.ramps import read_curves
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.output_evidence import OutputEvidence
 
@@ -139,7 +139,7 @@ TARGETS = {
         run=_stored(read_plant, "plant.toml"), seeds=lambda: [b"K_a = 4\nm_e_kg = 6e-2\nL_c_H = 0x10\n"]
     ),
     "tolerances": Target(
-        run=_stored(read_tolerances, "t.toml"), seeds=lambda: [b"plants = 9\nK_a = '3 %'\nm_e_kg = '1 % sd'\n"]
+        run=_stored(read_tolerances, "t.toml"), seeds=lambda: [b"machines = 9\nseed = 2\n"]
     ),
     "words": Target(
         run=_words,

@@ -18,10 +18,9 @@ from dzdesign.design.current.choosing import (
 from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
 from dzdesign.design.current.responses import step_responses, worst_margins
 from dzdesign.design.target_inputs import Converter
-from dzdesign.verify.current.coil_simulation import CoilLoop, CoilSimulation
+from dzdesign.verify.current.coil import CoilLoop, CoilSimulation
+from dzdesign.verify.current.controller_states import check_states, hashes_on
 from dzdesign.verify.current.corner_runs import HELD_S, fault_runs, run_corner
-from dzdesign.verify.current.declared_circuit import declared_corners
-from dzdesign.verify.current.state_check import check_states, hashes_on
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 from tests.support.current_loops import current_texts
 
@@ -65,8 +64,8 @@ def print_current_loop(quick: bool = False, seed: int = 0) -> list[Row]:
 def _settled(name: str, around: CoilLoop, core: dict[str, str], quick: bool) -> list[Row]:
     """Return the rows of set points held for ten seconds, and of the faults of the circuit, at every corner."""
     simulation = CoilSimulation(around, core)
-    corners = declared_corners(around.circuit)
-    found = [run_corner(simulation, corner).found for corner in (corners[::13] if quick else corners)]
+    corners = around.corners()
+    found = [run_corner(simulation, corner) for corner in (corners[::13] if quick else corners)]
     if faults := [each for each in found if each.faults]:
         return [Row(what=f"{name}: faults at {faults[0]}", value=faults[0].faults, limit=0)]
     missed = [fault for fault in fault_runs(simulation) if not fault.holds]
@@ -87,16 +86,16 @@ def _settled(name: str, around: CoilLoop, core: dict[str, str], quick: bool) -> 
 def _states(name: str, loop, core, states: int) -> list[Row]:
     """Return the rows of the comparison state by state."""
     start = perf_counter()
-    found = check_states(loop, core, states)
+    found, hashes = check_states(loop, core, states)
     rows = [
         Row(what=f"{name}: of {found.states} states other than the exact controller's, host", value=found.wrong,
-            limit=0, note=found.first or f"{perf_counter() - start:.0f} s")
+            limit=0, note=found.first_wrong or f"{perf_counter() - start:.0f} s")
     ]  # fmt: skip
     if missing := CORTEX_M4.missing():
         return [*rows, Row(what=f"{name}: the same on a Cortex-M4", value=1, limit=0, note=missing)]
     start = perf_counter()
     other = hashes_on(CORTEX_M4, loop, core, states)
-    wrong = sum(one != two for one, two in zip(other, found.hashes, strict=True))
+    wrong = sum(one != two for one, two in zip(other, hashes, strict=True))
     note = f"a hash for each 10000 states, {len(other)}; {perf_counter() - start:.0f} s"
     return [
         *rows,

@@ -17,9 +17,10 @@ from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
 from dzdesign.identify.identification import identify
 from dzdesign.identify.reading.ramp_files import read_ramp_file
-from dzdesign.verify.closed_loop.drive_corners import MOST_MOVED, valve_at_corners
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
+from dzdesign.verify.closed_loop.drive_corners import RELEASED, coil_and_supply
+from dzdesign.verify.closed_loop.loop_checks import MOST_MOVED
 from dzdesign.verify.closed_loop.plant import Plant, read_plant
+from dzdesign.verify.closed_loop.scene import scenes_of
 
 CONTROLLED = {
     "drive": "current",
@@ -59,24 +60,24 @@ def print_current_valve(quick: bool = False, seed: int = 0) -> list[Row]:
 
 def _rows(name: str, compensator: Compensator, plant: Plant | None) -> list[Row]:
     say(f"{name} ...")
-    drive = compensator.current_drive
-    if drive is None:
-        raise ValueError("the drive is by duty")
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "firmware"
         firmware = generate(compensator, TARGET)
         write_folder(folder, firmware.files, firmware.manifest)
-        found = [valve_at_corners(scene, drive.circuit) for scene in scenes_of(folder, compensator, plant)]
-    moved = max(found, key=lambda each: each.opening_largest - each.opening_least)
-    closed = max(found, key=lambda each: each.q_beyond_L_min)
-    released = max(found, key=lambda each: each.q_released_L_min)
+        scenes = scenes_of(folder, compensator, plant)
+        found = [each for scene in scenes for each in coil_and_supply(scene) if RELEASED in each.figures]
+    openings: dict[float, list[float]] = {}
+    for each in found:
+        openings.setdefault(each.dp_MPa, []).append(each.figures["dead_zone_on_opening_percent"])
+    dp_MPa, shares = max(openings.items(), key=lambda item: max(item[1]) - min(item[1]))
+    closed = max(each.q_beyond_L_min for each in found)
+    released = max(found, key=lambda each: each.figures[RELEASED])
     return [
-        Row(what=f"{name}: dead zone on opening moves by", value=100 * (moved.opening_largest - moved.opening_least),
-            limit=100 * MOST_MOVED, unit="%", note=f"{100 * moved.opening_least:.2f} to "
-            f"{100 * moved.opening_largest:.2f} % at {moved.dp_MPa:.1f} MPa, of {len(found)} pressure drops"),
-        Row(what=f"{name}: flow at zero command beyond what is allowed", value=closed.q_beyond_L_min, limit=1e-9,
-            unit="L/min"),
-        Row(what=f"{name}: of this on release, as the set point steps to the offset", value=released.q_released_L_min,
+        Row(what=f"{name}: dead zone on opening moves by", value=max(shares) - min(shares),
+            limit=100 * MOST_MOVED, unit="%", note=f"{min(shares):.2f} to {max(shares):.2f} % at {dp_MPa:.1f} MPa, of "
+            f"{len(openings)} pressure drops"),
+        Row(what=f"{name}: flow at zero command beyond what is allowed", value=closed, limit=1e-9, unit="L/min"),
+        Row(what=f"{name}: on release, as the set point steps to the offset", value=released.figures[RELEASED],
             unit="L/min", note=f"at {released.dp_MPa:.1f} MPa; a leak is in it"),
     ]  # fmt: skip
 

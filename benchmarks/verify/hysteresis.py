@@ -24,7 +24,7 @@ from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
+from dzdesign.verify.closed_loop.scene import scenes_of
 
 PRESSURES, RAMPS = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0), 2
 LIMIT, FREQUENCY_HZ = 0.5, 150.0

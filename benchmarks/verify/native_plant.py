@@ -16,10 +16,9 @@ from scoreboard import Row, print_rows, say
 from small_budgets import designed
 
 from dzdesign.verify.closed_loop.against_cvodes import MOST_APART, Window, compare
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.closed_loop.scene import Scene
+from dzdesign.verify.closed_loop.scene import Scene, scenes_of
 
 QUICK_S, WHOLE_S = 0.3, 1.0
 #: Times real time at least, and how often it is measured: the others held something else too.

@@ -1,4 +1,4 @@
-"""Machines drawn from the budget: none flows, none of the scenarios does, wrong budgets are caught; and how fast."""
+"""Machines drawn from the budget: none flows, none of the scenarios does; and how fast."""
 
 import os
 import tempfile
@@ -6,20 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
+from current_valve import CONTROLLED
 from example_valve import example_valve
 from scoreboard import Row, print_rows, say
-from small_budgets import DUTY, IN_TURN, LARGEST, LITTLE, called_ten_times_better, designed, right_and_wrong
+from small_budgets import DUTY, designed, drawn_alone
 from stand_in_flow import valve_of
 
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.closed_loop import population as population_module
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.population import run_population
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
-from dzdesign.verify.closed_loop.scene import Scene
+from dzdesign.verify.closed_loop.scene import Scene, scenes_of
 
 SHARED = Path(os.environ.get("DZDESIGN_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
-MACHINES, FEW, IN_A_CASE = 1_000_000, 20_000, 40
+MACHINES, FEW = 1_000_000, 20_000
 #: Machines a second, at least.
 SPEED_GOAL = 1e6
 #: Machines that are timed, one number less the other, and how often: the others held something else too.
@@ -28,12 +28,11 @@ TIMED_FROM, TIMED_TO, REPEATS = 200, 200_200, 5
 
 def print_population(*, quick: bool, seed: int) -> list[Row]:
     """Print and return the rows of the populations."""
-    rows, known = [], valves()
+    rows: list[Row] = []
     with tempfile.TemporaryDirectory(prefix="bench-verify-") as folder:
-        for name, valve in known.items():
+        for name, valve in valves().items():
             say(f"population: {name}")
             rows += _of_valve(name, valve, Path(folder) / name, quick, seed)
-        rows += _wrong_budgets(known["example"], Path(folder))
     print_rows(f"Machines drawn from the budget (seed {seed})", rows)
     return rows
 
@@ -52,7 +51,8 @@ def shut_rows(name: str, scenes: Sequence[Scene], machines: int, seed: int) -> l
     opening = [each.figures["dead_zone_on_opening_percent"] for each in coil]
     corners = f"; dead zone on opening {min(opening):.1f} to {max(opening):.1f} % at the corners" if opening else ""
     found = run_population(scenes, machines, seed)
-    corner = run_population(scenes, 4, seed, drawn=())
+    with drawn_alone(scenes):
+        corner = run_population(scenes, 4, seed)
     return [
         Row(what=f"{name}: required scenarios that flow at zero", value=flowing, limit=0,
             note=f"of {len(results)}{corners}"),
@@ -64,19 +64,21 @@ def shut_rows(name: str, scenes: Sequence[Scene], machines: int, seed: int) -> l
 
 
 def _of_valve(name: str, valve: ValveModel, folder: Path, quick: bool, seed: int) -> list[Row]:
-    """Run scenarios and machines of one valve, coil and supply straight at the duty."""
+    """Run scenarios and machines of one valve: coil and supply straight at the duty, and its current controlled."""
     scenes = scenes_of(folder, designed(valve, folder, **DUTY), None)
     rows = shut_rows(name, scenes, FEW if quick else MACHINES, seed)
     if name == "example":
         speed = _speed(scenes, seed)
         rows.append(Row(what="example: machines a second, goal over measured", value=SPEED_GOAL / speed, limit=1.0,
                         note=f"{speed:.3g} machines a second by the wall clock, one core"))  # fmt: skip
-    return rows
+    by_current = folder.with_name(f"{name}, by current")
+    scenes = scenes_of(by_current, designed(valve, by_current, **CONTROLLED), None)
+    return rows + shut_rows(by_current.name, scenes, FEW if quick else MACHINES, seed)
 
 
 def _speed(scenes: Sequence[Scene], seed: int) -> float:
     """Return how many machines are drawn and compared a second, what does not grow with their number left out."""
-    side = population_module.MachinesOfSide(scenes, scenes[0].compensator.machine, seed, population_module.COMPONENTS)
+    side = population_module.MachinesOfSide(scenes, scenes[0].compensator.machine, seed)
     taken = []
     for machines in (TIMED_FROM, TIMED_TO):
         times = []
@@ -86,21 +88,3 @@ def _speed(scenes: Sequence[Scene], seed: int) -> float:
             times.append(perf_counter() - begin)
         taken.append(min(times))
     return (TIMED_TO - TIMED_FROM) / (taken[1] - taken[0])
-
-
-def _wrong_budgets(valve: ValveModel, folder: Path) -> list[Row]:
-    """Count the wrong budgets that no machine shows, and the right ones that one contradicts."""
-    cases = {name: (*pair, (name,), None) for name, pair in IN_TURN.items()}
-    cases["the largest, all drawn"] = (*LARGEST, (), None)
-    cases["recording"] = (LITTLE, {}, ("recording",), called_ten_times_better)
-    rows = []
-    for number, (name, (true, wrong, drawn, change)) in enumerate(cases.items()):
-        say(f"population: {name} ten times too small")
-        more = {"change": change} if change else {}
-        right, short = right_and_wrong(
-            valve, folder / f"case{number}", true, wrong, *drawn, machines=IN_A_CASE, **more
-        )
-        rows.append(Row(what=f"{name}: ten times too small and not seen", value=float(short.flowing == 0), limit=0,
-                        note=f"{short.flowing} of {short.machines} flow"))  # fmt: skip
-        rows.append(Row(what=f"{name}: right, and one flows", value=right.flowing, limit=0))
-    return rows

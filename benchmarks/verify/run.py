@@ -15,7 +15,6 @@ from above_tests import print_above  # noqa: E402
 from all_inputs import print_inputs  # noqa: E402
 from calibration_blocks import print_blocks  # noqa: E402
 from current_loop import print_current_loop  # noqa: E402
-from current_population import print_current_population  # noqa: E402
 from current_valve import print_current_valve  # noqa: E402
 from hysteresis import print_hysteresis  # noqa: E402
 from mutants import print_mutants  # noqa: E402
@@ -35,7 +34,6 @@ PARTS = {
     "mutants": (print_mutants, 202),
     "current": (print_current_loop, 0),
     "current-valve": (print_current_valve, 0),
-    "current-population": (print_current_population, 1),
     "above": (print_above, 0),
     "blocks": (print_blocks, 24),
 }

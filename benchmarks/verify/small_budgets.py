@@ -1,8 +1,12 @@
 """Budgets of which one component is ten times too small, each to be caught by machines drawn from the right one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
@@ -10,9 +14,10 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
+from dzdesign.verify.closed_loop import population
 from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.population import run_population
+from dzdesign.verify.closed_loop.scene import Scene, scenes_of
 from dzdesign.verify.loop_results import Population
 
 SEED = 2
@@ -73,6 +78,31 @@ def called_ten_times_better(valve: ValveModel) -> ValveModel:
     return replace(valve, sides={"positive": replace(valve.positive, certified=certified, tests=tests)})
 
 
+#: The end of each component at which the valve passes flow soonest; of pressures where dP reads too low.
+ENDS = dict(zip(COMPONENTS, (-1, -1, 1, 1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1, 1, 1), strict=True))
+PRESSURES = [name for name in COMPONENTS if "pressure" in name or "converter" in name]
+
+
+def worst_ends(scene: Scene) -> np.ndarray:
+    """Return the end of each component at which the valve of a scene passes flow soonest."""
+    way = -1.0 if scene.identified.trend == "increasing" else 1.0
+    return np.array([end * (way if name in PRESSURES else 1.0) for name, end in ENDS.items()])
+
+
+@contextmanager
+def drawn_alone(scenes: Sequence[Scene], *names: str) -> Iterator[None]:
+    """Draw these components only; the others stand at their worst ends."""
+    kept, worst, draw = [name not in names for name in COMPONENTS], worst_ends(scenes[0]), population.draw
+
+    def some(count: int, random: np.random.Generator) -> np.ndarray:
+        shares = draw(count, random)
+        shares[:, kept] = worst[kept]
+        return shares
+
+    with patch.object(population, "draw", some):
+        yield
+
+
 def right_and_wrong(
     valve: ValveModel, folder: Path, true: dict[str, str], wrong: dict[str, str], *drawn: str, machines: int,
     change: Callable[[ValveModel], ValveModel] = lambda valve: valve,
@@ -85,8 +115,9 @@ def right_and_wrong(
     short = designed(change(valve), folder / "wrong", **(true | wrong))
     # What is drawn, and what the thresholds are bounded by, is that of the true budget.
     laws = {"true": compensator, "wrong": replace(short, machine=compensator.machine, valve=compensator.valve)}
-    right, short_of_it = (
-        run_population(scenes_of(folder / name, law, None), machines, SEED, drawn=drawn or COMPONENTS)
-        for name, law in laws.items()
-    )
-    return right, short_of_it
+    found = []
+    for name, law in laws.items():
+        scenes = scenes_of(folder / name, law, None)
+        with drawn_alone(scenes, *(drawn or COMPONENTS)):
+            found.append(run_population(scenes, machines, SEED))
+    return found[0], found[1]

@@ -364,16 +364,14 @@ def test_one_recording_of_both_signs_reads_each_sides_own_hold():
 @pytest.mark.slow
 def test_the_dead_zones_of_the_closed_loop_are_found_in_its_records(example_compensator, firmware_folder):
     """The loop reads its records at 0.1 % of the largest flow; read at that, they must agree to 0.1 % of command."""
-    from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, compare_at_pressure
-    from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
+    from dzdesign.verify.closed_loop.loop import RampSequence
     from dzdesign.verify.closed_loop.plant import Plant
+    from dzdesign.verify.closed_loop.ramps import FLOW_SHARE, compare_at_pressure
+    from dzdesign.verify.closed_loop.scene import scenes_of
 
-    loop = ClosedLoop(Plant(), firmware_folder, example_compensator)
-    for dp_MPa in (1.0, 5.0):
-        recorded_flow = example_compensator.valve.positive.tests[-1].recorded
-        compared = compare_at_pressure(
-            loop, dp_MPa, 1.0, RampSequence(ramp=50.0), reading_flow_L_min=0.6, recorded=recorded_flow
-        )
+    scenes = scenes_of(firmware_folder, example_compensator, Plant())
+    for scene in (scenes[1], scenes[-1]):
+        compared = compare_at_pressure(scene, RampSequence(ramp=50.0))
 
         def recorded(run, digit):
             q = run.q_L_min * L_MIN

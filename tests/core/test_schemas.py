@@ -69,13 +69,11 @@ def evidence(written_firmware, example_folder):
     """Return verification.json with all that can be asked for."""
     from dzdesign.verify.analysis.mutation import KILLED, SURVIVED, mutation_score
     from dzdesign.verify.closed_loop.plant import read_plant
-    from dzdesign.verify.closed_loop.tolerances import read_tolerances
     from dzdesign.verify.evidence import MutantOutcome
     from dzdesign.verify.verification import verify
 
-    tolerances = replace(read_tolerances(example_folder / "tolerances.toml"), plants=3)
     plant = read_plant(example_folder / "plant.toml")
-    evidence = verify(written_firmware, plant, "plant.toml", tolerances=tolerances).evidence
+    evidence = verify(written_firmware, plant, "plant.toml").evidence
     found = [MutantOutcome(file="core/dz_comp.c", line=9, change="+ to -", verdict=one) for one in (KILLED, SURVIVED)]
     score = mutation_score([replace(found[0], killer="a check"), found[1]])
     return json.loads(to_json_bytes(replace(evidence, mutants=score)))

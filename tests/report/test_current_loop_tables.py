@@ -2,14 +2,12 @@
 
 from dataclasses import replace
 
-from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.report.sections.closed_loop import current_tables
 from dzdesign.verify.current.results import (
     ControllerStates,
     CurrentCorner,
     CurrentLoopResult,
     FaultRun,
-    ValveAtCorners,
 )
 
 CORNER = CurrentCorner(
@@ -17,17 +15,12 @@ CORNER = CurrentCorner(
     steady_error_codes=0.02, current_error_codes=0.6, release_overshoot_codes=0.2,
     rise_s=0.006, least_rise_s=0.0028, overshoot=0.05, faults=0,
 )  # fmt: skip
-VALVE = ValveAtCorners(
-    dp_MPa=2.0, runs=9, opening_least=0.011, opening_largest=0.0115, q_zero_L_min=0.1, q_released_L_min=0.0,
-    unseen_below_L_min=0.65, leak_L_min=0.0, allowed_at_zero_L_min=None,
-)  # fmt: skip
 RESULT = CurrentLoopResult(
     states=ControllerStates(states=1000, seed=1, wrong=0, first_wrong=None),
     seconds=10.0, shares=(0.5, 1.0), not_carried=1,
     corners=(CORNER, replace(CORNER, rise_s=None, least_rise_s=None, overshoot=None)),
     offset_codes=(), offset_error_codes=0.0, dither_above_counts=0.0, dither_below_counts=0.0,
     faults=(FaultRun(name="the wire breaks", expected="OPEN", seen_after_s=None, limit_s=0.04, latched=False),),
-    valve=(VALVE,),
 )  # fmt: skip
 
 
@@ -35,13 +28,8 @@ def texts(table) -> list[list[str]]:
     return [[getattr(cell, "text", cell) for cell in row] for row in table.rows]
 
 
-def test_every_corner_fault_and_pressure_drop_has_a_row():
-    corners, faults, valve = current_tables(RESULT, AS_COMPUTED)
+def test_every_corner_and_fault_has_a_row_and_by_duty_there_is_nothing():
+    corners, faults = current_tables(RESULT)
     assert [row[-3:] for row in texts(corners)] == [["6.0", "2.8", "5.0"], ["not carried"] * 3]
     assert texts(faults)[0][1:3] == ["DZ_CURRENT_OPEN", "not seen"] and texts(faults)[0][-1] == "no"
-    assert texts(valve)[0][1:] == ["1.10", "1.15", "below 0.65", "below 0.65"]
-
-
-def test_without_a_closed_loop_there_is_no_valve_and_by_duty_nothing():
-    assert current_tables(replace(RESULT, valve=()), AS_COMPUTED)[-1] is None
-    assert current_tables(None, AS_COMPUTED) == ()
+    assert current_tables(None) == ()

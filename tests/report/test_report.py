@@ -215,19 +215,6 @@ def test_nobodys_text_becomes_markup(copied):
         assert " ".join(name.split()) in " ".join(dirty.text.split())
 
 
-@pytest.mark.slow
-def test_a_series_of_plants_is_shown(copied):
-    spread = {"p01": 0.01, "p05": 0.011, "p50": 0.021, "p95": 0.033, "p99": 0.0345, "worst": 0.04, "worst_plant": {}}
-    one = {
-        "side": "positive", "dp_MPa": 1.0, "plants": 200, "leaking": 3,
-        "residual_opening": spread, "residual_closing": spread, "q_zero_L_min": spread, "q_max_L_min": spread,
-    }  # fmt: skip
-    series = {"plants": 200, "seed": 1, "spreads": {}, "pressures": [one]}
-    change_evidence(copied, lambda evidence: evidence.update(monte_carlo=series))
-    html = report_of_folder(copied).html
-    assert "2.10 (1.00 to 3.45)" in html and "3 of 200" in html
-
-
 # ---- few tests, and two sides ----
 
 

@@ -12,9 +12,9 @@ import pytest
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.regeneration import regenerated
-from dzdesign.verify.closed_loop.dead_zone import dead_zone
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.closed_loop.ramps import dead_zone
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.firmware.folder import read_firmware_manifest

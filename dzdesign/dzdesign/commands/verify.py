@@ -10,7 +10,7 @@ Arguments = VerifyArguments
 EXAMPLES = (
     "dzdesign verify firmware",
     "dzdesign verify plc -o plc_evidence",
-    "dzdesign verify firmware --plant plant.toml --tolerances tolerances.toml",
+    "dzdesign verify firmware --tolerances machines.toml",
     'dzdesign verify calibrated/lot/firmware --blocks "calibrated/valves/*/calibration.bin"',
     "dzdesign verify firmware --machine-code --mutate --proof",
 )

@@ -28,7 +28,7 @@ from dzdesign.reproduce.offset_reading import offset_percent
 from dzdesign.reproduce.recovered_valves import Reading, at_rest, half_digit, printed_at
 from dzdesign.reproduce.rows import OF_THE_LOOP, ONE_RECORD_PERCENT, PRINTED_NONE_L_MIN, Reason
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, Drive, ValveRuns
-from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE
+from dzdesign.verify.closed_loop.ramps import FLOW_SHARE
 
 DROP = f"taken {DROP_ASSUMED}"
 #: By how much the end of the product's transition may lie off the opening threshold: four codes of the command, in per

@@ -9,8 +9,8 @@ from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.assumptions import LOADS_MPA, OILS
 from dzdesign.reproduce.recovered_valves import RecoveredValve
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, paper_drive, resting
-from dzdesign.verify.closed_loop.dead_zone import dead_zone
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, LoopRun, RampSequence
+from dzdesign.verify.closed_loop.ramps import dead_zone
 
 #: The valve settles for so long; then the load rises for so long, s.
 SETTLES_S, RISES_S = 1.0, 8.0

@@ -11,9 +11,9 @@ from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
 from dzdesign.reproduce.artefact import Driver
 from dzdesign.reproduce.recovered_valves import RecoveredValve
-from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S
+from dzdesign.verify.closed_loop.ramps import FLOW_SHARE, dead_zone
 
 PRESSURES_MPA = (float(DP0_MPA), float(DP1_MPA))
 #: Step of the command, Fig. 8: so long at zero, and at full command, s; one record a period of the PWM.

@@ -55,8 +55,7 @@ class VerifyArguments:
     """Pressure behind the metering edge in the closed loop (default: 0 and 1 MPa, or the span that the sensors have
     beside the tested pressure drops). Ramps run at the highest pressure, and failing sensors at each. Repeatable."""
     tolerances: Annotated[AnyPath | None, Option("TOL.toml", CHECKS)] = None
-    """File with the number of machines to draw from the declared budget, such as demo/example/machines.toml.
-    With --plant, a file with a series of plants, such as demo/example/tolerances.toml."""
+    """File with the number of machines to draw from the declared budget, such as demo/example/machines.toml."""
     include: Annotated[Paths, Option("DIR", CHECKS)] = ()
     """Folder of headers for your board files, such as those of your chip. Repeatable."""
     c2000ware: Annotated[AnyPath | None, Option("DIR", CHECKS)] = None
@@ -162,7 +161,7 @@ def _verify_code(
     from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
-    from dzdesign.verify.closed_loop.tolerances import read_tolerances
+    from dzdesign.verify.closed_loop.population import read_tolerances
     from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
     from dzdesign.verify.firmware.folder import read_compensator
     from dzdesign.verify.requirements import REPRODUCED

@@ -1,4 +1,4 @@
-"""A verification as tables on stdout: every requirement, the closed loop, the scenarios, a series of plants."""
+"""A verification as tables on stdout: every requirement, the closed loop, the scenarios."""
 
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.evidence import MutationScore
-    from dzdesign.verify.loop_results import MonteCarlo, PressureResult, Scatter, ScenarioResult, Spread
+    from dzdesign.verify.loop_results import PressureResult, ScenarioResult
     from dzdesign.verify.outputs.dispatch import OutputVerification
     from dzdesign.verify.verification import Verification
 
@@ -38,8 +38,6 @@ def print_verification(verification: "Verification", console: "Console | None" =
     if verification.loops:
         _put_closed_loop(console, verification, units)
     print_scenarios(verification.evidence.scenarios, console, units)
-    if verification.evidence.monte_carlo:
-        print_scatter(verification.evidence.monte_carlo, console, units)
     put_line(console, verification.verdict)
     if verification.evidence.mutants:
         print_firmware_mutants(verification.evidence.mutants, console)
@@ -155,42 +153,6 @@ def _figures(result: "ScenarioResult", units: "RecordedUnits") -> str:
         number = result.in_words(value, units) if hidden else number
         groups[start].append(f"{name} {number} {units.label(unit) if unit in RECORDED else unit}".rstrip())
     return "; ".join(VALVES[start] + ", ".join(each) for start, each in groups.items() if each)
-
-
-def print_scatter(series: "MonteCarlo", console: "Console", units: "RecordedUnits" = AS_COMPUTED) -> None:
-    """Print the quantiles of a series of plants per pressure drop."""
-
-    def spread(of: "Spread", text: "Callable[[float], str]") -> str:
-        middle, low, high = map(text, (of.p50, of.p01, of.p99))
-        return f"{middle} ({low} to {high})"
-
-    def percent(share: float) -> str:
-        return f"{100 * share:.1f}"
-
-    def flow(form: str) -> "Callable[[float], str]":
-        return lambda value: units.number(value, form)
-
-    unit = units.label("L/min")
-    columns: dict[str, Callable[[Scatter], str]] = {
-        "side": lambda each: each.side,
-        f"dP ({units.label('MPa')})": lambda each: units.number(each.dp_MPa, ".2f MPa"),
-        "dead zone opening (%)": lambda each: spread(each.residual_opening, percent),
-        "closing (%)": lambda each: spread(each.residual_closing, percent),
-        f"Q max ({unit})": lambda each: spread(each.q_max_L_min, flow(".1f L/min")),
-        f"Q at zero ({unit})": lambda each: spread(each.q_zero_L_min, flow(".2f L/min")),
-        "plants that leak": lambda each: f"{each.leaking} of {each.plants}",
-    }
-    put_rows(console, f"Series of {series.plants} plants: median (1 to 99 %)", series.pressures, columns)
-    at = max(series.pressures, key=lambda each: each.q_zero_L_min.worst)
-    worst = at.q_zero_L_min
-    if worst.worst > 0:
-        plant = ", ".join(f"{name} {value:.4g}" for name, value in worst.worst_plant.items())
-        put_line(
-            console,
-            f"Most at zero command: {units.text(worst.worst, '.2f L/min')} at {units.text(at.dp_MPa, '.2f MPa')}, by "
-            f"the plant with {plant}. "
-            "A series is no requirement: the compensator is certified for the valve of its ramp tests.",
-        )
 
 
 def print_demo(valve: "ValveModel", verification: "Verification", folder: str) -> None:

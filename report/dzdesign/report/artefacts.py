@@ -22,7 +22,7 @@ from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.design.side_law import SideLaw
 from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
-from dzdesign.verify.closed_loop.evidence_curves import Curves, read_curves
+from dzdesign.verify.closed_loop.ramps import Curves, read_curves
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.firmware.reproduced import added_files

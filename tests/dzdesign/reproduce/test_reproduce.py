@@ -28,9 +28,9 @@ from dzdesign.reproduce.assumptions import HYSTERESIS_V
 from dzdesign.reproduce.recovered_valves import recover_stopped, recover_valves
 from dzdesign.reproduce.reproduction import subject_of
 from dzdesign.reproduce.valve_runs import DIRECT, PAPER, PRODUCT, Drive
-from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun, RampSequence
 from dzdesign.verify.closed_loop.plant import read_plant
+from dzdesign.verify.closed_loop.ramps import FLOW_SHARE, dead_zone
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 

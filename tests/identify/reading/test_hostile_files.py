@@ -346,11 +346,11 @@ def test_hostile_options(tmp_path, monkeypatch, capsys, text):
 @pytest.mark.parametrize("name", ["plant", "tolerances"])
 def test_hostile_plants_and_tolerances(tmp_path, name, value):
     from dzdesign.verify.closed_loop.plant import read_plant
-    from dzdesign.verify.closed_loop.tolerances import read_tolerances
+    from dzdesign.verify.closed_loop.population import read_tolerances
 
     path = tmp_path / f"{name}.toml"
     read = {"plant": read_plant, "tolerances": read_tolerances}[name]
-    for key in ("K_a", "plants", "k" * 100_000):
+    for key in ("K_a", "machines", "k" * 100_000):
         path.write_text(f"{key} = {value}")
         line = outcome(read, path)
         assert f"{name}.toml'" in line and len(line) < 800

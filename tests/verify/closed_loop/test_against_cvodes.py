@@ -5,36 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.verify.closed_loop import against_cvodes
 from dzdesign.verify.closed_loop import loop as native_loop
 from dzdesign.verify.closed_loop.against_cvodes import Window, compare, compare_with_cvodes, native_plant_check
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
-from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
-from dzdesign.verify.closed_loop.plant import LARGEST_DP_MPA, PWM_PERIOD_S, Plant, read_plant
-from dzdesign.verify.closed_loop.plant_step import COIL_RAD, Numbers, numbers_of
+from dzdesign.verify.closed_loop.loop import ClosedLoop
+from dzdesign.verify.closed_loop.plant import COIL_RAD, LARGEST_DP_MPA, PWM_PERIOD_S, Plant
+from dzdesign.verify.closed_loop.scene import scenes_of
+from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
 from tests.support.synthetic import needs_compiler
-from tests.verify.closed_loop.test_current_in_loop import TEXTS, scenes
+from tests.verify.closed_loop.test_current_in_loop import TEXTS, scenes_at_ends
 
 SHORT_S = 0.3
 
 
 @pytest.fixture(scope="module")
-def example_plant(example_folder):
-    return read_plant(example_folder / "plant.toml")
-
-
-@pytest.fixture(scope="module")
-def core_folder(example_firmware, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("native_plant") / "firmware"
-    write_folder(folder, example_firmware.files, example_firmware.manifest)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def scene(core_folder, example_compensator, example_plant):
+def scene(plant_scenes):
     """The example with the plant of equations, compiled once."""
-    return scenes_of(core_folder, example_compensator, example_plant)[0]
+    return plant_scenes[0]
 
 
 #: What is other than in the example's plant.
@@ -81,15 +68,15 @@ def test_every_kind_of_plant_agrees(name, scene):
 
 
 @needs_compiler
-def test_the_stand_in_agrees(core_folder, example_compensator):
-    found = compare(Window.of(scenes_of(core_folder, example_compensator, None)[0], SHORT_S))
+def test_the_stand_in_agrees(scenes):
+    found = compare(Window.of(scenes[0], SHORT_S))
     assert found.q_largest_L_min > 1 and max(found.position_difference, found.flow_difference) < 5e-6
 
 
 @needs_compiler
 @pytest.mark.parametrize("given", [False, True], ids=["stand-in", "plant of equations"])
-def test_a_drive_by_current_agrees(given, example_valve, example_plant, tmp_path):
-    found = compare(Window.of(scenes(example_valve, TEXTS, tmp_path, example_plant if given else None)[0], SHORT_S))
+def test_a_drive_by_current_agrees(given, example_valve, plant, tmp_path):
+    found = compare(Window.of(scenes_at_ends(example_valve, TEXTS, tmp_path, plant if given else None)[0], SHORT_S))
     assert found.q_largest_L_min > 1 and max(found.position_difference, found.flow_difference) < 5e-6
 
 
@@ -98,22 +85,22 @@ def test_the_step_is_of_the_fourth_order(scene, monkeypatch):
     """Twice the step, sixteen times the error, stops and edge included."""
     window, errors = Window.of(scene, SHORT_S / 2), []
     for step_s in (200e-6, 100e-6):
-        monkeypatch.setattr(Numbers, "step_s", lambda _, dp_MPa, step_s=step_s: step_s)
+        monkeypatch.setattr(Plant, "step_s", lambda _, dp_MPa, step_s=step_s: step_s)
         errors.append(compare(window).position_difference)
     assert 10 < errors[0] / errors[1] < 40
 
 
 def test_the_step_follows_from_the_fastest_time_constant():
-    numbers, slow = numbers_of(Plant()), numbers_of(replace(Plant(), L_c_H=4.0))
-    assert numbers.step_s(1.0) < PWM_PERIOD_S / 2 and numbers.step_s(LARGEST_DP_MPA) < numbers.step_s(1.0)
-    assert numbers_of(replace(Plant(), L_c_H=0.004)).step_s(1.0) == pytest.approx(COIL_RAD / 10_000)
-    assert numbers_of(replace(Plant(), L_c_H=4.0, B_e_N_s_m=0.0)).step_s(1.0) < slow.step_s(1.0) / 2
+    plant, slow = Plant(), replace(Plant(), L_c_H=4.0)
+    assert plant.step_s(1.0) < PWM_PERIOD_S / 2 and plant.step_s(LARGEST_DP_MPA) < plant.step_s(1.0)
+    assert replace(plant, L_c_H=0.004).step_s(1.0) == pytest.approx(COIL_RAD / 10_000)
+    assert replace(slow, B_e_N_s_m=0.0).step_s(1.0) < slow.step_s(1.0) / 2
 
 
 @needs_compiler
-def test_an_integrator_that_gives_up_has_compared_nothing(core_folder, example_compensator, monkeypatch):
+def test_an_integrator_that_gives_up_has_compared_nothing(scenes, monkeypatch):
     monkeypatch.setitem(against_cvodes.OPTIONS, "max_num_steps", 2)
-    found, check = compare_with_cvodes(scenes_of(core_folder, example_compensator, None), lambda _: None)
+    found, check = compare_with_cvodes(scenes, lambda _: None)
     assert found == () and check.holds is None and "TOO_MUCH_WORK" in check.text
 
 
@@ -123,15 +110,21 @@ def other_plant(**factors):
     def fault(monkeypatch):
         right = native_loop.numbers_of
 
-        def wrong(plant):
+        def wrong(plant, *more):
             other = replace(plant)
             for name, factor in factors.items():
                 object.__setattr__(other, name, getattr(plant, name) * factor)  # a wrong sign, too
-            return right(other)
+            return right(other, *more)
 
         monkeypatch.setattr(native_loop, "numbers_of", wrong)
 
     return fault
+
+
+def undriven(monkeypatch):
+    """Let the native plant alone have no other drive."""
+    right = native_loop.numbers_of
+    monkeypatch.setattr(native_loop, "numbers_of", lambda plant, dp_MPa, _: right(plant, dp_MPa))
 
 
 def text(name, right, wrong):
@@ -181,51 +174,35 @@ FAULTS = {
         "loop.c", "(in_force < plant->counts) ? in_force", "((int32_t)compare < plant->counts) ? (int32_t)compare"
     ),
     "no drive is added": text("loop.c", "plant->bias = task->bias_V[k];", "plant->bias = 0.0;"),
-    "another drive is none": lambda monkeypatch: monkeypatch.setattr(Numbers, "driven", lambda numbers, _: numbers),
+    "another drive is none": undriven,
     "no flow in the mean of a record": text("loop.c", "= sum / (double)task->every", "= 0.0 * sum"),
     "no largest flow of a record": text("loop.c", "= largest;", "= 0.0 * largest;"),
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def at_the_stop(plant_scenes, plant):
+    """A plant whose spool meets the far stop at full command."""
+    return replace(plant_scenes[0], loop=plant_scenes[0].loop.with_plant(replace(plant, stroke_mm=1.5)))
+
+
 @needs_compiler
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
-def test_a_wrong_native_plant_is_seen(fault, core_folder, example_compensator, example_plant, monkeypatch):
-    """Of a plant whose spool meets the far stop at full command."""
-    plant = replace(example_plant, stroke_mm=1.5)
-
-    def found():
-        window = Window.of(scenes_of(core_folder, example_compensator, plant)[0], SHORT_S)
-        return native_plant_check([compare(window)]).holds
-
+def test_a_wrong_native_plant_is_seen(fault, at_the_stop, firmware, monkeypatch):
+    scene = at_the_stop
     fault(monkeypatch)
-    monkeypatch.setattr(native_loop, "FLOATING", ("-O1", "-ffp-contract=off"))  # which compiles in less time
-    assert found() is False
+    if native_loop.CompiledLibrary is not CompiledLibrary:  # the C is another
+        monkeypatch.setattr(native_loop, "FLOATING", ("-O1", "-ffp-contract=off"))  # which compiles in less time
+        scene = scenes_of(firmware, scene.compensator, scene.loop.plant)[0]
+    assert native_plant_check([compare(Window.of(scene, SHORT_S))]).holds is False
 
 
 @needs_compiler
-def test_the_window_shows_what_the_faults_need(core_folder, example_compensator, example_plant):
+def test_the_window_shows_what_the_faults_need(at_the_stop):
     """Without a fault the same plant holds, and meets the far stop."""
-    plant = replace(example_plant, stroke_mm=1.5)
-    found = compare(Window.of(scenes_of(core_folder, example_compensator, plant)[0], SHORT_S))
+    found = compare(Window.of(at_the_stop, SHORT_S))
     assert native_plant_check([found]).holds and found.impacts >= 1
-
-
-@needs_compiler
-def test_what_the_core_reads_is_what_the_sensors_show(scene):
-    """Codes of both sensors, rounded down, without noise and within its peak; those of a failing sensor as they are."""
-    signals, command = scene.compensator.signals, RampSequence(rest=0.1, ramp=1.0, top=0.1).command()
-    shown = np.full((command.size, 2), -1)
-    shown[-50:, 0] = 7
-    run = scene.loop.run(command, 2.0, "compensated", back_MPa=1.0, shown=shown, periods_per_record=2)
-    before = np.concatenate([[2.0], run.dp_MPa])[:-1]
-    for sensor, codes, pressure in (
-        (signals.pressure_a, run.code_a[:-50], 1.0 + before[:-50]), 
-        (signals.pressure_b, run.code_b, np.ones(command.size)),
-    ):  # fmt: skip
-        span = (sensor.full_code - sensor.zero_code + 1) / float(sensor.span_MPa)
-        assert np.array_equal(codes, np.floor(sensor.zero_code + pressure * span + 1e-9))
-    assert np.all(run.code_a[-50:] == 7)
 
 
 @needs_compiler

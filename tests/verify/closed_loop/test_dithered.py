@@ -6,24 +6,21 @@ from pathlib import Path
 import dithered_valve
 import numpy as np
 import pytest
-from dithered_valve import VALVES, driven, driven_loop, library, ramp_recording, widest, written
+from dithered_valve import VALVES, driven, driven_loop, library, ramp_recording, widest
 from msgspec import UNSET
 
 from dzdesign.api import identify
-from dzdesign.codegen.project import generate, target_named
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
-from dzdesign.design.designing import design
 from dzdesign.design.hysteresis_choices import hysteresis_choices, hysteresis_left
-from dzdesign.design.options import options_of
 from dzdesign.design.play import LEVELS
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant, read_plant
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
+from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.closed_loop.simulated_recordings import Bench, simulated_files
 from tests.support.synthetic import needs_compiler
+from tests.support.written_firmware import designed, written
 
 pytestmark = [needs_compiler, pytest.mark.slow]
 PRESSURES = (1.0, 3.0, 5.0)
@@ -43,7 +40,7 @@ def bench(tmp_path_factory):
             for dp in PRESSURES:
                 peak = 0.1 * float(dither.split()[-2]) if dither else 0.0
                 files.append(folder / f"{name}_{peak}_{dp}.csv")
-                written(
+                dithered_valve.written(
                     ramp_recording(plant, VALVES[name], dp, round(dp), peak_V=peak, frequency_Hz=150, ramp_s=30),
                     files[-1],
                 )
@@ -54,18 +51,8 @@ def bench(tmp_path_factory):
     return made
 
 
-def firmware(compensator, folder):
-    made = generate(compensator, "f28335")
-    write_folder(folder, made.files, made.manifest)
-    return folder
-
-
-def designed(valve, **texts):
-    return design(valve, options_of(texts, target_named("f28335").inputs()))
-
-
 def loops(compensator, name, folder):
-    plant = library(folder.parent, firmware(compensator, folder))
+    plant = library(folder.parent, written(compensator, folder))
     return [driven_loop(plant, VALVES[name], dp) for dp in PRESSURES]
 
 
@@ -105,7 +92,7 @@ def test_noise_on_a_standing_command_does_not_chatter_under_a_dither(bench, tmp_
     rms = {}
     for hysteresis in ("keep", "play"):
         made = designed(valve, dither="150 Hz 1 %", hysteresis=hysteresis)
-        plant = library(tmp_path, firmware(made, tmp_path / hysteresis))
+        plant = library(tmp_path, written(made, tmp_path / hysteresis))
         for level in (0.1, 0.4, 0.8):
             codes = np.concatenate([np.linspace(0, 4095 * level, 2000), 4095 * level + noise])
             rms[hysteresis, level] = driven(plant, VALVES["A"], 3.0, codes.round(), every=2)[-3000:, 3].std()
@@ -115,7 +102,7 @@ def test_noise_on_a_standing_command_does_not_chatter_under_a_dither(bench, tmp_
 
 def test_the_stand_in_of_a_dithered_recording_is_not_dithered_twice(bench, tmp_path, monkeypatch):
     made = designed(bench("A", "150 Hz 1 %"), dither="150 Hz 1 %")
-    folder = firmware(made, tmp_path / "fw")
+    folder = written(made, tmp_path / "fw")
     command = np.concatenate([np.linspace(0, 1, 5000), np.linspace(1, 0, 5000)])
 
     def width(scene):
@@ -128,7 +115,7 @@ def test_the_stand_in_of_a_dithered_recording_is_not_dithered_twice(bench, tmp_p
         expected = hysteresis_left(made, test)[LEVELS.index(0.5)]  # from the recorded branches
         assert width(scene) == pytest.approx(expected, abs=5e-4)
         assert all(not each.must_shut or each.q_zero_L_min == 0 for each in run_scenarios(scene))
-    monkeypatch.setattr(ClosedLoop, "wave", lambda _: (0, 1, False))
+    monkeypatch.setattr(ClosedLoop, "wave", property(lambda _: (0, 1, False)))
     twice = scenes_of(folder, made, None)[1]
     assert width(twice) < 0.8 * expected
 
@@ -144,7 +131,7 @@ def test_a_plant_that_is_given_feels_the_dither_of_the_recordings_without_the_co
     test = valve.positive.tests[0]
     assert test.u_knee_rising_V - test.u_knee_falling_V < 0.03
     made, plant = designed(valve, dither="150 Hz 1 %"), read_plant(plant_file)
-    folder = firmware(made, tmp_path / "fw")
+    folder = written(made, tmp_path / "fw")
 
     def width_V():
         scene = scenes_of(folder, made, plant)[0]
@@ -154,7 +141,7 @@ def test_a_plant_that_is_given_feels_the_dither_of_the_recordings_without_the_co
         return 10 * (opened - run.command[7999 - np.argmax(run.q_mean_L_min[::-1] >= half)])
 
     assert abs(width_V()) < 0.03
-    monkeypatch.setattr(ClosedLoop, "wave", lambda _: (0, 1, False))  # the seeded fault
+    monkeypatch.setattr(ClosedLoop, "wave", property(lambda _: (0, 1, False)))  # the seeded fault
     assert width_V() > 0.12
 
 

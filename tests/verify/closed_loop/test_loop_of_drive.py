@@ -7,16 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.designing import design
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.verify.closed_loop.dead_zone import compare_at_pressure
-from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
-from dzdesign.verify.closed_loop.stand_in import stand_in_of
+from dzdesign.verify.closed_loop.loop import RampSequence
+from dzdesign.verify.closed_loop.ramps import compare_at_pressure
+from dzdesign.verify.closed_loop.scene import scenes_of
 from tests.support.golden_firmware import FULL, full_options
 from tests.support.synthetic import needs_compiler
+from tests.support.written_firmware import written
 
 pytestmark = needs_compiler
 QUICK = RampSequence(rest=1.0, ramp=20.0, top=0.5)
@@ -30,15 +29,11 @@ def valve():
 
 
 def compared(folder, side: int = 1, change=lambda compensator: compensator, **options):
-    """The comparison at 3 MPa, of a compensator with these options instead of everything."""
+    """The scene and its comparison at 3 MPa, of a compensator with these options instead of everything."""
     compensator = change(design(valve(), full_options(**options)))
-    firmware = generate(compensator, "f28335")
-    write_folder(folder, firmware.files, firmware.manifest)
-    name = "positive" if side > 0 else "negative"
-    identified = valve().sides[name]
-    loop = ClosedLoop(stand_in_of(identified, 10.0), folder, compensator, side)
-    recorded = identified.tests[1].recorded
-    return loop, compare_at_pressure(loop, 3.0, 1.0, QUICK, name, reading_flow_L_min=0.6, recorded=recorded)
+    scenes = scenes_of(written(compensator, folder), compensator, None, [1.0])
+    (scene,) = [each for each in scenes if each.sign == side and abs(each.dp_MPa - 3) < 0.1]
+    return scene, compare_at_pressure(scene, QUICK)
 
 
 @pytest.mark.slow
@@ -46,24 +41,19 @@ def compared(folder, side: int = 1, change=lambda compensator: compensator, **op
 def test_ramps_far_slower_than_the_command_change_none_of_the_results(tmp_path, side):
     """60 s ramps, a command of 20 s: it waits for them, and residual and zero flow stay what they were."""
     _, plain = compared(tmp_path / "plain", side, **NO_RAMPS)
-    loop, slow = compared(tmp_path / "slow", side, ramp_up_s=(60.0, 60.0), ramp_down_s=(60.0, 60.0))
-    assert 60 <= loop.slowest_ramp_s <= 70
+    scene, slow = compared(tmp_path / "slow", side, ramp_up_s=(60.0, 60.0), ramp_down_s=(60.0, 60.0))
+    assert 60 <= scene.loop.slowest_ramp_s <= 70
     assert slow.result.q_zero_L_min == plain.result.q_zero_L_min == 0
     assert slow.result.q_max_L_min == pytest.approx(plain.result.q_max_L_min, rel=1e-3)
     for name in ("residual_opening", "residual_closing"):
         # The quicker command lags by the coil and the mass: some thousandths of it.
         assert getattr(slow.result, name) == pytest.approx(getattr(plain.result, name), abs=4e-3)
-
-
-@pytest.mark.slow
-def test_without_waiting_the_ramps_lag_would_be_read_as_dead_zone(tmp_path):
-    loop, slow = compared(tmp_path / "slow", ramp_up_s=(60.0, 60.0), ramp_down_s=(60.0, 60.0))
-    loop.slowest_ramp_s = 0.0
-    recorded = valve().sides["positive"].tests[1].recorded
-    hasty = compare_at_pressure(loop, 3.0, 1.0, QUICK, reading_flow_L_min=0.6, recorded=recorded)
+    # Without waiting the ramps' lag would be read as dead zone.
+    scene.loop.slowest_ramp_s = 0.0
+    hasty = compare_at_pressure(scene, QUICK)
     assert hasty.result.q_max_L_min < 0.7 * slow.result.q_max_L_min
     assert hasty.result.residual_opening > slow.result.residual_opening + 0.005
-    assert hasty.result.q_zero_L_min > 1, "zero command, and the ramp is still on its way there"
+    assert hasty.result.q_zero_L_min > 0.5, "zero command, and the ramp is still on its way there"
 
 
 @pytest.mark.slow
@@ -85,7 +75,7 @@ def test_a_dither_that_the_certificate_does_not_count_is_seen_at_the_waves_top(t
 @pytest.mark.slow
 def test_a_record_holds_a_whole_wave_of_any_dither(tmp_path):
     """The mean and the largest of a record settle, whatever the wave's place at the record's end."""
-    loop, _ = compared(tmp_path / "dither", dither_Hz=104.0)
+    loop = compared(tmp_path / "dither", dither_Hz=104.0)[0].loop
     # Zero command first, for which the interlock waits.
     run = loop.run(np.concatenate([np.zeros(50), np.full(400, 0.5)]), 3.0, "compensated")
     settled = slice(350, None)

@@ -6,14 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from dzdesign.codegen.project import generate, target_named
-from dzdesign.core.artefact_files import write_folder
-from dzdesign.design.designing import design
-from dzdesign.design.options import options_of
-from dzdesign.verify.closed_loop.firmware_loop import scenes_of
-from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.closed_loop.scenarios import run_scenarios
+from dzdesign.verify.closed_loop.scenarios import converter_off_at_zero, run_scenarios
+from dzdesign.verify.closed_loop.scene import scenes_of
 from tests.support.synthetic import needs_compiler
+from tests.support.written_firmware import designed, replaced, written
 
 pytestmark = [needs_compiler, pytest.mark.slow]
 #: Loops within loops: full, half, and small ones, back to zero at the end.
@@ -22,20 +18,14 @@ RECORDS = 10_000  # of a ramp over the whole command
 
 
 @pytest.fixture(scope="module")
-def plant(example_folder):
-    return read_plant(example_folder / "plant.toml")
-
-
-@pytest.fixture(scope="module")
-def with_play(example_valve):
-    return design(example_valve, options_of({"hysteresis": "play"}, target_named("f28335").inputs()))
-
-
-def folder_of(compensator, folder, edit=None):
-    made = generate(compensator, "f28335")
-    files = dict(made.files) if edit is None else edit(dict(made.files))
-    write_folder(folder, files, made.manifest)
-    return folder
+def made(example_valve, plant, tmp_path_factory):
+    """Compensator and scenes of the hysteresis that is kept, and of the play."""
+    found = {}
+    for name in ("keep", "play"):
+        compensator = designed(example_valve, hysteresis=name)
+        folder = written(compensator, tmp_path_factory.mktemp("play") / name)
+        found[name] = compensator, scenes_of(folder, compensator, plant)
+    return found
 
 
 def widest(scene, corners=CORNERS):
@@ -60,63 +50,54 @@ def sorted_by_flow(branch):
     return q[order], u[order]
 
 
-def test_the_play_takes_the_hysteresis_out_and_nothing_flows_at_zero(example_valve, with_play, plant, tmp_path):
-    kept = design(example_valve, options_of({}, target_named("f28335").inputs()))
-    for name, compensator, least, most in (("kept", kept, 0.03, 0.05), ("play", with_play, 0.0, 0.005)):
-        folder = folder_of(compensator, tmp_path / name)
-        for scene in scenes_of(folder, compensator, plant):
+def test_the_play_takes_the_hysteresis_out_and_nothing_flows_at_zero(made):
+    for name, least, most in (("keep", 0.03, 0.05), ("play", 0.0, 0.005)):
+        for scene in made[name][1]:
             width, last = widest(scene)
             assert least <= width <= most and last == 0.0, (name, scene.dp_MPa, width)
 
 
 @pytest.mark.parametrize("times", [0.5, 2.0])
-def test_a_wrong_play_makes_no_flow_at_zero(with_play, plant, tmp_path, times):
+def test_a_wrong_play_makes_no_flow_at_zero(made, plant, tmp_path, times):
     """Half and double of the width that the firmware counts on, in what it has and in the valve that it drives."""
-    nodes = tuple(round(times * count) for count in with_play.drive_functions.play_counts[0])
-    wrong = replace(with_play, drive_functions=replace(with_play.drive_functions, play_counts=(nodes, ())))
-    folder = folder_of(wrong, tmp_path / "wrong")
-    for scene in scenes_of(folder, wrong, plant):
+    right, _ = made["play"]
+    nodes = tuple(round(times * count) for count in right.drive_functions.play_counts[0])
+    wrong = replace(right, drive_functions=replace(right.drive_functions, play_counts=(nodes, ())))
+    scenes = scenes_of(written(wrong, tmp_path / "wrong"), wrong, plant)
+    for scene in scenes:
         assert widest(scene)[1] == 0.0
+    for scene in (scenes[0], scenes[-1]):
         for result in run_scenarios(scene):
             assert not result.must_shut or result.q_zero_L_min == 0.0, result.name
 
 
-def test_noise_on_a_standing_command_does_not_chatter(example_valve, with_play, plant, tmp_path):
+def test_noise_on_a_standing_command_does_not_chatter(made):
     rng = np.random.default_rng(3)
-    kept = design(example_valve, options_of({}, target_named("f28335").inputs()))
-    folders = {name: folder_of(c, tmp_path / name) for name, c in (("kept", kept), ("play", with_play))}
-    scenes = {
-        "kept": scenes_of(folders["kept"], kept, plant)[3],
-        "play": scenes_of(folders["play"], with_play, plant)[3],
-    }
     for code in (60, 300, 1500, 3000):
         for before in (0.0, 1.0):  # come from below, and from above
             # Zero command first, for which the interlock waits.
             ends = np.concatenate([np.zeros(500), np.linspace(4095 * before, code, 2000).round()])
             codes = np.concatenate([ends, code + rng.integers(-4, 5, 6000)])
             rms = {}
-            for name, scene in scenes.items():
+            for name in made:
+                scene = made[name][1][3]
                 command = scene.loop.channels.command_of_codes(codes)
                 run = scene.loop.run(command, scene.dp_MPa, "compensated", periods_per_record=2)
                 rms[name] = run.compare[4500:].std()
-            assert 0 < rms["play"] <= 2 * rms["kept"], (code, before, rms)
+            assert 0 < rms["play"] <= 2 * rms["keep"], (code, before, rms)
 
 
-def test_a_core_without_its_zero_band_is_seen_by_the_zero_command_that_is_read_too_high(example_valve, plant, tmp_path):
+def test_a_core_without_its_zero_band_is_seen_by_the_zero_command_that_is_read_too_high(made, plant, tmp_path):
     """The seeded fault: the band is one code wide, and the drive leaves its rest at once."""
-    compensator = design(example_valve, options_of({}, target_named("f28335").inputs()))
-
-    def edit(files):
-        for old, new in ((".zero_band = 19u", ".zero_band = 1u"), (".leave_zero = 24u", ".leave_zero = 2u"),
-                         (".band_end = 19u", ".band_end = 1u")):  # fmt: skip
-            assert old in files["core/dz_valve.h"]
-            files["core/dz_valve.h"] = files["core/dz_valve.h"].replace(old, new)
-        return files
-
-    leaks = {}
-    for name, change in (("right", None), ("wrong", edit)):
-        scenes = scenes_of(folder_of(compensator, tmp_path / name, change), compensator, plant)
-        results = [each for scene in scenes for each in run_scenarios(scene) if "codes too high" in each.name]
+    compensator, right = made["keep"]
+    edit = replaced(
+        (".zero_band = 19u", ".zero_band = 1u"), (".leave_zero = 24u", ".leave_zero = 2u"),
+        (".band_end = 19u", ".band_end = 1u"),
+    )  # fmt: skip
+    wrong = scenes_of(written(compensator, tmp_path, edit=edit, of="core/dz_valve.h"), compensator, plant)
+    leaks = []
+    for scenes in (right, wrong):
+        results = [each for scene in scenes for each in converter_off_at_zero(scene) if "codes too high" in each.name]
         assert len(results) == len(scenes) and all(each.must_shut for each in results)
-        leaks[name] = max(each.q_zero_L_min for each in results)
-    assert leaks["right"] == 0.0 < leaks["wrong"]
+        leaks.append(max(each.q_zero_L_min for each in results))
+    assert leaks[0] == 0.0 < leaks[1]

@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
-from dzdesign.verify.closed_loop.stored_digits import DECIMALS, STEP, stored, stored_comparison
-from dzdesign.verify.loop_results import PlantComparison
+from dzdesign.verify.closed_loop.scene import DECIMALS, rounded_up, stored
 from tests.support.evidence import pressure_result
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
@@ -26,6 +25,8 @@ RAMPS = sorted(
 WORK = """
 import sys
 from dzdesign.command_line.cli import main
+from dzdesign.verify.closed_loop import against_cvodes
+against_cvodes.WINDOW_S = 0.1
 ramps = sys.argv[1:]
 assert main(["identify", *ramps, "-o", "valve.json"]) == 0
 assert main(["design", "valve.json", "-o", "compensator.json"]) == 0
@@ -72,22 +73,16 @@ def test_digits_without_a_meaning_are_cut():
 
 
 @pytest.mark.parametrize("leak", [0.0, 0.1234567894, 0.1234567895, 0.1234567896])
-@pytest.mark.parametrize("share", [0.0, 0.4, 0.999, 1.0, 1.001, 1.4, 1.6, 2.5, 1e6])
-def test_no_verdict_changes(leak, share):
+@pytest.mark.parametrize("share", [0.0, 0.4, 0.999, 2.5, 1e6])
+def test_a_leak_is_no_flow_and_a_flow_is_no_leak(leak, share):
     given = pressure_result(q_zero_L_min=leak + share * NO_FLOW_L_MIN, leak_L_min=leak)
-    flows = given.q_beyond_L_min > NO_FLOW_L_MIN
     found = stored(given)
-    assert (found.q_beyond_L_min > NO_FLOW_L_MIN) == flows
-    assert abs(found.q_zero_L_min - given.q_zero_L_min) <= 2.5 * STEP
+    assert (found.q_beyond_L_min > NO_FLOW_L_MIN) == (share > 1)
+    assert abs(found.q_zero_L_min - given.q_zero_L_min) <= 2 * 10**-DECIMALS
 
 
 @pytest.mark.parametrize(
     ("difference", "shown"), [(0.0, 0.0), (1.8e-13, 1e-9), (1.0000001e-9, 1e-9), (1.2e-9, 2e-9), (7.7e-7, 7.7e-7)]
 )
 def test_a_difference_is_rounded_up(difference, shown):
-    given = PlantComparison(
-        side="positive", dp_MPa=(1.0, 2.0), seconds=0.1, step_s=1e-4, position_difference=difference,
-        flow_difference=difference, q_largest_L_min=10.0, impacts=0,
-    )  # fmt: skip
-    found = stored_comparison(given)
-    assert found.position_difference == found.flow_difference == shown
+    assert rounded_up(difference) == shown

@@ -10,13 +10,17 @@ import pytest
 
 from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.current.exact_controller import NO_OFFSET, OPEN, OVER, SENSOR, SHORT, ExactController
-from dzdesign.verify.current.state_check import (
+from dzdesign.verify.current.controller_states import (
     COMPARED,
+    NO_OFFSET,
+    OPEN,
+    OVER,
+    SENSOR,
+    SHORT,
     HostStates,
     check_states,
-    exact_controllers,
-    given_of,
+    exact_calibrations,
+    exact_ticks,
     hashes_on,
 )
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
@@ -31,8 +35,8 @@ on_every_loop = pytest.mark.parametrize("name", LOOPS)
 @needs_compiler
 @on_every_loop
 def test_c_equals_the_exact_controller_state_by_state(name):
-    found = check_states(LOOPS[name], current_texts(LOOPS[name]), STATES)
-    assert found.wrong == 0, found.first
+    found, _ = check_states(LOOPS[name], current_texts(LOOPS[name]), STATES)
+    assert found.wrong == 0, found.first_wrong
     assert found.states > STATES
 
 
@@ -64,17 +68,6 @@ def test_no_two_blocks_have_the_same_states():
 
 
 @needs_compiler
-@on_every_loop
-def test_both_forms_of_the_exact_controller_agree(name):
-    loop = LOOPS[name]
-    periods, _ = HostStates(loop, current_texts(loop)).periods(7, 3_000)
-    for exact, after in zip(exact_controllers(loop, given_of(periods, loop)), periods["after"], strict=True):
-        integral = exact.integral * (1 << loop.gain_shift)
-        found = (integral, exact.compare, exact.faults, exact.over_ticks, exact.open_ticks, exact.ramped)
-        assert found == tuple(int(after[field]) for field in COMPARED)
-
-
-@needs_compiler
 @pytest.mark.parametrize(
     ("machine", "states"),
     [
@@ -92,8 +85,7 @@ def test_other_machines_give_the_same_hashes(name, machine, states):
         periods, hashed = HostStates(LOOPS[name], core).periods(22, states)
         assert len(periods) == states and hashes[0] == hashed
     else:
-        host = check_states(LOOPS[name], core, states)
-        assert hashes == host.hashes
+        assert hashes == check_states(LOOPS[name], core, states)[1]
 
 
 SEEDED = {
@@ -146,7 +138,7 @@ def test_a_wrong_controller_is_seen(fault):
     right, wrong = SEEDED[fault]
     assert core["dz_current.c"].count(right) == 1
     core["dz_current.c"] = core["dz_current.c"].replace(right, wrong)
-    assert check_states(loop, core, 100_000).wrong > 0
+    assert check_states(loop, core, 100_000)[0].wrong > 0
 
 
 @needs_compiler
@@ -168,7 +160,7 @@ def test_a_difference_of_16_bits_is_seen_where_int_has_16():
     right, narrow = "(uint32_t)sum - numbers->short_sum", "sum - numbers->short_sum"
     assert right in core["dz_current.c"]
     wrong = core | {"dz_current.c": core["dz_current.c"].replace(right, narrow)}
-    assert check_states(loop, wrong, 10_000).wrong == 0
+    assert check_states(loop, wrong, 10_000)[0].wrong == 0
     _, hashed = HostStates(loop, core).periods(22, 2_000)
     assert hashes_on(AVR, loop, wrong, 2_000)[0] != hashed
 
@@ -188,27 +180,32 @@ def test_misra_finds_nothing_that_is_not_stated(name, tmp_path):
     assert [each for each in shown if (each[0].removeprefix("misra-c2012-"), symbol_of(each[2])) not in stated] == []
 
 
-def settled(controller: ExactController) -> ExactController:
-    """Calibrate a controller at its nominal offset."""
-    for _ in range(1 << controller.loop.offset_shift):
-        controller.calibrate(controller.loop.offset_nominal)
-    return controller
+class Exact:
+    """The exact controller, one state after another."""
+
+    def __init__(self, loop, **state):
+        self.loop, self.state = loop, {**dict.fromkeys(COMPARED, 0), "offset": loop.offset_nominal, **state}
+
+    def tick(self, set_point, total, supply_code=0):
+        given = self.state | {"set_point": set_point, "total": total, "supply_code": supply_code}
+        after = exact_ticks(self.loop, {name: np.array([value]) for name, value in given.items()})
+        self.state |= {name: int(values[0]) for name, values in after.items()}
+        return self.state
 
 
-def test_nothing_is_driven_before_the_offset_is_known():
-    controller = ExactController(PLAIN)
-    controller.tick(30000, PLAIN.offset_nominal)
-    assert (controller.compare, controller.faults) == (0, NO_OFFSET)
-    settled(controller).tick(30000, PLAIN.offset_nominal)
-    assert controller.compare > 0 and controller.faults == 0
+def calibrated(above):
+    """Offset and faults after a calibration so many codes beside the nominal offset, with one sum too many."""
+    sums = np.full((1, (1 << PLAIN.offset_shift) + 1), PLAIN.offset_nominal + above)
+    offsets, faults = exact_calibrations(PLAIN, sums, np.array([NO_OFFSET]))
+    return int(offsets[0]), int(faults[0])
 
 
-def test_an_offset_beyond_its_tolerance_is_a_fault():
-    controller = ExactController(PLAIN)
-    for _ in range(1 << PLAIN.offset_shift):
-        controller.calibrate(PLAIN.offset_nominal + PLAIN.offset_tolerance + 1)
-    controller.tick(30000, PLAIN.offset_nominal)
-    assert (controller.compare, controller.faults) == (0, SENSOR)
+def test_nothing_is_driven_before_the_offset_is_known_nor_with_one_beyond_its_tolerance():
+    beyond = PLAIN.offset_tolerance + 1
+    assert calibrated(0) == (PLAIN.offset_nominal, 0) and calibrated(beyond) == (PLAIN.offset_nominal + beyond, SENSOR)
+    for faults in (NO_OFFSET, SENSOR, 0):
+        after = Exact(PLAIN, faults=faults).tick(30000, PLAIN.offset_nominal)
+        assert after["faults"] == faults and (after["compare"] > 0) == (not faults)
 
 
 @pytest.mark.parametrize(
@@ -216,33 +213,30 @@ def test_an_offset_beyond_its_tolerance_is_a_fault():
     [(PLAIN.over_sum, PLAIN.over_ticks, OVER), (0, PLAIN.open_ticks + 1, OPEN), (PLAIN.short_sum, 1, SHORT)],
 )
 def test_a_fault_latches_after_its_periods_in_a_row(above, ticks, fault):
-    controller = settled(ExactController(PLAIN))
+    controller = Exact(PLAIN)
     for _ in range(ticks):
-        assert controller.faults == 0
+        assert controller.state["faults"] == 0
         controller.tick(30000, PLAIN.offset_nominal + above)
-    assert (controller.compare, controller.faults, controller.integral) == (0, fault, 0)
-    controller.tick(30000, PLAIN.offset_nominal + 9000)
-    assert (controller.compare, controller.faults) == (0, fault)
+    for _ in range(2):
+        assert [controller.state[name] for name in ("compare", "faults", "integral")] == [0, fault, 0]
+        controller.tick(30000, PLAIN.offset_nominal + 9000)
 
 
 def test_a_wound_up_integral_leaves_the_end_at_once():
     """At the output's end the integral stands, so that the first error of the other sign takes the output back."""
-    controller = settled(ExactController(replace(PLAIN, open_ticks=65535)))
+    controller = Exact(replace(PLAIN, open_ticks=65535))
     for _ in range(1000):
         controller.tick(60000, PLAIN.offset_nominal)
-    assert controller.compare == PLAIN.compare_limit
-    assert controller.integral < PLAIN.compare_limit
-    controller.tick(60000, PLAIN.offset_nominal + 25000)
-    assert controller.compare < PLAIN.compare_limit
+    assert controller.state["compare"] == PLAIN.compare_limit
+    assert controller.state["integral"] < PLAIN.compare_limit << PLAIN.gain_shift
+    assert controller.tick(60000, PLAIN.offset_nominal + 25000)["compare"] < PLAIN.compare_limit
 
 
 def test_the_supply_scales_the_output():
-    outputs = []
-    for code in (1638, 2457, 3276, 100, 4095):
-        controller = settled(ExactController(LOOPS["supply"], ramped=30000))
-        controller.tick(30000, PLAIN.offset_nominal + 8000, code)
-        outputs.append(controller.compare)
-    low, middle, high, below, above = outputs
+    low, middle, high, below, above = (
+        Exact(LOOPS["supply"], ramped=30000).tick(30000, PLAIN.offset_nominal + 8000, code)["compare"]
+        for code in (1638, 2457, 3276, 100, 4095)
+    )
     assert Fraction(low, high) == pytest.approx(2, rel=1e-3) and Fraction(low, middle) == pytest.approx(1.5, rel=1e-3)
     assert (below, above) == (low, high)
 

@@ -5,24 +5,21 @@ from fractions import Fraction
 
 import pytest
 
-from dzdesign.codegen.project import generate, target_named
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.current.choosing import CurrentSensor, choose_loop, gains_of
 from dzdesign.design.current.circuit import CoilCircuit
 from dzdesign.design.current.responses import Gains, margins
-from dzdesign.design.designing import design
-from dzdesign.design.options import options_of
 from dzdesign.verify.analysis import machine_code
-from dzdesign.verify.current.coil_simulation import CoilLoop
+from dzdesign.verify.current import corner_runs
+from dzdesign.verify.current.coil import CoilLoop, least_rise_s
+from dzdesign.verify.current.corner_runs import CURRENTS, stability_margins
 from dzdesign.verify.current.current_checks import current_checks
-from dzdesign.verify.current.declared_circuit import declared_corners, least_rise_s
-from dzdesign.verify.current.stability import CURRENTS, stability_margins
 from dzdesign.verify.requirements import OF_CURRENT
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
 from dzdesign.verify.verification import verify
 from tests.codegen.test_current_control import MEASURED, TEXTS
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
 from tests.support.synthetic import needs_compiler
+from tests.support.written_firmware import designed, replaced, written
 
 pytestmark = needs_compiler
 #: Fewer than `verify` compares, where a fault is a common one.
@@ -36,32 +33,28 @@ def silent(_: str) -> None:
 @pytest.fixture(scope="module")
 def controlled(example_valve):
     """The example's compensator with current control, the supply not measured."""
-    return design(example_valve, options_of(TEXTS, target_named("cortex-m4").inputs()))
+    return designed(example_valve, "cortex-m4", **TEXTS)
 
 
-@pytest.fixture(scope="module", params=SENSORS)
-def either(request, controlled, example_valve):
-    """The same, without and with the supply measured."""
-    if request.param == "supply unknown":
-        return controlled
-    return design(example_valve, options_of(MEASURED, target_named("cortex-m4").inputs()))
+@pytest.fixture(autouse=True)
+def short_holds(request, monkeypatch):
+    """Hold each set point for 1 s, not 10 s: much of what these tests take. Whole where the windows are."""
+    if "whole_windows" not in request.fixturenames:
+        monkeypatch.setattr(corner_runs, "HELD_S", 1.0)
 
 
-def firmware_of(compensator, folder, edit=lambda text: text):
-    firmware = generate(compensator, "cortex-m4")
-    write_folder(folder, firmware.files, firmware.manifest)
-    source = folder / "core" / "dz_current.c"
-    source.write_text(edit(source.read_text()))
-    return folder
+def firmware_of(compensator, folder, edit=str):
+    return written(compensator, folder, "cortex-m4", edit, "core/dz_current.c")
 
 
 def failing(checks) -> set[str]:
     return {check.id for check in checks if check.holds is False}
 
 
-def test_a_firmware_with_current_control_holds(either, tmp_path, whole_windows):
+def test_a_firmware_with_current_control_holds(example_valve, tmp_path, whole_windows):
     """All that `verify` requires, every input and whole windows; 27 corners and each kind of fault are in evidence."""
-    evidence = verify(firmware_of(either, tmp_path / "firmware")).evidence
+    measured = designed(example_valve, "cortex-m4", **MEASURED)
+    evidence = verify(firmware_of(measured, tmp_path / "firmware")).evidence
     assert failing(evidence.checks) == set()
     assert {each.id for each in OF_CURRENT} <= {check.id for check in evidence.checks}
     found = evidence.current_loop
@@ -78,22 +71,13 @@ def test_a_drive_by_duty_has_no_such_requirement(example_compensator, tmp_path):
     assert current_checks(tmp_path, example_compensator, silent).checks == ()
 
 
-#: What is edited in dz_current.c, and the requirements that must see it (the comparison of the files always does).
+#: What is edited in dz_current.c, and the requirements that must see it beside the comparison of states, which sees any
+#: (test_controller.py) and the comparison of the files.
 EDITS = {
-    "a gain a thousandth too large": (
-        ("(error * numbers->proportional)", "(error * (numbers->proportional + 6u))"),
-        {"current-controller"},
-    ),
     "twice the gain": (
         ("(error * numbers->proportional)", "(error * (2u * numbers->proportional))"),
         {"current-controller", "current-step"},
     ),
-    "feed-forward and integral swapped": (
-        ("aim * numbers->feed_forward", "aim * numbers->integral"),
-        {"current-controller"},
-    ),
-    "no anti-windup": ((" & ~past_end", ""), {"current-controller"}),
-    "an offset that is not rounded": (("+ half_of(shift)", ""), {"current-controller"}),
     "an offset that is not calibrated": (
         ("loop->offset = offset;", "loop->offset = numbers->offset_nominal;"),
         {"current-controller", "current-settles"},
@@ -114,13 +98,8 @@ EDITS = {
 
 @pytest.mark.parametrize("fault", EDITS)
 def test_an_edited_controller_is_seen(fault, controlled, tmp_path):
-    (right, wrong), expected = EDITS[fault]
-
-    def edit(text: str) -> str:
-        assert text.count(right) == 1
-        return text.replace(right, wrong)
-
-    found = current_checks(firmware_of(controlled, tmp_path / "firmware", edit), controlled, silent, STATES)
+    pair, expected = EDITS[fault]
+    found = current_checks(firmware_of(controlled, tmp_path / "fw", replaced(pair)), controlled, silent, STATES)
     assert expected <= failing(found.checks)
 
 
@@ -129,12 +108,7 @@ def test_one_code_too_many_in_one_of_a_million_states_is_seen(controlled, tmp_pa
     right = "smaller(counts, limit) & on"
     mixed = "(asked * 0x9E3779B1u) ^ (((uint32_t)sum + loop->offset) * 0x85EBCA6Bu) ^ (aim * 0xC2B2AE35u)"
     wrong = f"({right}) + ((((({mixed}) * 0x27D4EB2Fu) >> 8) % 1000000u) == 0u)"
-
-    def edit(text: str) -> str:
-        assert text.count(right) == 1
-        return text.replace(right, wrong)
-
-    found = current_checks(firmware_of(controlled, tmp_path / "firmware", edit), controlled, silent)
+    found = current_checks(firmware_of(controlled, tmp_path, replaced((right, wrong))), controlled, silent)
     assert 1 <= found.result.states.wrong <= 60
     assert failing(found.checks) == {"current-controller"}
 
@@ -162,8 +136,8 @@ def test_the_margins_are_those_of_design_by_another_way(name):
     around = CoilLoop(
         loop=example_loop(name), circuit=COIL, sensor=SENSORS[name], converter=CONVERTER, sampling=SAMPLING
     )
-    assert set(declared_corners(COIL)) == set(COIL.corners())
-    for corner in declared_corners(COIL)[::5]:
+    assert set(around.corners()) == set(COIL.corners())
+    for corner in around.corners()[::5]:
         ours = stability_margins(around, corner)
         theirs = [
             margins(COIL, corner, SAMPLING, gains_of(around.loop, COIL), share)
@@ -182,7 +156,7 @@ def test_a_small_fast_coil_has_the_margins_that_were_chosen():
     assert margins(coil, coil.nominal, SAMPLING, huge, 0.5).phase_deg == 0
     loop = choose_loop(coil, sensor, CONVERTER, SAMPLING, compare_max=60000)
     around = CoilLoop(loop=loop, circuit=coil, sensor=sensor, converter=CONVERTER, sampling=SAMPLING)
-    assert min(stability_margins(around, corner).phase_deg for corner in declared_corners(coil)) >= 50
+    assert min(stability_margins(around, corner).phase_deg for corner in around.corners()) >= 50
 
 
 def test_the_least_rise_is_that_of_an_exponential():
@@ -231,8 +205,7 @@ def test_a_set_point_that_the_supply_cannot_carry_is_said(controlled, tmp_path):
 
 @pytest.mark.parametrize("kept", ["what the coil makes", "the set point's peak alone"])
 def test_a_dither_that_the_current_overshoots_is_kept_free_or_seen(kept, example_valve, tmp_path):
-    target = target_named("cortex-m4").inputs()
-    made = design(example_valve, options_of(TEXTS | {"dither": "150 Hz 1 %"}, target))
+    made = designed(example_valve, "cortex-m4", **TEXTS, dither="150 Hz 1 %")
     if kept == "the set point's peak alone":
         made = replace(made, current_drive=replace(made.current_drive, dither_above_counts=0))
     found = current_checks(firmware_of(made, tmp_path / "firmware"), made, silent, STATES)

@@ -13,7 +13,7 @@ from dzdesign.core.artefact_types import Artefact, Sha256, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.design_choices import Above
 from dzdesign.verify.current.results import CurrentLoopResult
-from dzdesign.verify.loop_results import ClosedLoopResult, Count, MonteCarlo, Population, ScenarioResult, Side, about
+from dzdesign.verify.loop_results import ClosedLoopResult, Count, Population, ScenarioResult, Side, about
 from dzdesign.verify.requirements import ALWAYS, AS_STATED, OF_CURRENT, RAMPS, Check
 
 Sign = Literal[1, -1]
@@ -216,7 +216,6 @@ class Evidence(Artefact):
     population: Annotated[
         Population | None, about("Machines drawn from the declared budget, if --tolerances requested them.")
     ]
-    monte_carlo: Annotated[MonteCarlo | None, about("Series of plants, if --tolerances requested it.")]
     current_loop: Annotated[
         CurrentLoopResult | None,
         about("Current loop of a current-controlled drive; null for a duty-controlled one, or if it did not run."),

@@ -1,4 +1,4 @@
-"""Evidence of the closed loop: ramps, scenarios and series of plants, as ``verification.json`` holds them."""
+"""Evidence of the closed loop: ramps, scenarios and drawn machines, as ``verification.json`` holds them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -219,35 +219,6 @@ class ScenarioResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
-    """Quantiles of one quantity over a series of plants, and the least favourable plant."""
-
-    p01: Annotated[float, about("1 % quantile.")]
-    p05: Annotated[float, about("5 % quantile.")]
-    p50: Annotated[float, about("Median.")]
-    p95: Annotated[float, about("95 % quantile.")]
-    p99: Annotated[float, about("99 % quantile.")]
-    worst: Annotated[float, about("Value of the least favourable plant.")]
-    worst_plant: Annotated[Mapping[str, float], about("Drawn parameters of that plant.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scatter:
-    """Results of a series of plants on one side at one pressure drop."""
-
-    side: Side
-    dp_MPa: PressureDrop
-    plants: Annotated[int, Meta(description="Number of plants.", ge=1, le=10**6)]
-    leaking: Annotated[
-        Count, about("Number of plants with flow at zero command after closing, beyond any declared as allowed.")
-    ]
-    residual_opening: Annotated[Spread, about("Dead zone on opening, as a share of full command.")]
-    residual_closing: Annotated[Spread, about("Dead zone on closing, as a share of full command.")]
-    q_zero_L_min: Annotated[Spread, about("Flow at zero command, L/min.")]
-    q_max_L_min: Annotated[Spread, about("Largest flow, L/min.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Population:
     """Machines drawn from the declared budget: drive and threshold of each at and between the tested pressure drops."""
 
@@ -274,9 +245,6 @@ class Population:
         Mapping[str, float],
         about("Machine with that margin: position of each component within its half-width, from -1 to 1."),
     ]
-    drawn: Annotated[
-        tuple[str, ...], about("Components that were drawn; the others stood at their least favourable ends.")
-    ]
     in_loop: Annotated[Count, about("Number of machines, those with the least margins, that ran in the closed loop.")]
     flowing_in_loop: Annotated[
         Count, about("Number of these with flow at zero command beyond what is allowed.")
@@ -287,13 +255,3 @@ class Population:
     ]
     largest_L_min: Annotated[Flow, about("Largest flow of these at zero command beyond what is allowed.")]
     largest_dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at which that flow occurs.", ge=0, le=1000)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MonteCarlo:
-    """A series of plants around the given one."""
-
-    plants: Annotated[int, Meta(description="Number of plants.", ge=1, le=10**6)]
-    seed: Annotated[int, Meta(description="Random seed of the draw.", ge=0, le=2**60)]
-    spreads: Annotated[Mapping[str, str], about("Spread of each parameter, in words.")]
-    pressures: Annotated[tuple[Scatter, ...], about("Scatter on each side at each pressure drop.")]

@@ -116,11 +116,6 @@ LOAD_STEPS = Requirement(
     title="load steps, and readings stuck during one, were tried in the closed loop",
     how="`verify --plant`",
 )
-SERIES = Requirement(
-    id="series",
-    title="the closed-loop requirements hold for a series of plants",
-    how="`verify --plant` with `--tolerances`",
-)
 CURRENT_STATES = Requirement(id="current-controller", title="the current controller equals its exact model")
 CURRENT_MARGINS = Requirement(id="current-margins", title="the current loop is stable at every corner")
 CURRENT_SETTLES = Requirement(id="current-settles", title="the current settles at every corner")

@@ -13,7 +13,6 @@ from dzdesign.verify.requirements import (
     OWN_PLANT,
     POPULATION,
     PRESSURE_INPUTS,
-    SERIES,
     Requirement,
 )
 
@@ -40,8 +39,6 @@ def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
         untried.append(LOAD_STEPS)
     if evidence.population is None:
         untried.append(POPULATION)
-    if evidence.monte_carlo is None:
-        untried.append(SERIES)
     if len(evidence.inputs) > 1 and PRESSURE_INPUTS.id not in tried:
         untried.append(PRESSURE_INPUTS)
     optional = OPTIONAL + ((C2000WARE,) if evidence.target == "f28335" else ())

@@ -13,13 +13,12 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
-from dzdesign.verify.closed_loop.dead_zone import LoopComparison
-from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, loop_curves
-from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop, scenes_of
+from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.closed_loop.population import NOT_DECLARED
-from dzdesign.verify.closed_loop.tolerances import Tolerances
+from dzdesign.verify.closed_loop.population import NOT_DECLARED, Tolerances
+from dzdesign.verify.closed_loop.ramps import Curves, LoopComparison, csv_of, loop_curves
+from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks
@@ -91,8 +90,8 @@ def verify(
     """Verify a firmware folder made by `dzdesign codegen`.
 
     Without a `plant` the recorded characteristic stands in for the valve in the closed loop. `plant_source` and
-    `plant_sha256` are the name and hash of its file, for the evidence. `tolerances` define a series of plants around
-    it.
+    `plant_sha256` are the name and hash of its file, for the evidence. `tolerances` say how many machines are drawn
+    from the declared budget.
 
     `sequence` is the command over time, by default 0-10 V in 100 s and back. `backs_MPa` are the pressures downstream
     of the edge. `include` lists folders with headers of the user's board files.
@@ -107,7 +106,7 @@ def verify(
     InputError
         If the folder is not a firmware, or the machine has no C compiler.
     """
-    manifest, compensator = _read(folder, plant, tolerances, include)
+    manifest, compensator = _read(folder, tolerances, include)
     host_compiler()
     code = code or folder
     same = None if again is None else reproduced(folder, again)
@@ -133,8 +132,7 @@ def verify(
         closed_loop=loop.result(plant, plant_source, plant_sha256, run.compared),
         scenarios=loop.scenarios,
         population=loop.population,
-        monte_carlo=loop.monte_carlo,
-        current_loop=current.result and replace(current.result, valve=loop.valve_at_corners),
+        current_loop=current.result,
         mutants=None,
         not_covered=not_covered(compensator),
     )
@@ -147,15 +145,13 @@ def verify(
 
 
 def _read(
-    folder: Path, plant: Plant | None, tolerances: Tolerances | None, include: Sequence[Path]
+    folder: Path, tolerances: Tolerances | None, include: Sequence[Path]
 ) -> tuple[FirmwareManifest, Compensator]:
-    """Read the firmware's manifest and compensator, and refuse what does not go with them or with each other."""
-    if tolerances and tolerances.spreads and plant is None:
-        raise InputError("tolerances are about a plant; give it with --plant PLANT.toml")
+    """Read the firmware's manifest and compensator, and refuse what does not go with them."""
     manifest = read_firmware_manifest(folder)
     check_include(include, manifest)
     compensator = read_compensator(folder)
-    if tolerances and tolerances.machines and compensator.machine is None:
+    if tolerances and compensator.machine is None:
         raise InputError(NOT_DECLARED)
     return manifest, compensator
 

@@ -1,6 +1,6 @@
 """Sections on the evidence: every input, closed loop, requirements."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -30,15 +30,12 @@ from dzdesign.report.figure import (
     to_report_figure,
 )
 from dzdesign.report.page import Section
-from dzdesign.verify.closed_loop.evidence_curves import Curves, closed_loop_name, csv_of
+from dzdesign.verify.closed_loop.ramps import Curves, closed_loop_name, csv_of
 from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.loop_results import (
     ClosedLoopResult,
-    MonteCarlo,
     PressureResult,
     ScenarioResult,
-    Spread,
-    flow_in_words,
 )
 
 if TYPE_CHECKING:
@@ -72,9 +69,8 @@ def loop_section(chain: Chain) -> Section:
             loops_table(loop.pressures, units),
             readings_table(loop.pressures, units),
             scenarios_table(evidence.scenarios, units),
-            series_table(evidence.monte_carlo, units),
             plant_table(loop),
-            *current_tables(evidence.current_loop, units),
+            *current_tables(evidence.current_loop),
         ),
         lines=(_plant_line(loop),),
     )
@@ -188,38 +184,11 @@ def _required(scenario: ScenarioResult, units: RecordedUnits) -> str:
     return "must be shut at the end" if allowed is None else f"{units.text(allowed, '.3g L/min')} at most at the end"
 
 
-def series_table(series: MonteCarlo | None, units: RecordedUnits) -> Table | None:
-    """Return the quantiles of a series of plants; None if none was run."""
-    if series is None:
-        return None
-
-    def spread(of: Spread, shown: Callable[[float], str]) -> Cell:
-        middle, low, high = map(shown, (of.p50, of.p01, of.p99))
-        return in_number_font(f"{middle} ({low} to {high})")
-
-    def percent(share: float) -> str:
-        return f"{100 * share:.2f}"
-
-    def flow(value: float) -> str:
-        return units.number(value, ".2f L/min")
-
-    return table_of(
-        "Series of plants: median (1 to 99 %). No requirement: the certificate covers the tested valve",
-        series.pressures,
-        ("side", lambda one: one.side),
-        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
-        ("opening with (%)", lambda one: spread(one.residual_opening, percent)),
-        ("closing with (%)", lambda one: spread(one.residual_closing, percent)),
-        (f"at zero ({units.label('L/min')})", lambda one: spread(one.q_zero_L_min, flow)),
-        ("plants that leak", lambda one: in_number_font(f"{one.leaking} of {one.plants}")),
-    )
-
-
-def current_tables(result: CurrentLoopResult | None, units: RecordedUnits) -> tuple[Table | None, ...]:
+def current_tables(result: CurrentLoopResult | None) -> tuple[Table, ...]:
     """Return the tables; none of a drive by duty."""
     if result is None:
         return ()
-    return (_corners(result), _faults(result), _valve(result, units))
+    return (_corners(result), _faults(result))
 
 
 def _optional(value: float | None, places: int, factor: float = 1.0) -> Cell:
@@ -256,26 +225,6 @@ def _faults(result: CurrentLoopResult) -> Table:
         ),
         ("at most (ms)", lambda one: number(1e3 * one.limit_s, 1)),
         ("output stays off", lambda one: "yes" if one.latched else "no"),
-    )
-
-
-def _valve(result: CurrentLoopResult, units: RecordedUnits) -> Table | None:
-    if not result.valve:
-        return None
-    return table_of(
-        "The valve with the declared coil and at the ends of its ranges and the supply's",
-        result.valve,
-        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
-        ("opening, least (%)", lambda one: number(100 * one.opening_least, 2)),
-        ("opening, largest (%)", lambda one: number(100 * one.opening_largest, 2)),
-        (
-            f"at zero, after closing ({units.label('L/min')})",
-            lambda one: in_number_font(flow_in_words(one.q_zero_L_min, one.unseen_below_L_min, units)),
-        ),
-        (
-            f"at zero, as the drive is released ({units.label('L/min')})",
-            lambda one: in_number_font(flow_in_words(one.q_released_L_min, one.unseen_below_L_min, units)),
-        ),
     )
 
 

@@ -17,7 +17,7 @@ from dzdesign.assess.options import SETS, Set
 from dzdesign.identify.ramps.pooling import SAME_PRESSURE
 from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.recorded_curve import RecordedBranch
-from dzdesign.verify.closed_loop.evidence_curves import Curves, closed_loop_name
+from dzdesign.verify.closed_loop.ramps import Curves, closed_loop_name
 
 #: Where a curve is from: recordings of a valve, recordings that are simulated themselves, or a simulated closed loop.
 Origin = Literal["recorded", "example", "simulated"]

@@ -14,7 +14,7 @@ from dzdesign.report.cells import (
 )
 from dzdesign.report.figure import LIGHT, ReportFigure, legend_below, new_figure, to_report_figure
 from dzdesign.report.page import Section
-from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, input_map_name, zero_command_name
+from dzdesign.verify.closed_loop.ramps import Curves, csv_of, input_map_name, zero_command_name
 from dzdesign.verify.evidence import InputCheck
 
 if TYPE_CHECKING:

@@ -8,15 +8,15 @@ is a constant force over the next one; a stop swallows the spool's speed, and ho
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, RECORD_S, ClosedLoop, LoopRun
+from dzdesign.core.artefact_reading import rounded
+from dzdesign.verify.closed_loop.loop import PERIODS_PER_RECORD, RECORD_S, LoopRun
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
-from dzdesign.verify.closed_loop.scene import Scene
-from dzdesign.verify.closed_loop.stored_digits import stored_comparison
+from dzdesign.verify.closed_loop.scene import DECIMALS, Scene, rounded_up
 from dzdesign.verify.loop_results import PlantComparison
 from dzdesign.verify.requirements import NATIVE_PLANT, Check
 
@@ -53,11 +53,9 @@ PERIOD_MS = 1e3 * PWM_PERIOD_S
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """A loop with its plant, and what happens to it, a value for each record."""
+    """A scene, and what happens to it, a value for each record."""
 
     scene: Scene
-    loop: ClosedLoop
-    plant: Plant
     command: np.ndarray
     supply_MPa: np.ndarray
     added_V: np.ndarray
@@ -66,24 +64,21 @@ class Window:
     @classmethod
     def of(cls, scene: Scene, seconds: float = WINDOW_S, **parameters: float) -> "Window":
         """Return the window of a side, whose plant has other `parameters` where these are given."""
-        from dataclasses import replace
-
-        from dzdesign.verify.closed_loop.stand_in import StandIn
-
-        given = replace(scene.plant, **parameters) if parameters and isinstance(scene.plant, Plant) else scene.plant
-        plant = given.with_oil(VISCOSITY, DENSITY)
-        loop = scene.loop.with_plant(plant).with_drive(DRIVE)
+        given = scene.loop.plant
+        given = replace(given, **parameters) if parameters and isinstance(given, Plant) else given
+        loop = scene.loop.with_plant(given.with_oil(VISCOSITY, DENSITY)).with_drive(DRIVE)
         before = int(np.ceil((loop.waits_s + REST_S) / RECORD_S))
         count = round((seconds + 2 * loop.slowest_ramp_s) / RECORD_S)
         passed = np.concatenate([np.zeros(before), np.arange(count) / count])
         low, high = scene.tested_MPa or (scene.dp_MPa, scene.dp_MPa)
+        supply, added = (
+            np.array(levels)[np.searchsorted(begins, passed, side="right") - 1] for begins, levels in (SUPPLY, ADDED)
+        )
         return cls(
-            scene=scene,
-            loop=loop,
-            plant=plant.dynamics if isinstance(plant, StandIn) else plant,
+            scene=replace(scene, loop=loop),
             command=np.interp(passed, *COMMAND),
-            supply_MPa=low + (high - low) * _held(passed, *SUPPLY),
-            added_V=scene.loop.u_max_V * _held(passed, *ADDED),
+            supply_MPa=low + (high - low) * supply,
+            added_V=loop.u_max_V * added,
             seconds=seconds,
         )
 
@@ -91,16 +86,11 @@ class Window:
         """Run the native loop through it."""
         every = PERIODS_PER_RECORD // periods_per_record
         command, supply, added = (np.repeat(each, every) for each in (self.command, self.supply_MPa, self.added_V))
-        return self.loop.run(
-            command, supply, "compensated", back_MPa=self.loop.back_within_span(self.scene.back_MPa, supply.max()),
+        loop = self.scene.loop
+        return loop.run(
+            command, supply, "compensated", back_MPa=loop.back_within_span(self.scene.back_MPa, supply.max()),
             added_V=added, periods_per_record=periods_per_record,
         )  # fmt: skip
-
-
-def _held(passed: np.ndarray, begins: Sequence[float], levels: Sequence[float]) -> np.ndarray:
-    """Return the level of each share that has passed, from its own share on."""
-    held: np.ndarray = np.array(levels)[np.searchsorted(begins, passed, side="right") - 1]
-    return held
 
 
 def compare_with_cvodes(
@@ -110,8 +100,7 @@ def compare_with_cvodes(
     say("comparing the plant with CasADi's CVODES")
     of_sides = list({scene.side: scene for scene in reversed(scenes)}.values())[::-1]
     try:
-        windows = [Window.of(scene, WINDOW_S / len(of_sides)) for scene in of_sides]
-        found = tuple(stored_comparison(compare(window)) for window in windows)
+        found = tuple(compare(Window.of(scene, WINDOW_S / len(of_sides))) for scene in of_sides)
     except RuntimeError as error:  # of CasADi, of an integrator that gives up
         reason = next((line for line in reversed(str(error).splitlines()) if line.strip()), "no reason given")
         text = f"CVODES gave up ({reason.strip()[:100]}): correct mass, spring, damping or coil in --plant"
@@ -120,11 +109,11 @@ def compare_with_cvodes(
 
 
 def compare(window: Window) -> PlantComparison:
-    """Run one window in both, and return what is between them.
+    """Run one window in both, and return what is between them; a difference is rounded up, as it is an upper limit.
 
     The native loop runs twice: with a record for each period, and as the ramps of the closed loop have it.
     """
-    native, coarse = window.run(1), window.run(PERIODS_PER_RECORD)
+    native, coarse, loop = window.run(1), window.run(PERIODS_PER_RECORD), window.scene.loop
     moved = np.flatnonzero((native.compare > 0) | (native.mean_V > 0))
     flows = np.flatnonzero(native.q_L_min > native.q_L_min[0])
     begin = (int(moved[0]) if moved.size else 0) // PERIODS_PER_RECORD * PERIODS_PER_RECORD
@@ -133,34 +122,36 @@ def compare(window: Window) -> PlantComparison:
     end = min(max(begin + count, late), begin + round(LONGEST_S / PWM_PERIOD_S), native.compare.size)
     end -= end % PERIODS_PER_RECORD
     part, records = slice(begin, end), slice(begin // PERIODS_PER_RECORD, end // PERIODS_PER_RECORD)
-    spool = CvodesSpool(window.plant, window.loop.drive)
+    spool = CvodesSpool(loop.plant.parameters, loop.drive)
     in_force = np.concatenate([[0.0], native.compare])[part] / window.scene.compensator.signals.compare_max
-    means = native.mean_V[part] if window.loop.controls_current else [None] * (end - begin)
+    means = native.mean_V[part] if loop.coil else [None] * (end - begin)
     supply, added = (np.repeat(each, PERIODS_PER_RECORD)[part] for each in (window.supply_MPa, window.added_V))
     path = np.array([spool.period(*given) for given in zip(in_force, supply, added, means, strict=True)])
     position_mm, travel_mm = path.T
-    if window.loop.is_stand_in:
-        reference = window.loop.flow_at(travel_mm, supply)
+    if loop.stand_in:
+        reference = loop.flow_at(travel_mm, supply)
     else:
-        reference = np.array([flow_L_min(window.plant, *each) for each in zip(position_mm, supply, strict=True)])
+        reference = np.array([flow_L_min(spool.plant, *each) for each in zip(position_mm, supply, strict=True)])
     of_record = reference.reshape(-1, PERIODS_PER_RECORD)
-    apart = (
+    flows_apart = (
         native.q_L_min[part] - reference, coarse.q_L_min[records] - of_record[:, -1],
         coarse.q_mean_L_min[records] - of_record.mean(axis=1), coarse.q_largest_L_min[records] - of_record.max(axis=1),
     )  # fmt: skip
     largest = float(reference.max())
-    position = float(np.abs(native.position_mm[part] - position_mm).max()) / window.plant.stroke_mm
-    flow = max(float(np.abs(each).max()) for each in apart) / (largest if largest > 0 else 1.0)
-    return PlantComparison(
+    position, *of_flow = (float(np.abs(each).max()) for each in (native.position_mm[part] - position_mm, *flows_apart))
+    apart = (position / spool.plant.stroke_mm, max(of_flow) / (largest if largest > 0 else 1.0))
+    position, flow = (rounded_up(each) if each < NO_NUMBER else NO_NUMBER for each in apart)
+    found = PlantComparison(
         side=window.scene.side,
         dp_MPa=(float(supply.min()), float(supply.max())),
         seconds=(end - begin) * PWM_PERIOD_S,
-        step_s=window.loop.step_s(float(supply.max())),
-        position_difference=position if position < NO_NUMBER else NO_NUMBER,
-        flow_difference=flow if flow < NO_NUMBER else NO_NUMBER,
+        step_s=spool.plant.step_s(float(supply.max())),
+        position_difference=position,
+        flow_difference=flow,
         q_largest_L_min=largest,
         impacts=spool.impacts,
     )
+    return rounded(found, DECIMALS)
 
 
 def native_plant_check(found: Sequence[PlantComparison]) -> Check:
@@ -225,8 +216,7 @@ class CvodesSpool:
         Of a drive by current `mean_V` is the coil's mean current, in V of command.
         """
         plant = self.plant
-        loop_ohm = plant.R_c_ohm + plant.r_p_ohm + plant.K_a * plant.K_fi_V_A
-        A_per_V = plant.K_a / loop_ohm  # Eqs. (19)-(21) at rest
+        A_per_V = plant.K_a / (plant.R_c_ohm + plant.r_p_ohm + plant.K_a * plant.K_fi_V_A)  # Eqs. (19)-(21) at rest
         half_A = plant.hysteresis_V / 2 * A_per_V
         self.played_A = min(max(self.played_A, self.mean_A - half_A), self.mean_A + half_A)
         push_N = plant.K_i_N_A * (self.played_A - self.mean_A + added_V * A_per_V)
@@ -243,13 +233,16 @@ class CvodesSpool:
         for _ in range(MOST_EVENTS):
             if left <= SHORTEST_MS:
                 return
-            left -= self._rest(left) if self._is_held() else self._fly(left)
+            at_stop = self.state[4] == 0.0 and not 0.0 < self.state[2] < self.plant.stroke_mm
+            away = 1.0 if self.state[2] <= 0.0 else -1.0
+            held = at_stop and away * self._pull(float(self.state[0])) <= 0.0
+            left -= self._rest(left, away) if held else self._fly(left)
         self.state = self._path(left, free=False)[-1]  # to and fro at a stop, by less and less
 
     def _path(self, milliseconds: float, *, free: bool) -> np.ndarray:
         """Return the states at `PLACES` places in a time, its end the last."""
-        found = self._cvodes(x0=self.state, p=[milliseconds, *self._acting, float(free)])["xf"]
-        return np.array(found).T
+        p = [max(milliseconds, SHORTEST_MS), *self._acting, float(free)]
+        return np.array(self._cvodes(x0=self.state, p=p)["xf"]).T
 
     def _pull(self, current: float) -> float:
         """Return the force on a spool at rest where it is, N: Eqs. (22), (23)."""
@@ -258,60 +251,51 @@ class CvodesSpool:
         load = float(load_force(plant, max(position - plant.overlap_mm, 0.0), supply_MPa))
         return plant.K_i_N_A * current - plant.K_et_N_m * 1e-3 * position - load + push_N
 
-    def _is_held(self) -> bool:
-        position, speed = float(self.state[2]), float(self.state[4])
-        if speed != 0.0 or 0.0 < position < self.plant.stroke_mm:
-            return False
-        return (self._pull(float(self.state[0])) > 0.0) == (position > 0.0)
-
-    def _rest(self, left: float) -> float:
+    def _rest(self, left: float, away: float) -> float:
         """Stay at a stop until the current lets go, or to the end; return for how long."""
-        away = 1.0 if self.state[2] <= 0.0 else -1.0
 
         def pull(milliseconds: float) -> float:
             return away * self._pull(float(self._path(milliseconds, free=False)[-1, 0]))
 
-        taken = left
-        if pull(left) > 0.0:
-            taken = 0.0 if pull(SHORTEST_MS) > 0.0 else _root(pull, 0.0, left)
-        self.state = self._path(max(taken, SHORTEST_MS), free=False)[-1]
+        taken = _root(pull, 0.0, left) if pull(left) > 0.0 else left
+        self.state = self._path(taken, free=False)[-1]
         if taken < left:  # by a root's last digits it may not be free yet
             self.state[4] = away * 1e-15
         return max(taken, SHORTEST_MS)
 
     def _fly(self, left: float) -> float:
         """Move free of the stops until one is met, or to the end; return for how long."""
-        places = np.vstack([self.state, self._path(left, free=True)])
-        times = np.linspace(0.0, left, PLACES + 1)
-        position, speed = places[:, 2], places[:, 4]
+        places, stroke_mm = np.vstack([self.state, self._path(left, free=True)]), self.plant.stroke_mm
+        times, speed = np.linspace(0.0, left, PLACES + 1), places[:, 4]
+        outside = np.maximum(-places[:, 2], places[:, 2] - stroke_mm)
         turns = speed[1:] * speed[:-1] < 0.0
-        outside = np.maximum(-position, position - self.plant.stroke_mm)
         reach = np.abs(np.diff(speed)) * (left / PLACES)
         for cell in np.flatnonzero((outside[1:] > 0.0) | (turns & (outside[1:] + reach > 0.0))):
             begin, out = times[cell], times[cell + 1]
-            if turns[cell] and outside[cell + 1] <= 0.0:
+            if turns[cell] and outside[cell + 1] <= 0.0:  # it may have been there and back
                 out = _root(lambda ms: float(self._path(ms, free=True)[-1, 4]), begin, out)
             furthest = float(self._path(out, free=True)[-1, 2])
-            if max(-furthest, furthest - self.plant.stroke_mm) <= 0.0:
+            if 0.0 <= furthest <= stroke_mm:
                 continue
-            stop = 0.0 if furthest < 0.0 else self.plant.stroke_mm
+            stop = 0.0 if furthest < 0.0 else stroke_mm
             met = begin
             if outside[cell] < 0.0:
                 met = _root(lambda ms, at=stop: float(self._path(ms, free=True)[-1, 2]) - at, begin, out)  # type: ignore[misc]
-            met = max(met, SHORTEST_MS)
             self.state = self._path(met, free=True)[-1]
             self.state[2], self.state[4] = stop, 0.0
             self.impacts += 1
-            return float(met)
+            return max(float(met), SHORTEST_MS)
         self.state = places[-1]
         return left
 
 
 def _root(value: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function of unlike signs at both ends is zero; the function is not asked at no time at all."""
+    """Return where a function is zero: of like signs at both ends, where it begins."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda ms: value(max(ms, SHORTEST_MS)), low, high, xtol=1e-13, rtol=1e-14))
+    if value(low) * value(high) >= 0.0:
+        return low
+    return float(brentq(value, low, high, xtol=1e-13, rtol=1e-14))
 
 
 def _integrator(plant: Plant) -> "casadi.Function":

@@ -5,33 +5,25 @@ drive of many machines at once, by the law, without a plant; `drawn_machine` put
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from types import MappingProxyType
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dzdesign.design.machine.machine import Machine
 from dzdesign.verify.closed_loop.drive_corners import COPPER_AT_C, holds_current, resistance_ratio
-from dzdesign.verify.closed_loop.loop import ClosedLoop
+from dzdesign.verify.closed_loop.loop import ClosedLoop, ReadingErrors
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.closed_loop.readings import ReadingErrors
 from dzdesign.verify.closed_loop.scene import Scene
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.zero_command import counted_dither
 
-#: What is drawn, and the end of each at which the valve passes flow soonest; of pressures where dP reads too low.
-ENDS = MappingProxyType(
-    {
-        "recording": -1.0, "coil temperature": -1.0, "supply": 1.0, "current": 1.0, "bench current": 1.0,
-        "current's rest": 1.0, "oil": -1.0, "ageing": -1.0, "pressure sensor A": -1.0, "pressure sensor B": 1.0,
-        "bench pressure drop": -1.0, "offset of converter A": -1.0, "offset of converter B": 1.0,
-        "gain of converter A": -1.0, "gain of converter B": 1.0, "zero command": 1.0,
-    }
+#: What is drawn, each by itself.
+COMPONENTS = (
+    "recording", "coil temperature", "supply", "current", "bench current", "current's rest", "oil", "ageing",
+    "pressure sensor A", "pressure sensor B", "bench pressure drop", "offset of converter A", "offset of converter B",
+    "gain of converter A", "gain of converter B", "zero command",
 )  # fmt: skip
-COMPONENTS = tuple(ENDS)
-#: Those that make the pressure drop read wrong.
-PRESSURES = tuple(name for name in COMPONENTS if "pressure" in name or "converter" in name)
 #: A component's place in its half-width, of one machine or of many.
 Places = Mapping[str, Any]
 #: Of command, sensor A and sensor B.
@@ -45,46 +37,27 @@ def places_of(shares: np.ndarray) -> dict[str, Any]:
     return {name: shares[:, [place]] for place, name in enumerate(COMPONENTS)}
 
 
-def worst_ends(scene: Scene) -> np.ndarray:
-    """Return the end of each component at which the valve of a scene passes flow soonest."""
-    trend = scene.compensator.valve.sides[scene.side].trend
-    way = -1.0 if trend == "increasing" else 1.0
-    return np.array([end * (way if name in PRESSURES else 1.0) for name, end in ENDS.items()])
+def drawn_machine(
+    scene: Scene, machine: Machine, shares: np.ndarray, index: int
+) -> tuple[ClosedLoop, ReadingErrors]:
+    """Return the machine at so many half-widths from the bench, -1 to 1 each: its valve's threshold apart.
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DrawnMachine:
-    """A machine, its valve's threshold apart."""
-
-    #: With its coil, supply or current, and the valve's oil and age.
-    loop: ClosedLoop
-    #: Added to the drive whatever it is, V of command.
-    added_V: float
-    errors: ReadingErrors
-    #: Where the threshold lies in its band, from -1 to 1.
-    threshold: float
-
-
-def drawn_machine(scene: Scene, machine: Machine, shares: np.ndarray, index: int) -> DrawnMachine:
-    """Return the machine at so many half-widths from the bench, -1 to 1 each."""
+    The loop has its coil, supply or current, and the valve's oil and age.
+    """
     at, loop = places_of(shares), scene.loop
     resistance, ratio = _resistance_and_drive(scene, machine, at)
-    if loop.controls_current and (drive := scene.compensator.current_drive):
-        coil, supply = drive.circuit.resistance_factors, drive.circuit.supply_V
+    if loop.coil:
+        coil, supply = loop.coil.circuit.resistance_factors, loop.coil.circuit.supply_V
         loop = loop.with_coil(
             resistance=_between(coil, at["coil temperature"]), supply_V=_between(supply, at["supply"])
         )
-    elif isinstance(scene.plant, Plant):
-        loop = loop.with_plant(replace(scene.plant, R_c_ohm=scene.plant.R_c_ohm * resistance))
+    elif isinstance(loop.plant, Plant):
+        loop = loop.with_plant(replace(loop.plant, R_c_ohm=loop.plant.R_c_ohm * resistance))
     else:
         ratio /= resistance
     offsets, gains, noise = _errors(scene, machine, at)
-    return DrawnMachine(
-        loop=loop.with_drive(ratio),
-        added_V=_rest_V(scene, machine, at) * ratio,
-        errors=ReadingErrors(offset_codes=offsets, gain_codes=gains, noise_codes=noise, seed=index + 1),
-        threshold=at["recording"],
-    )
+    errors = ReadingErrors(offset_codes=offsets, gain_codes=gains, noise_codes=noise, seed=index + 1)
+    return loop.with_drive(ratio).with_added_drive(_rest_V(scene, machine, at) * ratio), errors
 
 
 def _resistance_and_drive(scene: Scene, machine: Machine, at: Places) -> tuple[Any, Any]:
@@ -118,7 +91,7 @@ def _errors(scene: Scene, machine: Machine, at: Places) -> tuple[OfChannels, OfC
     A wrong pressure drop on the bench is one of the sensor ahead.
     """
     channels, command = scene.loop.channels, scene.compensator.command_error
-    a_codes, b_codes = channels.codes_per_MPa
+    a_codes, b_codes = map(float, channels.per_unit[1:])
     a_MPa = at["pressure sensor A"] * machine.pressure_error_a_MPa
     b_MPa = at["pressure sensor B"] * machine.pressure_error_b_MPa
     # It is drawn for a drop of A minus B; where that is B minus A, all of it turns round.
@@ -170,10 +143,10 @@ class ZeroDrives:
         """Return the drive of each machine at its pressure drops, (machines, pressures)."""
         scene, exact, at = self._scene, self._exact, places_of(shares)
         resistance, ratio = _resistance_and_drive(scene, self._machine, at)
-        if isinstance(scene.plant, Plant):
+        if isinstance(plant := scene.loop.plant, Plant):
             # Eqs. (19)-(21) at rest: the amplifier's feedback holds the current against most of the coil's resistance.
-            beside = scene.plant.r_p_ohm + scene.plant.K_a * scene.plant.K_fi_V_A
-            resistance = (scene.plant.R_c_ohm * resistance + beside) / (scene.plant.R_c_ohm + beside)
+            beside = plant.r_p_ohm + plant.K_a * plant.K_fi_V_A
+            resistance = (plant.R_c_ohm * resistance + beside) / (plant.R_c_ohm + beside)
         ratio = ratio / resistance
         (command, *offsets), (_, *gains), (noise, *_) = _errors(scene, self._machine, at)
         ahead = 1 if scene.loop.channels.swapped else 0

@@ -11,11 +11,10 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import SIDE_NAMES, Signals
-from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
-from dzdesign.verify.closed_loop.plant_step import numbers_of, step_header
-from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
+from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, numbers_of, step_header
 from dzdesign.verify.closed_loop.stand_in import StandIn
-from dzdesign.verify.current.coil_simulation import HOLDING_H, coil_sources, nominal_coil
+from dzdesign.verify.current.coil import CoilLoop, coil_sources
 from dzdesign.verify.toolchain.bound_block import core_sources
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 
@@ -32,6 +31,8 @@ BENCH_BACK_MPA = 1.0
 NO_FLOW_L_MIN = 1e-9
 #: The command's ramps are longer than the drive's own by this factor.
 RAMP_RESERVE = 1.1
+#: Inductance of a plant's coil that keeps the current that it is given: over a period all but 2e-8 of it is left.
+HOLDING_H = 1e6
 #: No contraction to fused products: every processor gives the same digits.
 FLOATING = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 #: As loop.c has it: choices, series and channels, plant, coil and sensor; the record.
@@ -39,6 +40,62 @@ DZ_LOOP = Function("dz_loop", (*["in"] * 14, "out"))
 #: Of a stand-in: choices, supplies, mean positions, plant, recorded characteristic; the flows.
 DZ_FLOWS = Function("dz_flows", (*["in"] * 5, "out"))
 MODES = ("direct", "compensated", "without beta")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadingErrors:
+    """What the converter, and the sensors before it, read wrong; of command, sensor A and sensor B, (3,) each.
+
+    The noise is white: whole codes from minus its peak to plus it, drawn again at every sample of the core.
+    """
+
+    offset_codes: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    #: At the converter's largest code.
+    gain_codes: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    #: Peak.
+    noise_codes: tuple[int, int, int] = (0, 0, 0)
+    #: Of the noise.
+    seed: int = 1
+
+
+NO_ERRORS = ReadingErrors()
+
+
+class Channels:
+    """The converter's channels of one sign of command: command, sensor A, sensor B."""
+
+    def __init__(self, signals: Signals, sign: int) -> None:
+        command, sensors = signals.command, (signals.pressure_a, signals.pressure_b)
+        full = command.zero_code + command.direction(sign) * command.span(sign)
+        #: Codes at zero, (3,), and at the span, which is 1, MPa and MPa.
+        self.zeros = np.array([command.zero_code, *(sensor.zero_code for sensor in sensors)], dtype=np.int32)
+        self.fulls = np.array([full, *(sensor.full_code for sensor in sensors)], dtype=np.int32)
+        self.spans = np.array([1.0, *(float(sensor.span_MPa) for sensor in sensors)])
+        self.code_max = signals.code_max
+        #: Whether sensor B stands upstream of the edge.
+        self.swapped = sign < 0 and signals.swapped
+        #: Codes for one of what each channel measures; and as a converter rounds: a span of n codes has n + 1 of them.
+        self.per_unit = (self.fulls - self.zeros) / self.spans
+        self.converted_per_unit = (self.fulls - self.zeros + np.sign(self.fulls - self.zeros)) / self.spans
+
+    def command_of_codes(self, codes: np.ndarray) -> np.ndarray:
+        """Return the commands, shares of full, that the converter reads as so many codes from zero, (N,) whole numbers.
+
+        They may lie below zero: then the command is one of the other sign, or none that the signal has.
+        """
+        zero, full = int(self.zeros[0]), int(self.fulls[0])
+        span, way = abs(full - zero), 1 if full > zero else -1
+        middle: np.ndarray = (codes + 0.5 * way) / (span + 1)  # of the code: it is rounded down, whichever way it runs
+        return middle
+
+    def pressure_codes(self, dp_MPa: float | np.ndarray, back_MPa: float | np.ndarray) -> np.ndarray:
+        """Return the codes of sensors A and B at a pressure drop and a pressure downstream of the edge, (..., 2)."""
+        back = np.asarray(back_MPa, dtype=float)
+        ahead = back + dp_MPa
+        values = np.stack([back, ahead] if self.swapped else [ahead, back], axis=-1)
+        codes = np.floor(self.zeros[1:] + values * (self.fulls[1:] - self.zeros[1:] + 1) / self.spans[1:])
+        whole: np.ndarray = np.clip(codes, 0, self.code_max).astype(np.int32)
+        return whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,28 +140,6 @@ class LoopRun:
     mean_V: np.ndarray
 
 
-def _waits_s(compensator: Compensator) -> float:
-    """Return for how long the drive waits for zero command after a reset, s; 0 without an interlock."""
-    functions = compensator.drive_functions
-    return 0.0 if functions.interlock_codes is None else functions.fault_samples / compensator.signals.sample_Hz
-
-
-def _slowest_ramp_s(compensator: Compensator, sign: int) -> float:
-    """Return the time that the drive's own ramps take from zero to full command or back, at most; 0: none."""
-    functions, signals = compensator.drive_functions, compensator.signals
-    units, side = signals.command.span(sign) * RAMP_UNIT, 0 if sign > 0 else 1
-    steps = [ramp[side] for ramp in (functions.ramp_up, functions.ramp_down) if ramp[side]]
-    return max((units / step / signals.sample_Hz * RAMP_RESERVE for step in steps), default=0.0)
-
-
-def _recorded_dither(compensator: Compensator | None) -> tuple[int, int] | None:
-    """Return the drive's dither where the valve was recorded under it: `design` has seen to it that they are alike."""
-    if compensator is None or compensator.valve.dither is None:
-        return None
-    functions = compensator.drive_functions
-    return functions.dither_counts, functions.dither_ticks
-
-
 class ClosedLoop:
     """One plant and, where given, the core of one firmware folder, compiled into one native loop.
 
@@ -131,59 +166,92 @@ class ClosedLoop:
             raise InputError(f"'{firmware}' has no core/dz_drive.h; give the folder that `dzdesign codegen` made")
         else:
             sources |= core_sources(firmware)
-        #: Of a drive by current the coil, at a supply.
-        self.coil = nominal_coil(compensator) if firmware and compensator else None
+        #: Of a drive by current the coil and what is around it; and how the coil is, in one run.
+        self.coil = CoilLoop.of(compensator) if firmware and compensator else None
+        self._corner = self.coil.at() if self.coil else None
         sources |= coil_sources(self.coil)
         self._library = CompiledLibrary(sources, [DZ_LOOP, DZ_FLOWS], "the closed loop", FLOATING)
-        #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
-        self._dither = dither or _recorded_dither(compensator)
         #: Without a compensator no code is read, and any scaling serves.
         self._signals = compensator.signals if compensator else Signals()
-        self._negative = sign < 0
+        self._negative, self._has_core = sign < 0, firmware is not None
         #: Command, sensor A, sensor B.
         self.channels = Channels(self._signals, sign)
-        #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none.
-        self.slowest_ramp_s = _slowest_ramp_s(compensator, sign) if compensator else 0.0
-        #: For which an interlock must see zero command, s; 0: none.
-        self.waits_s = _waits_s(compensator) if compensator else 0.0
-        self._has_core = firmware is not None
-        self._side = compensator.valve.sides.get(SIDE_NAMES[sign]) if compensator else None
-        #: Added to the plant's drive, V of command.
-        self._added_V = 0.0
-        #: Times the drive at the plant.
-        self.drive = 1.0
-        self._take(plant)
+        #: Of a valve that was recorded under a dither the drive's own, (counts, PWM periods of half a wave).
+        self._dither = dither
+        #: Of the drive's own ramps on this side, from zero to full command or back, s; 0: none. And for which an
+        #: interlock must see zero command.
+        self.slowest_ramp_s = self.waits_s = 0.0
+        self._side: SideModel | None = None
+        if compensator:
+            self._take_drive(compensator, sign)
+        #: Added to the plant's drive, V of command; and times the drive at the plant.
+        self.added_V, self.drive = 0.0, 1.0
+        self.plant = plant
 
-    def _take(self, plant: Plant | StandIn) -> None:
-        parameters = plant.parameters
-        self._plant = numbers_of(parameters)
-        #: The same, moved by a given current.
-        self._of_current = numbers_of(replace(parameters, L_c_H=HOLDING_H)) if self.coil else self._plant
-        #: Of a stand-in its recorded characteristic.
-        self._curve = plant.table if isinstance(plant, StandIn) else None
-        #: Full command, V.
-        self.u_max_V = plant.parameters.u_max_V
-        self._stand_in = plant if isinstance(plant, StandIn) else None
+    def _take_drive(self, compensator: Compensator, sign: int) -> None:
+        """Take from the drive what a command must wait for, and the dither of its valve's recordings."""
+        functions, signals = compensator.drive_functions, compensator.signals
+        if compensator.valve.dither is not None:  # `design` has seen to it that they are alike
+            self._dither = self._dither or (functions.dither_counts, functions.dither_ticks)
+        units = signals.command.span(sign) * RAMP_UNIT
+        steps = [ramp[0 if sign > 0 else 1] for ramp in (functions.ramp_up, functions.ramp_down)]
+        ramps_s = [units / step / signals.sample_Hz * RAMP_RESERVE for step in steps if step]
+        self.slowest_ramp_s = max(ramps_s, default=0.0)
+        if functions.interlock_codes is not None:
+            self.waits_s = functions.fault_samples / signals.sample_Hz
+        self._side = compensator.valve.sides.get(SIDE_NAMES[sign])
 
+    def _with(self, **changes: object) -> "ClosedLoop":
+        """Return the same loop with other attributes; nothing is compiled again."""
+        other = copy.copy(self)
+        vars(other).update(changes)
+        return other
+
+    def with_plant(self, plant: Plant | StandIn) -> "ClosedLoop":
+        """Return the same loop with another plant."""
+        return self._with(plant=plant)
+
+    def with_drive(self, ratio: float) -> "ClosedLoop":
+        """Return the same loop with so many times the drive at the plant: another voltage, or another current."""
+        return self._with(drive=self.drive * ratio)
+
+    def with_added_drive(self, added_V: float) -> "ClosedLoop":
+        """Return the same loop with so much added to the plant's drive, V of command."""
+        return self._with(added_V=added_V)
+
+    def with_coil(
+        self, *, resistance: float = 1.0, inductance: float = 1.0, supply_V: float | None = None
+    ) -> "ClosedLoop":
+        """Return the same loop with another coil or supply, see `CoilLoop.at`; for a drive by current only."""
+        if self.coil is None:
+            raise InputError("this loop's drive is by duty; a coil and its supply belong to one by current")
+        return self._with(_corner=self.coil.at(resistance=resistance, inductance=inductance, supply_V=supply_V))
+
+    @property
+    def u_max_V(self) -> float:
+        """Full command, V."""
+        return self.plant.parameters.u_max_V
+
+    @property
+    def stand_in(self) -> StandIn | None:
+        """The recorded characteristic that stands in for the plant, if one does."""
+        return self.plant if isinstance(self.plant, StandIn) else None
+
+    @property
+    def _curve(self) -> np.ndarray | None:
+        """What plant_curve.h reads; None: the edge is that of a plant of equations."""
+        return None if self.stand_in is None else self.stand_in.table
+
+    @property
     def wave(self) -> tuple[int, int, bool]:
-        """Return the wave about a direct command, counts and periods of half of it; whether the plant has it in it.
+        """The wave about a direct command, counts and periods of half of it; whether the plant has it in it.
 
         A plant of equations feels the dither in time: that of the drive, and about a direct command that of the
         recordings. A stand-in is the recorded flow under the dither: a second one would shrink its hysteresis twice.
         """
         if self._dither is None:
             return 0, 1, False
-        return (0, 1, True) if self._stand_in else (*self._dither, False)
-
-    @property
-    def is_stand_in(self) -> bool:
-        """Whether a recorded characteristic stands in for the plant."""
-        return self._stand_in is not None
-
-    @property
-    def has_dither(self) -> bool:
-        """Whether a direct command has a wave about it."""
-        return self.wave()[0] > 0
+        return (0, 1, True) if self.stand_in else (*self._dither, False)
 
     def leak_L_min(self, dp_MPa: float) -> float:
         """Return what the valve passes without any drive at a pressure drop: no compensator can stop it."""
@@ -195,21 +263,7 @@ class ClosedLoop:
 
     def unseen_below_L_min(self, dp_MPa: float) -> float | None:
         """Return the flow below which a stand-in's is not known at a pressure drop; None of a plant of equations."""
-        return None if self._stand_in is None else self._stand_in.unseen_below_L_min(dp_MPa)
-
-    def with_drive(self, ratio: float) -> "ClosedLoop":
-        """Return the same loop with so many times the drive at the plant: another voltage, or another current."""
-        other = copy.copy(self)
-        other.drive = self.drive * ratio
-        other._plant = self._plant.driven(ratio)
-        other._of_current = self._of_current.driven(ratio) if self.coil else other._plant
-        return other
-
-    def with_added_drive(self, added_V: float) -> "ClosedLoop":
-        """Return the same loop with so much added to the plant's drive, V of command."""
-        other = copy.copy(self)
-        other._added_V = added_V
-        return other
+        return None if self.stand_in is None else self.stand_in.unseen_below_L_min(dp_MPa)
 
     @property
     def span_MPa(self) -> float:
@@ -222,41 +276,12 @@ class ClosedLoop:
             raise InputError(f"a pressure drop of {dp_MPa:g} MPa exceeds the sensors' span of {self.span_MPa:g} MPa")
         return min(back_MPa, self.span_MPa - dp_MPa)
 
-    def with_plant(self, plant: Plant | StandIn) -> "ClosedLoop":
-        """Return the same loop with another plant; nothing is compiled again."""
-        other = copy.copy(self)
-        other._take(plant)
-        return other
-
-    def with_coil(
-        self, *, resistance: float = 1.0, inductance: float = 1.0, supply_V: float | None = None
-    ) -> "ClosedLoop":
-        """Return the same loop with another coil or supply; nothing is compiled again.
-
-        Resistance and inductance are factors of the declared coil's; without a supply it is the nominal one. For a
-        drive by current only.
-        """
-        if self.coil is None:
-            raise InputError("this loop's drive is by duty; a coil and its supply belong to one by current")
-        other = copy.copy(self)
-        other.coil = self.coil.at(resistance=resistance, inductance=inductance, supply_V=supply_V)
-        return other
-
-    def step_s(self, dp_MPa: float) -> float:
-        """Return the longest step of the plant in runs up to a pressure drop, s."""
-        return self._plant.step_s(dp_MPa)
-
     def flow_at(self, position_mm: np.ndarray, supply_MPa: np.ndarray) -> np.ndarray:
         """Return the flow of a stand-in at its mean positions in one period after another, L/min, (N,)."""
-        flows = np.empty(position_mm.size)
-        size, position_m = np.array([flows.size], dtype=np.int32), 1e-3 * position_mm
-        self._library.call("dz_flows", size, supply_MPa, position_m, self._plant.flat, self._curve, flows)
+        flows, plant = np.empty(position_mm.size), numbers_of(self.plant.parameters, float(supply_MPa.max()))
+        size = np.array([flows.size], dtype=np.int32)
+        self._library.call("dz_flows", size, supply_MPa, 1e-3 * position_mm, plant, self._curve, flows)
         return flows
-
-    @property
-    def controls_current(self) -> bool:
-        """Whether the law's output is the set point of a current, in a coil that `with_coil` may change."""
-        return self.coil is not None
 
     def run(
         self,
@@ -288,24 +313,27 @@ class ClosedLoop:
             back_MPa = self.back_within_span(BENCH_BACK_MPA, float(np.max(supply_MPa)))
         supply, back, bias = (
             np.ascontiguousarray(np.broadcast_to(each, command.shape), dtype=float)
-            for each in (supply_MPa, back_MPa, self._added_V if added_V is None else added_V)
+            for each in (supply_MPa, back_MPa, self.added_V if added_V is None else added_V)
         )
         if mode == "without beta":
             shown = self.channels.pressure_codes(dp_frozen_MPa, back)
         codes = np.full((command.size, 2), -1) if shown is None else shown
         record = np.empty((command.size, len(RECORDED)))
-        channels, coil = self.channels, self.coil if mode != "direct" else None
-        signals, plant, negative = self._signals, self._of_current if coil else self._plant, self._negative
+        channels, coil, plant = self.channels, self.coil if mode != "direct" else None, self.plant.parameters
+        structs: tuple[np.ndarray | None, ...] = (None, None)
+        if coil and self._corner:  # the plant's own holds the current that it is given
+            plant = replace(plant, L_c_H=HOLDING_H)
+            structs = (coil.coil_struct(self._corner), coil.sensor_struct())
         choices = (
-            command.size, periods_per_record, mode != "direct", negative, channels.swapped, *self.wave(),
-            signals.code_max, signals.compare_max, errors.seed,
+            command.size, periods_per_record, mode != "direct", self._negative, channels.swapped, *self.wave,
+            channels.code_max, self._signals.compare_max, errors.seed,
         )  # fmt: skip
-        series = (
-            np.array(choices, dtype=np.int32), command, supply, back, bias, np.ascontiguousarray(codes, dtype=np.int32),
-            channels.zeros, channels.fulls, channels.spans, errors.table,
-            plant.up_to(float(supply.max())), self._curve,
+        of_channels = np.array([errors.offset_codes, errors.gain_codes, errors.noise_codes], dtype=float).T.copy()
+        self._library.call(
+            "dz_loop", np.array(choices, dtype=np.int32), command, supply, back, bias,
+            np.ascontiguousarray(codes, dtype=np.int32), channels.zeros, channels.fulls, channels.spans, of_channels,
+            numbers_of(plant, float(supply.max()), self.drive), self._curve, *structs, record,
         )  # fmt: skip
-        self._library.call("dz_loop", *series, *(coil.structs() if coil else (None, None)), record)
         recorded = dict(zip(RECORDED, record.T, strict=True))
         time = np.arange(command.size) * periods_per_record * PWM_PERIOD_S
         return LoopRun(time=time, command=command, position_mm=1e3 * recorded.pop("position_m"), **recorded)

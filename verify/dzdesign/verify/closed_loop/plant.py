@@ -1,15 +1,23 @@
-"""The plant of Eqs. (19)-(24), with what a real valve's measurements need.
+"""The plant of Eqs. (19)-(24), with what a real valve's measurements need; and its Runge-Kutta step, by CasADi, in C.
 
 Added to the paper's equations, each of them off where its parameter is zero: preload, overlap, stops, a pressure force
 that moves the threshold, flow force, a play in the magnetic force (hysteresis), droop of the supply.
+
+A step is taken in one of three states of the spool: open and shut on either side of the metering edge, where the
+equations are smooth, and held at a stop, where only the current goes on. plant.h shortens a step to where it meets a
+stop or the edge, or where the current lets go of a stop: what a step of the fourth order leaves is then its own error,
+and not that of a kink.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
+import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_files import read_bytes
@@ -30,6 +38,16 @@ LONGEST_KEY = 80
 FASTEST_RAD_S = 1e6
 #: Of a hydraulic system, for the flow force.
 LARGEST_DP_MPA = 40.0
+#: In a step the spool moves by so many radians of its fastest motion at most, and the coil by so many of its own, whose
+#: error the spool feels for a shorter time. An undamped spool keeps what a step is off by: so many times shorter steps,
+#: below so much damping, as a share of that at which it no longer swings.
+SPOOL_RAD, COIL_RAD = 0.1, 0.12
+UNDAMPED, SHORTER = 0.02, 4.0
+#: Numbers of a plant that plant.h and the step read by name, in SI units where none stands.
+NAMED = (
+    "STROKE_M", "OVERLAP_M", "HALF_PLAY_V", "VOLTS_PER_CHARGE", "U_MAX_V", "PERIOD_S", "FULL_A", "PUSH", "STEPS_PER_S",
+    "LINEAR", "DECAY", "DRIVE", "PULL", "SPRING", "DAMPING", "PER_KG",
+)  # fmt: skip
 
 
 def _parameter(unit: str, description: str) -> Meta:
@@ -91,11 +109,14 @@ class Plant:
         """Return the plant with other oil, by factors of viscosity and density; the damping follows the viscosity."""
         return replace(self, B_e_N_s_m=self.B_e_N_s_m * viscosity, rho_kg_m3=self.rho_kg_m3 * density)
 
+    def swings_rad_s(self, dp_MPa: float) -> float:
+        """Return the rate of the spool's free motion against spring and flow force at a pressure drop."""
+        return math.sqrt((self.K_et_N_m + self.flow_force_N_mm_MPa * 1e3 * dp_MPa) / self.m_e_kg)
+
     @property
     def fastest_rad_s(self) -> float:
         """Rate of the spool's fastest free motion: against spring and flow force, or against its damping."""
-        stiffest = self.K_et_N_m + self.flow_force_N_mm_MPa * 1e3 * LARGEST_DP_MPA
-        return max(math.sqrt(stiffest / self.m_e_kg), self.B_e_N_s_m / self.m_e_kg)
+        return max(self.swings_rad_s(LARGEST_DP_MPA), self.B_e_N_s_m / self.m_e_kg)
 
     @property
     def coil_rad_s(self) -> float:
@@ -107,92 +128,151 @@ class Plant:
         """Force per volt of command at rest, N/V, by Eqs. (19)-(22)."""
         return self.K_i_N_A * self.K_a / (self.R_c_ohm + self.r_p_ohm + self.K_a * self.K_fi_V_A)
 
+    def step_s(self, dp_MPa: float) -> float:
+        """Return the longest step up to a pressure drop, s: it follows from the plant's fastest time constant."""
+        swings, damping = self.swings_rad_s(dp_MPa), self.B_e_N_s_m / self.m_e_kg
+        spool_s = SPOOL_RAD / max(swings, damping)
+        return min(spool_s / SHORTER if damping < 2 * UNDAMPED * swings else spool_s, COIL_RAD / self.coil_rad_s)
+
 
 def read_plant(path: Path, say: Callable[[str], None] = lambda _: None) -> Plant:
     """Read a plant from a TOML file; an unknown key is refused, with the nearest known one.
 
     `say` receives a message about the parameters that keep the default plant's values.
     """
-    values = read_parameters(path, "plant file")
+    values = read_toml(read_bytes(path, "plant file"), str(path), "lines such as K_a = 4.0")
+    known = [field.name for field in fields(Plant)]
+    for key in values:
+        if key not in known:
+            raise InputError(f"'{path}': there is no plant parameter {quoted(key)}{nearest(key[:LONGEST_KEY], known)}")
     try:
         plant = Plant(**values)
     except InputError as error:
         raise InputError(f"'{path}': {error}") from error
-    missing = [field.name for field in fields(Plant) if field.name not in values]
+    missing = [name for name in known if name not in values]
     if missing:
         say(f"'{path}' leaves {', '.join(missing)} as the default plant has them")
     return plant
 
 
-def read_parameters(path: Path, what: str, others: Sequence[str] = ()) -> dict[str, Any]:
-    """Read TOML whose keys are parameters of `Plant`, or `others`; of any other the `InputError` names the nearest."""
-    content = read_bytes(path, what)
-    values = read_toml(content, str(path), "lines such as K_a = 4.0")
-    known = [*(field.name for field in fields(Plant)), *others]
-    for key in values:
-        if key not in known:
-            raise InputError(f"'{path}': there is no plant parameter {quoted(key)}{nearest(key[:LONGEST_KEY], known)}")
-    return values
+class Equations(NamedTuple):
+    """The plant's equations with every parameter a symbol."""
+
+    #: plant -> d rates / d state (3, 3), d rates / d (voltage, load force) (3, 2).
+    linear: "casadi.Function"
+    #: plant -> what of `acting` depends on the parameters only.
+    extracted: "casadi.Function"
+    #: (x, supply, plant, extracted) -> force beyond the linear part, N; dP, MPa; Q, L/min; force of an open edge,
+    #: continued where it is shut.
+    acting: "casadi.Function"
 
 
-def opening_of(plant: Plant, position: Any) -> Any:
-    """Return how far the edge is open, m."""
+@cache
+def equations() -> Equations:
+    """Return Eqs. (19)-(24), lowered from SymPy: what is linear, and what depends on the spool's position."""
     import casadi as ca
 
-    past = past_edge(plant, position)
-    return ca.if_else(past > 0, past, 0)  # fmax would be a call of the C library
-
-
-def past_edge(plant: Plant, position: Any) -> Any:
-    """Return how far the spool is past the edge, m; below zero where that is shut."""
-    return position - plant.overlap_mm * 1e-3
-
-
-def derivatives(
-    plant: Plant, opening_at: Callable[[Plant, Any], Any] = opening_of
-) -> tuple["casadi.SX", "casadi.SX", "casadi.SX"]:
-    """Return state, inputs and their derivatives of Eqs. (19)-(24), lowered from SymPy to CasADi, free of the stops.
-
-    The state is (i in A, x_e in m, v in m/s); the inputs are (amplifier voltage in V, force offset of the play in N,
-    supply pressure drop in MPa). With `past_edge` as its opening the equations of the open edge go smoothly on beyond.
-    """
-    import casadi as ca
-
-    from dzdesign.derivation import plant as equations
+    from dzdesign.derivation import plant as paper
     from dzdesign.derivation.lowering import lower
 
-    state, inputs = ca.SX.sym("state", 3), ca.SX.sym("inputs", 3)
-    current, position, speed = (state[index] for index in range(3))
-    voltage, play_force, supply = (inputs[index] for index in range(3))
-    opening = opening_at(plant, position)
-    dp_MPa, _ = orifice(plant, opening, supply)
-    load = (
-        plant.preload_N
-        - plant.pressure_force_N_MPa * dp_MPa
-        + plant.flow_force_N_mm_MPa * 1e3 * dp_MPa * opening
-        - play_force
-    )
+    names = [field.name for field in fields(Plant)]
+    symbols = ca.SX.sym("plant", len(names))
+    # Not a `Plant`, whose parameters are checked to be numbers, but with the same names.
+    plant = cast(Plant, SimpleNamespace(**dict(zip(names, ca.vertsplit(symbols), strict=True))))
     parameters = (
         plant.K_a, plant.K_fi_V_A, plant.K_i_N_A, plant.R_c_ohm, plant.r_p_ohm, plant.L_c_H, plant.m_e_kg,
         plant.B_e_N_s_m, plant.K_et_N_m,
     )  # fmt: skip
-    names = (*equations.STATE, *equations.INPUTS, *equations.PARAMETERS)
-    lowered = lower(list(equations.state_derivatives()), names)
-    return state, inputs, ca.vertcat(*lowered(current, position, speed, voltage, load, *parameters))
+    state, given = ca.SX.sym("state", 3), ca.SX.sym("given", 2)
+    rates_of = lower(list(paper.state_derivatives()), (*paper.STATE, *paper.INPUTS, *paper.PARAMETERS))
+    rates = ca.vertcat(*rates_of(*ca.vertsplit(state), *ca.vertsplit(given), *parameters))
+    flow = lower(paper.flow(), (paper.STATE[1], *paper.FLOW_PARAMETERS), {"sqrt": ca.sqrt})
+    x, supply = ca.SX.sym("x"), ca.SX.sym("supply")
+    past = x - plant.overlap_mm * 1e-3
+    # L/min at 1 MPa; Eq. (24) is linear in the opening, and of one metre it is a number.
+    per_metre = flow(1.0, 1.0, plant.C_d_W_mm * 1e-3, plant.rho_kg_m3, MPA) / L_MIN
+
+    def through(opening_m: Any) -> tuple[Any, Any, Any]:
+        # Eq. (24) is Q = G sqrt(dP); with dP = supply - droop Q^2 that gives dP = supply / (1 + droop G^2).
+        dp_MPa = supply / (1 + plant.droop_MPa_L_min2 * (opening_m * per_metre) ** 2)
+        flow_force = plant.flow_force_N_mm_MPa * 1e3 * dp_MPa * opening_m
+        force = plant.pressure_force_N_MPa * dp_MPa - plant.preload_N - flow_force
+        return force, dp_MPa, opening_m * per_metre * ca.sqrt(dp_MPa)
+
+    # fmax would be a call of the C library.
+    acting = ca.vertcat(*through(ca.if_else(past > 0, past, 0)), through(past)[0])
+    remaining, found, extracted = ca.extract_parametric(acting, symbols)
+    return Equations(
+        ca.Function("linear", [symbols], [ca.jacobian(rates, state), ca.jacobian(rates, given)]),
+        ca.Function("extracted", [symbols], [ca.vertcat(*extracted)]),
+        ca.Function("acting", [x, supply, symbols, ca.vertcat(*found)], ca.vertsplit(remaining)),
+    )
 
 
-def orifice(plant: Plant, opening_m: Any, supply_MPa: Any) -> tuple[Any, Any]:
-    """Return pressure drop (MPa) and flow (L/min) across the edge, the supply's droop solved for in closed form.
+def numbers_of(plant: Plant, dp_MPa: float, drive: float = 1.0) -> np.ndarray:
+    """Return a plant as plant.h takes it: `NAMED`, the parameters, and what `Equations.extracted` makes of them.
 
-    Eq. (24) is Q = G sqrt(dP); with dP = supply - droop Q^2 that gives dP = supply / (1 + droop G^2).
+    Its steps are those of runs up to a pressure drop; its PWM, or its coil's control, drives it so many times as much.
+    """
+    parameters = np.array([getattr(plant, field.name) for field in fields(Plant)], dtype=float)
+    by_state, by_given = (np.array(part) for part in equations().linear(parameters))
+    decay, per_V = -by_state[0, 0], by_given[0, 0]
+    linear = plant.flow_force_N_mm_MPa == 0 and plant.droop_MPa_L_min2 == 0
+    full_A = per_V * plant.u_max_V / decay
+    named = (
+        plant.stroke_mm * 1e-3, plant.overlap_mm * 1e-3, plant.hysteresis_V / 2,
+        plant.K_i_N_A / plant.force_per_volt / PWM_PERIOD_S, drive * plant.u_max_V, PWM_PERIOD_S, drive * full_A,
+        plant.force_per_volt / plant.m_e_kg, 1 / plant.step_s(dp_MPa), linear, decay, per_V, by_state[2, 0],
+        -by_state[2, 1], -by_state[2, 2], -by_given[2, 1],
+    )  # fmt: skip
+    return np.concatenate([named, parameters, np.array(equations().extracted(parameters)).ravel()])
+
+
+@cache
+def step_header() -> str:
+    """Return the C code of the functions that plant.h calls; the same for every plant.
+
+    ``plant_open(state[4], h, voltage, push, supply_MPa, p) -> state[4]``
+        is CasADi's Runge-Kutta step of the fourth order past the edge. The state is current, position, speed, and the
+        integral of the position; `push` is the acceleration by the play and by drive that is added.
+    ``plant_shut``
+        is that before the edge, where `push` has all that acts; ``plant_held`` is that at a stop.
+    ``plant_acting(x, supply_MPa, p) -> (acts in m/s², dp_MPa, Q_L_min)``
+        is what depends on the position.
+
+    p: `numbers_of`.
     """
     import casadi as ca
 
-    from dzdesign.derivation import plant as equations
-    from dzdesign.derivation.lowering import lower
+    sizes = (len(NAMED), len(fields(Plant)), equations().extracted.size1_out(0))
+    p = ca.SX.sym("p", sum(sizes))
+    parts = ca.vertsplit(p, [0, *np.cumsum(sizes).tolist()])
+    named = SimpleNamespace(**dict(zip(NAMED, ca.vertsplit(parts[0]), strict=True)))
+    state, given, supply = ca.SX.sym("state", 4), ca.SX.sym("given", 2), ca.SX.sym("supply")
+    current, x, v = state[0], state[1], state[2]
+    h, position = ca.SX.sym("h"), ca.SX.sym("x")
+    # All that the time step multiplies, once: a stage then waits for one product less of the stage before it.
+    stepped = [h * each for each in (
+        named.DRIVE * given[0], given[1], named.DECAY, named.PULL, named.SPRING, named.DAMPING, named.PER_KG, 1.0,
+    )]  # fmt: skip
+    drive, push, decay, pull, spring, damping, per_kg, time = ca.vertsplit(ca.SX.sym("stepped", len(stepped)))
 
-    flow = lower(equations.flow(), (equations.STATE[1], *equations.FLOW_PARAMETERS), {"sqrt": ca.sqrt})
-    # L/min at 1 MPa; Eq. (24) is linear in the opening, and of one metre it is a number.
-    conductance = opening_m * (flow(1.0, 1.0, plant.C_d_W_mm * 1e-3, plant.rho_kg_m3, MPA) / L_MIN)
-    dp_MPa = supply_MPa / (1 + plant.droop_MPa_L_min2 * conductance**2)
-    return dp_MPa, conductance * ca.sqrt(dp_MPa)
+    def step(name: str, speed: Any, acceleration: Any) -> "casadi.Function":
+        rates = ca.vertcat(drive - decay * current, speed, acceleration, time * x)
+        of_all = ca.vertcat(drive, push, decay, pull, spring, damping, per_kg, time, supply, p)
+        runge_kutta = ca.simpleRK(ca.Function(name, [state, of_all], [rates]), 1, 4).expand()
+        end = runge_kutta(state, ca.vertcat(*stepped, supply, p), 1)
+        return ca.Function(name, [state, h, *ca.vertsplit(given), supply, p], [end])
+
+    # In this order the spool's own terms, which each stage waits for, come last.
+    shut = (pull * current + push) - (spring * x + damping * v)
+    open_ = (pull * current + push + per_kg * equations().acting(x, supply, *parts[1:])[3]) - (spring * x + damping * v)
+    generator = ca.CodeGenerator("plant_step.c")
+    generator.add(step("plant_open", time * v, open_))
+    generator.add(step("plant_shut", time * v, shut))
+    generator.add(step("plant_held", 0, 0))
+    force, dp_MPa, flow, _ = equations().acting(position, supply, *parts[1:])
+    acting = [named.PER_KG * force, dp_MPa, flow]
+    generator.add(ca.Function("plant_acting", [position, supply, p], acting))
+    names = ", ".join(f"PLANT_{name}" for name in NAMED)
+    return f"enum {{ {names} }};\n{generator.dump()}"

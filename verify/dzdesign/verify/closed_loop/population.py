@@ -8,20 +8,22 @@ the converter's noise at its peak, is compared with that threshold. Those that c
 where no formula stands in for it: they open and close at each of these pressure drops, then zero command is held.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
-from dzdesign.core.errors import InputError
-from dzdesign.design.compensator import Compensator
+from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.errors import InputError, nearest, quoted
+from dzdesign.core.toml_documents import read_toml
 from dzdesign.design.machine.machine import Machine
-from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, ZeroDrives, drawn_machine, worst_ends
+from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, ZeroDrives, drawn_machine
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RECORD_S
-from dzdesign.verify.closed_loop.scene import SETTLE_S, Scene
-from dzdesign.verify.closed_loop.stored_digits import DECIMALS
+from dzdesign.verify.closed_loop.plant import LONGEST_KEY
+from dzdesign.verify.closed_loop.scene import DECIMALS, SETTLE_S, Scene
 from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
 from dzdesign.verify.exhaustive.zero_command import Staircase, guarded_bounds
 from dzdesign.verify.loop_results import Population, Side
@@ -39,6 +41,7 @@ NODES, HALVINGS = 16, 17
 IN_LOOP, AT_ONCE = 200, 2048
 #: So far within the tested pressure drops, MPa, their ends are inside them in doubles too.
 WITHIN_MPA = 1e-9
+RECORDING = COMPONENTS.index("recording")
 NOT_DECLARED = (
     "machines are drawn from the declared one, and this compensator has none; design it again with --coil-temperature "
     "and --supply, or --amplifier"
@@ -46,6 +49,30 @@ NOT_DECLARED = (
 #: Of the upper limit of the probability.
 CONFIDENCE = 0.95
 WORKERS = 2
+#: Keys of a file of tolerances, and their least and largest.
+KEYS = {"machines": (1, 100_000_000), "seed": (0, 100_000)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """How many machines are drawn from the declared budget, which says how they scatter."""
+
+    machines: int
+    seed: int = 1
+
+
+def read_tolerances(path: Path) -> Tolerances:
+    """Read tolerances from TOML: how many ``machines`` are drawn, and the ``seed`` of the draw."""
+    values = read_toml(read_bytes(path, "file of tolerances"), str(path), "lines such as machines = 1000000")
+    for name, value in values.items():
+        if name not in KEYS:
+            raise InputError(f"'{path}': there is no key {quoted(name)}{nearest(name[:LONGEST_KEY], KEYS)}")
+        low, high = KEYS[name]
+        if type(value) is not int or not low <= value <= high:
+            raise InputError(f"'{path}': {name} is {quoted(value)}, expected a whole number from {low} to {high}")
+    if "machines" not in values:
+        raise InputError(f"'{path}' does not say how many machines are drawn; write for example machines = 1000000")
+    return Tolerances(**values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,24 +117,14 @@ class Openings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThresholdBand:
-    """The valve's closing threshold, and how far it may lie from that of the plant; all of one pressure drop each."""
+    """The valve's closing threshold, and how far it may lie from that of the plant; an entry for each pressure drop."""
 
     dp_MPa: np.ndarray
     #: Of the plant, and of the valve in the middle of its band.
     closing_V: np.ndarray
     middle_V: np.ndarray
-    #: Certified, V, of a pressure drop.
-    bound: Callable[[np.ndarray], np.ndarray]
-
-    def half_width_V(self, dp_MPa: np.ndarray) -> np.ndarray:
-        """Return by how much the middle lies above the certified bound, at least nothing."""
-        half_V: np.ndarray = np.maximum(np.interp(dp_MPa, self.dp_MPa, self.middle_V) - self.bound(dp_MPa), 0.0)
-        return half_V
-
-    def moved_V(self, dp_MPa: np.ndarray, share: float) -> np.ndarray:
-        """Return by how much a valve closes above the plant, at so many half-widths from the middle."""
-        middle: np.ndarray = np.interp(dp_MPa, self.dp_MPa, self.middle_V - self.closing_V)
-        return middle + share * self.half_width_V(dp_MPa)
+    #: By how much the middle lies above the certified bound, at least nothing.
+    half_V: np.ndarray
 
 
 def threshold_band(scene: Scene, tested_MPa: Sequence[float] | np.ndarray) -> ThresholdBand:
@@ -116,7 +133,7 @@ def threshold_band(scene: Scene, tested_MPa: Sequence[float] | np.ndarray) -> Th
     inner = [np.linspace(low, high, NODES, endpoint=False) for low, high in pairwise(tested)]
     dp = np.concatenate([*inner, tested[-1:]])
     # What flows without a drive counts as no flow, and so does what was declared as allowed.
-    none = np.array([_no_flow(scene, one) for one in dp])
+    none = np.array([_allowed(scene, one) for one in dp]) + NO_FLOW_L_MIN
     low, high = np.zeros(dp.size), np.ones(dp.size)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -125,62 +142,41 @@ def threshold_band(scene: Scene, tested_MPa: Sequence[float] | np.ndarray) -> Th
         shut = openings.largest(run.q_largest_L_min, judged=True) <= none
         low, high = np.where(shut, middle, low), np.where(shut, high, middle)
     closing_V = low * scene.loop.u_max_V
-    return ThresholdBand(
-        dp_MPa=dp,
-        closing_V=closing_V,
-        middle_V=np.interp(dp, tested, closing_V[::NODES]) if scene.loop.is_stand_in else closing_V,
-        bound=_certified(scene.compensator, scene.sign),
-    )
+    middle_V = np.interp(dp, tested, closing_V[::NODES]) if scene.loop.stand_in else closing_V
+    half_V = np.maximum(middle_V - _certified_V(scene, dp), 0.0)
+    return ThresholdBand(dp_MPa=dp, closing_V=closing_V, middle_V=middle_V, half_V=half_V)
 
 
-def _no_flow(scene: Scene, dp_MPa: float) -> float:
-    return max(scene.loop.leak_L_min(dp_MPa), scene.loop.allowed_at_zero_L_min(dp_MPa) or 0.0) + NO_FLOW_L_MIN
+def _allowed(scene: Scene, dp_MPa: float) -> float:
+    return max(scene.loop.leak_L_min(dp_MPa), scene.loop.allowed_at_zero_L_min(dp_MPa) or 0.0)
 
 
-def _certified(compensator: Compensator, sign: int) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the certified bound, V, at pressure drops, from the ramp tests again."""
-    bounds = guarded_bounds(compensator, sign)
+def _certified_V(scene: Scene, dp_MPa: np.ndarray) -> np.ndarray:
+    """Return the certified bound at pressure drops, from the ramp tests again."""
+    bounds = guarded_bounds(scene.compensator, scene.sign)
     if bounds.premise != "monotone" and len(bounds.dp_MPa) > 1:
-        sagging, ends_MPa = SaggingBound(bounds), (bounds.dp_MPa[0] + WITHIN_MPA, bounds.dp_MPa[-1] - WITHIN_MPA)
-
-        def sagging_bound(dp_MPa: np.ndarray) -> np.ndarray:
-            inside = np.clip(dp_MPa, *ends_MPa)
-            return sagging.least_in_doubles(inside, inside)
-
-        return sagging_bound
+        inside = np.clip(dp_MPa, bounds.dp_MPa[0] + WITHIN_MPA, bounds.dp_MPa[-1] - WITHIN_MPA)
+        return SaggingBound(bounds).least_in_doubles(inside, inside)
     stairs = Staircase(bounds)
-    ends, levels = np.array([float(dp) for dp in stairs.dp_MPa]), np.array([float(v) for v in stairs.bounds_V])
-
-    def bound(dp_MPa: np.ndarray) -> np.ndarray:
-        inside = np.clip(dp_MPa, ends[0], ends[-1])
-        if stairs.falling:
-            place = np.searchsorted(ends, inside, side="left")
-        else:
-            place = np.searchsorted(ends, inside, side="right") - 1
-        return np.asarray(levels[place])
-
-    return bound
+    ends, levels = (np.array([float(each) for each in exact]) for exact in (stairs.dp_MPa, stairs.bounds_V))
+    inside = np.clip(dp_MPa, ends[0], ends[-1])
+    side, back = ("left", 0) if stairs.falling else ("right", 1)
+    found: np.ndarray = levels[np.searchsorted(ends, inside, side=side) - back]  # type: ignore[call-overload]
+    return found
 
 
-def draw(
-    count: int, random: np.random.Generator, worst: np.ndarray, drawn: Collection[str] = COMPONENTS
-) -> np.ndarray:
+def draw(count: int, random: np.random.Generator) -> np.ndarray:
     """Return where in its half-width each component of each machine lies, (count, components), from -1 to 1.
 
-    Components that are not drawn stand at their worst ends. The first n of a larger number are the same.
+    The first n of a larger number are the same.
     """
-    shares = random.uniform(-1, 1, (count, len(COMPONENTS)))
-    kept = [name not in drawn for name in COMPONENTS]
-    shares[:, kept] = worst[kept]
-    return shares
+    return random.uniform(-1, 1, (count, len(COMPONENTS)))
 
 
-def run_population(
-    scenes: Sequence[Scene], machines: int, seed: int, *, drawn: Collection[str] = COMPONENTS
-) -> Population:
+def run_population(scenes: Sequence[Scene], machines: int, seed: int) -> Population:
     """Draw machines from the declared one, compare each with its threshold, and run the nearest ones through the loop.
 
-    Scenes of one side are one: its pressure drops. Components that are not `drawn` stand at their worst ends.
+    Scenes of one side are one: its pressure drops.
     """
     machine = scenes[0].compensator.machine
     if machine is None:
@@ -188,26 +184,27 @@ def run_population(
     sides: dict[Side, list[Scene]] = {}
     for scene in scenes:
         sides.setdefault(scene.side, []).append(scene)
-    found = [MachinesOfSide(own, machine, seed, drawn).of(machines) for own in sides.values()]
-    worst = min(found, key=lambda each: float(each.compared.margins_V[0]))
-    leaking = max(found, key=lambda each: each.largest_L_min)
-    flowing = int(np.any([each.compared.flows for each in found], axis=0).sum())
+    found = [(side, side.compared(machines)) for side in (MachinesOfSide(own, machine, seed) for own in sides.values())]
+    worst_side, worst = min(found, key=lambda each: float(each[1].margins_V[0]))
+    # Of each side of the valve the machines that ran: flow at zero command beyond what is allowed, and before.
+    ran = [(*side.in_loop(nearest), side.dp_MPa(nearest.nodes)) for side, nearest in found]
+    beyond, _, dp_MPa = max(ran, key=lambda each: float(each[0].max()))
+    flowing = int(np.any([nearest.flows for _, nearest in found], axis=0).sum())
     return Population(
         machines=machines,
         seed=seed,
         flowing=flowing,
         confidence=CONFIDENCE,
         upper_limit=upper_limit(flowing, machines),
-        pressures=max(each.compared.dp_MPa.shape[1] for each in found),
-        least_margin_V=round(float(worst.compared.margins_V[0]), DECIMALS),
-        least_dp_MPa=round(worst.nearest_MPa, DECIMALS),
-        worst={name: round(float(share), 6) for name, share in zip(COMPONENTS, worst.compared.shares[0], strict=True)},
-        drawn=tuple(name for name in COMPONENTS if name in drawn),
-        in_loop=sum(each.compared.index.size for each in found),
-        flowing_in_loop=sum(each.flowing_in_loop for each in found),
-        never_open=sum(each.never_open for each in found),
-        largest_L_min=round(max(leaking.largest_L_min, 0.0), DECIMALS),
-        largest_dp_MPa=round(leaking.largest_dp_MPa, DECIMALS),
+        pressures=max(nearest.nodes.shape[1] for _, nearest in found),
+        least_margin_V=round(float(worst.margins_V[0]), DECIMALS),
+        least_dp_MPa=round(worst_side.nearest_MPa(worst), DECIMALS),
+        worst={name: round(float(share), 6) for name, share in zip(COMPONENTS, worst.shares[0], strict=True)},
+        in_loop=sum(nearest.index.size for _, nearest in found),
+        flowing_in_loop=sum(int((each > NO_FLOW_L_MIN).any(axis=1).sum()) for each, _, _ in ran),
+        never_open=sum(int((opened <= NO_FLOW_L_MIN).any(axis=1).sum()) for _, opened, _ in ran),
+        largest_L_min=round(max(float(beyond.max()), 0.0), DECIMALS),
+        largest_dp_MPa=round(float(dp_MPa.flat[beyond.argmax()]), DECIMALS),
     )
 
 
@@ -231,41 +228,25 @@ class Compared:
     #: (machines,): whether the drive at zero command is above the threshold at some pressure drop.
     flows: np.ndarray
     #: Which machine it is; by how much the threshold lies above its drive, V; where each component lies in its
-    #: half-width; its pressure drops, MPa, (.., pressures).
+    #: half-width; its pressure drops, (.., pressures) places in the band.
     index: np.ndarray
     margins_V: np.ndarray
     shares: np.ndarray
-    dp_MPa: np.ndarray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Found:
-    """What the machines of one side do."""
-
-    compared: Compared
-    #: Where the nearest of all comes so near.
-    nearest_MPa: float
-    #: Of the nearest ones in the loop: how many flow, how many do not open at some pressure drop, the largest flow at
-    #: zero command beyond what is allowed.
-    flowing_in_loop: int
-    never_open: int
-    largest_L_min: float
-    largest_dp_MPa: float
+    nodes: np.ndarray
 
 
 class MachinesOfSide:
     """The machines of one side, whose scenes are its pressure drops."""
 
-    def __init__(self, scenes: Sequence[Scene], machine: Machine, seed: int, drawn: Collection[str]) -> None:
-        self._scene, self._machine, self._drawn, self._seed = scenes[0], machine, drawn, seed
+    def __init__(self, scenes: Sequence[Scene], machine: Machine, seed: int) -> None:
+        self._scene, self._machine, self._seed = scenes[0], machine, seed
         self._tested = np.array(sorted(scene.dp_MPa for scene in scenes))
         self._band = threshold_band(self._scene, self._tested)
-        self._half_V = self._band.half_width_V(self._band.dp_MPa)
         self._drives = ZeroDrives(self._scene, machine)
 
     def compared(self, machines: int) -> Compared:
         """Draw machines, and compare the drive of each at zero command with the threshold of its valve."""
-        worst, gaps = worst_ends(self._scene), self._tested.size - 1
+        gaps = self._tested.size - 1
         places, steps = np.random.default_rng(self._seed), np.random.default_rng([self._seed, 1])
         at_tests = np.arange(gaps + 1) * NODES
         flows = np.zeros(machines, dtype=bool)
@@ -273,7 +254,7 @@ class MachinesOfSide:
         shares, nodes = np.empty((0, len(COMPONENTS))), np.empty((0, 2 * gaps + 1), int)
         for begin in range(0, machines, AT_ONCE):
             count = min(AT_ONCE, machines - begin)
-            own = draw(count, places, worst, self._drawn)
+            own = draw(count, places)
             # Where the threshold of the plant was found: it need not be linear between two tests.
             between = steps.integers(1, NODES, (count, gaps)) + at_tests[:-1]
             at = np.concatenate([np.tile(at_tests, (count, 1)), between], axis=1)
@@ -285,49 +266,47 @@ class MachinesOfSide:
                 shares, nodes = np.vstack([shares, own[near]]), np.vstack([nodes, at[near]])
                 nearest = np.argsort(margins, kind="stable")[:IN_LOOP]
                 index, margins, shares, nodes = index[nearest], margins[nearest], shares[nearest], nodes[nearest]
-        return Compared(flows=flows, index=index, margins_V=margins, shares=shares, dp_MPa=self._band.dp_MPa[nodes])
+        return Compared(flows=flows, index=index, margins_V=margins, shares=shares, nodes=nodes)
+
+    def dp_MPa(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the pressure drops at places in the band."""
+        found: np.ndarray = self._band.dp_MPa[nodes]
+        return found
+
+    def nearest_MPa(self, found: Compared) -> float:
+        """Return where the nearest of all comes so near."""
+        nodes = found.nodes[:1]
+        return float(self.dp_MPa(nodes).flat[self._margins_V(found.shares[:1], nodes).argmin()])
 
     def _margins_V(self, shares: np.ndarray, nodes: np.ndarray) -> np.ndarray:
         """Return by how much each threshold lies above the drive, at nodes of the band, V."""
-        threshold_V = self._band.middle_V[nodes] + shares[:, [COMPONENTS.index("recording")]] * self._half_V[nodes]
-        margins: np.ndarray = threshold_V - self._drives.at(shares, self._band.dp_MPa[nodes])
+        band, place = self._band, shares[:, [RECORDING]]
+        threshold_V = band.middle_V[nodes] + place * band.half_V[nodes]
+        margins: np.ndarray = threshold_V - self._drives.at(shares, band.dp_MPa[nodes])
         return margins
 
-    def of(self, machines: int) -> _Found:
-        """Return what the machines do, the nearest of them in the loop too."""
-        found = self.compared(machines)
-        nodes = np.searchsorted(self._band.dp_MPa, found.dp_MPa[:1])
-        beyond, opened = self._in_loop(found)
-        row, place = np.unravel_index(int(beyond.argmax()), beyond.shape)
-        return _Found(
-            compared=found,
-            nearest_MPa=float(found.dp_MPa[0, np.argmin(self._margins_V(found.shares[:1], nodes))]),
-            flowing_in_loop=int((beyond > NO_FLOW_L_MIN).any(axis=1).sum()),
-            never_open=int((opened <= NO_FLOW_L_MIN).any(axis=1).sum()),
-            largest_L_min=float(beyond.max()),
-            largest_dp_MPa=float(found.dp_MPa[row, place]),
-        )
-
-    def _in_loop(self, found: Compared) -> tuple[np.ndarray, np.ndarray]:
+    def in_loop(self, found: Compared) -> tuple[np.ndarray, np.ndarray]:
         """Run machines; return the flow at zero command beyond what is allowed, and before, at each pressure drop."""
-        scene, dp_MPa = self._scene, found.dp_MPa
-        openings = Openings.of(dp_MPa.shape[1], settle_s=scene.settle_s, waits_s=scene.loop.waits_s)
+        scene, band = self._scene, self._band
+        openings = Openings.of(found.nodes.shape[1], settle_s=scene.settle_s, waits_s=scene.loop.waits_s)
 
         def one(place: int) -> tuple[np.ndarray, np.ndarray]:
-            each = drawn_machine(scene, self._machine, found.shares[place], int(found.index[place]))
-            moved_V = self._band.moved_V(dp_MPa[place], each.threshold)
-            run = each.loop.run(
+            nodes, shares = found.nodes[place], found.shares[place]
+            loop, errors = drawn_machine(scene, self._machine, shares, int(found.index[place]))
+            # By how much the valve closes above the plant.
+            moved_V = band.middle_V[nodes] - band.closing_V[nodes] + shares[RECORDING] * band.half_V[nodes]
+            run = loop.run(
                 openings.command,
-                dp_MPa[place][openings.place],
+                band.dp_MPa[nodes][openings.place],
                 "compensated",
                 back_MPa=scene.back_MPa,
-                added_V=each.added_V - moved_V[openings.place],
-                errors=each.errors,
+                added_V=loop.added_V - moved_V[openings.place],
+                errors=errors,
             )
             flow = run.q_largest_L_min
             return openings.largest(flow, judged=True), openings.largest(flow, judged=False)
 
         with ThreadPoolExecutor(WORKERS) as pool:
-            at_zero, opened = (np.array(each) for each in zip(*pool.map(one, range(len(dp_MPa))), strict=True))
-        none = np.array([_no_flow(scene, one) for one in self._tested]) - NO_FLOW_L_MIN
-        return at_zero - np.interp(dp_MPa, self._tested, none), opened
+            at_zero, opened = (np.array(each) for each in zip(*pool.map(one, range(len(found.nodes))), strict=True))
+        allowed = np.array([_allowed(scene, one) for one in self._tested])
+        return at_zero - np.interp(self.dp_MPa(found.nodes), self._tested, allowed), opened

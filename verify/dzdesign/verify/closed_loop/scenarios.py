@@ -11,8 +11,7 @@ import numpy as np
 
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, coil_and_supply
-from dzdesign.verify.closed_loop.loop import LoopRun
-from dzdesign.verify.closed_loop.readings import ReadingErrors
+from dzdesign.verify.closed_loop.loop import LoopRun, ReadingErrors
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW, SETTLE_S, STEP_S, Ends, Scene, ramp
 from dzdesign.verify.loop_results import ScenarioResult
 
@@ -39,7 +38,7 @@ def run_scenarios(scene: Scene) -> Iterator[ScenarioResult]:
         yield _above_the_tests(scene, scene.tested_MPa)
     yield from sensor_failures(scene)
     yield _noise_at_zero(scene)
-    yield from _converter_off_at_zero(scene)
+    yield from converter_off_at_zero(scene)
     yield from readings_off(scene)
     yield _restart(scene)
     yield from coil_and_supply(scene)
@@ -58,32 +57,20 @@ def _steps(scene: Scene) -> ScenarioResult:
         final = float(step[-1])
         figures[f"{name}_flow_L_min"] = final
         if final > 0:
-            figures[f"{name}_rise_ms"] = 1e3 * STEP_S * _rise(step / final)
-            figures[f"{name}_settling_ms"] = 1e3 * STEP_S * _last(np.abs(step / final - 1) > SETTLED)
+            begins, ends = (int(np.argmax(step / final >= level)) for level in RISE)
+            unsettled = np.flatnonzero(np.abs(step / final - 1) > SETTLED)
+            figures[f"{name}_rise_ms"] = 1e3 * STEP_S * (ends - begins)
+            figures[f"{name}_settling_ms"] = 1e3 * STEP_S * (int(unsettled[-1]) + 1 if unsettled.size else 0)
             figures[f"{name}_overshoot_percent"] = max(100 * float(step.max() / final - 1), 0.0)
     return scene.result("step to half command and back", runs["compensated"], figures=figures)
 
 
-def _rise(response: np.ndarray) -> int:
-    begin, end = (int(np.argmax(response >= level)) for level in RISE)
-    return end - begin
-
-
-def _last(condition: np.ndarray) -> int:
-    return int(np.flatnonzero(condition)[-1]) + 1 if condition.any() else 0
-
-
-def _other_pressures(scene: Scene, tested_MPa: Ends, length: int) -> np.ndarray:
-    """Return the supply: as before, then at both ends of the tested interval, then as before."""
-    quarter = length // 4
-    parts = [scene.dp_MPa, *tested_MPa[::-1], scene.dp_MPa]
-    return np.repeat(parts, [quarter, quarter, quarter, length - 3 * quarter])
-
-
 def _load_step_at_zero(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
-    """The pressure drop jumps to both ends of what was tested while the command is zero."""
+    """The pressure drop jumps to both ends of what was tested while the command is zero, and back."""
     before, quiet = scene.opened_and_closed(), scene.held(0, 8)
-    supply = np.concatenate([np.full(before.size, scene.dp_MPa), _other_pressures(scene, tested_MPa, quiet.size)])
+    quarter = quiet.size // 4
+    lasts = [before.size + quarter, quarter, quarter, quiet.size - 3 * quarter]
+    supply = np.repeat([scene.dp_MPa, *tested_MPa[::-1], scene.dp_MPa], lasts)
     run = scene.run(np.concatenate([before, quiet]), supply_MPa=supply)
     flow, unseen = run.q_mean_L_min[before.size :], scene.loop.unseen_below_L_min(scene.dp_MPa) or 0.0
     # Of a stand-in's flow that no recording shows there is no volume to be told.
@@ -137,19 +124,14 @@ def _above_the_tests(scene: Scene, tested_MPa: Ends) -> ScenarioResult:
     supply = np.concatenate([np.full(before.size, scene.dp_MPa), steps, np.full(ends.size, pressures[-1])])
     run = scene.run(command, supply_MPa=supply)
     last, first = (scene.units.text(dp_MPa, ".2f MPa") for dp_MPa in (pressures[-1], highest))
-    reason = _not_certified_above(scene, first)
+    choice, certificate = scene.compensator.above, scene.compensator.side(scene.sign).certificate
+    reason = f"held above {first}, not certified" if choice == "hold" else f"not certified above {first}"
+    # Required where the certificate goes on, or no offset is left.
+    if choice == "release" or (choice != "hold" and certificate.holds_to_MPa > certificate.dp_MPa[1]):
+        reason = ""
     found = scene.result(f"dP above the tests, up to {last}", run, not_required=reason, end_MPa=pressures[-1])
     rests = before.size + each.size * np.arange(1, len(pressures) + 1) - 1
     return replace(found, q_zero_L_min=max(found.q_zero_L_min, float(run.q_largest_L_min[rests].max())))
-
-
-def _not_certified_above(scene: Scene, first: str) -> str:
-    """Say why no flow is not required above the tests; empty where the certificate goes on, or no offset is left."""
-    choice, certificate = scene.compensator.above, scene.compensator.side(scene.sign).certificate
-    if choice == "hold":
-        return f"held above {first}, not certified"
-    goes_on = certificate.holds_to_MPa > certificate.dp_MPa[1]
-    return "" if goes_on or choice == "release" else f"not certified above {first}"
 
 
 def _noise_at_zero(scene: Scene) -> ScenarioResult:
@@ -171,7 +153,7 @@ def _noise_at_zero(scene: Scene) -> ScenarioResult:
     )
 
 
-def _converter_off_at_zero(scene: Scene) -> Iterator[ScenarioResult]:
+def converter_off_at_zero(scene: Scene) -> Iterator[ScenarioResult]:
     """A zero command that the converter reads with its declared error: off for long, either way, and noisy on top.
 
     Judged while it lasts, once the spool has had the time to follow. Without a zero band flow is to be expected.
@@ -211,7 +193,7 @@ def readings_off(scene: Scene) -> Iterator[ScenarioResult]:
         else (converter.offset_codes, converter.gain_codes, converter.noise_codes)
     )
     own_MPa = (machine.pressure_error_a_MPa, machine.pressure_error_b_MPa) if machine else (0.0, 0.0)
-    own = [error * codes for error, codes in zip(own_MPa, scene.loop.channels.codes_per_MPa, strict=True)]
+    own = own_MPa * scene.loop.channels.per_unit[1:]
     command = scene.opened_and_closed()
     for name, way in (("low", -1), ("high", 1)):
         a, b = (-way, way) if scene.loop.channels.swapped else (way, -way)
@@ -247,8 +229,7 @@ def _restart(scene: Scene) -> ScenarioResult:
 def _oils(scene: Scene) -> Iterator[ScenarioResult]:
     """The same ramp with oil far from the temperature of the bench."""
     for name, (viscosity, density) in OILS.items():
-        plant = scene.plant.with_oil(viscosity, density)
-        warm = replace(scene, loop=scene.loop.with_plant(plant), plant=plant)
+        warm = replace(scene, loop=scene.loop.with_plant(scene.loop.plant.with_oil(viscosity, density)))
         run = warm.run(warm.opened_and_closed())
         yield warm.result(name, run, figures={"largest_flow_L_min": run.q_mean_L_min.max()})
 
@@ -277,36 +258,27 @@ def _failed(scene: Scene, sensor: int, code: int, name: str, back_MPa: float) ->
 def _stuck(scene: Scene, sensor: int, back_MPa: float, ends_MPa: Ends) -> Iterator[ScenarioResult]:
     """The sensor goes on showing what it shows, and the pressure at it goes from one end to the other."""
     behind = (sensor == 1) != scene.loop.channels.swapped
+    # Pressure drop and pressure behind the edge, before and after.
+    changes: list[tuple[Ends, Ends]] = []
     if behind:
-        changes = [(scene.dp_MPa, back_MPa, then) for then in ends_MPa if then != back_MPa]
+        changes = [((scene.dp_MPa, scene.dp_MPa), (back_MPa, then)) for then in ends_MPa if then != back_MPa]
     elif scene.tested_MPa:
-        low, high = scene.tested_MPa
-        changes = [(first, then, back_MPa) for first, then in ((low, high), (high, low))]
-    else:
-        changes = []
-    for first, second, third in changes:
-        supply, back = ((first, first), (second, third)) if behind else ((first, second), (third, third))
-        yield _stuck_over(scene, sensor, supply, back)
-
-
-def _stuck_over(scene: Scene, sensor: int, supply_MPa: Ends, back_MPa: Ends) -> ScenarioResult:
+        changes = [(ends, (back_MPa, back_MPa)) for ends in (scene.tested_MPa, scene.tested_MPa[::-1])]
     command, change = _through_mid_ramp(scene)
-    before, after = (
-        scene.loop.channels.pressure_codes(dp, back) for dp, back in zip(supply_MPa, back_MPa, strict=True)
-    )
-    supply, back = (np.where(np.arange(command.size) < change, *pair) for pair in (supply_MPa, back_MPa))
-    shown = np.full((command.size, 2), -1)
-    shown[change:, sensor] = before[sensor]
-    run = scene.run(command, supply_MPa=supply, back_MPa=back, shown=shown)
-    what, pair = ("dP", supply_MPa) if supply_MPa[0] != supply_MPa[1] else ("the pressure behind the edge", back_MPa)
-    first, then = (scene.units.text(value, ".2f MPa") for value in pair)
-    return scene.result(
-        f"sensor {SENSORS[sensor]} is stuck while {what} goes from {first} to {then}",
-        run,
-        back_MPa=back_MPa[1],
-        end_MPa=supply_MPa[1],
-        not_required=_unknowable(scene, after, sensor, int(before[sensor])),
-    )
+    for supply_MPa, backs_MPa in changes:
+        before, after = map(scene.loop.channels.pressure_codes, supply_MPa, backs_MPa)
+        supply, back = (np.where(np.arange(command.size) < change, *pair) for pair in (supply_MPa, backs_MPa))
+        shown = np.full((command.size, 2), -1)
+        shown[change:, sensor] = before[sensor]
+        what, pair = ("the pressure behind the edge", backs_MPa) if behind else ("dP", supply_MPa)
+        first, then = (scene.units.text(value, ".2f MPa") for value in pair)
+        yield scene.result(
+            f"sensor {SENSORS[sensor]} is stuck while {what} goes from {first} to {then}",
+            scene.run(command, supply_MPa=supply, back_MPa=back, shown=shown),
+            back_MPa=backs_MPa[1],
+            end_MPa=supply_MPa[1],
+            not_required=_unknowable(scene, after, sensor, int(before[sensor])),
+        )
 
 
 def _through_mid_ramp(scene: Scene) -> tuple[np.ndarray, int]:

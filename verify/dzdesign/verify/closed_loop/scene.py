@@ -1,19 +1,23 @@
-"""The loop of one side at one pressure drop, and how a scenario is run and judged there."""
+"""The loop of one side at one pressure drop; how a scenario is run and judged there, and to which digits it is kept."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 
+from dzdesign.core.artefact_reading import rounded
+from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.closed_loop.loop import ClosedLoop, LoopRun
+from dzdesign.identify.valve.side_model import SideModel
+from dzdesign.verify.closed_loop.loop import NO_ERRORS, NO_FLOW_L_MIN, ClosedLoop, LoopRun, ReadingErrors
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
-from dzdesign.verify.closed_loop.readings import NO_ERRORS, ReadingErrors
-from dzdesign.verify.closed_loop.stand_in import StandIn
-from dzdesign.verify.closed_loop.stored_digits import stored
-from dzdesign.verify.loop_results import ScenarioResult, Side
+from dzdesign.verify.closed_loop.stand_in import stand_in_of
+from dzdesign.verify.loop_results import PressureResult, ScenarioResult, Side
 
 #: Two periods a record: as often as the core samples, 1.25 kHz.
 PERIODS = 2
@@ -25,21 +29,26 @@ Ends = tuple[float, float]
 NO_FIGURES: Mapping[str, float] = MappingProxyType({})
 #: Why a scenario is not required, in words of the report.
 NO_CORE_CAN_KNOW = "the firmware cannot detect it"
+SIGNS: dict[Side, int] = {"positive": 1, "negative": -1}
+#: Pressures downstream of the edge where none were given, MPa: a port open to the tank, and a pipe's back pressure.
+BACKS_MPA = (0.0, 1.0)
+#: Digits that mean something, of a flow in L/min, a share, a time in s: the last ones depend on the processor, by whose
+#: instructions the linear algebra adds up, 1e-14 L/min from one to another. Evidence is compared by its hash.
+DECIMALS = 9
+
+Judged = TypeVar("Judged", PressureResult, ScenarioResult)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """The loop of one side at one pressure drop."""
 
-    #: With the compensator, and the plant of this pressure drop.
+    #: With the compensator.
     loop: ClosedLoop
-    plant: Plant | StandIn
     compensator: Compensator
     side: Side
     #: At no flow.
     dp_MPa: float
-    #: The law's dP0.
-    reference_MPa: float
     #: Of the tests; None where the plant holds at `dp_MPa` only.
     tested_MPa: Ends | None
     #: Pressures downstream of the edge, rising; what has nothing to do with them runs at the highest.
@@ -48,7 +57,12 @@ class Scene:
     @property
     def sign(self) -> int:
         """Sign of the commands that drive the side."""
-        return 1 if self.side == "positive" else -1
+        return SIGNS[self.side]
+
+    @property
+    def identified(self) -> SideModel:
+        """The side as it was identified."""
+        return self.compensator.valve.sides[self.side]
 
     @property
     def units(self) -> RecordedUnits:
@@ -143,6 +157,39 @@ class Scene:
         return stored(found)
 
 
+def scenes_of(
+    folder: Path, compensator: Compensator, plant: Plant | None, backs_MPa: Sequence[float] | None = None
+) -> tuple[Scene, ...]:
+    """Return the compensated loop of each side at every tested pressure drop.
+
+    Without a plant the recorded characteristic stands in for the valve. Pressures behind the edge that were given must
+    be within the sensors' spans; usual ones are lowered until they are.
+    """
+    valve = compensator.valve
+    scenes: list[Scene] = []
+    for name, sign in SIGNS.items():
+        if sign not in compensator.signals.signs:
+            continue
+        side = valve.sides[name]
+        pressures = side.beta.dp_MPa or tuple(test.dp_MPa for test in side.tests if test.dp_MPa is not None)
+        loop = ClosedLoop(plant or stand_in_of(side, valve.u_max_V), folder, compensator, sign)
+        for back_MPa in backs_MPa or ():
+            if loop.back_within_span(back_MPa, max(pressures)) < back_MPa:
+                first, second = (valve.recorded_units.text(each, ".3g MPa") for each in (back_MPa, max(pressures)))
+                raise InputError(
+                    f"a back pressure of {first} and the tested {second} together exceed the sensors' span; give a "
+                    "lower --back-pressure, or design with larger sensors"
+                )
+        # A recording at one pressure drop says nothing of another.
+        tested = (min(pressures), max(pressures)) if plant or len(pressures) > 1 else None
+        backs = tuple(sorted(BACKS_MPA if backs_MPa is None else backs_MPa))
+        scenes += [
+            Scene(loop=loop, compensator=compensator, side=name, dp_MPa=each, tested_MPa=tested, backs_MPa=backs)
+            for each in pressures
+        ]
+    return tuple(scenes)
+
+
 def ramp(start: float, end: float, seconds: float = RAMP_S) -> np.ndarray:
     """Return a ramp of the command."""
     return np.linspace(start, end, round(seconds / STEP_S))
@@ -152,3 +199,16 @@ def held_for(condition: np.ndarray, count: int) -> np.ndarray:
     """Return where a condition has held for so many records, this one included."""
     since = np.arange(condition.size) - np.maximum.accumulate(np.where(condition, -1, np.arange(condition.size)))
     return condition & (since > count)
+
+
+def stored(result: Judged) -> Judged:
+    """Return a result with its digits cut; a flow at zero command that is the leak stays one."""
+    if abs(result.q_zero_L_min - result.leak_L_min) <= NO_FLOW_L_MIN:
+        result = replace(result, q_zero_L_min=result.leak_L_min)
+    return rounded(result, DECIMALS)
+
+
+def rounded_up(difference: float) -> float:
+    """Return a difference with its digits cut, an upper limit."""
+    # So little above a step, as a rounding of doubles, is no reason for the next.
+    return round(max(ceil(difference * 10.0**DECIMALS - 1e-3), difference > 0) / 10.0**DECIMALS, DECIMALS)

@@ -107,7 +107,7 @@ def simulate_ramp(
     scatter_N = series.scatter_V * plant.force_per_volt * np.random.default_rng([*stream, 1, number]).standard_normal()
     loop = loop.with_plant(replace(plant, preload_N=max(plant.preload_N + scatter_N, 0.0)))
     run = loop.run(sequence.for_drive(loop).command(), dp_MPa, mode)
-    waves = with_core or loop.has_dither
+    waves = with_core or loop.wave[0] > 0
     share = 1 - np.exp(-RECORD_S / bench.meter_lag_s) if bench.meter_lag_s > 0 else 1.0
     # Of a dither a meter sees the mean.
     metered = lfilter([share], [1, share - 1], run.q_mean_L_min if waves else run.q_L_min)
@@ -151,14 +151,25 @@ def simulated_files(
         )
     if firmware is not None and dither is not None:
         raise InputError("a firmware makes its own dither, the one that `design` was given; leave out --dither")
-    loop, made_from = (ClosedLoop(plant, dither=_wave(dither)), ()) if firmware is None else _loop_of(plant, firmware)
-    name, mode = ("ramp", "direct") if firmware is None else ("compensated", "compensated")
+    name, mode, made_from = "ramp", "direct", tuple[SourceFile, ...]()
+    if firmware is None:
+        # Counts, and periods of half a wave: the whole number that comes nearest.
+        wave = dither and (
+            round(dither.peak * Signals().compare_max), round(0.5 / (dither.frequency_Hz * PWM_PERIOD_S)),
+        )  # fmt: skip
+        loop = ClosedLoop(plant, dither=wave or None)
+    else:
+        check_firmware_inside(firmware)
+        digest = sha256_of((firmware / "compensator.json").read_bytes())
+        loop = ClosedLoop(plant, firmware, read_compensator(firmware))
+        name, mode, made_from = "compensated", "compensated", (SourceFile(source="compensator.json", sha256=digest),)
     sequence = RampSequence(ramp=ramp_s)
     ramps = [(dp_MPa, number) for dp_MPa in pressures_MPa for number in range(1, series.repeats + 1)]
+    if series.repeats > 1:
+        ramps = [ramps[place] for place in np.random.default_rng([bench.seed, len(ramps)]).permutation(len(ramps))]
     begins = SERIES_BEGINS
     contents = {}
-    for place in _order(len(ramps), bench.seed) if series.repeats > 1 else range(len(ramps)):
-        dp_MPa, number = ramps[place]
+    for dp_MPa, number in ramps:
         if not 0.01 <= dp_MPa <= 18:
             raise InputError(f"a pressure drop of {dp_MPa:g} MPa can't be simulated, expected 0.01 to 18 MPa")
         say(f"simulating {dp_MPa:g} MPa")
@@ -180,27 +191,7 @@ def simulated_files(
     return contents, SimulationManifest(tool=THIS_TOOL, made_from=made_from, plant=plant, bench=bench, series=series)
 
 
-def _wave(dither: Dither | None) -> tuple[int, int] | None:
-    """Return a dither as the loop takes it: counts, and periods of half a wave, the whole number that comes nearest."""
-    if dither is None:
-        return None
-    return round(dither.peak * Signals().compare_max), round(0.5 / (dither.frequency_Hz * PWM_PERIOD_S))
-
-
-def _order(count: int, seed: int) -> list[int]:
-    """Return in which order so many ramps are taken."""
-    return [int(place) for place in np.random.default_rng([seed, count]).permutation(count)]
-
-
 def _time_stamps(begins: datetime.datetime, seconds: np.ndarray) -> np.ndarray:
     """Return date and time of each row, as text to the millisecond."""
     times = np.datetime64(begins, "ms") + np.round(1e3 * seconds).astype("timedelta64[ms]")
     return np.char.replace(np.datetime_as_string(times), "T", " ")
-
-
-def _loop_of(plant: Plant, firmware: Path) -> tuple[ClosedLoop, tuple[SourceFile, ...]]:
-    """Return the loop of a plant with a firmware's core, and the compensator's file."""
-    check_firmware_inside(firmware)
-    compensator = read_compensator(firmware)
-    digest = sha256_of((firmware / "compensator.json").read_bytes())
-    return ClosedLoop(plant, firmware, compensator), (SourceFile(source="compensator.json", sha256=digest),)

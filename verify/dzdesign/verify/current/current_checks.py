@@ -2,26 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from math import log
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.drive import CurrentDrive
-from dzdesign.verify.current.coil_simulation import CoilLoop, CoilSimulation, coil_loop_of
-from dzdesign.verify.current.corner_runs import (
-    HELD_S,
-    SHARES,
-    dithered_current,
-    fault_runs,
-    held_current,
-    offset_errors,
-    run_corner,
-)
-from dzdesign.verify.current.declared_circuit import declared_corners, nominal_corner
+from dzdesign.verify.current import corner_runs
+from dzdesign.verify.current.coil import CoilLoop, CoilSimulation
+from dzdesign.verify.current.controller_states import BLOCK, SEED, check_states, hashes_on
 from dzdesign.verify.current.results import ControllerStates, CurrentCorner, CurrentLoopResult, FaultRun
-from dzdesign.verify.current.state_check import BLOCK, SEED, StateFindings, check_states, hashes_on
 from dzdesign.verify.requirements import (
     CURRENT_FAULTS,
     CURRENT_MARGINS,
@@ -72,32 +62,25 @@ def current_checks(
     folder: Path, compensator: Compensator, say: Callable[[str], None], states: int = STATES
 ) -> CurrentChecks:
     """Check the current loop of a firmware; one whose drive is by duty has none."""
-    drive, around = compensator.current_drive, coil_loop_of(compensator)
-    if drive is None:
+    drive, around = compensator.current_drive, CoilLoop.of(compensator)
+    if drive is None or around is None:
         return CurrentChecks()
-    if around is None:
-        text = "compensator.json names no target, so the converter of the current is not known; design it again"
-        return CurrentChecks(checks=(CURRENT_STATES.check(holds=None, text=text),))
     say("comparing the current controller with its exact model, state by state")
     try:
         core = read_controller(folder)
-        found = check_states(drive.loop, core, states)
+        found, _ = check_states(drive.loop, core, states)
         say("running the current controller with the coil at every corner")
         result = _result(CoilSimulation(around, core), found, compensator)
     except RequirementError as error:
         return CurrentChecks(checks=(CURRENT_STATES.check(holds=False, text=str(error)),))
-    return CurrentChecks(checks=checks_of(result, drive, around), result=result)
-
-
-def checks_of(result: CurrentLoopResult, drive: CurrentDrive, around: CoilLoop) -> tuple[Check, ...]:
-    """Return the requirements on a loop by its figures, in the order of the report."""
-    return (
+    checks = (
         _states_check(result.states),
         _margins_check(result, drive),
         _settles_check(result, drive, around),
         _step_check(result, drive, around),
         _faults_check(result.faults),
     )
+    return CurrentChecks(checks=checks, result=result)
 
 
 def controller_on_machine(folder: Path, compensator: Compensator, machine: Machine, states: int = STATES) -> Check:
@@ -111,10 +94,10 @@ def controller_on_machine(folder: Path, compensator: Compensator, machine: Machi
     count = FEW_STATES if machine.small else states
     try:
         core = read_controller(folder)
-        host, found = check_states(drive.loop, core, count), hashes_on(machine, drive.loop, core, count)
+        (host, hashes), found = check_states(drive.loop, core, count), hashes_on(machine, drive.loop, core, count)
     except RequirementError as error:
         return MACHINE_CODE.check(name=name, holds=False, text=str(error))
-    wrong = sum(one != other for one, other in zip(found, host.hashes, strict=True))
+    wrong = sum(one != other for one, other in zip(found, hashes, strict=True))
     text = (
         f"{host.states} states and calibrations (seed {SEED}) in {len(found)} hashes: {wrong} other than the host's, "
         f"whose states are those of the exact model but for {host.wrong}; {machine.runner[0]}, {machine.compiler} "
@@ -130,23 +113,22 @@ def zero_command_points(compensator: Compensator) -> tuple[int, ...]:
     return tuple(sorted({compensator.compare(zero, round(signals.dp_code(dp))) for dp in ends}))
 
 
-def _result(simulation: CoilSimulation, found: StateFindings, compensator: Compensator) -> CurrentLoopResult:
-    around, functions = simulation.around, compensator.drive_functions
-    above, below = dithered_current(simulation, functions, zero_command_points(compensator))
-    corners = [run_corner(simulation, corner) for corner in declared_corners(around.circuit)]
-    offsets = offset_errors(around)
-    shifted = partial(held_current, simulation, nominal_corner(around.circuit), 0.5)
+def _result(simulation: CoilSimulation, found: ControllerStates, compensator: Compensator) -> CurrentLoopResult:
+    around, corners, functions = simulation.around, simulation.around.corners(), compensator.drive_functions
+    above, below = corner_runs.dithered_current(simulation, functions, zero_command_points(compensator))
+    offsets = corner_runs.offset_errors(around)
+    shifted = [corner_runs.held_current(simulation, around.at(), 0.5, codes).reading_error for codes in offsets]
     return CurrentLoopResult(
-        states=ControllerStates(states=found.states, seed=SEED, wrong=found.wrong, first_wrong=found.first or None),
-        seconds=HELD_S,
-        shares=SHARES,
-        not_carried=sum(corner.not_carried for corner in corners),
-        corners=tuple(corner.found for corner in corners),
+        states=found,
+        seconds=corner_runs.HELD_S,
+        shares=corner_runs.SHARES,
+        not_carried=sum(not around.carries(corner, share) for corner in corners for share in corner_runs.SHARES),
+        corners=tuple(corner_runs.run_corner(simulation, corner) for corner in corners),
         offset_codes=offsets,
-        offset_error_codes=max((shifted(offset).reading_error for offset in offsets), default=0.0),
+        offset_error_codes=max(shifted, default=0.0),
         dither_above_counts=above,
         dither_below_counts=below,
-        faults=tuple(fault_runs(simulation)),
+        faults=tuple(corner_runs.fault_runs(simulation)),
     )
 
 

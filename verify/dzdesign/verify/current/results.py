@@ -3,29 +3,22 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from msgspec import Meta
-
 from dzdesign.core.artefact_types import quantity
+from dzdesign.verify.loop_results import Count, about
 
-Number = Annotated[int, Meta(ge=0, le=2**60)]
 Share = Annotated[float, quantity("1", "Share of the rated current.", ge=0, le=1)]
 Codes = Annotated[float, quantity("codes", "Codes of the converter.", ge=-65536, le=65536)]
 #: Names of the bits of dz_current.h.
 FaultName = Literal["NO_OFFSET", "SENSOR", "OPEN", "SHORT", "OVER"]
 
 
-def about(description: str) -> Meta:
-    """Return what an annotation says of a field."""
-    return Meta(description=description)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerStates:
     """Comparison of the controller's C with its exact model."""
 
-    states: Annotated[Number, about("Number of states and calibrations that were compared.")]
-    seed: Annotated[Number, about("Random seed of the first block of states; each further block uses the next seed.")]
-    wrong: Annotated[Number, about("Number of states in which any value differs.")]
+    states: Annotated[Count, about("Number of states and calibrations that were compared.")]
+    seed: Annotated[Count, about("Random seed of the first block of states; each further block uses the next seed.")]
+    wrong: Annotated[Count, about("Number of states in which any value differs.")]
     first_wrong: Annotated[str | None, about("First difference, in words.")]
 
 
@@ -68,7 +61,7 @@ class CurrentCorner:
     ]
     least_rise_s: Annotated[float | None, quantity("s", "Rise time with the switch always on.")]
     overshoot: Annotated[float | None, quantity("1", "Overshoot of that step, relative to its height.")]
-    faults: Annotated[Number, about("Fault bits DZ_CURRENT_... that the C code set; must be 0.")]
+    faults: Annotated[Count, about("Fault bits DZ_CURRENT_... that the C code set; must be 0.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,40 +82,6 @@ class FaultRun:
         return self.seen_after_s is not None and self.seen_after_s <= self.limit_s and self.latched
 
 
-Flow = Annotated[float, quantity("L/min", "Flow.", ge=-1e6, le=1e6)]
-OpeningShare = Annotated[float, quantity("1", "Of full command.", ge=0, le=1)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ValveAtCorners:
-    """The valve in closed loop at one pressure drop, with the current of every coil at every supply."""
-
-    dp_MPa: Annotated[float, quantity("MPa", "Pressure drop at no flow.", ge=0, le=1000)]
-    runs: Annotated[Number, about(
-        "Number of coil and supply combinations: the declared one and the ends of all ranges.")]
-    opening_least: Annotated[OpeningShare, about("Least dead zone on opening that the compensator leaves.")]
-    opening_largest: Annotated[OpeningShare, about("Largest dead zone on opening that the compensator leaves.")]
-    q_zero_L_min: Annotated[Flow, about("Largest flow at zero command after closing, leak included.")]
-    q_released_L_min: Annotated[
-        Flow, about("Largest flow before the ramp, when the drive is released and the set point steps to the offset.")
-    ]
-    unseen_below_L_min: Annotated[
-        Flow | None,
-        about("Flow below which the recordings show none, so that the plant's flow is unknown; null for a "
-            "given plant."),
-    ]
-    leak_L_min: Annotated[Flow, about("Flow without drive, which no compensator can stop.")]
-    allowed_at_zero_L_min: Annotated[
-        Flow | None,
-        about("Flow at zero command, leak included, that --zero-flow allows; null if only the leak is allowed."),
-    ]
-
-    @property
-    def q_beyond_L_min(self) -> float:
-        """Flow at zero command beyond what is allowed there, after closing or as the drive is released."""
-        return max(self.q_zero_L_min, self.q_released_L_min) - max(self.leak_L_min, self.allowed_at_zero_L_min or 0.0)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentLoopResult:
     """Result of the current loop: the C code alone, and with the coil at every corner of the declared ranges."""
@@ -130,7 +89,7 @@ class CurrentLoopResult:
     states: Annotated[ControllerStates, about("Comparison of the controller with its exact model, state by state.")]
     seconds: Annotated[float, quantity("s", "Time for which each set point was held after settling.", ge=0, le=1e6)]
     shares: Annotated[tuple[Share, ...], about("Set points, as shares of the rated current.")]
-    not_carried: Annotated[Number, about(
+    not_carried: Annotated[Count, about(
         "Combinations of corner and set point that the supply can't carry. They were not tried.")]
     corners: Annotated[tuple[CurrentCorner, ...], about("Result of each corner.")]
     offset_codes: Annotated[
@@ -147,7 +106,3 @@ class CurrentLoopResult:
         float, quantity("counts", "Deficit of the current's peak against that of the set point under dither.", ge=0)
     ]
     faults: Annotated[tuple[FaultRun, ...], about("Result of each injected fault.")]
-    valve: Annotated[
-        tuple[ValveAtCorners, ...],
-        about("Valve in closed loop at each tested pressure drop; empty if the closed loop did not run."),
-    ] = ()

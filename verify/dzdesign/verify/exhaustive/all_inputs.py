@@ -7,7 +7,7 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify import requirements
-from dzdesign.verify.closed_loop.evidence_curves import Curves
+from dzdesign.verify.closed_loop.ramps import Curves
 from dzdesign.verify.evidence import InputCheck, InputCounts
 from dzdesign.verify.exhaustive.above_tests import above_checked, check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dzdesign.verify.closed_loop.evidence_curves import Curves, input_map_name, zero_command_name
+from dzdesign.verify.closed_loop.ramps import Curves, input_map_name, zero_command_name
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences, PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import bounds_at, counted_dither, guarded_bounds, pressure_drops

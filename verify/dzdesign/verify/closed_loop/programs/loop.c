@@ -169,7 +169,7 @@ static inline void run(const struct task *task, struct plant *plant, double *rec
 
 /* choices: n, every, amplifier, negative, swapped, wave, its ticks, mean, largest code, largest compare value, seed.
  * series, channels: see `task`; errors: three numbers a channel, see `channel_of`.
- * p: the plant, see plant_step.py; curve: its recorded characteristic, see stand_in.py, or null; coil, sensor:
+ * p: the plant, see plant.py; curve: its recorded characteristic, see stand_in.py, or null; coil, sensor:
  * of a drive by current, or null.
  * record[n][9]: compare value, dP in MPa, Q in L/min at its end; over the record mean and largest Q; position in m; the
  * last codes of sensors A and B; mean current of the last period in V of command. */

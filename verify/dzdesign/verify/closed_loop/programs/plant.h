@@ -22,7 +22,7 @@ enum { CURRENT, POSITION, SPEED, TRAVEL, STATES };
 
 struct plant
 {
-    const double *p;     /* the numbers of plant_step.py */
+    const double *p;     /* see numbers_of() of plant.py */
     const double *curve; /* the recorded characteristic, see plant_curve.h; none: the edge is that of Eq. (24) */
     int32_t counts;      /* of the compare value in a period */
     double state[STATES]; /* A, m, m/s; m s since the period began */

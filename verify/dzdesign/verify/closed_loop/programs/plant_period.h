@@ -65,7 +65,7 @@ static inline void plant_period(struct plant *plant, int32_t compare)
 
 /* The plant moved by the true current of a coil, in place of that of its amplifier: dz_current.c and coil.h make it. Over
  * a period the spool feels the current's mean; its ripple, of 0.1 % to 2 % of the rated current, is left out. The plant's
- * own coil holds its current (plant_step.py gives it the inductance for that), which is set here: as much of the current
+ * own coil holds its current (loop.py gives it the inductance for that), which is set here: as much of the current
  * of full command as the coil has of the rated one. */
 static inline void plant_period_of_current(struct plant *plant, double share)
 {

@@ -1,32 +1,27 @@
-"""The controller in C against the exact one, over random and hostile states; other machines by hashes of the same."""
+"""The current controller in C against what it must do, over random and hostile states; other machines by hashes.
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+What it must do is written from what a PI controller with feed-forward, limit and anti-windup is, in whole numbers over
+the gains' denominator, and not from the template: the integral is a number of either sign, a fault a set of conditions.
+"""
+
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.current.loop import CurrentLoop
-from dzdesign.verify.current.exact_controller import (
-    NO_OFFSET,
-    OPEN,
-    OVER,
-    SENSOR,
-    SHORT,
-    ExactController,
-    exact_ticks,
-)
+from dzdesign.design.current.loop import CORRECTION_SHIFT, CurrentLoop
+from dzdesign.verify.current.results import ControllerStates
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import HOST, Machine
 
 PROGRAMS = Path(str(files("dzdesign.verify.current"))) / "programs"
-BLOCK = 10_000
-OFFSETS = 200
-SEED = 22
+#: Bits of the faults.
+NO_OFFSET, SENSOR, OPEN, SHORT, OVER = (1 << place for place in range(5))
 #: Faults of which every combination stands at the start of some calibration.
 STANDING = SENSOR | OPEN | SHORT | OVER
+BLOCK, OFFSETS, SEED = 10_000, 200, 22
 STATE = np.dtype(
     [("integral", "<i4"), ("offset_total", "<u4")]
     + [(name, "<u4") for name in ("offset_ticks", "offset", "compare", "faults", "over_ticks", "open_ticks", "ramped")]
@@ -44,16 +39,65 @@ FUNCTIONS = (
 COMPARED = ("integral", "compare", "faults", "over_ticks", "open_ticks", "ramped")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StateFindings:
-    """What a comparison of states found."""
+def exact_ticks(loop: CurrentLoop, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return what a period of the PWM makes of many states at once.
 
-    states: int
-    wrong: int
-    #: Of the first wrong state: which field, before, inputs and after; empty if there is none.
-    first: str
-    #: A hash of each block of states, and one of the calibrations.
-    hashes: tuple[int, ...]
+    `given` has the state by the names of `COMPARED`, which what is returned has too, `offset`, and what comes in:
+    `set_point`, `total` and `supply_code`.
+    """
+    unit = 1 << loop.gain_shift
+    above = np.maximum(given["total"] - given["offset"], 0)
+    aim = given["ramped"] + np.clip(given["set_point"] - given["ramped"], -loop.rate, loop.rate)
+    error = aim - _rounded(loop.current_gain * above, 1 << loop.current_shift)
+    too_high, dead = above >= loop.over_sum, (above < loop.open_sum) & (given["compare"] >= loop.open_compare)
+    over_ticks = np.where(too_high, given["over_ticks"] + 1, 0)
+    open_ticks = np.where(dead, given["open_ticks"] + 1, 0)
+    faults = given["faults"].copy()
+    for bit, stands in (
+        (SHORT, given["total"] >= loop.short_sum),
+        (OVER, over_ticks >= loop.over_ticks),
+        (OPEN, open_ticks >= loop.open_ticks),
+    ):
+        faults |= np.where(stands, bit, 0)
+    asked = given["integral"] - loop.release * unit + loop.proportional * error + loop.feed_forward * aim
+    counts = _corrected(loop, _rounded(np.maximum(asked, 0), unit), given["supply_code"])
+    winds_up = ((counts > loop.compare_limit) & (error > 0)) | ((asked < 0) & (error < 0))
+    end = loop.integral_limit * unit
+    moved = np.clip(given["integral"] + loop.integral * error, -end, end)
+    off = (given["set_point"] == 0) | (faults != 0)
+    return {
+        "integral": np.where(off, 0, np.where(winds_up, given["integral"], moved)),
+        "compare": np.where(off, 0, np.minimum(counts, loop.compare_limit)),
+        "faults": faults,
+        "over_ticks": over_ticks,
+        "open_ticks": open_ticks,
+        "ramped": np.where(off, 0, aim),
+    }
+
+
+def exact_calibrations(loop: CurrentLoop, sums: np.ndarray, faults: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return offsets and faults after many calibrations by their sums without current, a row each; any more are left.
+
+    `faults` are those that stood before.
+    """
+    count = 1 << loop.offset_shift
+    offsets = _rounded(sums[:, :count].astype(np.int64).sum(axis=1), count)
+    off = np.abs(offsets - loop.offset_nominal) > loop.offset_tolerance
+    return offsets, (faults & ~NO_OFFSET) | np.where(off, SENSOR, 0)
+
+
+def _rounded(numerator: np.ndarray, denominator: int) -> np.ndarray:
+    return (2 * numerator + denominator) // (2 * denominator)
+
+
+def _corrected(loop: CurrentLoop, counts: np.ndarray, supply_code: np.ndarray) -> np.ndarray:
+    supply = loop.supply
+    if supply is None:
+        return counts
+    node, past = np.divmod(np.clip(supply_code, *supply.valid_codes) - supply.valid_codes[0], supply.step_codes)
+    nodes = np.array(supply.nodes, dtype=np.int64)
+    factor = (nodes[node] * (supply.step_codes - past) + nodes[node + 1] * past) // supply.step_codes
+    return _rounded(np.minimum(counts, 65535) * factor, 1 << CORRECTION_SHIFT)
 
 
 def edges_of(loop: CurrentLoop) -> str:
@@ -126,49 +170,47 @@ class HostStates:
         return ends, sums, self._library.call("current_offsets", seed, count, ends, sums)
 
 
-def _initial(loop: CurrentLoop) -> dict[str, int]:
-    """Return the state before anything: nothing but the designed offset, and a fault until it is calibrated."""
-    return {**dict.fromkeys(STATE.names or (), 0), "offset": loop.offset_nominal, "faults": NO_OFFSET}
-
-
-def given_of(periods: np.ndarray, loop: CurrentLoop) -> dict[str, np.ndarray]:
+def given_of(periods: np.ndarray) -> dict[str, np.ndarray]:
     """Return state and inputs before each period, as `exact_ticks` takes them."""
     before = periods["before"]
     given = {name: before[name].astype(np.int64) for name in (*COMPARED, "offset")}
     return given | {name: periods[name].astype(np.int64) for name in ("set_point", "total", "supply_code")}
 
 
-def check_states(loop: CurrentLoop, core: Mapping[str, str], states: int, seed: int = SEED) -> StateFindings:
-    """Compare so many states on the host, and a few calibrations, with the exact controller.
+def check_states(
+    loop: CurrentLoop, core: Mapping[str, str], states: int, seed: int = SEED
+) -> tuple[ControllerStates, tuple[int, ...]]:
+    """Compare so many states on the host, and a few calibrations, with the exact controller; return their hashes too.
 
-    A controller that crashes is a `RequirementError`: it is run in a program of its own first.
+    A controller that crashes is a `RequirementError`: it is run in a program of its own first. There is a hash of each
+    block of states, and one of the calibrations.
     """
     hashes_on(HOST, loop, core, states, seed)
-    host = HostStates(loop, core)
-    wrong, first, hashes = 0, "", []
+    host, wrong, first, hashes = HostStates(loop, core), 0, [], []
     for block in range(-(-states // BLOCK)):
         periods, hashed = host.periods(block + seed, BLOCK)
         hashes.append(hashed)
-        expected = exact_ticks(loop, given_of(periods, loop))
+        expected = exact_ticks(loop, given_of(periods))
         differs = {name: periods["after"][name] != expected[name] for name in COMPARED}
         places = np.flatnonzero(np.any(list(differs.values()), axis=0))
         wrong += len(places)
-        if len(places) and not first:
-            at = int(places[0])
+        for at in places[:1]:
             field = next(name for name in COMPARED if differs[name][at])
-            first = f"{field} of {periods[at]}, expected {int(expected[field][at])}"
-    if (initial := host.initial()) != (expected_initial := _initial(loop)):
+            first.append(f"{field} of {periods[at]}, expected {int(expected[field][at])}")
+    # Before anything: nothing but the designed offset, and a fault until it is calibrated.
+    known = {**dict.fromkeys(STATE.names or (), 0), "offset": loop.offset_nominal, "faults": NO_OFFSET}
+    if (initial := host.initial()) != known:
         wrong += 1
-        first = first or f"initial state {initial}, expected {expected_initial}"
+        first.append(f"initial state {initial}, expected {known}")
     ends, sums, hashed = host.offsets(seed, OFFSETS)
-    for place, (end, totals) in enumerate(zip(ends, sums, strict=True)):
-        exact = ExactController(loop, faults=NO_OFFSET | (2 * place & STANDING))
-        for total in totals:
-            exact.calibrate(int(total))
-        if (exact.offset, exact.faults) != (end["offset"], end["faults"]):
-            wrong += 1
-            first = first or f"calibration {end}, expected offset {exact.offset}, faults {exact.faults}"
-    return StateFindings(states=BLOCK * len(hashes) + OFFSETS + 1, wrong=wrong, first=first, hashes=(*hashes, hashed))
+    offsets, faults = exact_calibrations(loop, sums, NO_OFFSET | (2 * np.arange(OFFSETS) & STANDING))
+    places = np.flatnonzero((ends["offset"] != offsets) | (ends["faults"] != faults))
+    wrong += len(places)
+    first += [f"calibration {ends[at]}, expected offset {offsets[at]}, faults {faults[at]}" for at in places[:1]]
+    found = ControllerStates(
+        states=BLOCK * len(hashes) + OFFSETS + 1, seed=seed, wrong=wrong, first_wrong=first[0] if first else None
+    )
+    return found, (*hashes, hashed)
 
 
 def hashes_on(
@@ -194,19 +236,3 @@ def hashes_on(
     if len(hashes) != counts["BLOCKS"] + 1:
         raise RequirementError(f"{what} reported {len(hashes)} hashes, expected {counts['BLOCKS'] + 1}")
     return hashes
-
-
-def exact_controllers(loop: CurrentLoop, given: Mapping[str, np.ndarray]) -> Iterator[ExactController]:
-    """Yield the exact controller after each of the periods that `exact_ticks` takes at once."""
-    from fractions import Fraction
-
-    rows = {name: values.tolist() for name, values in given.items()}
-    for place in range(len(rows["total"])):
-        row = {name: values[place] for name, values in rows.items()}
-        controller = ExactController(
-            loop,
-            integral=Fraction(row["integral"], 1 << loop.gain_shift),
-            **{name: row[name] for name in ("compare", "faults", "over_ticks", "open_ticks", "ramped", "offset")},
-        )
-        controller.tick(row["set_point"], row["total"], row["supply_code"])
-        yield controller
