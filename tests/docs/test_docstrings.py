@@ -13,9 +13,8 @@ from docs.generated import API, key_lines
 from dzdesign import api
 from dzdesign.commands.schema import SCHEMAS, schema_document
 from dzdesign.core.artefact_types import Artefact
-from dzdesign.verify import requirements
-from dzdesign.verify.requirements import Requirement
 from tests.docs.sentences import MEAN, MOST, faults_of, words_of
+from tests.support.evidence import DECLARED
 
 PUBLIC = [(module, name) for module, names in API for name in names]
 #: Examples that run in seconds, on the bundled recordings.
@@ -104,8 +103,7 @@ def test_the_keys_of_a_public_result_are_described():
 
 def requirement_texts():
     """Return the title of every requirement, and what to do to have it checked, as sentences."""
-    found = [each for each in vars(requirements).values() if isinstance(each, Requirement)]
-    return [f"{each.title[0].upper()}{each.title[1:]}." for each in found], [each.how for each in found]
+    return [f"{each.title[0].upper()}{each.title[1:]}." for each in DECLARED], [each.how for each in DECLARED]
 
 
 def test_a_requirement_can_be_read_once():

@@ -7,7 +7,7 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core import artefact_reading
-from dzdesign.verify.untried import not_tried
+from dzdesign.verify.verification import not_tried
 from tests.support.evidence import evidence_with
 from tests.support.synthetic import needs_compiler
 

@@ -11,7 +11,7 @@ from dzdesign.codegen.integers.text import matlab_integer
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import DzdesignError, InputError
-from dzdesign.verify.integers.octave import FLAGS
+from dzdesign.verify.outputs.texts import FLAGS
 from tests.support.example_coil import SENSORS, with_current
 from tests.support.octave import OCTAVE, compensator_of, needs_octave, output_of, written
 from tests.support.paths import GOLDENS, GOLDENS_FULL

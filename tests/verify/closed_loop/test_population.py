@@ -19,7 +19,7 @@ from dzdesign.verify.closed_loop.scene import PERIODS, ramp
 from dzdesign.verify.closed_loop.stand_in import stand_in_of
 from dzdesign.verify.closed_loop.tolerances import Tolerances, read_tolerances
 from dzdesign.verify.requirements import ZERO_FLOW
-from dzdesign.verify.verification import verify
+from tests.support.evidence import verify
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler

@@ -13,7 +13,7 @@ from dzdesign.verify.closed_loop.plant import Plant, read_plant
 from dzdesign.verify.closed_loop.scenarios import run_scenarios
 from dzdesign.verify.closed_loop.scene import SETTLE_S, STEP_S, Scene
 from dzdesign.verify.closed_loop.tolerances import SEQUENCE, Tolerances, read_tolerances, scatter
-from dzdesign.verify.verification import verify
+from tests.support.evidence import verify
 from tests.support.synthetic import needs_compiler, with_side
 
 pytestmark = needs_compiler

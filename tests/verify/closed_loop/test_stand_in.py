@@ -19,7 +19,7 @@ from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero, stand_in_is_the_recording
 from dzdesign.verify.closed_loop.stand_in import StandIn, stand_in_of
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
-from dzdesign.verify.verification import verify
+from tests.support.evidence import verify
 from tests.support.synthetic import SHARED, Truth, needs_compiler, synthetic_ramp, with_side
 
 pytestmark = needs_compiler

@@ -18,10 +18,9 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.programs import find_program
 from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import scratch_folder
-from dzdesign.verify.firmware.folder import read_compensator
+from dzdesign.verify.folder import read_compensator
 from dzdesign.verify.requirements import UNDEFINED_BEHAVIOUR, Check
-from dzdesign.verify.toolchain.bound_block import block_of
-from dzdesign.verify.toolchain.machines import PROGRAMS
+from dzdesign.verify.toolchain.machines import PROGRAMS, block_of
 
 PROGRAM = "frama-c"
 #: A shift of a negative number to the right is each compiler's own; overflow of unsigned words is the core's tool.

@@ -10,7 +10,7 @@ from dzdesign.verify.current.current_checks import controller_on_machine
 from dzdesign.verify.evidence import InputCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import SAMPLED_STRIDE, PreparedInputs
-from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
+from dzdesign.verify.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.requirements import MACHINE_CODE, Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore, Findings
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, Machine

@@ -16,8 +16,8 @@ from dzdesign.verify.closed_loop.plant_step import numbers_of, step_header
 from dzdesign.verify.closed_loop.readings import NO_ERRORS, Channels, ReadingErrors
 from dzdesign.verify.closed_loop.stand_in import StandIn
 from dzdesign.verify.current.coil_simulation import HOLDING_H, coil_sources, nominal_coil
-from dzdesign.verify.toolchain.bound_block import core_sources
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
+from dzdesign.verify.toolchain.machines import core_sources
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
 PERIODS_PER_RECORD = 25
