@@ -18,7 +18,6 @@ LOADS = {
 STARTS = {
     "core/dzdesign/core/processes/running.py",
     "identify/dzdesign/identify/reading/binary/reader_process.py",
-    "verify/dzdesign/verify/outputs/texts.py",
     "verify/dzdesign/verify/toolchain/compiled_library.py",
 }
 STARTING = {f"subprocess.{name}" for name in ("Popen", "run", "call", "check_call", "check_output")}

@@ -30,6 +30,11 @@ def evidence_with(**changes: Any) -> Evidence:
     return replace(EVIDENCE, **changes)
 
 
+def with_checks(evidence: Evidence, *checks: Any) -> Evidence:
+    """Return evidence with further checks."""
+    return replace(evidence, checks=(*evidence.checks, *checks))
+
+
 def verify(folder: Any, plant: Any = None, again: Any = None, **asked: Any) -> Verification:
     """Verify a firmware folder, by default without comparing it."""
     return verify_folder(folder, Asked(plant=plant, **asked), again)

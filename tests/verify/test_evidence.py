@@ -14,7 +14,7 @@ from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.outputs import verification as outputs
 from dzdesign.verify.requirements import AS_STATED, RAMPS, Requirement
 from dzdesign.verify.verification import not_tried, untried_requirements
-from tests.support.evidence import ALWAYS, DECLARED, EVIDENCE, read_evidence
+from tests.support.evidence import ALWAYS, DECLARED, EVIDENCE, read_evidence, with_checks
 from tests.support.synthetic import needs_compiler
 
 OPTIONAL = [requirements.RAMPS, requirements.MACHINE_CODE, requirements.UNDEFINED_BEHAVIOUR, requirements.MUTATION]
@@ -48,7 +48,7 @@ def test_findings_that_are_not_required_stand_beside_the_scenarios_alone(reporte
 
 
 def test_of_a_lot_setting_the_recordings_of_one_valve_leave_the_others_as_stated():
-    compared = EVIDENCE.with_checks(RAMPS.check(holds=True, text="every number the same"))
+    compared = with_checks(EVIDENCE, RAMPS.check(holds=True, text="every number the same"))
     assert EVIDENCE.reservation == AS_STATED and compared.reservation == ""
     lot = replace(compared, inputs=(SimpleNamespace(lot=SimpleNamespace(valves=7)), SimpleNamespace(lot=None)))
     assert lot.reservation == f"of the lot's other 6 valves {AS_STATED}"
@@ -59,13 +59,13 @@ def test_what_holds_follows_from_the_checks():
         replace(EVIDENCE.checks[0], name=name, holds=holds) for name, holds in (("a", True), ("b", False), ("c", None))
     )
     assert EVIDENCE.holds and EVIDENCE.verdict == "Every requirement holds."
-    assert EVIDENCE.with_checks(unknown).verdict == f"{NOT_CHECKED}: c"
-    both = EVIDENCE.with_checks(unknown, failed, passed)
+    assert with_checks(EVIDENCE, unknown).verdict == f"{NOT_CHECKED}: c"
+    both = with_checks(EVIDENCE, unknown, failed, passed)
     assert not both.holds and both.verdict == f"{DOES_NOT_HOLD}: b; {NOT_CHECKED}: c"
 
 
 def test_evidence_is_read_as_it_was_written_and_not_where_it_contradicts_itself(wording):
-    failed = EVIDENCE.with_checks(replace(EVIDENCE.checks[0], holds=False))
+    failed = with_checks(EVIDENCE, replace(EVIDENCE.checks[0], holds=False))
     assert read_artefact(to_json_bytes(failed), Evidence, "verification.json") == failed
     document = json.loads(to_json_bytes(failed))
     with wording.refusal(InputError, "evidence: said to hold, and does not"):
@@ -76,6 +76,6 @@ def test_a_requirement_is_not_tried_until_a_check_of_it_is_there():
     for requirement in (*ALWAYS, *OPTIONAL):
         bare = replace(EVIDENCE, checks=(EVIDENCE.checks[0],))
         assert (requirement in untried_requirements(bare)) == (requirement.id != EVIDENCE.checks[0].id)
-        tried = bare.with_checks(requirement.check(holds=None, text="not run"))
+        tried = with_checks(bare, requirement.check(holds=None, text="not run"))
         assert requirement not in untried_requirements(tried)
         assert f"{requirement.title}: {requirement.how}" not in not_tried(tried)

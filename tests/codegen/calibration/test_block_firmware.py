@@ -14,7 +14,7 @@ from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.analysis.frama_c import PROGRAM, prove
+from dzdesign.verify.analysis.machine_code import PROGRAM, prove
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.toolchain.host_compiler import STRICT
 from tests.codegen.core.test_misra import findings

@@ -210,19 +210,6 @@ def test_verify_compares_the_core_with_every_valve(common, tmp_path, wording):
     wording.of_test(check.text)
 
 
-@pytest.mark.slow
-@needs_compiler
-def test_the_command_fails_and_names_the_valve(common, tmp_path, capsys):
-    folder, _ = firmware_of(with_bound(common.compensator, "c", 1, -1.0), tmp_path / "firmware")
-    assert main(["verify", str(folder), "-o", str(tmp_path / "evidence")]) == 1
-    said = " ".join(capsys.readouterr().out.split())
-    missed = "the lot setting over-compensates 1 of 4 valves of its lot: c;"
-    assert f"DOES NOT HOLD the files are reproduced from compensator.json: {missed}" in said
-    evidence = json.loads((tmp_path / "evidence" / "verification.json").read_text(encoding="utf-8"))
-    assert evidence["holds"] is False and evidence["inputs"] == []
-    assert missed in (tmp_path / "evidence" / "report.html").read_text(encoding="utf-8")
-
-
 def test_of_the_valve_in_the_file_it_finds_what_the_input_check_finds(document):
     """On a drive that is the law's own, and on one that is a count too high everywhere."""
     compensator = read(document)

@@ -83,12 +83,6 @@ def test_a_block_that_is_not_the_linked_one_is_found(firmware, change, found):
     assert check.holds is False and found in check.text
 
 
-def test_a_linked_number_that_is_another_is_found(firmware):
-    edit(firmware, LINKED, ".dither_ticks = ", ".dither_ticks = 1u + ")
-    check = checked(firmware)
-    assert check.holds is False and "1 octets of dz_block.c" in check.text
-
-
 def test_the_block_of_another_compensator_is_found(firmware):
     """Both files are of one block, and the firmware accepts it: only the hash that it names tells."""
     document = firmware / "compensator.json"

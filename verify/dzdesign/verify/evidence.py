@@ -4,7 +4,7 @@ The checks, the exhaustive comparison and the closed loop fill these classes; th
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
@@ -254,10 +254,6 @@ class Evidence(Artefact):
         stated = AS_STATED if not compared else f"of the lot's other {others} valves {AS_STATED}" if others else ""
         return "; ".join(filter(None, [stated, *self.not_covered]))
 
-    def with_checks(self, *checks: Check) -> "Evidence":
-        """Return the evidence with further requirements."""
-        return replace(self, checks=(*self.checks, *checks))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TriedInputs:
@@ -313,7 +309,3 @@ class OutputEvidence(Artefact):
             return missed
         stated = [] if any(check.id == RAMPS.id for check in self.checks) else [AS_STATED]
         return "; ".join(["Every requirement holds", *stated, *self.not_covered]) + "."
-
-    def with_checks(self, *checks: Check) -> "OutputEvidence":
-        """Return the evidence with further requirements."""
-        return replace(self, checks=(*self.checks, *checks))

@@ -18,8 +18,7 @@ from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify import requirements
 from dzdesign.verify.analysis import mutation
-from dzdesign.verify.analysis.frama_c import proof_check
-from dzdesign.verify.analysis.machine_code import machine_code_checks
+from dzdesign.verify.analysis.machine_code import machine_code_checks, proof_check
 from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.dead_zone import LoopComparison
 from dzdesign.verify.closed_loop.evidence_curves import Curves, csv_of, loop_curves
