@@ -20,9 +20,9 @@ from dzdesign.verify import compilation
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.compilation import BoardCompiled, board_compiles
 from dzdesign.verify.folder import changed_board_files, read_firmware_manifest, reproduced, user_files
-from dzdesign.verify.verification import evidence_manifest, not_tried, verify
+from dzdesign.verify.verification import evidence_manifest, not_tried
 from tests.conftest import default_options
-from tests.support.evidence import evidence_with
+from tests.support.evidence import evidence_with, verify
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
