@@ -120,7 +120,7 @@ def reported_demo(example_valve, tmp_path_factory):
     from dzdesign.regeneration import regenerated
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.loop import RampSequence
-    from dzdesign.verify.verification import evidence_manifest, verify
+    from dzdesign.verify.verification import Asked, evidence_manifest, verify
 
     folder = tmp_path_factory.mktemp("reported")
     valve_json = to_json_bytes(example_valve)
@@ -131,7 +131,8 @@ def reported_demo(example_valve, tmp_path_factory):
     firmware = generate(compensator, "f28335")
     write_folder(folder / "firmware", firmware.files, firmware.manifest)
     again = regenerated(folder / "firmware")
-    evidence = verify(folder / "firmware", again=again, sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
+    asked = Asked(sequence=RampSequence(rest=0.5, ramp=10.0, top=0.5))
+    evidence = verify(folder / "firmware", asked, again)
     files = with_report(evidence, folder / "firmware", folder / "evidence")
     write_folder(folder / "evidence", files, evidence_manifest(evidence.evidence))
     return folder

@@ -12,7 +12,7 @@ import pytest
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.firmware_manifest import Calibration
-from dzdesign.verify.firmware.c2000ware import HEADERS, PRELUDE, check_against_c2000ware
+from dzdesign.verify.compilation import HEADERS, PRELUDE, check_against_c2000ware
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 from tests.codegen.f28335.test_f28335_current import CURRENT_VALUES, SUPPLY_VALUES
 from tests.codegen.f28335.test_f28335_target import START_VALUES

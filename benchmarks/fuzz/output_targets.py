@@ -17,8 +17,8 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import dead_zones
-from dzdesign.verify.amplifier.checks import checks as amplifier_checks
-from dzdesign.verify.amplifier.readers import READERS
+from dzdesign.verify.outputs.amplifier import file_checks as amplifier_checks
+from dzdesign.verify.outputs.amplifier_files import READERS
 
 TESTS = Path(__file__).parents[2] / "tests"
 #: Codes that a function in MATLAB is tried with, and numbers that a function block is.

@@ -33,8 +33,7 @@ from dzdesign.report.lot.table import TABLE, read_table
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.population import read_tolerances
 from dzdesign.verify.closed_loop.ramps import read_curves
-from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.output_evidence import OutputEvidence
+from dzdesign.verify.evidence import Evidence, OutputEvidence
 
 GOLDENS = Path(__file__).parents[2] / "tests" / "goldens"
 CSV = b"# bench 3\ntime_s;u [V];dP (bar);Q_Lmin\n" + b"".join(

@@ -20,8 +20,8 @@ from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
 from dzdesign.example import example_folder
 from dzdesign.verify.closed_loop.plant import read_plant
-from dzdesign.verify.fmu import checks
-from dzdesign.verify.outputs.folder import read_output_manifest
+from dzdesign.verify.folder import read_output_manifest
+from dzdesign.verify.outputs import fmu
 from dzdesign.verify.requirements import FMU_CLOSED_LOOP
 
 STEP_S, STOP_S = 1 / 2500, 0.1
@@ -52,7 +52,7 @@ def print_fmus(quick: bool = False, seed: int = 0) -> list[Row]:
 def _checked(folder: Path, compensator: Compensator) -> list[Row]:
     """Return what the checks of `verify` found."""
     begin = perf_counter()
-    found = checks.checks(folder, read_output_manifest(folder), compensator, say)
+    found = fmu.checks(folder, read_output_manifest(folder), compensator, say)
     seconds = perf_counter() - begin
     rows = [Row(what=f"{each.name}: wrong of {each.inputs} inputs", value=each.wrong, limit=0,
                 note=f"hash {each.outputs_hash}") for each in found.inputs]  # fmt: skip

@@ -10,7 +10,7 @@ from dzdesign.codegen.calibration.acceptance import refusals
 from dzdesign.codegen.calibration.files import FINDINGS, block_core_files, texts
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
+from dzdesign.verify.analysis.mutation import Mutant, mutants_of
 from tests.support.c_library import load_library
 
 CHECK = "dz_calibration.c"

@@ -42,7 +42,7 @@ def given_blocks(folder: Path, files: Iterable[Path]) -> list[GivenBlock]:
     A firmware with the numbers of its valve in it, a file that is no block, and one without its compensator beside it
     are an `InputError`.
     """
-    from dzdesign.verify.firmware.folder import read_firmware_manifest
+    from dzdesign.verify.folder import read_firmware_manifest
 
     wanted = list(dict.fromkeys(files))
     if wanted and read_firmware_manifest(folder).calibration != "block":
@@ -61,7 +61,7 @@ def blocks_checked(folder: Path, given: Iterable[GivenBlock], code: Path | None 
     """
     from dzdesign.codegen.calibration.packing import unpack
     from dzdesign.verify.exhaustive.block_check import BlockFirmware
-    from dzdesign.verify.firmware.folder import read_firmware_manifest
+    from dzdesign.verify.folder import read_firmware_manifest
     from dzdesign.verify.requirements import CALIBRATION_BLOCK
 
     firmware, target, blocks = BlockFirmware(code or folder), read_firmware_manifest(folder).target, list(given)

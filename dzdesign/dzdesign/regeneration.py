@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.firmware_manifest import FirmwareManifest
     from dzdesign.design.output_manifest import OutputManifest
-    from dzdesign.verify.firmware.reproduced import Regenerated
+    from dzdesign.verify.folder import Regenerated
 
     Manifest = FirmwareManifest | OutputManifest
 
@@ -29,9 +29,13 @@ def regenerated(folder: Path) -> "Regenerated":
     Nothing can be said where another version of dzdesign made the folder, or one with other targets, or where a
     compiler is missing.
     """
-    from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
-    from dzdesign.verify.firmware.reproduced import Regenerated
-    from dzdesign.verify.outputs.folder import holds_output, read_output_manifest
+    from dzdesign.verify.folder import (
+        Regenerated,
+        holds_output,
+        read_compensator,
+        read_firmware_manifest,
+        read_output_manifest,
+    )
 
     manifest: Manifest = read_output_manifest(folder) if holds_output(folder) else read_firmware_manifest(folder)
     compensator = read_compensator(folder)
@@ -55,7 +59,7 @@ def regenerated(folder: Path) -> "Regenerated":
 @contextmanager
 def generated_code(folder: Path) -> Iterator[Path]:
     """Give a folder with the generated text of a firmware; of one that differs from it a `RequirementError`."""
-    from dzdesign.verify.firmware.reproduced import reproduced
+    from dzdesign.verify.folder import reproduced
 
     again = regenerated(folder)
     check = reproduced(folder, again)

@@ -20,7 +20,6 @@ from dzdesign.stages.recordings import expand
 if TYPE_CHECKING:
     from dzdesign.design.compensator import Compensator
     from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.verify.exhaustive.recorded_inputs import Answers
     from dzdesign.verify.requirements import Check
 
 #: valve.json has seven decimals: on another machine the last one may differ. Of a larger number the same share.
@@ -95,12 +94,9 @@ def identified_again(
     return _check(holds=True, text=text)
 
 
-def inputs_again(compensator: "Compensator", given: GivenFiles, answers: "Answers | None" = None) -> "list[Check]":
-    """Tell whether the pressure inputs of a compensator for both signs, wired as recorded, give the recorded drop.
-
-    `answers` calls the firmware. Without it the exact law answers, to which another output was compared.
-    """
-    from dzdesign.verify.exhaustive.recorded_inputs import exact_answers, recorded_inputs_follow
+def inputs_again(compensator: "Compensator", given: GivenFiles) -> "list[Check]":
+    """Tell whether the pressure inputs of a compensator for both signs, wired as recorded, give the recorded drop."""
+    from dzdesign.verify.exhaustive.recorded_inputs import recorded_inputs_follow
     from dzdesign.verify.requirements import PRESSURE_INPUTS
 
     valve = compensator.valve
@@ -114,7 +110,7 @@ def inputs_again(compensator: "Compensator", given: GivenFiles, answers: "Answer
         tests = read_again(valve.options, files).tests
     except InputError as error:
         return [PRESSURE_INPUTS.check(holds=False, text=one_line(f"the recordings can't be read: {error}"))]
-    return [recorded_inputs_follow(compensator, tests, answers or exact_answers(compensator))]
+    return [recorded_inputs_follow(compensator, tests)]
 
 
 def _check(*, holds: bool | None, text: str) -> "Check":

@@ -16,15 +16,13 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.regeneration import regenerated
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder, with_report
+from dzdesign.verify import compilation
 from dzdesign.verify.closed_loop.loop import RampSequence
-from dzdesign.verify.firmware import compilation
-from dzdesign.verify.firmware.compilation import BoardCompiled, board_compiles
-from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.firmware.reproduced import changed_board_files, reproduced, user_files
-from dzdesign.verify.untried import not_tried
-from dzdesign.verify.verification import evidence_manifest, verify
+from dzdesign.verify.compilation import BoardCompiled, board_compiles
+from dzdesign.verify.folder import changed_board_files, read_firmware_manifest, reproduced, user_files
+from dzdesign.verify.verification import evidence_manifest, not_tried
 from tests.conftest import default_options
-from tests.support.evidence import evidence_with
+from tests.support.evidence import evidence_with, verify
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler

@@ -19,7 +19,7 @@ from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError, one_line
 from dzdesign.design.firmware_manifest import FirmwareManifest, FirmwareOrigin
 from dzdesign.identify.valve.model import Warning_
-from dzdesign.verify.firmware.folder import read_firmware_manifest
+from dzdesign.verify.folder import read_firmware_manifest
 from tests.support.golden_firmware import FULL, golden_compensator
 
 NAMES = [

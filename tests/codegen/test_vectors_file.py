@@ -14,7 +14,6 @@ from dzdesign.codegen.vectors import required_codes
 from dzdesign.core.errors import InputError
 from dzdesign.design.side_law import Sides
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.recorded_inputs import exact_answer
 from dzdesign.verify.toolchain.host_compiler import host_compiler, words_of
 from tests.support.c_library import load_library
 from tests.support.documented_commands import FILE
@@ -205,7 +204,7 @@ def test_every_kind_of_fault_is_caught_by_the_fewest_vectors(firmwares):
 def test_verify_has_the_same_values_from_its_own_law(name, firmwares):
     """Of the same rationals by other code."""
     compensator = firmwares[name].compensator
-    answers = [exact_answer(ExactLaw(compensator, sign)) for sign in compensator.signals.signs]
+    answers = [ExactLaw(compensator, sign).answer for sign in compensator.signals.signs]
     rows = [tuple(map(int, line.split(","))) for line in firmwares[name].files["vectors.csv"].splitlines()[1:]]
     assert len(rows) > 100
     assert all(row[3:] == tuple(value for answer in answers for value in answer(*row[:3])) for row in rows)

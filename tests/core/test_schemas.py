@@ -70,10 +70,10 @@ def evidence(written_firmware, example_folder):
     from dzdesign.verify.analysis.mutation import KILLED, SURVIVED, mutation_score
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.evidence import MutantOutcome
-    from dzdesign.verify.verification import verify
+    from tests.support.evidence import verify
 
     plant = read_plant(example_folder / "plant.toml")
-    evidence = verify(written_firmware, plant, "plant.toml").evidence
+    evidence = verify(written_firmware, plant, plant_source="plant.toml").evidence
     found = [MutantOutcome(file="core/dz_comp.c", line=9, change="+ to -", verdict=one) for one in (KILLED, SURVIVED)]
     score = mutation_score([replace(found[0], killer="a check"), found[1]])
     return json.loads(to_json_bytes(replace(evidence, mutants=score)))
@@ -146,7 +146,7 @@ def test_evidence_fits_and_every_fault_in_it_is_seen(evidence):
 
 @needs_compiler
 def test_evidence_of_a_core_that_does_not_compile_fits(firmware_folder):
-    from dzdesign.verify.verification import verify
+    from tests.support.evidence import verify
 
     source = firmware_folder / "core" / "dz_comp.c"
     source.write_text(source.read_text() + "\nint unused = 1.5;;\n")

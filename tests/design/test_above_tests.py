@@ -15,7 +15,7 @@ from dzdesign.design.certificate import prove_certificates
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.verify.exhaustive.above_tests import check_above
+from dzdesign.verify.exhaustive.all_inputs import check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import differences
 from tests.support.repeatable_valves import identify

@@ -12,8 +12,8 @@ from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.valve.reading_flow import dead_zone_at, default_reading_flow, ideal_line
 from dzdesign.verify.closed_loop.loop import RampSequence
-from dzdesign.verify.verification import verify
 from tests.conftest import default_options
+from tests.support.evidence import verify
 from tests.support.synthetic import needs_compiler
 
 

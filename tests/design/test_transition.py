@@ -99,7 +99,7 @@ def test_no_leak_and_one_per_cent_of_dead_zone_on_the_example(with_transition, e
     """The goal in the closed loop with hysteresis, PWM resolved: the plant is the one of the recordings."""
     from dzdesign.codegen.project import generate
     from dzdesign.verify.closed_loop.plant import read_plant
-    from dzdesign.verify.verification import verify
+    from tests.support.evidence import verify
 
     firmware = generate(with_transition, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)

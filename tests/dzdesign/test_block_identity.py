@@ -44,7 +44,7 @@ def tried(monkeypatch, tmp_path):
     monkeypatch.setattr("dzdesign.block_checks.drives_checked", lambda folder, blocks: [])
     monkeypatch.setattr("dzdesign.block_checks.refuse_underived", lambda *_, **__: None)
     firmware = generate(of_valve(""), "f28335", calibration="block").manifest
-    monkeypatch.setattr("dzdesign.verify.firmware.folder.read_firmware_manifest", lambda folder: firmware)
+    monkeypatch.setattr("dzdesign.verify.folder.read_firmware_manifest", lambda folder: firmware)
 
     def check(blocks: dict[str, tuple[Compensator, str | None]]) -> list[Check]:
         given = []

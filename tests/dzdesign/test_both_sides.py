@@ -16,9 +16,9 @@ from dzdesign.design.options import options_of
 from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.valve.model import ValveModel
-from dzdesign.verify.requirements import ALWAYS, OPTIONAL
-from dzdesign.verify.untried import label_of_untried
-from tests.support.evidence import EVIDENCE
+from dzdesign.verify.requirements import MACHINE_CODE, RAMPS
+from dzdesign.verify.verification import label_of_untried
+from tests.support.evidence import ALWAYS, EVIDENCE
 from tests.support.golden_firmware import FULL
 from tests.support.synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 
@@ -106,5 +106,5 @@ def test_identify_says_the_direction_and_what_to_type_next(tmp_path, monkeypatch
 
 
 def test_what_nobody_asked_for_is_not_called_unchecked():
-    assert {label_of_untried(each) for each in OPTIONAL} == {NOT_ASKED_FOR}
+    assert {label_of_untried(each) for each in (RAMPS, MACHINE_CODE)} == {NOT_ASKED_FOR}
     assert {label_of_untried(each) for each in ALWAYS} == {NOT_CHECKED}

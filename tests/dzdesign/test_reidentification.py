@@ -14,7 +14,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.regeneration import regenerated
 from dzdesign.reidentification import GivenFiles, identified_again
-from dzdesign.verify.firmware.reproduced import reproduced
+from dzdesign.verify.folder import reproduced
 from dzdesign.verify.requirements import AS_STATED
 from tests.support.attacked_firmware import sealed
 from tests.support.synthetic import needs_compiler

@@ -10,8 +10,8 @@ from dzdesign.codegen.project import generate, write_firmware
 from dzdesign.command_line.cli import main
 from dzdesign.core.errors import RequirementError
 from dzdesign.regeneration import generated_code, regenerated
-from dzdesign.verify.firmware.reproduced import reproduced
-from dzdesign.verify.outputs import dispatch
+from dzdesign.verify.folder import reproduced
+from dzdesign.verify.outputs.verification import Given
 from tests.support.attacked_firmware import add, change_json, edit, take_the_rest_as_held
 from tests.support.synthetic import needs_compiler
 
@@ -123,7 +123,7 @@ OUTPUTS = {
 
 @pytest.mark.parametrize("fault", OUTPUTS)
 def test_an_edit_of_another_output_is_named(verify, fault, monkeypatch):
-    monkeypatch.setattr(dispatch, "import_module", lambda name: pytest.fail(name))
+    monkeypatch.setattr(Given, "run_by", lambda *_: pytest.fail("it was tried"))
     target, change, named = OUTPUTS[fault]
     status, said = verify(target, change)
     assert status == 1 and named in said, said

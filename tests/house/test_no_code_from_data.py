@@ -27,7 +27,6 @@ LOADS = {
 STARTS = {
     "core/dzdesign/core/processes/running.py",
     "identify/dzdesign/identify/reading/binary/reader_process.py",
-    "verify/dzdesign/verify/integers/octave.py",
     "verify/dzdesign/verify/toolchain/compiled_library.py",
 }
 

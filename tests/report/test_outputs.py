@@ -17,7 +17,7 @@ from dzdesign.report.artefacts import Chain, Place
 from dzdesign.report.outputs import change_in, outputs_in, outputs_sections, with_outputs
 from dzdesign.report.page import Headline, MadeOutput, MadeOutputs
 from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
-from dzdesign.verify.output_evidence import OutputEvidence, TriedInputs
+from dzdesign.verify.evidence import OutputEvidence, TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
 from dzdesign.verify.verification import evidence_manifest
 from tests.support.evidence import evidence_with

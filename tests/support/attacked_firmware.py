@@ -1,14 +1,15 @@
 """Edits of a firmware folder by hand, and `dzdesign verify` with all that takes long taken as held."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.report import valve_report
 from dzdesign.verify import verification
-from dzdesign.verify.firmware.compilation import BoardCompiled
-from dzdesign.verify.requirements import ALWAYS, REPRODUCED
+from dzdesign.verify.requirements import REPRODUCED, Tried, checks_of
+from tests.support.evidence import ALWAYS
 
 
 def edit(folder, name, old, new):
@@ -41,12 +42,21 @@ def sealed(valve):
 
 def take_the_rest_as_held(monkeypatch):
     """Let `verify` design, generate and compare, and try nothing that compiles or runs C."""
-    held = tuple(each.check(holds=True, text="taken as held") for each in ALWAYS if each is not REPRODUCED)
-    run = verification._Run(core=verification._Core(checks=held))
-    monkeypatch.setattr(verification, "_run_core", lambda *_: run)
-    monkeypatch.setattr(verification, "own_block_accepted", lambda *_: ())
-    monkeypatch.setattr(verification, "board_compiles", lambda *_: BoardCompiled())
+    held = Tried(ALWAYS[1:], lambda _: [each.check(holds=True, text="taken as held") for each in ALWAYS[1:]], is_next)
+    assert ALWAYS[0] is REPRODUCED
+    monkeypatch.setattr(verification, "REQUIREMENTS", (verification.REQUIREMENTS[0], held))
+    monkeypatch.setattr(verification, "host_compiler", lambda: "")
     monkeypatch.setattr(valve_report, "with_report", lambda found, *_: verification.evidence_files(found))
+
+
+def is_next(firmware):
+    return firmware.is_as_generated
+
+
+#: What running a core leaves, for the evidence and for what is tried next.
+LEFT = ("scenes", "inputs", "curves", "current", "loop", "compared")
+#: Rows of requirements that run the core, up to the closed loop.
+CORE = verification.REQUIREMENTS[2:8]
 
 
 @cache
@@ -59,13 +69,20 @@ def run_each_core_once(monkeypatch):
 
     For tests of what stands around that: the files of the target, recordings, report and command.
     """
-    run = verification._run_core
 
-    def once(folder, manifest, compensator, given, *watching):
-        core = tuple((path.name, path.read_bytes()) for path in sorted((folder / "core").iterdir()))
-        key = (core, tuple(manifest.core), to_json_bytes(compensator), repr(given))
+    def once(firmware):
+        core = tuple((path.name, path.read_bytes()) for path in sorted((firmware.code / "core").iterdir()))
+        asked = replace(firmware.asked, ramps=None, blocks=None)
+        key = (core, tuple(firmware.manifest.core), to_json_bytes(firmware.compensator), repr(asked))
         if key not in _runs():
-            _runs()[key] = run(folder, manifest, compensator, given, *watching)
-        return _runs()[key]
+            checks = checks_of(CORE, firmware)
+            _runs()[key] = checks, {name: getattr(firmware, name) for name in LEFT}
+        checks, left = _runs()[key]
+        for name, value in left.items():
+            setattr(firmware, name, value)
+        return checks
 
-    monkeypatch.setattr(verification, "_run_core", once)
+    at = verification.REQUIREMENTS.index(CORE[0])
+    others = [row for row in verification.REQUIREMENTS if row not in CORE]
+    rows = (*others[:at], Tried(ALWAYS[1:], once, is_next), *others[at:])
+    monkeypatch.setattr(verification, "REQUIREMENTS", rows)

@@ -7,8 +7,13 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.loop_results import ClosedLoopResult, PressureResult
-from dzdesign.verify.requirements import ALWAYS
+from dzdesign.verify.requirements import EVERY_RUN
+from dzdesign.verify.verification import REQUIREMENTS, Asked, Verification
+from dzdesign.verify.verification import verify as verify_folder
 
+#: Every requirement on a firmware, and those that every `verify` tries.
+DECLARED = tuple(each for row in REQUIREMENTS for each in row.requirements)
+ALWAYS = tuple(each for each in DECLARED if each.how == EVERY_RUN)
 LOOP = ClosedLoopResult(
     plant=None, plant_source="none", plant_sha256=None, dynamics=None, back_MPa=(), pressures=(), against_cvodes=()
 )
@@ -23,6 +28,16 @@ EVIDENCE = Evidence(
 def evidence_with(**changes: Any) -> Evidence:
     """Return evidence of which every requirement holds, with other fields."""
     return replace(EVIDENCE, **changes)
+
+
+def with_checks(evidence: Evidence, *checks: Any) -> Evidence:
+    """Return evidence with further checks."""
+    return replace(evidence, checks=(*evidence.checks, *checks))
+
+
+def verify(folder: Any, plant: Any = None, again: Any = None, **asked: Any) -> Verification:
+    """Verify a firmware folder, by default without comparing it."""
+    return verify_folder(folder, Asked(plant=plant, **asked), again)
 
 
 def read_evidence(path: Any) -> Evidence:

@@ -13,7 +13,7 @@ from dzdesign.codegen.fmu.files import archive
 from dzdesign.codegen.other_targets import Output, generate_output
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.fmu.checks import Unpacked
+from dzdesign.verify.outputs.fmu import Unpacked
 from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
 from tests.support.golden_firmware import FULL, golden_compensator
 

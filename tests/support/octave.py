@@ -5,7 +5,7 @@ import pytest
 from dzdesign.codegen.other_targets import generate_output, write_output
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.integers.octave import available_octave
+from dzdesign.verify.outputs.texts import available_octave
 
 OCTAVE = available_octave().path or None
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="no octave-cli on the path: apt install octave")

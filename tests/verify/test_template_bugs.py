@@ -11,9 +11,9 @@ from dzdesign.codegen.project import generate, write_firmware
 from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, input_checks
+from dzdesign.verify.exhaustive.block_check import own_block_accepted
 from dzdesign.verify.exhaustive.drive_check import drive_follows
-from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
-from dzdesign.verify.firmware.own_block import own_block_accepted
+from dzdesign.verify.folder import read_compensator, read_firmware_manifest
 from tests.support.core_variants import variant
 from tests.support.synthetic import needs_compiler
 

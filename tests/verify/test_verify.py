@@ -2,8 +2,6 @@
 
 import json
 import re
-import shutil
-import subprocess
 from fractions import Fraction
 
 import numpy as np
@@ -11,15 +9,14 @@ import pytest
 
 from dzdesign.core.artefact_files import to_json, write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.regeneration import regenerated
 from dzdesign.verify.closed_loop.loop import ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.ramps import dead_zone
+from dzdesign.verify.closed_loop.scene import scenes_of
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.firmware.folder import read_firmware_manifest
-from dzdesign.verify.firmware.reproduced import Regenerated, reproduced
-from dzdesign.verify.verification import verify
+from dzdesign.verify.folder import Regenerated, read_compensator, read_firmware_manifest, reproduced
+from tests.support.evidence import verify
 from tests.support.synthetic import needs_compiler, with_side
 
 pytestmark = needs_compiler
@@ -141,16 +138,6 @@ def test_what_cmake_built_may_stay_where_nothing_of_ours_is(firmware_folder, wor
     wording.of_test(fault_of(firmware_folder, manifest))
 
 
-@pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake")
-def test_a_true_build_of_cmake_is_no_foreign_source(example_compensator, tmp_path):
-    from dzdesign.codegen.project import generate
-
-    firmware = generate(example_compensator, "host")
-    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    subprocess.run(["cmake", "-S", "host", "-B", "host/build"], cwd=tmp_path / "fw", check=True, capture_output=True)
-    assert fault_of(tmp_path / "fw", read_firmware_manifest(tmp_path / "fw")) == ""
-
-
 def test_a_header_that_may_be_taken_for_ours_is_said(firmware_folder, wording):
     manifest = read_firmware_manifest(firmware_folder)
     (firmware_folder / "f28335" / "dz_comp.h").write_text("#define DZ_COMPARE_MAX 1u\n")  # goes before core's
@@ -207,22 +194,6 @@ class TestPlant:
 
 
 @pytest.mark.slow
-def test_closed_loop_removes_the_dead_zone_and_without_beta_leaks(firmware_folder, example_folder):
-    from dzdesign.verify.closed_loop.plant import read_plant
-
-    plant, again = read_plant(example_folder / "plant.toml"), regenerated(firmware_folder)
-    result = verify(firmware_folder, plant, again=again, sequence=QUICK)
-    assert result.holds
-    for loop in result.loops:
-        # The quick ramp lags by some tens of millivolts.
-        assert loop.result.dead_zone_opening > 0.5
-        assert loop.result.residual_opening < 0.085
-        assert loop.result.q_zero_L_min == 0
-    at_highest = result.loops[-1].result
-    assert at_highest.q_zero_without_beta_L_min > 0.3
-
-
-@pytest.mark.slow
 def test_a_law_without_its_guard_leaks_in_the_loop(example_compensator, example_folder, tmp_path):
     """The closed loop sees over-compensation on its own: an offset of the opening threshold, at every pressure."""
     from dzdesign.codegen.project import generate
@@ -262,4 +233,5 @@ def test_a_span_that_ends_at_the_tested_pressure_can_be_verified(example_valve, 
     options = options_of({"pressure_span": "5.1 MPa"}, target_named("f28335").inputs())
     firmware = generate(design(example_valve, options), "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    assert verify(tmp_path / "fw", again=regenerated(tmp_path / "fw"), sequence=QUICK).holds
+    scenes = scenes_of(tmp_path / "fw", read_compensator(tmp_path / "fw"), None)
+    assert len(scenes) > 1 and all(scene.back_MPa >= 0 for scene in scenes)

@@ -7,8 +7,6 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core import artefact_reading
-from dzdesign.verify.untried import not_tried
-from tests.support.evidence import evidence_with
 from tests.support.synthetic import needs_compiler
 
 pytestmark = [pytest.mark.slow, needs_compiler]
@@ -20,11 +18,6 @@ def copied(reported_demo, tmp_path):
 
 
 # ---- what was not tried ----
-
-
-@pytest.mark.parametrize(("target", "said"), [("f28335", True), ("cortex-m4", False), ("host", False)])
-def test_the_headers_of_ti_are_named_where_they_make_sense(target, said):
-    assert any("--c2000ware" in line for line in not_tried(evidence_with(target=target))) is said
 
 
 # ---- read once ----

@@ -30,8 +30,6 @@ class MeasuredBlockCost:
     check_most: int
     #: The most of a call that was counted with other blocks too: every drive function on, and the longest shifts.
     hardest: tuple[int, int, int]
-    #: The most with any block, over all paths of the machine code.
-    bounds: tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +65,6 @@ MEASURED = {
             check_stack_bytes=92,
             check_most=31390,
             hardest=(84, 294, 28),
-            bounds=(84, 298, 28),
         ),
         everything_block=MeasuredBlockCost(
             core=MeasuredCost(flash_bytes=2556, ram_bytes=0, valve_bytes=32, stack_bytes=88, most=(85, 305, 35)),
@@ -76,7 +73,6 @@ MEASURED = {
             check_stack_bytes=132,
             check_most=35549,
             hardest=(85, 373, 35),
-            bounds=(85, 377, 35),
         ),
     ),
 }

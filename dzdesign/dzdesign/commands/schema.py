@@ -16,7 +16,7 @@ SCHEMAS = {
     "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
     "output": ("dzdesign.design.output_manifest:OutputManifest", "manifest.json of another output", "codegen"),
     "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
-    "output-evidence": ("dzdesign.verify.output_evidence:OutputEvidence", "evidence.json of another output", "verify"),
+    "output-evidence": ("dzdesign.verify.evidence:OutputEvidence", "evidence.json of another output", "verify"),
     "calibration": (
         "dzdesign.verify.exhaustive.block_check:BlockCheck", "calibration_check.json", "batch --calibration block"
     ),

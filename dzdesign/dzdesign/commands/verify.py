@@ -20,7 +20,7 @@ def run(arguments: Arguments, json: bool) -> int:
     """Verify a firmware or another output and print every requirement; 1 if one does not hold."""
     from dzdesign.report.valve_report import REPORT_NAME
     from dzdesign.terminal.verification_tables import print_output_verification, print_verification
-    from dzdesign.verify.output_evidence import OutputEvidence
+    from dzdesign.verify.evidence import OutputEvidence
     from dzdesign.verify.verification import Verification
 
     verification = verify(arguments)

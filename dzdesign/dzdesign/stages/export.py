@@ -112,10 +112,10 @@ def _read_back(
     threshold: Fraction | None,
 ) -> "tuple[Check, ...]":
     """Check a file before anybody has it; refuse one that does not hold."""
-    from dzdesign.verify.amplifier.checks import checks
+    from dzdesign.verify.outputs.amplifier import file_checks
 
     stated = {sign: [(row.dp_MPa, row.fixed) for row in rows] for sign, rows in zones.items()}
-    found = checks(device.name, content, compensator, stated, threshold)
+    found = file_checks(device.name, content, compensator, stated, threshold)
     if wrong := [check for check in found if not check.holds]:
         raise RequirementError(
             f"the file for {device.name} does not hold as it is read back, so it is not written: {wrong[0].name}: "

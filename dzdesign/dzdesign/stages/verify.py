@@ -1,8 +1,8 @@
 """`verify`: firmware, or another output, -> evidence."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,15 +13,14 @@ from dzdesign.core.options import CHECKS, AnyPath, Option, Paths, Texts, flag_of
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.core.units import parse_quantity
 from dzdesign.stages.recordings import expand
-from dzdesign.terminal.progress import say, stage_progress, with_bar
+from dzdesign.terminal.progress import say, stage_progress
 
 if TYPE_CHECKING:
     from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.identify.valve.model import ValveModel
-    from dzdesign.verify.evidence import MutationScore
-    from dzdesign.verify.firmware.reproduced import Regenerated
-    from dzdesign.verify.outputs.dispatch import OutputVerification
+    from dzdesign.verify.folder import Regenerated
+    from dzdesign.verify.outputs.verification import OutputVerification
     from dzdesign.verify.requirements import Check
     from dzdesign.verify.verification import Verification
 
@@ -84,7 +83,7 @@ def verify(arguments: VerifyArguments) -> "Verification | OutputVerification":
         If a file can't be read, or there is no C compiler. A requirement that does not hold is not an error: see
         ``holds``. Code that was edited by hand is not run.
     """
-    from dzdesign.verify.outputs.folder import holds_output
+    from dzdesign.verify.folder import holds_output
 
     with _firmware_folder(arguments.firmware) as folder:
         if holds_output(folder):
@@ -104,30 +103,18 @@ def verify_output_folder(
     folder: Path, arguments: VerifyArguments, identified: "ValveModel | None" = None
 ) -> "OutputVerification":
     """Verify an output other than a C firmware; `identified` is as in `verify_firmware`."""
-    from dzdesign.codegen.integers.law import forms_of
     from dzdesign.regeneration import regenerated
-    from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
-    from dzdesign.verify.firmware.folder import read_compensator
-    from dzdesign.verify.outputs.dispatch import SCHEMA, kind_for, output_evidence_files, verify_output
-    from dzdesign.verify.outputs.folder import read_output_manifest
+    from dzdesign.verify.outputs.verification import SCHEMA, check_kind, output_evidence_files, verify_output
     from dzdesign.verify.verification import evidence_manifest
 
-    given = [flag_of(name) for name in OF_FIRMWARE if getattr(arguments, name)]
     if arguments.output is not None:
         check_folder_may_be_written(Path(arguments.output), SCHEMA)
-    recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
-    kind_for(folder, given)
+    ramps = _ramp_checks(folder, arguments, identified)
+    check_kind(folder, [flag_of(name) for name in OF_FIRMWARE if getattr(arguments, name)])
     with stage_progress("designing and generating again"):
         again = regenerated(folder)
     with again.written() as code, stage_progress() as stage:
-        forms = forms_of(read_compensator(folder), read_output_manifest(folder)) if again.files else {}
-        verification = verify_output(folder, given, stage, again, code, forms)
-    added: list[Check] = []
-    if recordings and verification.evidence.inputs:
-        with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
-            compensator = read_compensator(folder)
-            added += [identified_again(compensator, recordings, identified), *inputs_again(compensator, recordings)]
-    verification = replace(verification, evidence=verification.evidence.with_checks(*added))
+        verification = verify_output(folder, stage, again, code, partial(ramps, stage) if ramps else None)
     if arguments.output is not None:
         manifest = evidence_manifest(verification.evidence)
         write_folder(Path(arguments.output), output_evidence_files(verification), manifest)
@@ -158,15 +145,10 @@ def _verify_code(
 ) -> "Verification":
     """Verify a C firmware whose code is compiled and run from a folder of its own."""
     from dzdesign.block_checks import blocks_checked, given_blocks
-    from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
     from dzdesign.report.valve_report import with_report
     from dzdesign.verify.closed_loop.plant import read_plant
     from dzdesign.verify.closed_loop.population import read_tolerances
-    from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
-    from dzdesign.verify.firmware.folder import read_compensator
-    from dzdesign.verify.requirements import REPRODUCED
-    from dzdesign.verify.toolchain.compiled_core import core_answers
-    from dzdesign.verify.verification import evidence_manifest
+    from dzdesign.verify.verification import Asked, evidence_manifest
     from dzdesign.verify.verification import verify as verify_folder
 
     plant, digest = None, None
@@ -174,38 +156,54 @@ def _verify_code(
         plant = read_plant(Path(arguments.plant), say)
         digest = sha256_of(read_bytes(Path(arguments.plant), "plant file"))
         plant_source = plant_source or Path(arguments.plant).name  # how the evidence calls the plant
-    tolerances = read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None
-    backs_MPa = _back_pressures_MPa(texts_of(arguments.back_pressure))
-    include = [Path(place) for place in paths_of(arguments.include)]
-    recordings = GivenFiles.read(arguments.ramps) if paths_of(arguments.ramps) else None
-    block_files = expand(arguments.blocks) if paths_of(arguments.blocks) else []
-    blocks = given_blocks(folder, block_files)
-    ware = arguments.c2000ware
-    added = [check_against_c2000ware(folder, Path(ware), say)] if ware is not None else []
+    ramps = _ramp_checks(folder, arguments, identified)
+    blocks = given_blocks(folder, expand(arguments.blocks) if paths_of(arguments.blocks) else [])
     with stage_progress() as stage:
-        verification = verify_folder(
-            folder, plant, plant_source, digest, tolerances=tolerances, backs_MPa=backs_MPa,
-            include=include, again=again, code=code, say=stage, watch=stage.each,
-        )  # fmt: skip
-    tried = any(check.id != REPRODUCED.id for check in verification.evidence.checks)
-    if recordings and tried:
-        with stage_progress("identifying again" if identified is None else "comparing with the ramp tests"):
-            compensator = read_compensator(folder)
-            added.append(identified_again(compensator, recordings, identified))
-            if verification.evidence.inputs:  # the core compiles and runs
-                added += inputs_again(compensator, recordings, partial(core_answers, code))
-    if blocks and tried:
-        with stage_progress("comparing every input with each of the calibration blocks"):
-            added += blocks_checked(folder, blocks, code)
-    more, mutants = _further_checks(arguments, code, verification) if tried else ([], None)
-    verification = verification.with_checks(*added, *more)
-    if mutants:
-        verification = replace(verification, evidence=replace(verification.evidence, mutants=mutants))
+
+        def of_blocks(_: bool) -> "list[Check]":
+            stage("comparing every input with each of the calibration blocks")
+            return blocks_checked(folder, blocks, code)
+
+        asked = Asked(
+            plant=plant,
+            plant_source=plant_source,
+            plant_sha256=digest,
+            backs_MPa=_back_pressures_MPa(texts_of(arguments.back_pressure)),
+            tolerances=read_tolerances(Path(arguments.tolerances)) if arguments.tolerances is not None else None,
+            include=[Path(place) for place in paths_of(arguments.include)],
+            c2000ware=None if arguments.c2000ware is None else Path(arguments.c2000ware),
+            machine_code=arguments.machine_code,
+            proof=arguments.proof,
+            mutate=arguments.mutate,
+            ramps=partial(ramps, stage) if ramps else None,
+            blocks=of_blocks if blocks else None,
+        )
+        verification = verify_folder(folder, asked, again, code, stage, stage.each)
     if arguments.output is not None:
         output = Path(arguments.output)
         manifest = evidence_manifest(verification.evidence)
         write_folder(output, with_report(verification, folder, output), manifest)
     return verification
+
+
+def _ramp_checks(
+    folder: Path, arguments: VerifyArguments, identified: "ValveModel | None"
+) -> "Callable[[Callable[[str], None], bool], list[Check]] | None":
+    """Return what checks a folder with the recordings that were given, for `say` and whether the core ran."""
+    from dzdesign.reidentification import GivenFiles, identified_again, inputs_again
+    from dzdesign.verify.folder import read_compensator
+
+    if not paths_of(arguments.ramps):
+        return None
+    recordings = GivenFiles.read(arguments.ramps)
+
+    def checks(stage: "Callable[[str], None]", runs: bool) -> "list[Check]":
+        stage("identifying again" if identified is None else "comparing with the ramp tests")
+        compensator = read_compensator(folder)
+        found = [identified_again(compensator, recordings, identified)]
+        return found + (inputs_again(compensator, recordings) if runs else [])
+
+    return checks
 
 
 def _back_pressures_MPa(texts: list[str]) -> list[float] | None:
@@ -234,30 +232,3 @@ def _firmware_folder(firmware: "Firmware | Output | AnyPath") -> Iterator[Path]:
         folder = temporary / "firmware"
         write_folder(folder, firmware.contents, firmware.manifest)
         yield folder
-
-
-def _further_checks(
-    arguments: VerifyArguments, folder: Path, verification: "Verification"
-) -> tuple[list["Check"], "MutationScore | None"]:
-    """Return the checks that were asked for beside those of every verification, and what came of the mutants."""
-    checks: list[Check] = []
-    if arguments.machine_code:
-        from dzdesign.verify.analysis.machine_code import machine_code_checks
-
-        with stage_progress("comparing the machine code of other processors with the exact law, in simulators"):
-            checks += machine_code_checks(folder, verification.evidence.inputs)
-    if arguments.proof:
-        from dzdesign.verify.analysis.frama_c import proof_check
-
-        with stage_progress("reading the core's C for all inputs, with Frama-C: some minutes"):
-            checks.append(proof_check(folder))
-    if not arguments.mutate:
-        return checks, None
-    from dzdesign.verify.analysis import mutation
-
-    bench = mutation.MutationBench(folder)
-    mutants = mutation.all_mutants(bench)
-    say(f"checking the core with {len(mutants)} faults, one at a time")
-    bench.check_original()
-    found = mutation.mutation_score(mutation.judge_all(bench, mutants, lambda work: with_bar(work, "mutants")))
-    return [*checks, mutation.mutation_check(found)], found

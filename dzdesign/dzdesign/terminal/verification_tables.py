@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dzdesign.identify.valve.model import ValveModel
     from dzdesign.verify.evidence import MutationScore
     from dzdesign.verify.loop_results import PressureResult, ScenarioResult
-    from dzdesign.verify.outputs.dispatch import OutputVerification
+    from dzdesign.verify.outputs.verification import OutputVerification
     from dzdesign.verify.verification import Verification
 
 
@@ -25,7 +25,7 @@ def _percent(share: float) -> str:
 
 def print_verification(verification: "Verification", console: "Console | None" = None) -> None:
     """Print every check, what was not tried, and the closed loop per pressure drop."""
-    from dzdesign.verify.untried import label_of_untried, untried_requirements
+    from dzdesign.verify.verification import label_of_untried, untried_requirements
 
     console = console or new_console()
     for check in verification.evidence.checks:

@@ -23,10 +23,8 @@ from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.design.side_law import SideLaw
 from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
 from dzdesign.verify.closed_loop.ramps import Curves, read_curves
-from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.firmware.folder import read_compensator
-from dzdesign.verify.firmware.reproduced import added_files
-from dzdesign.verify.output_evidence import OutputEvidence
+from dzdesign.verify.evidence import Evidence, OutputEvidence
+from dzdesign.verify.folder import added_files, read_compensator
 
 #: Role of an artefact -> what it is called, and its type, from the evidence back to the recordings.
 ROLES: Mapping[str, tuple[str, type[Artefact]]] = {

@@ -16,8 +16,7 @@ from dzdesign.design.output_manifest import OutputManifest, setting_words
 from dzdesign.report.artefacts import Chain
 from dzdesign.report.cells import Cell, counted, table_of, verdict, whole
 from dzdesign.report.page import Headline, MadeOutput, MadeOutputs, Section
-from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.output_evidence import OutputEvidence
+from dzdesign.verify.evidence import Evidence, OutputEvidence
 
 FIRMWARE, OUTPUT = (family_of(schema_of(kind)) for kind in (FirmwareManifest, OutputManifest))
 MANIFESTS: tuple[type[FirmwareManifest | OutputManifest], ...] = (FirmwareManifest, OutputManifest)
@@ -95,7 +94,7 @@ def _with_evidence(output: MadeOutput, places: Sequence[Path]) -> MadeOutput:
         if manifest and not _is(path, manifest["files"].get(path.name, "")):
             raise InputError(f"'{name}' was changed since `dzdesign verify` wrote it; run that again")
         evidence: Evidence | OutputEvidence = read_artefact(read_bytes(path, "evidence"), EVIDENCE, name)
-        checks = evidence.all_checks if isinstance(evidence, Evidence) else evidence.checks
+        checks = evidence.checks
         worst = min(checks, key=lambda check: COUNTS_FIRST.index(check.holds))
         inputs = sum(each.inputs for each in evidence.inputs)
         fault = "" if worst.holds else f"{worst.name}: {worst.text}"

@@ -23,7 +23,7 @@ from dzdesign.verify.closed_loop.loop_checks import in_which_runs
 from dzdesign.verify.evidence import Evidence, InputCheck
 from dzdesign.verify.loop_results import PressureResult, ScenarioResult
 from dzdesign.verify.requirements import Check
-from dzdesign.verify.untried import not_tried
+from dzdesign.verify.verification import not_tried
 
 
 def headline(chain: Chain) -> Headline:
@@ -64,7 +64,7 @@ def _verdict(chain: Chain) -> Headline:
                             reasons=reasons)  # fmt: skip
         what = "a design" if chain.compensator else "an identified valve"
         return Headline(kind="open", text=f"NOT VERIFIED: there is no evidence here, only {what}")
-    judged = _judged([*evidence.all_checks, *_limits(chain)], chain.compensator)
+    judged = _judged([*evidence.checks, *_limits(chain)], chain.compensator)
     if judged.kind != "good":
         return judged
     absent = "" if chain.firmware else "the firmware that was verified is not here"

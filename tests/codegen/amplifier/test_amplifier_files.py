@@ -17,7 +17,8 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import dead_zones
-from dzdesign.verify.amplifier.checks import SAFE, checks
+from dzdesign.verify.outputs.amplifier import checks
+from dzdesign.verify.requirements import SAFE
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 
 DIGEST = "0123456789abcdef" * 4

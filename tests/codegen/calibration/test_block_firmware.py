@@ -13,9 +13,9 @@ from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.verify.analysis.frama_c import PROGRAM, prove
+from dzdesign.verify.analysis.machine_code import PROGRAM, prove
+from dzdesign.verify.current.controller_states import check_states
 from dzdesign.verify.current.current_checks import read_controller
-from dzdesign.verify.current.state_check import check_states
 from dzdesign.verify.exhaustive.drive_check import drive_follows
 from dzdesign.verify.toolchain.host_compiler import STRICT
 from tests.codegen.core.test_misra import findings
@@ -117,11 +117,11 @@ def test_the_current_controller_is_the_exact_one_in_every_state(loop, tmp_path):
     for name, text in texts(block_core_files(built)).items():
         (tmp_path / "core" / name).write_text(text, encoding="utf-8")
     (tmp_path / "calibration.bin").write_bytes(pack(block))
-    found = check_states(loop, read_controller(tmp_path), 60_000)
-    assert found.wrong == 0 and found.states > 60_000, found.first
+    found, _ = check_states(loop, read_controller(tmp_path), 60_000)
+    assert found.wrong == 0 and found.states > 60_000, found.first_wrong
     gain = replace(block, current=replace(block.current, integral=block.current.integral + 1))
     (tmp_path / "calibration.bin").write_bytes(pack(gain))
-    assert check_states(loop, read_controller(tmp_path), 2_000).wrong
+    assert check_states(loop, read_controller(tmp_path), 2_000)[0].wrong
 
 
 #: File of the core, and a fault in it that makes some block's octets do what C leaves undefined.

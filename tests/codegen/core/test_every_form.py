@@ -60,7 +60,7 @@ def test_a_core_is_compiled_once_and_a_wrong_number_is_seen(tmp_path):
         {"tested_to": side.tested_to // 2},
     ):
         octets = pack(replace(block, sides=(block.sides[0], replace(side, **wrong))))
-        found = core.with_block(octets).check(sample, sample=True)
+        found = CompiledCore(folder, -1, octets).check(sample, sample=True)
         assert found.faults and found.object_sha256 == right.object_sha256, wrong
 
 

@@ -12,9 +12,14 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions, options_of
-from dzdesign.verify.exhaustive.drive_check import CompiledDrive, PreparedDrive
+from dzdesign.verify.exhaustive.drive_check import (
+    CompiledDrive,
+    PreparedDrive,
+    memories,
+    tried_commands,
+    tried_pressures,
+)
 from dzdesign.verify.exhaustive.exact_drive import DriveModel
-from dzdesign.verify.exhaustive.fault_model import memories, tried_commands, tried_pressures
 from tests.codegen.core.test_drive import Firmware, compensator_named
 from tests.support.golden_firmware import GOLDENS, golden_compensator
 from tests.support.synthetic import needs_compiler

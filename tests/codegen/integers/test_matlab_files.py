@@ -10,7 +10,7 @@ from dzdesign.codegen.integers.matlab import law_function, note_of, output_files
 from dzdesign.codegen.integers.text import matlab_integer
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.errors import DzdesignError, InputError
-from dzdesign.verify.integers.octave import FLAGS
+from dzdesign.verify.outputs.texts import FLAGS
 from tests.support.example_coil import SENSORS, with_current
 from tests.support.octave import OCTAVE, compensator_of, needs_octave, output_of, written
 from tests.support.paths import GOLDENS, GOLDENS_FULL

@@ -25,7 +25,7 @@ from dzdesign.report.lot.report import report_of_lot
 from dzdesign.report.lot.summary import LotSummary, ValveManifest, ValveOutput
 from dzdesign.report.lot.table import ValveFolder, read_manifest
 from dzdesign.stages import verify as verify_stage
-from dzdesign.verify.output_evidence import TriedInputs
+from dzdesign.verify.evidence import TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
 from tests.dzdesign.batch.test_batch import NOTHING, tree
 from tests.support.many_valves import write_lot

@@ -27,7 +27,7 @@ from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve import estimated_curvature
 from dzdesign.identify.valve.certified_bound import CertifiedBound, largest_excess
 from dzdesign.identify.valve.estimated_curvature import second_differences
-from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
+from dzdesign.verify.exhaustive.zero_command import SaggingBound
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import L_MIN, Truth, synthetic_ramp
 

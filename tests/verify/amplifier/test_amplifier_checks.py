@@ -14,8 +14,9 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import dead_zones, fixed_offset
 from dzdesign.design.lot_valves import LotSide, LotValve
-from dzdesign.verify.amplifier.checks import DEAD_ZONES, READ_BACK, SAFE, checks
-from dzdesign.verify.amplifier.readers import READERS
+from dzdesign.verify.outputs.amplifier import file_checks
+from dzdesign.verify.outputs.amplifier_files import READERS
+from dzdesign.verify.requirements import DEAD_ZONES, READ_BACK, SAFE
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 
 DIGEST = "0" * 64
@@ -40,7 +41,7 @@ def exported(compensator, device):
 
 
 def failed(device, content, compensator, stated):
-    return {check.id for check in checks(device, content, compensator, stated) if not check.holds}
+    return {check.id for check in file_checks(device, content, compensator, stated) if not check.holds}
 
 
 @pytest.mark.parametrize(
@@ -50,7 +51,7 @@ def failed(device, content, compensator, stated):
 def test_a_file_as_written_holds(designs, name, device):
     content, stated = exported(designs[name], device)
     assert failed(device, content, designs[name], stated) == set()
-    assert len(checks(device, content, designs[name], stated)) == 3
+    assert len(file_checks(device, content, designs[name], stated)) == 3
 
 
 @pytest.mark.parametrize(
@@ -107,7 +108,7 @@ def test_a_threshold_below_the_designs_reading_of_zero_is_said(designs, share, s
     threshold = None if share is None else Fraction(share)
     setting = amplifier_setting(designs["one"], device_named("csv"), threshold=threshold)
     content = amplifier_file(setting, designs["one"], DIGEST)
-    _, safe, _ = checks("csv", content, designs["one"], {}, threshold)
+    _, safe, _ = file_checks("csv", content, designs["one"], {}, threshold)
     assert safe.id == SAFE.id and safe.holds
     assert ("the design declares 0.46%" in safe.text) is said
     assert any("flow at zero command is possible" in note and "--threshold" in note

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from dzdesign.command_line.cli import main
-from dzdesign.verify.analysis import frama_c as proof
-from dzdesign.verify.analysis.frama_c import proof_check, prove
+from dzdesign.verify.analysis import machine_code as proof
+from dzdesign.verify.analysis.machine_code import proof_check, prove
 from tests.support.core_variants import firmware
 
 needs_frama_c = pytest.mark.skipif(not shutil.which("frama-c"), reason="needs Frama-C: apt install frama-c-base")

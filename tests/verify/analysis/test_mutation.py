@@ -13,16 +13,17 @@ from dzdesign.core.errors import RequirementError
 from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.verify.analysis import mutation
-from dzdesign.verify.analysis.c_mutants import Mutant, mutants_of
 from dzdesign.verify.analysis.mutation import (
     KILLED,
     REFUSED,
     SAME_OBJECT,
     SAME_OUTPUTS,
     SURVIVED,
+    Mutant,
     MutationBench,
     all_mutants,
     judge_all,
+    mutants_of,
     mutation_check,
     mutation_score,
 )

@@ -33,7 +33,7 @@ from dzdesign.verify.closed_loop.population import (
 )
 from dzdesign.verify.closed_loop.scene import PERIODS, ramp, scenes_of
 from dzdesign.verify.requirements import ZERO_FLOW
-from dzdesign.verify.verification import verify
+from tests.support.evidence import verify
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler

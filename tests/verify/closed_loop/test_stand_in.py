@@ -16,8 +16,7 @@ from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero, plant_is_th
 from dzdesign.verify.closed_loop.ramps import compare_at_pressure
 from dzdesign.verify.closed_loop.stand_in import StandIn, stand_in_of
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary
-from dzdesign.verify.verification import verify
-from tests.support.evidence import pressure_result
+from tests.support.evidence import pressure_result, verify
 from tests.support.synthetic import SHARED, Truth, needs_compiler, synthetic_ramp
 from tests.support.written_firmware import designed, written
 

@@ -13,8 +13,8 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.report.sections.closed_loop import scenarios_table
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.loop_checks import no_flow_at_zero
-from dzdesign.verify.verification import verify
 from tests.identify.fitting.test_zero_flow import L_MIN, WORN, recordings
+from tests.support.evidence import verify
 
 QUICK = RampSequence(rest=1.0, ramp=10.0, top=0.5)
 

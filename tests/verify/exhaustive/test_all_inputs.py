@@ -28,7 +28,7 @@ from dzdesign.verify.exhaustive.test_vectors import (
     differences,
 )
 from dzdesign.verify.exhaustive.zero_command import pressure_drops
-from dzdesign.verify.firmware.folder import read_compensator
+from dzdesign.verify.folder import read_compensator
 from dzdesign.verify.toolchain import machines
 from dzdesign.verify.toolchain.compiled_core import COUNTED, CompiledCore, Findings
 from dzdesign.verify.toolchain.host_compiler import host_compiler

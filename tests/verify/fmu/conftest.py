@@ -3,7 +3,7 @@
 import pytest
 
 from dzdesign.codegen.fmu import files
-from dzdesign.verify.fmu.checks import unpacked
+from dzdesign.verify.outputs.fmu import unpacked
 from tests.support.host_fmus import fmus_of, full_compensator, host_platforms, written
 
 

@@ -10,8 +10,8 @@ import pytest
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
-from dzdesign.verify.fmu import checks
-from dzdesign.verify.fmu.checks import (
+from dzdesign.verify.outputs import fmu as room
+from dzdesign.verify.outputs.fmu import (
     FMU_HOST,
     FmuCore,
     closed_loop_check,
@@ -33,9 +33,9 @@ def prepared(compensator):
 @pytest.fixture(autouse=True)
 def fewer_rows(monkeypatch):
     """Step fewer rows than `verify` does."""
-    monkeypatch.setattr(checks, "PHYSICAL_ROWS", 300)
-    monkeypatch.setattr(checks, "DRIVE_SAMPLES", 900)
-    monkeypatch.setattr(checks, "COURSE", checks.COURSE[:5])
+    monkeypatch.setattr(room, "PHYSICAL_ROWS", 300)
+    monkeypatch.setattr(room, "DRIVE_SAMPLES", 900)
+    monkeypatch.setattr(room, "COURSE", room.COURSE[:5])
 
 
 def sampled(fmu, sign, prepared):
@@ -174,22 +174,22 @@ def test_the_core_of_another_valve_is_found(fmu, compensator, prepared, tmp_path
 
 
 def test_without_fmpy_an_fmu_could_not_be_checked(fmu_folder, compensator, monkeypatch):
-    monkeypatch.setattr(checks, "find_spec", lambda name: None)
+    monkeypatch.setattr(room, "find_spec", lambda name: None)
     manifest = SimpleNamespace(settings={"plant": plant_setting()})
-    (found,) = checks.checks(fmu_folder, manifest, compensator, print).checks
+    (found,) = room.checks(fmu_folder, manifest, compensator, print).checks
     assert found.holds is None and "pip install" in found.text
 
 
 @pytest.mark.slow
 def test_the_checks_of_a_folder(fmu_folder, fmu, compensator, monkeypatch):
     manifest = SimpleNamespace(settings={"plant": plant_setting()})
-    found = checks.checks(fmu_folder, manifest, compensator, lambda text: None)
+    found = room.checks(fmu_folder, manifest, compensator, lambda text: None)
     assert all(check.holds for check in found.checks) and {"fmu-valid", "exact-law", "fmu-closed-loop"} <= {
         check.id for check in found.checks
     }
     assert sum(each.inputs for each in found.inputs) > 4e7 and not sum(each.wrong for each in found.inputs)
-    monkeypatch.setattr(checks, "unpacked", lambda path, place: replace(fmu, binary=None))
-    assert [check.holds for check in checks.checks(fmu_folder, manifest, compensator, print).checks] == [True, None]
+    monkeypatch.setattr(room, "unpacked", lambda path, place: replace(fmu, binary=None))
+    assert [check.holds for check in room.checks(fmu_folder, manifest, compensator, print).checks] == [True, None]
 
 
 @pytest.mark.parametrize("text", ("{", "[]", '{"K_b": 1}', '{"K_a": "x"}', '{"K_a": -1}'))

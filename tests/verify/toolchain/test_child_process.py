@@ -13,9 +13,8 @@ import pytest
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.verify.toolchain import compiled_library
-from dzdesign.verify.toolchain.child_process import numbers_in
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
-from dzdesign.verify.toolchain.machines import HOST
+from dzdesign.verify.toolchain.machines import HOST, numbers_in
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler

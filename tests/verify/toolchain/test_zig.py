@@ -1,16 +1,17 @@
 """Without any C compiler on the path, the wheel `ziglang` serves: verify runs to its end, and holds."""
 
 import importlib.util
-import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from dzdesign.verify.closed_loop.scene import scenes_of
+from dzdesign.verify.compilation import compiles_strictly
+from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
+from dzdesign.verify.folder import read_compensator, read_firmware_manifest
 from dzdesign.verify.toolchain import host_compiler
-from dzdesign.verify.toolchain.host_compiler import LIKE_OTHERS, environment, find_compilers, find_zig, words_of
+from dzdesign.verify.toolchain.host_compiler import LIKE_OTHERS, find_compilers, words_of
 from dzdesign.verify.toolchain.machines import HOST
 
 needs_zig = pytest.mark.skipif(
@@ -62,36 +63,14 @@ def test_the_same_source_is_the_same_object_anywhere(no_compiler, tmp_path, monk
     assert sorted(path.name for path in tmp_path.iterdir()) == ["another", "one"]
 
 
-@needs_zig
-def test_what_is_undefined_builds_no_trap(no_compiler, tmp_path):
-    """Zig's own default traps where nothing is optimized: gcc and clang do not, and neither must the check."""
-    (tmp_path / "shift.c").write_text("int f(int a); int f(int a) { return a << 40 << a; }\n")
-
-    def assembly(*words):
-        subprocess.run([*words, "-w", "-S", "shift.c", "-o", "f.s"], cwd=tmp_path, check=True, env=environment())
-        return (tmp_path / "f.s").read_text()
-
-    assert "ubsan" in assembly(find_zig(), "cc")  # its default, or this test shows nothing
-    ours = assembly(*words_of(find_zig()))
-    assert "f:" in ours and "ubsan" not in ours
-
-
 @pytest.mark.slow
 @needs_zig
-def test_verify_holds_without_a_compiler_on_the_path(firmware_folder, tmp_path):
-    nothing = tmp_path / "nothing"
-    nothing.mkdir()
-    environment = {**os.environ, "PATH": str(nothing)}
-    environment.pop("CC", None)
-    code = "import sys; from dzdesign.command_line.cli import main; sys.exit(main(sys.argv[1:]))"
-    done = subprocess.run(
-        [sys.executable, "-c", code, "verify", str(firmware_folder), "-o", str(tmp_path / "evidence"), "--json"],
-        env=environment, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    document = json.loads(done.stdout)
+def test_every_input_and_the_closed_loop_run_without_a_compiler_on_the_path(no_compiler, firmware_folder):
+    compensator = read_compensator(firmware_folder)
+    inputs = check_all_inputs(firmware_folder)
     # Every command at each difference of two sound pressures, 688 to 4014.
-    (inputs,) = document["inputs"]
-    assert document["holds"] and inputs["wrong"] == 0 and inputs["inputs"] == 4096 * (2 * (4014 - 688) + 1)
-    strict = next(check for check in document["checks"] if check["name"] == "compiles without warnings")
-    assert strict["text"].endswith("-Werror: zig")
+    assert inputs.holds and inputs.wrong == 0 and inputs.inputs == 4096 * (2 * (4014 - 688) + 1)
+    strict = compiles_strictly(firmware_folder, read_firmware_manifest(firmware_folder))
+    assert strict.holds and strict.text.endswith("-Werror: zig")
+    run = scenes_of(firmware_folder, compensator, None)[0].loop.run(np.linspace(0, 1, 5000), 1.0)
+    assert run.q_L_min.max() > 1

@@ -1,10 +1,10 @@
-"""Evidence about one firmware, declared once; it is stored as ``verification.json``.
+"""Evidence about a firmware and about another output, declared once; stored as verification.json and evidence.json.
 
 The checks, the exhaustive comparison and the closed loop fill these classes; the report and the terminal read them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
@@ -12,14 +12,23 @@ from msgspec import Meta
 from dzdesign.core.artefact_types import Artefact, Sha256, quantity
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED
 from dzdesign.design.design_choices import Above
+from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.loop_results import ClosedLoopResult, Count, Population, ScenarioResult, Side, about
-from dzdesign.verify.requirements import ALWAYS, AS_STATED, OF_CURRENT, RAMPS, Check
+from dzdesign.verify.requirements import AS_STATED, RAMPS, Check
 
 Sign = Literal[1, -1]
 Names = tuple[str, ...]
 #: Voltages are bounded so that no arithmetic on them overflows.
 MOST_V = 1e4
+
+
+def missed_in(checks: tuple[Check, ...]) -> str:
+    """Return what does not hold, then what could not be checked; an empty text where everything holds."""
+    missed = [check.name for check in checks if check.holds is False]
+    unknown = [check.name for check in checks if check.holds is None]
+    parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
+    return "; ".join([*parts, *([f"{NOT_CHECKED}: {', '.join(unknown)}"] if unknown else [])])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,7 +209,7 @@ class Evidence(Artefact):
     ]
     holds: Annotated[
         bool,
-        about("Whether every requirement holds. One that could not be checked, or has no check here, does not hold."),
+        about("Whether every requirement holds. One that could not be checked does not hold."),
     ] = field(init=False)
     checks: Annotated[
         tuple[Check, ...], Meta(description="Result of every requirement that was checked.", min_length=1)
@@ -226,26 +235,12 @@ class Evidence(Artefact):
     ] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "holds", all(check.holds for check in self.all_checks))
-
-    @property
-    def all_checks(self) -> tuple[Check, ...]:
-        """All checks. A standard check that is absent here counts as not checked, unless a failure explains it."""
-        if any(check.holds is False for check in self.checks):
-            return self.checks
-        tried = {check.id for check in self.checks}
-        text = "the evidence has no check of it; make it again with `dzdesign verify`"
-        required = ALWAYS if self.current_loop is None else ALWAYS + OF_CURRENT
-        return (*self.checks, *(each.check(holds=None, text=text) for each in required if each.id not in tried))
+        object.__setattr__(self, "holds", all(check.holds for check in self.checks))
 
     @property
     def verdict(self) -> str:
         """The verdict in one sentence: what does not hold, then what could not be checked."""
-        missed = [check.name for check in self.checks if check.holds is False]
-        unknown = [check.name for check in self.all_checks if check.holds is None]
-        parts = [f"{DOES_NOT_HOLD}: {', '.join(missed)}"] if missed else []
-        parts += [f"{NOT_CHECKED}: {', '.join(unknown)}"] if unknown else []
-        return "; ".join(parts) or "Every requirement holds."
+        return missed_in(self.checks) or "Every requirement holds."
 
     @property
     def reservation(self) -> str:
@@ -258,6 +253,58 @@ class Evidence(Artefact):
         stated = AS_STATED if not compared else f"of the lot's other {others} valves {AS_STATED}" if others else ""
         return "; ".join(filter(None, [stated, *self.not_covered]))
 
-    def with_checks(self, *checks: Check) -> "Evidence":
-        """Return the evidence with further requirements."""
-        return replace(self, checks=(*self.checks, *checks))
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TriedInputs:
+    """A set of inputs, each given to the output and compared with the exact law."""
+
+    name: Annotated[str, about("Units of the inputs and sign of the command.")]
+    inputs: Annotated[Count, about("Number of inputs.")]
+    wrong: Annotated[Count, about("Number of answers that are not the exactly rounded law; must be 0.")]
+    outputs_hash: Annotated[str, about("Hash of all answers in order; empty if there were none.")] = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputChecks:
+    """What the room of one kind of output found."""
+
+    checks: tuple[Check, ...]
+    inputs: tuple[TriedInputs, ...] = ()
+    #: Tool that a check used, to its version.
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputEvidence(Artefact):
+    """The evidence about one output, as `dzdesign verify` writes it."""
+
+    FILE_NAME: ClassVar[str] = "evidence.json"
+    schema: Annotated[Literal["dzdesign.output-evidence/1"], about("Name and version of this schema.")] = (
+        "dzdesign.output-evidence/1"
+    )
+    target: Annotated[str, about("Kind of output, as listed by `codegen --list-targets`.")]
+    settings: Annotated[Mapping[str, str], about("Settings of the output, as in its manifest.")]
+    origin: Annotated[FirmwareOrigin, about("Hashes of all files from which the output was made.")]
+    holds: Annotated[bool, about("Whether every requirement holds. One that could not be checked does not hold.")] = (
+        field(init=False)
+    )
+    checks: Annotated[
+        tuple[Check, ...], Meta(description="Result of every requirement that was checked.", min_length=1)
+    ]
+    inputs: Annotated[tuple[TriedInputs, ...], about("Inputs that were tried.")]
+    versions: Annotated[Mapping[str, str], about("Version of each tool that a check used.")]
+    not_covered: Annotated[
+        tuple[str, ...],
+        about("What the verdict does not cover, such as an identified side that the output does not drive."),
+    ] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "holds", all(check.holds for check in self.checks))
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: what does not hold stands before what could not be checked."""
+        if missed := missed_in(self.checks):
+            return missed
+        stated = [] if any(check.id == RAMPS.id for check in self.checks) else [AS_STATED]
+        return "; ".join(["Every requirement holds", *stated, *self.not_covered]) + "."

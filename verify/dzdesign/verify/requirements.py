@@ -1,11 +1,21 @@
-"""Every requirement on a firmware or another output: id, title and how to have it checked; and its result."""
+"""Every requirement on a firmware or another output: id, title and how to have it checked; and its result.
 
+The checks are of rooms that import this module. What runs them stands above them: `verification.REQUIREMENTS` and
+`outputs.verification.REQUIREMENTS` are tuples of `Tried`.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Generic, TypeVar
 
 from msgspec import Meta
 
 from dzdesign.core.verdicts import DOES_NOT_HOLD, HOLDS, NOT_CHECKED
+
+#: How what every run tries is tried; and that of some firmware alone.
+EVERY_RUN, OF_SOME = "`verify`", "`verify` of a firmware "
+IN_BLOCK_FORM, BY_CURRENT = f"{OF_SOME}in block form", f"{OF_SOME}with a current controller"
+Context = TypeVar("Context")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,11 +44,25 @@ class Requirement:
     #: What is required.
     title: str
     #: What to do to have it checked; a command stands in backticks.
-    how: str = "`verify`"
+    how: str = EVERY_RUN
 
     def check(self, *, holds: bool | None, text: str, name: str = "", not_required: tuple[str, ...] = ()) -> Check:
         """Return the result of a check; `name` says which part was tried, such as one processor's machine code."""
         return Check(id=self.id, name=name or self.title, holds=holds, text=text, not_required=not_required)
+
+
+@dataclass(frozen=True, slots=True)
+class Tried(Generic[Context]):
+    """Requirements that one run tries together: what runs, which returns their checks, and when it does."""
+
+    requirements: tuple[Requirement, ...]
+    run: Callable[[Context], Iterable[Check]]
+    when: Callable[[Context], bool]
+
+
+def checks_of(rows: Sequence[Tried[Context]], context: Context) -> tuple[Check, ...]:
+    """Return the checks of all requirements that apply, in their order; a run may find that the next ones do not."""
+    return tuple(check for row in rows if row.when(context) for check in row.run(context))
 
 
 #: The front door designs and generates again; this room, which shares no code with it, compares.
@@ -51,7 +75,9 @@ EXACT_LAW = Requirement(id="exact-law", title="equals the exactly rounded law")
 MONOTONE = Requirement(id="monotone", title="within range and monotone")
 ZERO_COMMAND = Requirement(id="over-compensation", title="no over-compensation in the tested pressure range")
 ABOVE_TESTS = Requirement(id="above-tests", title="the output at zero command above the tests matches the certificate")
-LOT = Requirement(id="over-compensation-of-lot", title="no over-compensation of any valve in the lot")
+LOT = Requirement(
+    id="over-compensation-of-lot", title="no over-compensation of any valve in the lot", how=f"{OF_SOME}for a lot"
+)
 PRESSURE_DIFFERENCE = Requirement(
     id="pressure-difference", title="depends on the pressures only through their difference"
 )
@@ -76,10 +102,12 @@ PRESSURE_INPUTS = Requirement(
     title="the pressure inputs, wired as recorded, give the recorded pressure drop",
     how="`verify --ramps` with the recordings that valve.json was made from",
 )
-BOARD_FILES = Requirement(id="board-files", title="your board files compile")
+BOARD_FILES = Requirement(
+    id="board-files", title="your board files compile", how=f"{OF_SOME}with board files of yours"
+)
 #: Of a firmware in block form.
 OWN_BLOCK = Requirement(
-    id="block-accepted", title="the firmware accepts its calibration block and refuses damaged ones"
+    id="block-accepted", title="the firmware accepts its calibration block and refuses damaged ones", how=IN_BLOCK_FORM
 )
 #: Of a firmware in block form: blocks of other valves than the one that lies in its folder.
 CALIBRATION_BLOCK = Requirement(
@@ -102,6 +130,21 @@ FMU_DRIVE = Requirement(
 )
 FMU_UNITS = Requirement(id="fmu-units", title="inputs in V and MPa give the exact law of their codes")
 FMU_CLOSED_LOOP = Requirement(id="fmu-closed-loop", title="the coupled FMUs behave as the closed loop")
+#: Of amplifiers: `export` checks a file before it writes it, `verify` that of a folder.
+READ_BACK = Requirement(id="amplifier-read-back", title="the file is read back", how="`export`, `verify`")
+SAFE = Requirement(
+    id="amplifier-over-compensation",
+    title="no over-compensation at zero command in the tested pressure range",
+    how="`export`, `verify`",
+)
+DEAD_ZONES = Requirement(
+    id="amplifier-dead-zones",
+    title="the stated dead zones are those of the file's law",
+    how="`export`, `verify`",
+)
+LAW_DEAD_ZONES = Requirement(
+    id="amplifier-law-dead-zones", title="the dead zones stated beside them are those of the design"
+)
 POPULATION = Requirement(
     id="population",
     title="no flow at zero command for random machines within the tolerances",
@@ -116,24 +159,29 @@ LOAD_STEPS = Requirement(
     title="load steps, and readings stuck during one, were tried in the closed loop",
     how="`verify --plant`",
 )
-CURRENT_STATES = Requirement(id="current-controller", title="the current controller equals its exact model")
-CURRENT_MARGINS = Requirement(id="current-margins", title="the current loop is stable at every corner")
-CURRENT_SETTLES = Requirement(id="current-settles", title="the current settles at every corner")
-CURRENT_STEP = Requirement(id="current-step", title="the current follows a step as fast as stated")
+CURRENT_STATES = Requirement(
+    id="current-controller", title="the current controller equals its exact model", how=BY_CURRENT
+)
+CURRENT_MARGINS = Requirement(
+    id="current-margins", title="the current loop is stable at every corner", how=BY_CURRENT
+)
+CURRENT_SETTLES = Requirement(id="current-settles", title="the current settles at every corner", how=BY_CURRENT)
+CURRENT_STEP = Requirement(
+    id="current-step", title="the current follows a step as fast as stated", how=BY_CURRENT
+)
 CURRENT_FAULTS = Requirement(
-    id="current-faults", title="an open, shorted or over-driven coil switches the output off"
+    id="current-faults", title="an open, shorted or over-driven coil switches the output off", how=BY_CURRENT
 )
 CURRENT_VALVE = Requirement(
-    id="current-valve", title="the valve opens at the same command with any coil and supply"
+    id="current-valve", title="the valve opens at the same command with any coil and supply", how=BY_CURRENT
 )
-#: What every `verify` checks, in the order of the report.
-ALWAYS = (
-    REPRODUCED, COMPILES, EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK, DRIVE,
-    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, NATIVE_PLANT,
+#: What one run tries together: every input, the current loop, the closed loop.
+OF_INPUTS = (EXACT_LAW, MONOTONE, ZERO_COMMAND, ABOVE_TESTS, PRESSURE_DIFFERENCE, FALLBACK)
+OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS)
+OF_LOOP = (
+    PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CURRENT_VALVE, NATIVE_PLANT,
 )  # fmt: skip
-#: What every `verify` checks beside it where the drive is by current.
-OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CURRENT_FAULTS, CURRENT_VALVE)
+#: What the closed loop tries beside it, if it is given what that takes.
+OF_GIVEN_LOOP = (OWN_PLANT, LOAD_STEPS, POPULATION)
 #: What a verdict adds where the ramp tests were not there.
 AS_STATED = "thresholds not checked against the recordings"
-#: What is checked if it is asked for.
-OPTIONAL = (RAMPS, MACHINE_CODE, UNDEFINED_BEHAVIOUR, MUTATION)

@@ -1,7 +1,10 @@
-"""`verify`: a firmware folder in, evidence out: strict compilation, every input, closed loop."""
+"""`verify`: a firmware folder in, evidence out: `REQUIREMENTS` is the one list, and it runs.
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+An output other than a C firmware has a list of its own, in `outputs.verification`.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -9,36 +12,228 @@ from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_types import THIS_TOOL, Artefact, SourceFile, as_document, schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
+from dzdesign.core.verdicts import NOT_ASKED_FOR, NOT_CHECKED
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
 from dzdesign.design.pressure_inputs import not_covered
+from dzdesign.verify import requirements
+from dzdesign.verify.analysis import mutation
+from dzdesign.verify.analysis.machine_code import machine_code_checks, proof_check
 from dzdesign.verify.closed_loop.against_cvodes import compare_with_cvodes
 from dzdesign.verify.closed_loop.firmware_loop import FirmwareLoop, Watch, close_the_loop
 from dzdesign.verify.closed_loop.loop import RampSequence
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.population import NOT_DECLARED, Tolerances
 from dzdesign.verify.closed_loop.ramps import Curves, LoopComparison, csv_of, loop_curves
-from dzdesign.verify.closed_loop.scene import scenes_of
+from dzdesign.verify.closed_loop.scene import Scene, scenes_of
+from dzdesign.verify.compilation import (
+    board_compiles,
+    check_against_c2000ware,
+    check_include,
+    check_ware,
+    compiles_strictly,
+)
 from dzdesign.verify.current.current_checks import CurrentChecks, current_checks
-from dzdesign.verify.evidence import Evidence, InputCheck
-from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks
+from dzdesign.verify.evidence import Evidence, InputCheck, MutationScore
+from dzdesign.verify.exhaustive.all_inputs import every_input, input_checks, lot_checked
+from dzdesign.verify.exhaustive.block_check import own_block_accepted
 from dzdesign.verify.exhaustive.drive_check import drive_follows
-from dzdesign.verify.exhaustive.lot_check import lot_checked
-from dzdesign.verify.firmware.compilation import BoardCompiled, board_compiles, check_include, compiles_strictly
-from dzdesign.verify.firmware.folder import read_compensator, read_firmware_manifest
-from dzdesign.verify.firmware.own_block import own_block_accepted
-from dzdesign.verify.firmware.reproduced import (
+from dzdesign.verify.folder import (
     Regenerated,
+    as_generated,
     changed_board_files,
     differing_files,
+    read_compensator,
+    read_firmware_manifest,
     reproduced,
     user_files,
 )
 from dzdesign.verify.loop_results import PlantComparison
-from dzdesign.verify.requirements import EXACT_LAW, Check
+from dzdesign.verify.requirements import EVERY_RUN, OF_SOME, Check, Requirement, Tried, checks_of
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 
 SCHEMA = schema_of(Evidence)
+#: Of a file of the user's: nothing that was generated is there to compare it with.
+REVIEW = "review it, and try it on the machine"
+#: What the front door checks, which may ask `identify` and `codegen`; given whether the core was tried.
+FrontDoor = Callable[[bool], Sequence[Check]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What of a firmware is to be tried, and with what."""
+
+    #: In the closed loop; without one the recorded characteristic stands in for the valve.
+    plant: Plant | None = None
+    #: Name and hash of its file, for the evidence.
+    plant_source: str = ""
+    plant_sha256: str | None = None
+    #: The command over time, and the pressures downstream of the edge.
+    sequence: RampSequence = field(default_factory=RampSequence)
+    backs_MPa: Sequence[float] | None = None
+    #: How many machines are drawn from the declared budget.
+    tolerances: Tolerances | None = None
+    #: Folders with headers of the user's board files, and of C2000Ware.
+    include: Sequence[Path] = ()
+    c2000ware: Path | None = None
+    machine_code: bool = False
+    proof: bool = False
+    mutate: bool = False
+    #: With the ramp tests, and with the calibration blocks of other valves.
+    ramps: FrontDoor | None = None
+    blocks: FrontDoor | None = None
+
+
+@dataclass(slots=True, kw_only=True)
+class Firmware:
+    """A firmware that is being verified: as it is given, and what was found up to now, for what is tried next."""
+
+    folder: Path
+    #: As it is generated now; without it the folder is not compared.
+    again: Regenerated | None
+    #: What is compiled and run.
+    code: Path
+    manifest: FirmwareManifest
+    compensator: Compensator
+    asked: Asked
+    #: Called before each stage; and given the pieces of a long one and their number, to yield each when it is done.
+    say: Callable[[str], None]
+    watch: Watch
+    same: Check | None = None
+    scenes: "Future[tuple[Scene, ...]] | None" = None
+    inputs: tuple[InputCheck, ...] = ()
+    curves: dict[str, Curves] = field(default_factory=dict)
+    current: CurrentChecks = field(default_factory=CurrentChecks)
+    loop: FirmwareLoop = field(default_factory=FirmwareLoop)
+    compared: tuple[PlantComparison, ...] = ()
+    board_not_compiled: str = ""
+    mutants: MutationScore | None = None
+
+    def is_as_generated(self) -> bool:
+        """Tell whether more is tried than its text: of a folder that differs nothing else is."""
+        return as_generated(self.again, self.same)
+
+    def runs(self) -> bool:
+        """Tell whether its core compiles, and every input could be tried."""
+        return bool(self.inputs)
+
+
+# ---- what runs ----
+
+
+def _same(firmware: Firmware) -> list[Check]:
+    firmware.same = reproduced(firmware.folder, firmware.again)
+    return [firmware.same]
+
+
+def _compiles(firmware: Firmware) -> Iterator[Check]:
+    firmware.say("compiling the core with every warning an error")
+    asked, compensator = firmware.asked, firmware.compensator
+    # A compiler's time, not ours.
+    building = ThreadPoolExecutor(1).submit(scenes_of, firmware.code, compensator, asked.plant, asked.backs_MPa)
+    compiles = compiles_strictly(firmware.code, firmware.manifest)
+    firmware.scenes = building if compiles.holds else None
+    yield compiles
+
+
+def _every_input(firmware: Firmware) -> list[Check]:
+    firmware.say("comparing every input with the exact law")
+    compensator = firmware.compensator
+    signs, units = compensator.signals.signs, compensator.valve.recorded_units
+    try:
+        tried = [every_input(firmware.code, sign, compensator) for sign in signs]
+    except RequirementError as error:
+        return [requirements.EXACT_LAW.check(holds=False, text=str(error))]
+    firmware.inputs = tuple(found for found, _ in tried)
+    firmware.curves |= {name: columns for _, curves in tried for name, columns in curves.items()}
+    return [check for each in firmware.inputs for check in input_checks(each, units, both_signs=len(signs) > 1)]
+
+
+def _current(firmware: Firmware) -> Sequence[Check]:
+    firmware.current = current_checks(firmware.code, firmware.compensator, firmware.say)
+    return firmware.current.checks
+
+
+def _closed_loop(firmware: Firmware) -> Iterator[Check]:
+    asked = firmware.asked
+    scenes = firmware.scenes.result() if firmware.scenes else ()
+    firmware.loop = close_the_loop(
+        scenes, firmware.compensator, asked.plant, asked.sequence, asked.tolerances, firmware.say, firmware.watch
+    )
+    firmware.curves = {**loop_curves(firmware.loop.loops), **firmware.curves}
+    yield from firmware.loop.checks
+    firmware.compared, native_plant = compare_with_cvodes(scenes, firmware.say)
+    yield native_plant
+
+
+def _board(firmware: Firmware) -> Sequence[Check]:
+    board = board_compiles(firmware.folder, firmware.manifest, firmware.asked.include)
+    firmware.board_not_compiled = board.not_compiled
+    return board.checks
+
+
+def _machine_code(firmware: Firmware) -> list[Check]:
+    firmware.say("comparing the machine code of other processors with the exact law, in simulators")
+    return machine_code_checks(firmware.code, firmware.inputs)
+
+
+def _proof(firmware: Firmware) -> list[Check]:
+    firmware.say("reading the core's C for all inputs, with Frama-C: some minutes")
+    return [proof_check(firmware.code)]
+
+
+def _mutants(firmware: Firmware) -> list[Check]:
+    bench = mutation.MutationBench(firmware.code)
+    mutants = mutation.all_mutants(bench)
+    firmware.say(f"checking the core with {len(mutants)} faults, one at a time")
+    bench.check_original()
+    judged = mutation.judge_all(bench, mutants, lambda work: firmware.watch(work, len(work)))
+    firmware.mutants = mutation.mutation_score(judged)
+    return [mutation.mutation_check(firmware.mutants)]
+
+
+def _asks(name: str) -> Callable[[Firmware], bool]:
+    return lambda firmware: firmware.is_as_generated() and bool(getattr(firmware.asked, name))
+
+
+#: Every requirement on a firmware, in the order of the report.
+REQUIREMENTS: tuple[Tried[Firmware], ...] = (
+    Tried((requirements.REPRODUCED,), _same, lambda _: True),
+    Tried(
+        (requirements.OWN_BLOCK,),
+        lambda each: own_block_accepted(each.code, each.manifest),
+        Firmware.is_as_generated,
+    ),
+    Tried((requirements.COMPILES,), _compiles, Firmware.is_as_generated),
+    Tried(requirements.OF_INPUTS, _every_input, lambda each: each.scenes is not None),
+    Tried((requirements.LOT,), lambda each: lot_checked(each.inputs, each.compensator), Firmware.runs),
+    Tried((requirements.DRIVE,), lambda each: [drive_follows(each.code, each.compensator)], Firmware.runs),
+    Tried(requirements.OF_CURRENT, _current, Firmware.runs),
+    Tried(requirements.OF_LOOP, _closed_loop, Firmware.runs),
+    Tried((requirements.BOARD_FILES,), _board, Firmware.is_as_generated),
+    Tried(requirements.OF_GIVEN_LOOP, lambda _: (), lambda _: False),  # the closed loop's run tells of them
+    Tried(
+        (requirements.RAMPS, requirements.PRESSURE_INPUTS),
+        lambda each: each.asked.ramps(each.runs()) if each.asked.ramps else (),
+        _asks("ramps"),
+    ),
+    Tried(
+        (requirements.CALIBRATION_BLOCK,),
+        lambda each: each.asked.blocks(each.runs()) if each.asked.blocks else (),
+        _asks("blocks"),
+    ),
+    Tried((requirements.MACHINE_CODE,), _machine_code, _asks("machine_code")),
+    Tried((requirements.UNDEFINED_BEHAVIOUR,), _proof, _asks("proof")),
+    Tried((requirements.MUTATION,), _mutants, _asks("mutate")),
+    Tried(
+        (requirements.C2000WARE,),
+        lambda each: [check_against_c2000ware(each.folder, each.asked.c2000ware or Path(), each.say)],
+        lambda each: each.asked.c2000ware is not None,
+    ),
+)  # fmt: skip
+
+
+# ---- what comes of it ----
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -47,7 +242,7 @@ class Verification(ShownInNotebooks):
 
     #: Every requirement that was tried, with its figures; stored as verification.json.
     evidence: Evidence
-    #: The numbers of the figures by the names of their files: the core's answers over its inputs, and the ramps.
+    #: The numbers of the figures by the names of their files: the law over its inputs, the drive at zero, the ramps.
     curves: Mapping[str, Curves]
     #: The ramps in closed loop, one a side and tested pressure drop.
     loops: tuple[LoopComparison, ...]
@@ -68,20 +263,10 @@ class Verification(ShownInNotebooks):
         parts = [words.removesuffix("."), f"the certificate covers {self.derived.certified_of}"]
         return "; ".join([*parts, *filter(None, [self.evidence.reservation])]) + "."
 
-    def with_checks(self, *checks: Check) -> "Verification":
-        """Return the verification with further requirements."""
-        return replace(self, evidence=self.evidence.with_checks(*checks))
-
 
 def verify(
     folder: Path,
-    plant: Plant | None = None,
-    plant_source: str = "",
-    plant_sha256: str | None = None,
-    sequence: RampSequence | None = None,
-    tolerances: Tolerances | None = None,
-    backs_MPa: Sequence[float] | None = None,
-    include: Sequence[Path] = (),
+    asked: Asked | None = None,
     again: Regenerated | None = None,
     code: Path | None = None,
     say: Callable[[str], None] = lambda _: None,
@@ -89,142 +274,58 @@ def verify(
 ) -> Verification:
     """Verify a firmware folder made by `dzdesign codegen`.
 
-    Without a `plant` the recorded characteristic stands in for the valve in the closed loop. `plant_source` and
-    `plant_sha256` are the name and hash of its file, for the evidence. `tolerances` say how many machines are drawn
-    from the declared budget.
-
-    `sequence` is the command over time, by default 0-10 V in 100 s and back. `backs_MPa` are the pressures downstream
-    of the edge. `include` lists folders with headers of the user's board files.
-
-    `again` is the firmware as it is generated now; without it the folder is not compared. Of a folder that differs
-    nothing else is tried. The code to compile and run is taken from `code`, by default the folder itself. `say` is
-    called before each stage. `watch` receives the pieces of a long stage and their number, and yields each piece when
-    it is done.
+    `again` is the firmware as it is generated now. The code to compile and run is taken from `code`, by default the
+    folder itself. For `say` and `watch` see `Firmware`.
 
     Raises
     ------
     InputError
-        If the folder is not a firmware, or the machine has no C compiler.
+        If the folder is not a firmware, what is asked for does not go with it, or the machine has no C compiler.
     """
-    manifest, compensator = _read(folder, tolerances, include)
+    asked = asked or Asked()
+    firmware = Firmware(
+        folder=folder, again=again, code=code or folder, manifest=read_firmware_manifest(folder),
+        compensator=read_compensator(folder), asked=asked, say=say, watch=watch,
+    )  # fmt: skip
+    _refuse(firmware)
     host_compiler()
-    code = code or folder
-    same = None if again is None else reproduced(folder, again)
-    run, block, board = _Run(), tuple[Check, ...](), BoardCompiled()
-    if again is None or same is None or (again.files and same.holds is not False):
-        say("compiling the core with every warning an error")
-        given = (plant, sequence or RampSequence(), tolerances, backs_MPa)
-        run = _run_core(code, manifest, compensator, given, say, watch)
-        block, board = own_block_accepted(code, manifest), board_compiles(folder, manifest, include)
-    core, current, loop = run.core, run.current, run.loop
-    of_text = (same,) if same else ()
-    checks = (*of_text, *block, *core.checks, *current.checks, *loop.checks, *run.of_plant, *board.checks)
+    checks = checks_of(REQUIREMENTS, firmware)
+    manifest = firmware.manifest
     evidence = Evidence(
         tool=THIS_TOOL,
-        made_from=(_manifest_source(folder),),
+        made_from=manifest_source(folder),
         target=manifest.target,
         changed_board_files=changed_board_files(folder, manifest),
         user_files=user_files(folder, manifest.files),
         differing_files=differing_files(folder, manifest),
-        board_not_compiled=board.not_compiled,
+        board_not_compiled=firmware.board_not_compiled,
         checks=checks,
-        inputs=core.inputs,
-        closed_loop=loop.result(plant, plant_source, plant_sha256, run.compared),
-        scenarios=loop.scenarios,
-        population=loop.population,
-        current_loop=current.result,
-        mutants=None,
-        not_covered=not_covered(compensator),
+        inputs=firmware.inputs,
+        closed_loop=firmware.loop.result(asked.plant, asked.plant_source, asked.plant_sha256, firmware.compared),
+        scenarios=firmware.loop.scenarios,
+        population=firmware.loop.population,
+        current_loop=firmware.current.result,
+        mutants=firmware.mutants,
+        not_covered=not_covered(firmware.compensator),
     )
-    return Verification(
-        evidence=evidence,
-        curves={**loop_curves(loop.loops), **core.curves},
-        loops=loop.loops,
-        derived=compensator if same and same.holds else None,
-    )
+    derived = firmware.compensator if firmware.same and firmware.same.holds else None
+    return Verification(evidence=evidence, curves=firmware.curves, loops=firmware.loop.loops, derived=derived)
 
 
-def _read(
-    folder: Path, tolerances: Tolerances | None, include: Sequence[Path]
-) -> tuple[FirmwareManifest, Compensator]:
-    """Read the firmware's manifest and compensator, and refuse what does not go with them."""
-    manifest = read_firmware_manifest(folder)
-    check_include(include, manifest)
-    compensator = read_compensator(folder)
-    if tolerances and compensator.machine is None:
+def _refuse(firmware: Firmware) -> None:
+    """Refuse what is asked for and does not go with the firmware, or with what else is asked for."""
+    asked = firmware.asked
+    check_include(asked.include, firmware.manifest)
+    if asked.tolerances and firmware.compensator.machine is None:
         raise InputError(NOT_DECLARED)
-    return manifest, compensator
+    if asked.c2000ware is not None:
+        check_ware(firmware.folder, firmware.manifest, asked.c2000ware)
 
 
-def _manifest_source(folder: Path) -> SourceFile:
-    """Return name and hash of the manifest, which has the hashes of all other files."""
+def manifest_source(folder: Path) -> tuple[SourceFile]:
+    """Return name and hash of a folder's manifest, which has the hashes of all other files."""
     digest = sha256_of((folder / MANIFEST_NAME).read_bytes())
-    return SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=digest)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Core:
-    """What trying the core showed; of one that does not compile nothing more."""
-
-    checks: tuple[Check, ...] = ()
-    inputs: tuple[InputCheck, ...] = ()
-    curves: Mapping[str, Curves] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
-    """What the compiled core did: by itself, with its current controller, in the closed loop and beside CasADi."""
-
-    core: _Core = field(default_factory=_Core)
-    current: CurrentChecks = field(default_factory=CurrentChecks)
-    loop: FirmwareLoop = field(default_factory=FirmwareLoop)
-    compared: tuple[PlantComparison, ...] = ()
-    of_plant: tuple[Check, ...] = ()
-
-
-def _run_core(
-    folder: Path,
-    manifest: FirmwareManifest,
-    compensator: Compensator,
-    given: tuple[Plant | None, RampSequence, Tolerances | None, Sequence[float] | None],
-    say: Callable[[str], None],
-    watch: Watch,
-) -> _Run:
-    """Try the core, then the closed loop around it: of a firmware folder only what lies in core/ counts here."""
-    plant, sequence, tolerances, backs_MPa = given
-    # A compiler's time, not ours.
-    building = ThreadPoolExecutor(1).submit(scenes_of, folder, compensator, plant, backs_MPa)
-    core = _try_core(folder, manifest, compensator, say)
-    if not core.inputs:
-        return _Run(core=core)
-    current, scenes = current_checks(folder, compensator, say), building.result()
-    loop = close_the_loop(scenes, compensator, plant, sequence, tolerances, say, watch)
-    compared, native_plant = compare_with_cvodes(scenes, say)
-    return _Run(core=core, current=current, loop=loop, compared=compared, of_plant=(native_plant,))
-
-
-def _try_core(folder: Path, manifest: FirmwareManifest, compensator: Compensator, say: Callable[[str], None]) -> _Core:
-    """Compile the core; then compare every input with the exact law, and the drive with its model."""
-    compiles = compiles_strictly(folder, manifest)
-    if not compiles.holds:
-        return _Core(checks=(compiles,))
-    say("comparing every input with the exact law")
-    signs, units = compensator.signals.signs, compensator.valve.recorded_units
-    try:
-        tried = [every_input(folder, sign, compensator) for sign in signs]
-    except RequirementError as error:
-        return _Core(checks=(compiles, EXACT_LAW.check(holds=False, text=str(error))))
-    inputs = tuple(found for found, _ in tried)
-    return _Core(
-        checks=(
-            compiles,
-            *(check for each in inputs for check in input_checks(each, units, both_signs=len(inputs) > 1)),
-            *lot_checked(inputs, compensator),
-            drive_follows(folder, compensator),
-        ),
-        inputs=inputs,
-        curves={name: columns for _, curves in tried for name, columns in curves.items()},
-    )
+    return (SourceFile(source=f"{folder.name}/{MANIFEST_NAME}", sha256=digest),)
 
 
 def evidence_manifest(evidence: Artefact) -> Mapping[str, object]:
@@ -237,3 +338,38 @@ def evidence_files(verification: Verification) -> dict[str, bytes]:
     """Return the files of the evidence folder: verification.json, and curves to draw."""
     contents = {Evidence.FILE_NAME: to_json_bytes(verification.evidence)}
     return contents | {name: csv_of(columns).encode() for name, columns in verification.curves.items()}
+
+
+# ---- what was not tried ----
+
+
+def untried_requirements(evidence: Evidence) -> tuple[Requirement, ...]:
+    """Return what can be checked of a firmware and was not tried, and how to have it tried."""
+    yours = [f"{name}, which is yours and was changed" for name in evidence.changed_board_files]
+    yours += [f"{name}, which is yours" for name in evidence.user_files]
+    untried = [Requirement(id="user-file", title=title, how=REVIEW) for title in yours]
+    tried, needed = {check.id for check in evidence.checks}, requirements
+    #: Whether those are lacking of which no check tells, and that which makes sense of some firmware alone.
+    lacking = {
+        needed.BOARD_FILES: bool(evidence.board_not_compiled),
+        needed.OWN_PLANT: evidence.closed_loop.plant is None,
+        needed.LOAD_STEPS: not any(each.is_load_step for each in evidence.scenarios),
+        needed.POPULATION: evidence.population is None,
+        needed.PRESSURE_INPUTS: len(evidence.inputs) > 1 and needed.PRESSURE_INPUTS.id not in tried,
+        needed.C2000WARE: evidence.target == "f28335" and needed.C2000WARE.id not in tried,
+        needed.CALIBRATION_BLOCK: False,
+    }
+    for each in (each for row in REQUIREMENTS for each in row.requirements):
+        if lacking.get(each, each.id not in tried and not each.how.startswith(OF_SOME)):
+            untried.append(replace(each, how=evidence.board_not_compiled) if each == needed.BOARD_FILES else each)
+    return tuple(untried)
+
+
+def label_of_untried(requirement: Requirement) -> str:
+    """Return the words for a requirement that was not tried: only what every `verify` checks was to be."""
+    return NOT_CHECKED if requirement.how == EVERY_RUN else NOT_ASKED_FOR
+
+
+def not_tried(evidence: Evidence) -> tuple[str, ...]:
+    """Return the lines of what was not tried, each with the command that would."""
+    return tuple(f"{each.title}: {each.how}" for each in untried_requirements(evidence))

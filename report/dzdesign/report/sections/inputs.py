@@ -59,7 +59,7 @@ def _input_lines(found: InputCheck, units: RecordedUnits) -> list[str]:
 def map_figure(
     curves: Curves, zero: Curves, compensator: Compensator, inputs: InputCheck
 ) -> ReportFigure:
-    """Draw what the core gives against command and pressure drop, and where it falls back or is wrong.
+    """Draw what the core gives against command and pressure drop, and where it falls back.
 
     From input_map_<side>.csv and, for where the valve is over-compensated, zero_command_<side>.csv.
     """
@@ -82,18 +82,18 @@ def map_figure(
     bar.set_label(f"output u_O of the C code ({units.label('V')})")
     bar.outline.set_visible(False)
     bar.add_lines(lines)
-    wrong, fallen = int(grid.wrong.sum()), int(grid.fallen.sum())
+    fallen = int(grid.fallen.sum())
     return to_report_figure(
         figure,
         f"map-{side}",
-        f"What the compiled C puts out for {side} commands, on a coarse grid of the pairs that were checked. "
-        "Hatched: a command or a pressure drop that can't be, where the C code falls back to the safe value. "
-        "Red crosses: points where it is not "
-        f"the exactly rounded law; on this grid {wrong}, of all pairs {whole(inputs.wrong)}. Strip at zero "
-        f"command: green where the output is below the threshold's bound, red and hatched where not ({over} codes).",
+        f"The exactly rounded law for {side} commands, on a coarse grid of the pairs at which the compiled C was "
+        f"compared with it; of all pairs {whole(inputs.wrong)} differ. "
+        "Hatched: a command or a pressure drop that can't be, where the C code falls back to the safe value. Strip at "
+        f"zero command: green where the output is below the threshold's bound, red and hatched where not ({over} "
+        "codes).",
         f"Map of the output against command and pressure drop. {whole(inputs.inputs)} pairs checked, "
-        f"{whole(inputs.wrong)} wrong. On the drawn grid {wrong} of {grid.output.size} points are wrong, "
-        f"{fallen} fall back to the safe value; {over} codes are over-compensated at zero command.",
+        f"{whole(inputs.wrong)} wrong. On the drawn grid {fallen} of {grid.output.size} points fall back to the safe "
+        f"value; {over} codes are over-compensated at zero command.",
         csv_of(curves),
     )
 
@@ -101,12 +101,11 @@ def map_figure(
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Grid:
     """What the core gives on a grid: command in percent, pressure drop and output in the units that are shown, and
-    where it is wrong or falls back, each (pressures, commands)."""
+    where it falls back, each (pressures, commands)."""
 
     u: np.ndarray
     dp: np.ndarray
     output: np.ndarray
-    wrong: np.ndarray
     fallen: np.ndarray
 
 
@@ -117,14 +116,13 @@ def _grid_of(curves: Curves, compensator: Compensator, inputs: InputCheck) -> _G
     towards_full = command.direction(sign) * command.span(sign)
     codes, dp_codes = np.unique(curves["command_code"]), np.unique(curves["dp_code"])
     order = np.lexsort((curves["command_code"], curves["dp_code"]))
-    output, error, status = (
-        curves[name][order].reshape(dp_codes.size, codes.size) for name in ("compare", "error", "status")
+    output, status = (
+        curves[name][order].reshape(dp_codes.size, codes.size) for name in ("compare", "status")
     )
     return _Grid(
         u=100 * (codes - command.zero_code) / towards_full,
         dp=units.convert(dp_codes * float(compensator.signals.pressure_a.per_code_MPa), "MPa"),
         output=units.convert(volt * output, "V"),
-        wrong=error != 0,
         fallen=status != 0,
     )
 
@@ -132,7 +130,7 @@ def _grid_of(curves: Curves, compensator: Compensator, inputs: InputCheck) -> _G
 def _draw_map(
     axes: "Axes", grid: _Grid, certified: tuple[float, float], limits: tuple[float, float]
 ) -> "QuadMesh":
-    """Draw the output as colours, the fallback hatched, what is wrong as crosses, the certified interval dashed."""
+    """Draw the output as colours, the fallback hatched, the certified interval dashed."""
     from matplotlib.colors import ListedColormap
 
     mesh = axes.pcolormesh(grid.u, grid.dp, grid.output, cmap="cividis", shading="nearest", rasterized=True)
@@ -143,8 +141,6 @@ def _draw_map(
         axes.contourf(grid.u, grid.dp, grid.fallen.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
     for end in certified:
         axes.axhline(end, color="#ffffff", lw=1.6, ls="--")
-    rows, columns = np.nonzero(grid.wrong)
-    axes.plot(grid.u[columns], grid.dp[rows], "x", color="#ff2d2d", ms=4.5, mew=1.6, zorder=5)
     axes.set(ylim=limits, xlabel="command u_i (% of full)")
     axes.grid(False)
     return mesh

@@ -28,7 +28,7 @@ from dzdesign.report.cells import (
 )
 from dzdesign.report.page import Section
 from dzdesign.verify.evidence import Evidence
-from dzdesign.verify.untried import label_of_untried, untried_requirements
+from dzdesign.verify.verification import label_of_untried, untried_requirements
 
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:

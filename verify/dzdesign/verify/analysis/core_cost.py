@@ -2,16 +2,13 @@
 
 import re
 import subprocess
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.running import run_program
-from dzdesign.verify.analysis.longest_path import WORD, Bound, bounds
-from dzdesign.verify.toolchain.bound_block import block_of
 from dzdesign.verify.toolchain.compiled_core import embedded
-from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, PROGRAMS, Machine
+from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4, PROGRAMS, Machine, block_of
 
 PROGRAM = "core_cost.c"
 #: Sources of law and drive, and of the check of a block.
@@ -40,23 +37,15 @@ class BlockCost:
     #: Of each of `CALLS` the most that was counted with this block, then with every drive function on, then with the
     #: longest shifts of its divisions too, as far as the firmware's check takes such a block.
     hardest: tuple[int, int, int]
-    #: The most of any block, over all paths of the machine code; or why there is no bound.
-    bounds: tuple[Bound, Bound, Bound] | str
 
     def words(self, unit: str) -> str:
         """The figures as a sentence has them."""
         hardest = ", ".join(f"{name} {most}" for name, most in zip(CALLS, self.hardest, strict=True))
-        text = (
+        return (
             f"the check of a block takes {self.check_flash_bytes} bytes of flash, {self.check_ram_bytes} of RAM, "
             f"{self.check_stack_bytes} of stack and {self.check_count} {unit}, the block {self.block_bytes} bytes; "
             f"most {unit} counted with this block and with the drive functions on that it leaves off: {hardest}"
         )
-        if isinstance(self.bounds, str):
-            return f"{text}; of any block: {self.bounds}"
-        each = ", ".join(f"{name} {bound.instructions}" for name, bound in zip(CALLS, self.bounds, strict=True))
-        stack = max(bound.stack_bytes for bound in self.bounds)
-        text += f"; with any block, over all paths of the machine code: {each}"
-        return f"{text}, {stack} bytes of stack, no recursion"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +117,6 @@ def core_cost(folder: Path, machine: Machine) -> CoreCost:
         check_count=count,
         block_bytes=len(block),
         hardest=(comp, sample, tick),
-        bounds=_bounds(machine, objects.values(), core),
     )
     return replace(cost, block=of_block, stack_bytes=max(numbers[2::3] + other[2::3]))
 
@@ -147,24 +135,6 @@ def _counted(machine: Machine, core: dict[str, bytes], objects: dict[str, Path],
     if len(printed) != 1 or len(printed[0]) != expected:
         raise RequirementError(f"{what} on the {machine.name} reported {printed[:1]}, expected {expected} numbers")
     return printed[0]
-
-
-def _bounds(machine: Machine, objects: Iterable[Path], core: dict[str, bytes]) -> tuple[Bound, Bound, Bound] | str:
-    """Return the most of each call over all paths of the machine code, of both signs' laws the greater; or why not."""
-    if machine.small:
-        return "no bound, as a shift takes cycles by its places"
-    program = machine.compiler.replace("gcc", "objdump")
-    text = "".join(_printed(program, "-dr", "--no-show-raw-insn", str(each)) for each in objects)
-    laws = [f"dz_comp{ending}" for ending in ("", "_negative") if f"dz_comp{ending}(".encode() in core["dz_comp.c"]]
-    try:
-        found = bounds(text, [*laws, *CALLS[1:]])
-    except RequirementError as error:
-        return str(error)
-    return (
-        Bound(*(max(getattr(found[name], each) for name in laws) for each in Bound.__slots__)),
-        replace(found[CALLS[1]], stack_bytes=found[CALLS[1]].stack_bytes + WORD),  # its fifth argument
-        found[CALLS[2]],
-    )
 
 
 def _counting(machine: Machine) -> Machine:

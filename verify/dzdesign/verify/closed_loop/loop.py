@@ -15,8 +15,8 @@ from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant, numbers_of, step_header
 from dzdesign.verify.closed_loop.stand_in import StandIn
 from dzdesign.verify.current.coil import CoilLoop, coil_sources
-from dzdesign.verify.toolchain.bound_block import core_sources
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
+from dzdesign.verify.toolchain.machines import core_sources
 
 #: Periods of the PWM between two records: 100 a second, as in the paper's tests.
 PERIODS_PER_RECORD = 25

@@ -24,8 +24,7 @@ from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, ZeroDrives, dr
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RECORD_S
 from dzdesign.verify.closed_loop.plant import LONGEST_KEY
 from dzdesign.verify.closed_loop.scene import DECIMALS, SETTLE_S, Scene
-from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
-from dzdesign.verify.exhaustive.zero_command import Staircase, guarded_bounds
+from dzdesign.verify.exhaustive.zero_command import SaggingBound, Staircase, guarded_bounds
 from dzdesign.verify.loop_results import Population, Side
 
 #: Of one opening and closing, s: full command is held, closed quickly while the valve still is open, then slowly, so

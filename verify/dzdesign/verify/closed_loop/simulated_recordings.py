@@ -17,7 +17,7 @@ from dzdesign.design.signals import Signals
 from dzdesign.identify.reading.ramp_files import SIMULATED_MARK, ramp_file_bytes
 from dzdesign.verify.closed_loop.loop import RECORD_S, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import PWM_PERIOD_S, Plant
-from dzdesign.verify.firmware.folder import check_firmware_inside, read_compensator
+from dzdesign.verify.folder import check_firmware_inside, read_compensator
 
 #: Beginning of a series, in its time stamps; any day serves, and the same day gives the same bytes.
 SERIES_BEGINS = datetime.datetime(2026, 1, 1, 8)

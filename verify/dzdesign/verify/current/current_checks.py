@@ -21,8 +21,7 @@ from dzdesign.verify.requirements import (
     MACHINE_CODE,
     Check,
 )
-from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, VALVE_HEADER, bound_files
-from dzdesign.verify.toolchain.machines import Machine
+from dzdesign.verify.toolchain.machines import BLOCK_HEADER, VALVE_HEADER, Machine, bound_files
 
 #: States that every verification compares: a second's work.
 STATES = 10_000_000

@@ -1,20 +1,20 @@
 """The compiled drive against its model, tick by tick: outputs and state, over corners and random samples."""
 
 import copy
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel
-from dzdesign.verify.exhaustive.fault_model import Memory, every_memory
 from dzdesign.verify.requirements import DRIVE, Check
-from dzdesign.verify.toolchain.bound_block import bound_files
-from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, stored
+from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, bound_files, stored
 
 #: Codes of command, pressure A and pressure B.
 Codes = tuple[int, int, int]
@@ -27,8 +27,21 @@ INVALID = 65535
 PLAYED_SHIFTED, PLAYED_STRIDE = 8192, 61
 FIELDS = ("compare_a", "compare_b", "status", "law", "side", "ticks", "at_rest", "rising", "played", "ramped",
           "valid_commands", "valid_pressures", "faulty_commands", "faulty_pressures")  # fmt: skip
+#: Up to so many samples of debounce every state is tried; beyond that those about the ends.
+EVERY_UP_TO = 40
+#: Sound and faulty samples that are remembered of the command, then of the pressures.
+Memory = tuple[int, int, int, int]
 #: Most samples at zero command in a row among the random ones, for an interlock that waits for them.
 MOST_AT_ZERO = 60
+
+
+class Sample(NamedTuple):
+    """Codes of a sample, and what is put before it: the ramp's place, a `state_word` and the memory of faults."""
+
+    codes: Codes
+    place: int = STAYS
+    word: int = STAYS
+    memory: Memory | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,8 +104,8 @@ def ramp_places(compensator: Compensator, seed: int, count: int) -> list[int]:
     return [place() if rng.random() < PUT_SHARE else STAYS for _ in range(count)]
 
 
-def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
-    """Return samples, each with the ramp's place: from either end to the window's edges, where the side changes."""
+def window_samples(compensator: Compensator, used: Memory) -> list[Sample]:
+    """Return samples from either end to the window's edges, where the side changes, both channels being `used`."""
     functions, command = compensator.drive_functions, compensator.signals.command
     sensors = (compensator.signals.pressure_a, compensator.signals.pressure_b)
     p_a, p_b = (sum(sensor.valid_codes) // 2 for sensor in sensors)
@@ -104,12 +117,12 @@ def window_samples(compensator: Compensator) -> list[tuple[Codes, int]]:
         for step in (-1, 0, 1):
             for away in (far, sign * max(functions.leave_zero_codes + step, 0)):
                 code = command.zero_code + command.direction(1) * away
-                made.append(((code, p_a, p_b), away * STEP_UNIT if ramps else STAYS))
+                made.append(Sample((code, p_a, p_b), away * STEP_UNIT if ramps else STAYS, memory=used))
     return made
 
 
-def every_state(compensator: Compensator) -> list[tuple[Codes, int, int]]:
-    """Return every valid command from every state of rest and side: codes, the ramp's place and `state_word`.
+def every_state(compensator: Compensator, used: Memory) -> list[Sample]:
+    """Return every valid command from every state of rest and side, both channels being `used`.
 
     The ramp is put where the command is, so that it does not hold it back. After a command that is not valid the drive
     must be at rest, so one is tried from each state too, and a command between the ends of the zero band behind it.
@@ -136,10 +149,10 @@ def every_state(compensator: Compensator) -> list[tuple[Codes, int, int]]:
             played = max(away + stray, 0)
             code = command.zero_code + command.direction(side) * away
             asked.append((code, state_word(side, rest, rising, played)))
-    return [_with_pressures(compensator, code, word, index) for index, (code, word) in enumerate(asked)]
+    return [_with_pressures(compensator, code, word, index, used) for index, (code, word) in enumerate(asked)]
 
 
-def _with_pressures(compensator: Compensator, code: int, word: int, index: int) -> tuple[Codes, int, int]:
+def _with_pressures(compensator: Compensator, code: int, word: int, index: int, used: Memory) -> Sample:
     """Return a command with valid pressures, ever others, and the ramp's place beside the state."""
     signals, functions = compensator.signals, compensator.drive_functions
     p_a, p_b = (
@@ -148,7 +161,8 @@ def _with_pressures(compensator: Compensator, code: int, word: int, index: int) 
     )
     away = signals.command.direction(1) * (code - signals.command.zero_code)
     place = away if len(signals.signs) == 2 else max(away, 0)
-    return (code, p_a, p_b), place * STEP_UNIT if functions.has_ramp and code != INVALID else STAYS, word
+    ramped = functions.has_ramp and code != INVALID
+    return Sample((code, p_a, p_b), place * STEP_UNIT if ramped else STAYS, word, None if word == STAYS else used)
 
 
 def state_word(side: int, rest: int, rising: int = 0, played: int = 0) -> int:
@@ -161,54 +175,114 @@ def state_of(word: int) -> tuple[int, int, bool, int]:
     return word >> 3 & 63, (word >> 1 & 3) - 1, bool(word & 1), (word >> 9) - PLAYED_SHIFTED
 
 
+def memories(compensator: Compensator) -> Iterator[tuple[int, int]]:
+    """Yield what a channel may remember, (sound, faulty): all of it, of a long debounce all about the ends."""
+    functions = compensator.drive_functions
+    needed = functions.fault_samples
+    counts = list(range(needed + 1))
+    if needed > EVERY_UP_TO:
+        counts = [*range(4), needed // 2, *range(needed - 3, needed + 1)]
+    faulty = counts if functions.fault_latch else [0]
+    for sound, faults in product(counts, faulty):
+        if sound < needed or not faults:  # of a channel that is used no fault is remembered
+            yield sound, faults
+
+
+def tried_commands(compensator: Compensator) -> list[int]:
+    """Return codes on either side of every border of the command's machine: valid or not, zero or not."""
+    command, codes = compensator.signals.command, compensator.drive_functions.interlock_codes or 0
+    low, high = command.valid_codes
+    made = {0, low, low - 1, high, high + 1, command.zero_code, command.full_code, compensator.signals.code_max, 65535}
+    for sign in (1, -1):
+        made |= {command.zero_code + sign * (codes + step) for step in (-1, 0, 1)}
+    return sorted(code for code in made if 0 <= code <= 65535)
+
+
+def tried_pressures(compensator: Compensator) -> list[tuple[int, int]]:
+    """Return pairs of pressure codes on either side of every border of the pressures' machine."""
+    a, b = compensator.signals.pressure_a, compensator.signals.pressure_b
+    middle = (sum(a.valid_codes) // 2, sum(b.valid_codes) // 2)
+    made = {middle, (65535, 65535), (0, 0)}
+    for place, sensor in enumerate((a, b)):
+        low, high = sensor.valid_codes
+        for code in (0, low - 1, low, high, high + 1, 65535):
+            made.add((code, middle[1]) if place == 0 else (middle[0], code))
+    # The plausible difference ends within these codes, whatever the sensors' weights and the side.
+    reverse = compensator.reverse_codes
+    for sign in compensator.signals.signs:
+        for code in range(a.valid_codes[0], a.valid_codes[1] + 1):
+            if abs(compensator.signals.difference(code, middle[1], sign) + reverse) <= 1:
+                made.add((code, middle[1]))
+    return sorted(pair for pair in made if min(pair) >= 0)
+
+
+def every_memory(compensator: Compensator) -> Iterator[Sample]:
+    """Yield samples, each with the memory that it meets.
+
+    Every memory of one channel meets every border of its inputs, the other channel being used, waited for or about to
+    be used; after an invalid command the next must wait, so one of each follows it.
+    """
+    signals, needed = compensator.signals, compensator.drive_functions.fault_samples
+    others, word = [(needed, 0), (0, 0), (needed - 1, 0)], state_word(signals.signs[-1], 0)
+    commands, pressures = tried_commands(compensator), tried_pressures(compensator)
+    sound = next(pair for pair in pressures if _is_sound(compensator, pair))
+    for (memory, other), code in product(product(memories(compensator), others), commands):
+        yield Sample((code, *sound), word=word, memory=(*memory, *other))
+    for (memory, other), pair in product(product(memories(compensator), others), pressures):
+        yield Sample((signals.command.full_code, *pair), word=word, memory=(*other, *memory))
+        yield Sample((signals.command.zero_code, *pair), word=word, memory=(*other, *memory))
+
+
+def _is_sound(compensator: Compensator, pair: tuple[int, int]) -> bool:
+    signals = compensator.signals
+    sensors = (signals.pressure_a, signals.pressure_b)
+    valid = all(
+        sensor.valid_codes[0] <= code <= sensor.valid_codes[1] for sensor, code in zip(sensors, pair, strict=True)
+    )
+    return valid and all(signals.difference(*pair, sign) >= 0 for sign in signals.signs[:1])
+
+
 class PreparedDrive:
     """Samples, and what the model says after every tick."""
 
     def __init__(self, compensator: Compensator, seed: int = SEED, count: int = SAMPLES) -> None:
-        signals = compensator.signals
-        first, put = zip(*window_samples(compensator), strict=True)
-        states_put, memories_put = every_state(compensator), list(every_memory(compensator))
-        drawn = drive_samples(compensator, seed, count)
-        self.samples = [*first, *drawn, *(codes for codes, _, _ in states_put), *(codes for codes, _ in memories_put)]
+        signals, needed = compensator.signals, compensator.drive_functions.fault_samples
+        used = (needed, 0, needed, 0)
+        drawn = zip(drive_samples(compensator, seed, count), ramp_places(compensator, seed, count), strict=True)
+        states_put, memories_put = every_state(compensator, used), list(every_memory(compensator))
+        samples = [*window_samples(compensator, used), *(Sample(*each) for each in drawn), *states_put, *memories_put]
+        self.samples = [each.codes for each in samples]
         #: How many of the samples are taken from a state that was put: every command, from each; and of how many the
         #: memory of faults is.
         self.put, self.memories = len(states_put), len(memories_put)
         self.ticks_per_sample = signals.tick_Hz // signals.sample_Hz
         model = DriveModel(compensator)
         states = [model.state]
-        places = [*put, *ramp_places(compensator, seed, count), *(place for _, place, _ in states_put)]
-        places += [STAYS] * len(memories_put)
-        words = [STAYS] * (len(first) + count) + [word for _, _, word in states_put]
-        words += [state_word(signals.signs[-1], 0)] * len(memories_put)
-        needed = compensator.drive_functions.fault_samples
-        used = (needed, 0, needed, 0)
-        memories: list[Memory | None] = [used] * len(first) + [None] * count
-        memories += [None if word == STAYS else used for _, _, word in states_put]
-        memories += [memory for _, memory in memories_put]
-        for index, codes in enumerate((None, *self.samples)):  # some PWM periods go by before the first sample
-            if codes:
-                if places[index - 1] != STAYS:
-                    model.position = Fraction(places[index - 1], STEP_UNIT)
-                if words[index - 1] != STAYS:
-                    model.rising, model.side, model.at_rest, model.played = state_of(words[index - 1])
-                if memory := memories[index - 1]:
-                    model.commands.sound, model.commands.faulty = memory[:2]
-                    model.pressures.sound, model.pressures.faulty = memory[2:]
-                model.sample(*codes)
+        for each in (None, *samples):  # some PWM periods go by before the first sample
+            if each:
+                _put(model, each)
+                model.sample(*each.codes)
             for _ in range(self.ticks_per_sample):
                 model.tick()
                 states.append(model.state)
-        head = np.array([len(self.samples), self.ticks_per_sample], dtype="<i4")
+        head = np.array([len(samples), self.ticks_per_sample], dtype="<i4")
         codes = np.array(self.samples, dtype="<u2").tobytes()
-        columns = (places, words, *_in_words(memories), states)
+        sound = [STAYS if each.memory is None else each.memory[0] | each.memory[2] << 15 for each in samples]
+        faulty = [STAYS if each.memory is None else each.memory[1] | each.memory[3] << 15 for each in samples]
+        columns = ([each.place for each in samples], [each.word for each in samples], sound, faulty, states)
         numbers = b"".join(np.array(each, dtype="<i4").tobytes() for each in columns)
         self.content = head.tobytes() + codes + bytes(-len(codes) % 4) + numbers
 
 
-def _in_words(memories: list[Memory | None]) -> tuple[list[int], list[int]]:
-    """Return the sound samples, then the faulty ones, of command and pressures in one number each."""
-    sound = [STAYS if each is None else each[0] | each[2] << 15 for each in memories]
-    return sound, [STAYS if each is None else each[1] | each[3] << 15 for each in memories]
+def _put(model: DriveModel, sample: Sample) -> None:
+    """Put the model into the state that a sample begins with."""
+    if sample.place != STAYS:
+        model.position = Fraction(sample.place, STEP_UNIT)
+    if sample.word != STAYS:
+        model.rising, model.side, model.at_rest, model.played = state_of(sample.word)
+    if sample.memory:
+        model.commands.sound, model.commands.faulty = sample.memory[:2]
+        model.pressures.sound, model.pressures.faulty = sample.memory[2:]
 
 
 class CompiledDrive:

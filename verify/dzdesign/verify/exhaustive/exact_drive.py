@@ -2,7 +2,9 @@
 
 Written from what the drive functions are asked for, not from the template: the command is a position in codes that the
 ramps hold back, it counts as zero until it leaves the zero band, the side changes where it does so on the other side,
-the dither is a square wave about the law.
+the dither is a square wave about the law. A fault of an input acts from its first sample on, and is over with the
+declared number of sound samples in a row, the last of which is used again. Where faults are latched, the declared
+number of faulty samples, with no such row between them, stays.
 """
 
 from dataclasses import dataclass, field
@@ -10,10 +12,51 @@ from fractions import Fraction
 from math import floor
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.exhaustive.fault_model import HELD, LATCHED, WAITING, FaultMemory, command_counts_as_zero
 
 #: Seconds and steps of a ramp are held as codes over this.
 STEP_UNIT = 65536
+#: Bits of the drive's status.
+WAITING, HELD, LATCHED = 32, 64, 128
+
+
+@dataclass
+class FaultMemory:
+    """The memory of one channel: the command, or the pressures together."""
+
+    #: Declared: samples of debounce, and whether faults are latched.
+    needed: int
+    latches: bool
+    #: Sound samples in a row up to now, no more than needed; and faulty ones since the channel was last used.
+    sound: int
+    faulty: int = 0
+
+    @property
+    def usable(self) -> bool:
+        """Whether the channel is used."""
+        return self.sound == self.needed
+
+    @property
+    def is_latched(self) -> bool:
+        """Whether only a reset helps."""
+        return self.latches and self.faulty == self.needed
+
+    def take(self, *, fault: bool, unwanted: bool = False) -> None:
+        """Take a sample; one that is sound but `unwanted` is not a fault, and ends a row of sound ones like one."""
+        if fault and self.latches and self.faulty < self.needed:
+            self.faulty += 1
+        if fault or unwanted or self.is_latched:
+            self.sound = 0
+        elif self.sound < self.needed:
+            self.sound += 1
+        if self.usable:
+            self.faulty = 0
+
+
+def command_counts_as_zero(compensator: Compensator, away: int) -> bool:
+    """Tell whether the interlock takes a command, in codes from zero, for zero command; of one sign below zero too."""
+    codes = compensator.drive_functions.interlock_codes
+    distance = abs(away) if len(compensator.signals.signs) == 2 else away
+    return codes is None or distance <= codes
 
 
 @dataclass

@@ -6,6 +6,7 @@ reciprocal is shared with the generated C.
 """
 
 from fractions import Fraction
+from functools import cache
 from math import floor
 from typing import NamedTuple
 
@@ -19,6 +20,9 @@ from dzdesign.verify.loop_results import Side
 
 #: What sensor B's weight is stated over, where the two sensors count unlike (DESIGN: codes of A over 2^12).
 WEIGHT_UNIT = 4096
+#: What dz_beta() multiplies beta by, rounding down; bits of the status.
+BETA_UNIT = 2**15
+COMMAND, PRESSURE_A, PRESSURE_B, DIFFERENCE, ABOVE = 1, 2, 4, 8, 16
 
 
 class Betas(NamedTuple):
@@ -34,6 +38,14 @@ class BetaNumerators(NamedTuple):
     law: np.ndarray
     zero: np.ndarray
     denominator: int
+
+
+class Answer(NamedTuple):
+    """What the law gives for three codes: compare value, status word and beta over 2^15."""
+
+    compare: int
+    status: int
+    beta: int
 
 
 class ExactLaw:
@@ -124,6 +136,23 @@ class ExactLaw:
         (first, start), (last, end) = corners[part : part + 2]
         counts = start + (end - start) * Fraction(away - first, last - first)
         return min(max((counts + Fraction(1, 2)).__floor__(), 0), self.compare_limit)
+
+    def answer(self, u: int, a: int, b: int) -> Answer:
+        """Return what the law gives for any codes of command and sensors."""
+        (a_low, a_high), (b_low, b_high) = self.a.valid_codes, self.b.valid_codes
+        status = COMMAND * (u not in self.sound_commands)
+        status |= PRESSURE_A * (not a_low <= a <= a_high) | PRESSURE_B * (not b_low <= b <= b_high)
+        drop = -self.reverse - 1  # of pressures that can't be right
+        if not status & (PRESSURE_A | PRESSURE_B):
+            drop = int(self.difference(np.array(a), np.array(b)))
+            status |= DIFFERENCE * (drop < -self.reverse) | ABOVE * (drop > self.tested_to)
+        corners, beta = self._at_drop(drop)
+        return Answer(0 if status & COMMAND else self.compare_value(u, corners), status, beta)
+
+    @cache  # noqa: B019 (the cache goes with the few laws of a run)
+    def _at_drop(self, drop: int) -> tuple[list[tuple[int, Fraction]], int]:
+        betas = self.betas(drop)
+        return self.corners(betas), floor(betas.law * BETA_UNIT)
 
     def lines_in_beta(self) -> list[tuple[int, Fraction, Fraction]]:
         """Return the corners as lines in their beta: command, counts at beta 0, counts that a beta of 1 adds."""

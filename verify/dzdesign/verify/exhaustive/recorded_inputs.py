@@ -4,11 +4,8 @@ Neither the direction that `identify` stores nor the one that `design` chose cou
 columns that make the drop of positive commands, and keep them at negative ones, as wires do.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
-from functools import cache
-from math import floor
 
 import numpy as np
 
@@ -19,8 +16,6 @@ from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.requirements import PRESSURE_INPUTS, Check
 
-#: Sign of command and codes (N, 3) of command, A and B -> compare values and status words (N, 2).
-Answers = Callable[[int, np.ndarray], np.ndarray]
 #: A command this far into a side, as a share of its largest, is where the pressure drop is read.
 OPEN = 0.8
 #: A recording shows a side if its command goes that far into it, as a share of full command.
@@ -30,10 +25,6 @@ TWO_SENSORS = {("pA", "pB"), ("dP",)}
 #: Status bits that a sound pressure does not set: sensor A, sensor B, a difference that can't be right.
 PRESSURE_BITS = 2 | 4 | 8
 MPA = 1e6
-#: Bits of the status.
-COMMAND, PRESSURE_A, PRESSURE_B, DIFFERENCE, ABOVE = 1, 2, 4, 8, 16
-#: What the exact law gives for any three codes: compare value, status and beta over 2^15.
-Answer = Callable[[int, int, int], tuple[int, int, int]]
 MOST_NAMED = 3
 
 
@@ -48,10 +39,11 @@ class _Reading:
     a_minus_b_MPa: float
 
 
-def recorded_inputs_follow(compensator: Compensator, tests: Sequence[RampTest], answers: Answers) -> Check:
+def recorded_inputs_follow(compensator: Compensator, tests: Sequence[RampTest]) -> Check:
     """Tell whether a firmware of both signs, wired as recorded, reads the pressure drop of each recording.
 
-    `tests` are the recordings as they were read, and `answers` calls the firmware.
+    `tests` are the recordings as they were read. It is the exact law that answers: the firmware, or another output, was
+    compared with it at every pair of pressures.
     """
     readings = list(_readings(tests, float(compensator.u_max_V)))
     declared = (compensator.options or {}).get("negative_dp")
@@ -60,7 +52,7 @@ def recorded_inputs_follow(compensator: Compensator, tests: Sequence[RampTest], 
         readings = [each for each in readings if each.sign > 0]
     if declared == "swapped":  # of a column above zero on both sides nobody knows which sensor is ahead
         readings = [each for each in readings if each.sign > 0 or each.columns != ("dP",) or each.a_minus_b_MPa < 0]
-    if fault := next(_faults(compensator, readings, answers), ""):
+    if fault := next(_faults(compensator, readings), ""):
         return PRESSURE_INPUTS.check(holds=False, text=one_line(f"{fault}; design again from these recordings"))
     counts = {sign: sum(each.sign == sign for each in readings) for sign in (1, -1)}
     text = (
@@ -93,7 +85,7 @@ def _readings(tests: Sequence[RampTest], u_max_V: float) -> Iterator[_Reading]:
             )
 
 
-def _faults(compensator: Compensator, readings: Sequence[_Reading], answers: Answers) -> Iterator[str]:
+def _faults(compensator: Compensator, readings: Sequence[_Reading]) -> Iterator[str]:
     """Yield what the firmware reads wrong, and a drop that its inputs do not have."""
     units = compensator.valve.recorded_units
     ways = {each.columns for each in readings if each.sign > 0}
@@ -105,31 +97,21 @@ def _faults(compensator: Compensator, readings: Sequence[_Reading], answers: Ans
                 f"'{others[0].source}': the pressure drop was recorded as {others[0].words}, which is no difference of "
                 f"the inputs that read {_words(readings, 1)}"
             )
-        yield from _misread(ExactLaw(compensator, sign), mine, answers, units) if mine else ()
+        yield from _misread(ExactLaw(compensator, sign), mine, units) if mine else ()
 
 
-def _misread(
-    exact: ExactLaw, readings: Sequence[_Reading], answers: Answers, units: RecordedUnits
-) -> Iterator[str]:
-    """Yield the recordings of one side whose pressure drop the firmware does not read."""
-    ends = (exact.zero, exact.zero + exact.along * (exact.span // 2))
-    found = answers(exact.sign, np.array([(u, *_codes(exact, each)) for each in readings for u in ends]))
-    for row, reading in enumerate(readings):
-        drop, expected = _drop_code(exact, reading), []
-        for u in ends:
-            values = [exact.compare_value(u, exact.corners(exact.betas(max(drop + off, 0)))) for off in (-1, 0, 1)]
-            expected.append((min(values), max(values)))
-        both = found[2 * row : 2 * row + 2]
-        right = all(low <= value <= high for (value, _), (low, high) in zip(both, expected, strict=True))
-        status = int(np.bitwise_or.reduce(both[:, 1])) & PRESSURE_BITS
-        if right and not status:
+def _misread(exact: ExactLaw, readings: Sequence[_Reading], units: RecordedUnits) -> Iterator[str]:
+    """Yield the recordings of one side whose pressure drop the law does not read, within a code."""
+    for reading in readings:
+        a, b = _codes(exact, reading)
+        status = exact.answer(exact.zero, a, b).status & PRESSURE_BITS
+        if not status and abs(int(exact.difference(np.array(a), np.array(b))) - _drop_code(exact, reading)) <= 1:
             continue
-        side = "positive" if exact.sign > 0 else "negative"
         drop_text = units.text(abs(reading.a_minus_b_MPa), ".3g MPa")
         below = "below" if reading.a_minus_b_MPa < 0 else "above"
         what = f"reports a failed sensor (status {status})" if status else "reads another pressure drop"
         yield (
-            f"{side} commands of '{reading.source}': input A is {drop_text} {below} input B as recorded "
+            f"{exact.side} commands of '{reading.source}': input A is {drop_text} {below} input B as recorded "
             f"({reading.words}), and the firmware {what}"
         )
 
@@ -155,35 +137,3 @@ def _drop_code(exact: ExactLaw, reading: _Reading) -> int:
 def _words(readings: Sequence[_Reading], sign: int) -> str:
     """Return the columns that make the drop of one sign, as differences of labels."""
     return and_more(list(dict.fromkeys(each.words for each in readings if each.sign == sign)), MOST_NAMED)
-
-
-def exact_answers(compensator: Compensator) -> Callable[[int, np.ndarray], np.ndarray]:
-    """Return what the exact law gives for codes of one sign (N, 3): compare value and status (N, 2)."""
-
-    def answers(sign: int, codes: np.ndarray) -> np.ndarray:
-        answer = exact_answer(ExactLaw(compensator, sign))
-        return np.array([answer(*map(int, row))[:2] for row in codes])
-
-    return answers
-
-
-def exact_answer(exact: ExactLaw) -> Answer:
-    """Return the law of one sign: compare value, status and beta over 2^15 of any three codes."""
-    (a_low, a_high), (b_low, b_high) = exact.a.valid_codes, exact.b.valid_codes
-
-    @cache
-    def at_drop(drop: int) -> tuple[list[tuple[int, Fraction]], int]:
-        betas = exact.betas(drop)
-        return exact.corners(betas), floor(betas.law * 2**15)
-
-    def answer(u: int, a: int, b: int) -> tuple[int, int, int]:
-        status = COMMAND * (u not in exact.sound_commands)
-        status |= PRESSURE_A * (not a_low <= a <= a_high) | PRESSURE_B * (not b_low <= b <= b_high)
-        drop = -exact.reverse - 1  # of pressures that can't be right
-        if not status & (PRESSURE_A | PRESSURE_B):
-            drop = int(exact.difference(np.array(a), np.array(b)))
-            status |= DIFFERENCE * (drop < -exact.reverse) | ABOVE * (drop > exact.tested_to)
-        corners, beta = at_drop(drop)
-        return (0 if status & COMMAND else exact.compare_value(u, corners)), status, beta
-
-    return answer

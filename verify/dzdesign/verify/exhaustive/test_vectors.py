@@ -10,7 +10,7 @@ from math import lcm
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.verify.exhaustive.exact_law import ExactLaw
+from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, ExactLaw
 
 #: Codes beyond the converter's range: the largest that 16 bits hold.
 OUTSIDE = 65535
@@ -23,8 +23,6 @@ SAMPLED_ROWS, SAMPLED_PLACES, SAMPLED_STRIDE = 32, 200, 257
 SPREAD = 40503
 #: Above every numerator of beta.
 KEY = 2**31
-#: What dz_beta() multiplies beta by, rounding down.
-BETA_UNIT = 2**15
 SCALARS = (
     "parts", "codes", "first_code", "code_step", "sound_from", "sound_to", "zero_place", "zero_code", "compare_limit",
     "a_low", "a_high", "b_low", "b_high", "turn", "reverse", "lowest", "safe_law", "safe_at_zero", "rows", "pairs",

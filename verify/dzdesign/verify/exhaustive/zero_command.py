@@ -2,15 +2,18 @@
 
 The bound is argued from the ramp tests again. By monotonicity a threshold that falls with dP is at least the bound of
 any test at a higher dP, one that rises at least that of any test at a lower dP, and of a flat one only the lowest bound
-is known. One of limited curvature sags below the chord of two tests by a parabola at most (`SaggingBound`). A code
-stands for all pressures that may have made it; what of a dither the recordings do not have counts as drive.
+is known. One of limited curvature, whose second divided difference is at most M, sags below the chord of two tests by a
+parabola at most: 2 f[a, x, b] <= M with f(a) >= A and f(b) >= B says, for x = a + s (b - a),
+f(x) >= A + s (B - A) - M (b - a)² s (1 - s) / 2, whose least value over an interval lies at an end, or where its slope
+is zero. A code stands for all pressures that may have made it; what of a dither the recordings do not have counts as
+drive.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import accumulate
-from math import ceil, floor, lcm
+from itertools import accumulate, pairwise
+from math import ceil, lcm
 
 import numpy as np
 
@@ -18,8 +21,68 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
-from dzdesign.verify.exhaustive.sagging_bound import SaggingBound
 from dzdesign.verify.exhaustive.test_vectors import Differences
+
+
+@dataclass(frozen=True, slots=True)
+class _Parabola:
+    """A + B s + C s² from `start` on, s in units of `width`; MPa and V."""
+
+    start: Fraction
+    width: Fraction
+    coefficients: tuple[Fraction, Fraction, Fraction]
+
+    def at(self, share: Fraction) -> Fraction:
+        constant, linear, square = self.coefficients
+        return constant + share * (linear + share * square)
+
+    @property
+    def lowest(self) -> Fraction | None:
+        """Where the slope is zero, as a share; None of a straight line."""
+        _, linear, square = self.coefficients
+        return -linear / (2 * square) if square else None
+
+
+class SaggingBound:
+    """What is known of a threshold of limited curvature, straight for M = 0, over its tested interval."""
+
+    def __init__(self, bounds: LotSide) -> None:
+        nodes = [Fraction(repr(dp)) for dp in bounds.dp_MPa]
+        lower = [Fraction(repr(value)) for value in bounds.u_lower_V]
+        self._parabolas = []
+        for (a, b), (low, high), bend in zip(pairwise(nodes), pairwise(lower), bounds.curvature_V_MPa2, strict=True):
+            sag = Fraction(repr(bend)) * (b - a) ** 2 / 2
+            self._parabolas.append(_Parabola(a, b - a, (low, high - low - sag, sag)))
+
+    def least(self, low_MPa: Fraction, high_MPa: Fraction) -> Fraction:
+        """Return the least value over an interval, as far as tests reach, V; the interval touches the tested one."""
+        return min(value for part in self._parabolas for value in self._values(part, low_MPa, high_MPa))
+
+    @staticmethod
+    def _values(part: _Parabola, low_MPa: Fraction, high_MPa: Fraction) -> Iterator[Fraction]:
+        first, last = ((end - part.start) / part.width for end in (low_MPa, high_MPa))
+        if last < 0 or first > 1:
+            return
+        first, last = max(first, Fraction(0)), min(last, Fraction(1))
+        yield from (part.at(first), part.at(last))
+        if part.lowest is not None and first < part.lowest < last:
+            yield part.at(part.lowest)
+
+    def least_in_doubles(self, low_MPa: np.ndarray, high_MPa: np.ndarray) -> np.ndarray:
+        """Return the same of many intervals in double precision; infinite for one that no test reaches."""
+        found = np.full(low_MPa.shape, np.inf)
+        for part in self._parabolas:
+            start, width = float(part.start), float(part.width)
+            constant, linear, square = map(float, part.coefficients)
+            first, last = (low_MPa - start) / width, (high_MPa - start) / width
+            inside = (last >= 0) & (first <= 1)
+            first, last = np.clip(first, 0, 1), np.clip(last, 0, 1)
+            lowest = np.clip(-linear / (2 * square), first, last) if square else first
+            for share in (first, last, lowest):
+                value = constant + share * (linear + share * square)
+                found = np.where(inside, np.minimum(found, value), found)
+        return found
+
 
 #: Margins that differ by less than this in doubles, V, are compared exactly.
 CLOSE_V = 1e-9
@@ -66,6 +129,10 @@ class PressureDrops:
     most: np.ndarray
     #: (D,): which differences sound codes make.
     made: np.ndarray
+
+    def ends(self, row: int) -> tuple[Fraction, Fraction]:
+        """Return the ends of one difference, MPa."""
+        return Fraction(int(self.least[row]), self.scale), Fraction(int(self.most[row]), self.scale)
 
     def steps_of(self, staircase: Staircase) -> np.ndarray:
         """Return which bound of a staircase is known at each difference, by its place; -1: none."""
@@ -141,29 +208,41 @@ def zero_command_margins(
 def margins_of_drives(
     drops: PressureDrops, at_peak: np.ndarray, unit_V: Fraction, bounds: Sequence[LotSide]
 ) -> list[ZeroCommandMargin | None]:
-    """Return what drives at zero command, in units of `unit_V`, leave to each valve's bounds."""
-    return [
-        _margin(Staircase(each), drops, at_peak, unit_V)
-        if _is_staircase(each)
-        else margin_of_sagging(SaggingBound(each), drops, at_peak, unit_V)
-        for each in bounds
-    ]
+    """Return what drives at zero command, counts of `unit_V`, leave to each valve's bounds.
+
+    By doubles, and exactly where they decide.
+    """
+    return [_margin(drops, at_peak, unit_V, each) for each in bounds]
+
+
+def _margin(drops: PressureDrops, at_peak: np.ndarray, unit_V: Fraction, bounds: LotSide) -> ZeroCommandMargin | None:
+    known_V, exactly = _known(drops, bounds)
+    left_V = np.where(np.isnan(known_V), np.inf, known_V) - float(unit_V) * at_peak
+    if not np.isfinite(left_V).any():
+        return None
+    near = np.flatnonzero((left_V <= left_V.min() + CLOSE_V) | (np.abs(left_V) <= CLOSE_V)).tolist()
+    exact = [(exactly(row) - unit_V * int(at_peak[row]), row) for row in near]
+    margin, place = min(exact)
+    exceeded = int(np.sum(left_V < -CLOSE_V)) + sum(value < 0 for value, at in exact if abs(left_V[at]) <= CLOSE_V)
+    return ZeroCommandMargin(margin_V=margin, dp_MPa=round(float(sum(drops.ends(place)) / 2), 4), exceeded=exceeded)
 
 
 def bounds_at(drops: PressureDrops, bounds: LotSide) -> np.ndarray:
     """Return what is known of a valve's threshold at each difference of codes, V in doubles; NaN where nothing is."""
-    if _is_staircase(bounds):
+    return _known(drops, bounds)[0]
+
+
+def _known(drops: PressureDrops, bounds: LotSide) -> tuple[np.ndarray, Callable[[int], Fraction]]:
+    """Return what is known of a threshold, V: in doubles at each difference, and exactly at one."""
+    if bounds.premise == "monotone" or len(bounds.dp_MPa) == 1:  # all between the tests follows from monotony
         staircase = Staircase(bounds)
         steps = drops.steps_of(staircase)
-        return np.where(steps >= 0, np.array(staircase.bounds_V, dtype=float)[steps], np.nan)
-    least, most = (values.astype(float) / drops.scale for values in (drops.least, drops.most))
-    known = SaggingBound(bounds).least_in_doubles(least, most)
-    return np.where(drops.made & np.isfinite(known), known, np.nan)
-
-
-def _is_staircase(bounds: LotSide) -> bool:
-    """Return whether all that is known between the tests follows from monotony."""
-    return bounds.premise == "monotone" or len(bounds.dp_MPa) == 1
+        values = np.where(steps >= 0, np.array(staircase.bounds_V, dtype=float)[steps], np.nan)
+        return values, lambda row: staircase.bounds_V[int(steps[row])]
+    sagging = SaggingBound(bounds)
+    known = sagging.least_in_doubles(*(each.astype(float) / drops.scale for each in (drops.least, drops.most)))
+    values = np.where(drops.made & np.isfinite(known), known, np.nan)
+    return values, lambda row: sagging.least(*drops.ends(row))
 
 
 def counted_dither(compensator: Compensator) -> int:
@@ -181,41 +260,3 @@ def counted_dither(compensator: Compensator) -> int:
     half_waves = 2 * Fraction(repr(recorded.frequency_Hz)) * functions.dither_ticks / signals.tick_Hz
     other_peak = abs(Fraction(repr(recorded.peak)) * signals.compare_max - functions.dither_counts)
     return ceil(other_peak + functions.dither_counts * abs(1 - half_waves * half_waves)) + max(above, below)
-
-
-def margin_of_sagging(
-    bound: SaggingBound, drops: PressureDrops, at_peak: np.ndarray, unit_V: Fraction
-) -> ZeroCommandMargin | None:
-    """Return what drives, counts of `unit_V`, leave to a bound that sags: by doubles, and exactly where they decide."""
-    least, most = (values.astype(float) / drops.scale for values in (drops.least, drops.most))
-    left_V = np.where(drops.made, bound.least_in_doubles(least, most), np.inf) - float(unit_V) * at_peak
-    if not np.isfinite(left_V).any():
-        return None
-    near = np.flatnonzero((left_V <= left_V.min() + CLOSE_V) | (np.abs(left_V) <= CLOSE_V))
-    exact = []
-    for row in near:
-        ends = Fraction(int(drops.least[row]), drops.scale), Fraction(int(drops.most[row]), drops.scale)
-        exact.append((bound.least(*ends) - unit_V * int(at_peak[row]), int(row)))
-    margin, place = min(exact)
-    exceeded = int(np.sum(left_V < -CLOSE_V)) + sum(value < 0 for value, at in exact if abs(left_V[at]) <= CLOSE_V)
-    middle = Fraction(int(drops.least[place]) + int(drops.most[place]), 2 * drops.scale)
-    return ZeroCommandMargin(margin_V=margin, dp_MPa=round(float(middle), 4), exceeded=exceeded)
-
-
-def _margin(
-    staircase: Staircase, drops: PressureDrops, at_peak: np.ndarray, unit_V: Fraction
-) -> ZeroCommandMargin | None:
-    """Return what drives, counts of `unit_V`, leave to a staircase."""
-    steps, exceeded = drops.steps_of(staircase), 0
-    least: list[tuple[Fraction, int]] = []
-    for place, bound in enumerate(staircase.bounds_V):
-        drive = np.where(steps == place, at_peak, -1)
-        row = int(drive.argmax())
-        if drive[row] >= 0:
-            least.append((bound - unit_V * int(drive[row]), row))
-            exceeded += int(((steps == place) & (at_peak > floor(bound / unit_V))).sum())
-    if not least:
-        return None
-    margin, row = min(least)
-    middle = Fraction(int(drops.least[row]) + int(drops.most[row]), 2 * drops.scale)
-    return ZeroCommandMargin(margin_V=margin, dp_MPa=round(float(middle), 4), exceeded=exceeded)

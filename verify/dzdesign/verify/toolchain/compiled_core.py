@@ -10,9 +10,15 @@ import numpy as np
 from dzdesign.core.artefact_files import sha256_of, sha256_of_octets
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.verify.evidence import InputCounts
-from dzdesign.verify.toolchain.bound_block import BLOCK_HEADER, VALVE_HEADER, block_of, bound_files
-from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
-from dzdesign.verify.toolchain.machines import HOST, PROGRAMS, Machine, stored
+from dzdesign.verify.toolchain.machines import (
+    BLOCK_HEADER,
+    HOST,
+    PROGRAMS,
+    VALVE_HEADER,
+    Machine,
+    block_of,
+    stored,
+)
 
 #: Source of the law, and what the names of its functions end with, by the sign of command.
 SOURCE, ENDINGS = "dz_comp.c", {1: "", -1: "_negative"}
@@ -23,8 +29,6 @@ CALLED = ("comp", "status", "beta")
 #: The check in C, of programs/.
 CHECK = ("every_input.c", "other_codes.c", "every_input.h", "march.h")
 
-#: Of programs/core_answers.c: codes, how many, answers.
-ANSWERS = Function("core_answers", ("in", "uint32_t", "out"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,12 +72,6 @@ class CompiledCore:
         other.sources = {**self.sources, name: text}
         return other
 
-    def with_block(self, block: bytes) -> "CompiledCore":
-        """Return the same core with another calibration block."""
-        other = copy.copy(self)
-        other.block = block
-        return other
-
     def compiled(self, machine: Machine = HOST) -> Path:
         """Return the core's object for a machine: compiled alone, so that nothing of it is inlined into the check."""
         return machine.compile(self.name, self.sources, machine.core_flags, f"the core {self.name}")
@@ -107,18 +105,6 @@ class CompiledCore:
         sources = {**self.sources, BOUND: _read(PROGRAMS / BOUND)}
         flags = (*machine.check_flags, *_defines(held, ("DZ_COMP", "DZ_STATUS", "DZ_BETA"), names))
         return machine.compile(BOUND, sources, flags, "the adapter of the block")
-
-
-def core_answers(folder: Path, sign: int, codes: np.ndarray) -> np.ndarray:
-    """Return compare value and status word of one side, (N, 2), at codes of command and sensors A and B, (N, 3)."""
-    core, ending = CompiledCore(folder, sign), ENDINGS[sign]
-    sources = {**core.sources, f"{ANSWERS.name}.c": _read(PROGRAMS / f"{ANSWERS.name}.c")}
-    texts = {name: text.decode(errors="surrogateescape") for name, text in sources.items()} | bound_files(folder)
-    called = _defines(held=False, macros=("DZ_COMP", "DZ_STATUS"), names=[f"dz_{name}{ending}" for name in CALLED[:2]])
-    library = CompiledLibrary(texts, [ANSWERS], f"the core {core.name}", called)
-    given, found = np.ascontiguousarray(codes, dtype=np.uint16), np.zeros((len(codes), 2), dtype=np.uint16)
-    library.call(ANSWERS.name, given, len(given), found)
-    return found
 
 
 def _defines(held: bool, macros: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:

@@ -18,8 +18,8 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.running import ended_with_this_process, start_watch
-from dzdesign.verify.toolchain.child_process import reason_of
 from dzdesign.verify.toolchain.host_compiler import built, host_compiler, words_of
+from dzdesign.verify.toolchain.machines import reason_of
 
 SERVER = Path(__file__).with_name("library_server.py")
 #: A call that takes longer hangs, s.

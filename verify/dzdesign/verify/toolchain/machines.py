@@ -1,14 +1,20 @@
-"""Programs around the compiled core, on the host, on a Cortex-M4 in QEMU and on an AVR in simavr.
+"""Compiled code in a child process with a time-out: a crash of it is one sentence that names its signal.
+
+Programs around the compiled core, on the host, on a Cortex-M4 in QEMU and on an AVR in simavr.
 
 The core's C is compiled by itself, with nothing of the check in sight, and only linked with it: a black box.
+
+The calibration block of a firmware in block form, and what binds the core to it: in C, for every check's program.
 """
 
 import logging
 import re
 import shlex
+import signal
+import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -16,8 +22,66 @@ from pathlib import Path
 from dzdesign.core.artefact_files import sha256_of_octets
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.processes.programs import find_program
-from dzdesign.verify.toolchain.child_process import numbers_in, run_child
+from dzdesign.core.processes.running import run_program
+from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.verify.toolchain.host_compiler import alone, build_folder, built, host_compiler, words_of
+
+#: Largest number that a program of ours prints has 32 bits; what has more digits is none of ours.
+NUMBERS = re.compile(r"\s*\d{1,10}(?:\s+\d{1,10})*\s*", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ended:
+    """How a program ended, and what it printed."""
+
+    #: Why it did not end well, in words; empty where it did.
+    reason: str
+    printed: str
+    complaint: str
+
+
+def run_child(
+    command: Sequence[str],
+    what: str,
+    timeout_s: float,
+    *,
+    place: Path | None = None,
+    environment: Mapping[str, str] | None = None,
+) -> Ended:
+    """Run a program in a folder and return how it ended; one that does not start or end is a `RequirementError`."""
+    try:
+        done = run_program(command, timeout=timeout_s, cwd=place, env=environment)
+    except subprocess.TimeoutExpired:
+        raise RequirementError(f"{what} did not end within {timeout_s:g} s") from None
+    except OSError as error:
+        raise RequirementError(f"{what} did not start: {error}") from error
+    return Ended(reason=reason_of(done.returncode), printed=done.stdout, complaint=done.stderr)
+
+
+def reason_of(status: int) -> str:
+    """Return why an exit status is not that of a good end, in words; empty where it is.
+
+    Examples
+    --------
+    >>> reason_of(3), reason_of(-11)
+    ('exit status 3', 'signal 11 (SIGSEGV)')
+    """
+    if status >= 0:
+        return f"exit status {status}" if status else ""
+    name = signal.Signals(-status).name if -status in {*signal.Signals} else "unknown"
+    return f"signal {-status} ({name})"
+
+
+def numbers_in(printed: str) -> list[list[int]]:
+    """Return the lines of numbers in what was printed, whatever else there is.
+
+    Examples
+    --------
+    >>> numbers_in("1 22 \\nnot 3\\n4\\n" + 5000 * "9")
+    [[1, 22], [4]]
+    """
+    return [list(map(int, line.split())) for line in printed.splitlines() if NUMBERS.fullmatch(line)]
+
 
 logger = logging.getLogger(__name__)
 
@@ -154,3 +218,51 @@ AVR = Machine(
     small=True,
     run_timeout_s=300.0,
 )
+
+
+#: The struct of the valve's numbers; the numbers themselves, where they stand in the core; and the check of a block,
+#: which only a core has that takes one.
+BLOCK_HEADER, VALVE_HEADER, ACCEPTANCE = "dz_calibration.h", "dz_valve.h", "dz_calibration.c"
+BOUND_HEADER, BOUND_SOURCE = "bound.h", "dz_bound.c"
+WORDS_A_LINE = 12
+
+
+def block_of(folder: Path) -> bytes | None:
+    """Return the octets of a firmware's calibration block; None of a core with the numbers of its valve in it.
+
+    A firmware in block form without one is a `RequirementError`: nothing says what its core computes.
+    """
+    if not (folder / "core" / ACCEPTANCE).exists():
+        return None
+    path = folder / BLOCK_FILE
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RequirementError(
+            f"{path}: can't be read: {error.strerror}; this firmware takes its valve's numbers from a calibration "
+            "block, make it again with `dzdesign codegen --calibration block`"
+        ) from error
+
+
+def bound_files(folder: Path) -> dict[str, str]:
+    """Return what a program is compiled with beside a core in block form; nothing for a core with its valve's numbers.
+
+    That is a header for the program, which calls the core's functions as those of the fixed form, and the block as C.
+    """
+    block = block_of(folder)
+    if block is None:
+        return {}
+    words = [int.from_bytes(block[at : at + 2], "little") for at in range(0, len(block), 2)]
+    lines = [words[at : at + WORDS_A_LINE] for at in range(0, len(words), WORDS_A_LINE)]
+    numbers = "\n".join("    " + " ".join(f"{word}u," for word in line) for line in lines)
+    includes = f'#include "{BLOCK_HEADER}"\n\n#include "{BOUND_HEADER}"\n\n'
+    return {
+        BOUND_HEADER: (PROGRAMS / BOUND_HEADER).read_text(encoding="utf-8"),
+        BOUND_SOURCE: f"{includes}const union dz_bound dz_bound = {{{{\n{numbers}\n}}}};\n",
+    }
+
+
+def core_sources(folder: Path) -> dict[str, str]:
+    """Return the C code of a firmware's core, and what binds one in block form to its block."""
+    core = {path.name: path.read_text(encoding="utf-8") for path in sorted((folder / "core").glob("*.[ch]"))}
+    return {**core, **bound_files(folder)}

@@ -14,8 +14,7 @@ import numpy as np
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.exhaustive.exact_law import Betas, ExactLaw
-from dzdesign.verify.exhaustive.test_vectors import BETA_UNIT
+from dzdesign.verify.exhaustive.exact_law import BETA_UNIT, Betas, ExactLaw
 
 #: Units of a PLC: of command and output in a whole, and of pressure in 1 MPa.
 PER_WHOLE, PER_MPa = 10_000, 100

@@ -1,9 +1,18 @@
-"""Checks of a folder with Structured Text or for MATLAB: the law at every input, evaluated twice and run."""
+"""Checks of a folder with Structured Text or for MATLAB: the law of its text at every input, evaluated and run.
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+`text_values` evaluates the text's own assignments, GNU Octave runs a function for MATLAB, block after block of inputs;
+`every_pair` tries either at every input, and `exact_block` says what it must give.
+"""
+
+import os
+import re
+import subprocess
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial, reduce
+from itertools import count
 from math import lcm
 from pathlib import Path
 
@@ -11,8 +20,12 @@ import numpy as np
 
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.processes.programs import find_program
+from dzdesign.core.processes.running import run_program
+from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.verify.evidence import OutputChecks, TriedInputs
 from dzdesign.verify.exhaustive.all_inputs import input_check, input_checks
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs, differences
@@ -23,25 +36,31 @@ from dzdesign.verify.exhaustive.zero_command import (
     margins_of_drives,
     pressure_drops,
 )
-from dzdesign.verify.integers.every_pair import EveryPair, Program, Tried
-from dzdesign.verify.integers.exact_block import PER_MPa
-from dzdesign.verify.integers.octave import available_octave, running
-from dzdesign.verify.integers.text_values import Overflow, TextValues
-from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
+from dzdesign.verify.outputs.every_pair import STARTED_ANEW, EveryPair, Program, Tried
+from dzdesign.verify.outputs.exact_block import PER_MPa
+from dzdesign.verify.outputs.text_values import Overflow, TextValues
 from dzdesign.verify.requirements import EXACT_LAW, FALLBACK, OVERFLOW, STATES, ZERO_COMMAND, Check
 from dzdesign.verify.toolchain.compiled_core import CompiledCore
+from dzdesign.verify.toolchain.machines import run_child
 
 Say = Callable[[str], None]
 BLOCK, FUNCTIONS = "FB_DeadZone", {1: "dz_comp", -1: "dz_comp_negative"}
 INTERFACES = ("plc", "codes")
 #: What a function block remembers of a new instance.
 FIRST = {"side": "0", "at_rest": "TRUE"}
+#: Of Octave: the program that it runs, and itself, the one without a window first.
+PROGRAM = Path(__file__).parent / "programs" / "answers_of.m"
+NAMES = ("octave-cli", "octave")
+#: No file of the user's or the site's is run, and nothing of the run is kept.
+FLAGS = ("--norc", "--no-init-file", "--no-site-file", "--no-history", "--no-window-system", "--quiet")
+MISSING = "GNU Octave not found; install it (Debian: apt install octave) to have the function itself run"
+#: A block of inputs that takes longer hangs, s; and so many characters of what Octave says are told.
+TIMEOUT_S, LONGEST = 120.0, 300
+OUTPUTS = ("compare", "status", "beta")
 
 
-def block_checks(
-    folder: Path, manifest: OutputManifest, compensator: Compensator, say: Say, forms: Mapping[str, Program]
-) -> OutputChecks:
-    """Check a folder with Structured Text; `forms` are the generator's own evaluations, by the file's name."""
+def block_checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say: Say) -> OutputChecks:
+    """Check a folder with Structured Text."""
     interface = manifest.settings.get("interface", "")
     if interface not in INTERFACES:
         raise InputError(
@@ -51,13 +70,10 @@ def block_checks(
     say("comparing every input of the function block with the exact law")
     name = f"{BLOCK}.st"
     every = EveryPair(compensator, interface, compensator.signals.signs, remembers=True)
-    text = _TriedText(folder, name, "st", every)
-    return text.checks(forms[name])
+    return _TriedText(folder, name, "st", every).checks()
 
 
-def function_checks(
-    folder: Path, manifest: OutputManifest, compensator: Compensator, say: Say, forms: Mapping[str, Program]
-) -> OutputChecks:
+def function_checks(folder: Path, manifest: OutputManifest, compensator: Compensator, say: Say) -> OutputChecks:
     """Check a folder for MATLAB: each function evaluated and run in Octave, and the C code beside it."""
     del manifest  # it has no settings
     octave = available_octave()
@@ -67,7 +83,7 @@ def function_checks(
         say(f"comparing every input of {name} with the exact law")
         every = EveryPair(compensator, "codes", (sign,), remembers=False)
         text = _TriedText(folder, name, "m", every)
-        parts = [text.checks(_of_function(forms[name]))]
+        parts = [text.checks()]
         if octave.path:
             say(f"trying every input of {name} in Octave")
             parts.append(text.in_octave(octave.path))
@@ -112,8 +128,8 @@ class _TriedText:
     language: str
     every: EveryPair
 
-    def checks(self, form: Program) -> OutputChecks:
-        """Evaluate the generator's form and the text itself, and compare both with the exact law."""
+    def checks(self) -> OutputChecks:
+        """Evaluate the text, and compare it with the exact law."""
         content = read_bytes(self.folder / self.name, "text of the law").decode("ascii", "replace")
         of_text: Program
         try:
@@ -130,7 +146,6 @@ class _TriedText:
         fits = f"{len(text.lines)} assignments evaluated as they are written, 0 results beyond their {kind}"
         return OutputChecks(
             checks=(
-                self._compared(form, "the integer form")[0][0],
                 *found[0],
                 self._named(OVERFLOW.check(holds=True, text=fits)),
                 *(self._zero_command(of_text, place) for place in range(len(self.every.laws))),
@@ -142,8 +157,9 @@ class _TriedText:
         """Run the function in Octave on the same inputs."""
         text, name = read_bytes(self.folder / self.name, "text of the law"), self.name.removesuffix(".m")
         try:
+            self.every.at_once = STARTED_ANEW
             with running(path, name, text) as function:
-                checks, inputs = self._compared(_of_function(function.run), f"{self.name} in Octave")
+                checks, inputs = self._compared(_of_function(function), f"{self.name} in Octave")
         except RequirementError as error:
             check = EXACT_LAW.check(holds=False, text=str(error), name=f"{self.name} in Octave: {EXACT_LAW.title}")
             return OutputChecks(checks=(check,))
@@ -231,3 +247,57 @@ class _TriedText:
         kind = np.int64 if max(abs(int(each)) for each in (least[0], most[-1])) < 2**61 else object
         return PressureDrops(scale=scale, least=least.astype(kind), most=most.astype(kind),
                              made=np.ones(values.size, dtype=bool))  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Octave:
+    """Octave on this machine: its path, and as what its version stands in the evidence; or why it can't be run."""
+
+    path: str = ""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    missing: str = ""
+
+
+def available_octave() -> Octave:
+    """Return Octave where it runs."""
+    path = next((found for name in NAMES if (found := find_program(name))), None)
+    if path is None:
+        return Octave(missing=MISSING)
+    try:
+        done = run_program([path, "--version"], timeout=60.0)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return Octave(missing=f"'{path}' does not run: {error}")
+    version = re.search(r"GNU Octave, version (\S+)", done.stdout)
+    if version is None:
+        return Octave(missing=f"'{path} --version' does not say that it is GNU Octave; install it anew")
+    return Octave(path=path, versions={"octave": f"GNU Octave {version[1]}"})
+
+
+@contextmanager
+def running(path: str, name: str, text: bytes) -> Iterator[Program]:
+    """Give a function with this text, run by Octave in a folder of its own and with nothing of the user's.
+
+    It takes codes u, p_a and p_b, which broadcast against each other. One that fails or hangs is a `RequirementError`.
+    """
+    with scratch_folder() as place:
+        (place / f"{name}.m").write_bytes(text)
+        (place / PROGRAM.name).write_bytes(PROGRAM.read_bytes())
+        # It does little linear algebra, and a thread of a library for each core would only wait.
+        own = {"HOME": str(place), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        kept = {each: value for each, value in os.environ.items() if each == "OCTAVE_HOME" or each[:6] != "OCTAVE"}
+        numbers = count()
+
+        def run(given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+            codes, job = np.broadcast_arrays(*(given[each] for each in ("u", "p_a", "p_b"))), next(numbers)
+            asked, answers = place / f"{job}.in", place / f"{job}.out"
+            asked.write_bytes(b"".join(np.ascontiguousarray(each, dtype="<u2").tobytes() for each in codes))
+            command = [path, *FLAGS, PROGRAM.name, name, asked.name, answers.name]
+            ended = run_child(command, f"{name}.m in Octave", TIMEOUT_S, place=place, environment={**kept, **own})
+            octets = answers.read_bytes() if answers.exists() else b""
+            if ended.reason or len(octets) != 2 * len(OUTPUTS) * codes[0].size:
+                said = " ".join(ended.complaint.split())[:LONGEST]
+                raise RequirementError(f"{name}.m gave no answer in Octave: {said or 'it ended before'}")
+            rows = np.frombuffer(octets, dtype="<u2").reshape(len(OUTPUTS), *codes[0].shape)
+            return {each: row.astype(np.int64) for each, row in zip(OUTPUTS, rows, strict=True)}
+
+        yield run

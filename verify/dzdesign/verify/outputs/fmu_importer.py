@@ -1,7 +1,7 @@
 """An FMU in FMPy: what it is, and what is run of it.
 
-Run as a program, ``python -m dzdesign.verify.fmu.importer JOB ANSWER``, in a process that a binary may crash or hang.
-The job is JSON: the name of a function here and its arguments; the answer is the JSON of what it returns.
+Run as a program, ``python -m dzdesign.verify.outputs.fmu_importer JOB ANSWER``, in a process that a binary may crash or
+hang. The job is JSON: the name of a function here and its arguments; the answer is the JSON of what it returns.
 """
 
 import json
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.core.scratch import scratch_folder
-from dzdesign.verify.toolchain.child_process import run_child
+from dzdesign.verify.toolchain.machines import run_child
 
 if TYPE_CHECKING:
     from fmpy.model_description import ModelDescription
@@ -117,7 +117,7 @@ def run_in_child(function: str, what: str, **arguments: Any) -> list[Row]:
     with scratch_folder() as place:
         job, answer = place / "job", place / "answer"
         job.write_text(json.dumps({"function": function, **arguments}), encoding="utf-8")
-        command = [sys.executable, "-P", "-m", "dzdesign.verify.fmu.importer", str(job), str(answer)]
+        command = [sys.executable, "-P", "-m", "dzdesign.verify.outputs.fmu_importer", str(job), str(answer)]
         ended = run_child(command, what, LONGEST_S, place=place)
         if ended.reason:
             said = ended.complaint.strip().splitlines()[-1:] or ["without a word"]

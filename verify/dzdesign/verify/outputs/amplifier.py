@@ -1,24 +1,24 @@
-"""What is checked of an amplifier's file as it is read back: its law at zero command, the dead zones stated of it."""
+"""What is checked of an amplifier's file, as it is read back, and of the table of dead zones beside it in a folder."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from itertools import groupby
+from math import inf
+from pathlib import Path
+from typing import NamedTuple
 
-from dzdesign.core.errors import InputError
+from dzdesign.core.artefact_files import read_bytes
+from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.option_readers import percent
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.costs_at_tests import remaining_dead_zone
+from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.design.signals import SIDE_NAMES
-from dzdesign.verify.amplifier.readers import FileLaw, read_file
-from dzdesign.verify.requirements import Check, Requirement
+from dzdesign.verify.evidence import OutputChecks
+from dzdesign.verify.outputs.amplifier_files import FileLaw, read_file
+from dzdesign.verify.requirements import DEAD_ZONES, LAW_DEAD_ZONES, READ_BACK, SAFE, Check
 
-#: `export` checks a file before it writes it, `verify` that of a folder.
-HOW = "`export`, `verify`"
-READ_BACK = Requirement(id="amplifier-read-back", title="the file is read back", how=HOW)
-SAFE = Requirement(
-    id="amplifier-over-compensation", title="no over-compensation at zero command in the tested pressure range",
-    how=HOW,
-)  # fmt: skip
-DEAD_ZONES = Requirement(
-    id="amplifier-dead-zones", title="the stated dead zones are those of the file's law", how=HOW
-)
 #: Pressure drops between the tests of each side, beside the tests themselves.
 PLACES = 1000
 #: Of command; a threshold is looked for in steps of a quarter of it.
@@ -30,11 +30,14 @@ ROUNDED = 0.51e-6
 EXACT_ZERO = ("rmc", "rmc75")
 #: Devices with one offset, which acts on commands of both signs whatever the design has.
 BOTH_SIGNS = EXACT_ZERO
+#: Of the folder: its table, and a line of it; no command opens the valve where a share is infinite.
+TABLE, HEADER = "dead_zones.csv", "side,dp_MPa,branch,dead_zone_fixed,dead_zone_law"
+LINE = re.compile(r"([a-z]+),(\d{1,9}\.\d{6}),([a-z]+),(\d{1,9}\.\d{6}|inf),(\d{1,9}\.\d{6}|inf)", re.ASCII)
 #: Of one side: pressure drop, MPa, and share of command to the knee by branch.
 Stated = tuple[float, Mapping[str, float]]
 
 
-def checks(
+def file_checks(
     device: str,
     content: bytes,
     compensator: Compensator,
@@ -146,3 +149,84 @@ def _dead_zone(law: FileLaw, threshold: Fraction) -> float:
         reached = law.drive(Fraction(middle, STEPS)) >= threshold
         low, high = (low, middle) if reached else (middle, high)
     return high / STEPS
+
+
+def checks(
+    folder: Path, manifest: OutputManifest, compensator: Compensator, say: Callable[[str], None]
+) -> OutputChecks:
+    """Check a folder for an amplifier: read its file and its table back, and compare them with the valve."""
+    say("reading the file and the table back")
+    try:
+        device = manifest.settings.get("device", "")
+        content = _file_for(folder, manifest, device)
+        threshold = manifest.settings.get("threshold", "")
+        zero = Fraction(repr(percent("0.5 %")(threshold, "threshold in the manifest"))) if threshold else None
+    except InputError as error:
+        return OutputChecks(checks=(READ_BACK.check(holds=False, text=str(error)),))
+    try:
+        rows = read_table(read_bytes(folder / TABLE, "table of dead zones"))
+    except InputError as error:
+        found = [each for each in file_checks(device, content, compensator, {}, zero) if each.id != DEAD_ZONES.id]
+        return OutputChecks(checks=(*found, DEAD_ZONES.check(holds=False, text=str(error))))
+    signs = {SIDE_NAMES[sign]: sign for sign in compensator.signals.signs}
+    stated: dict[int, list[Stated]] = {}
+    for (side, dp_MPa), of_test in groupby(rows, key=lambda row: row[:2]):
+        stated.setdefault(signs.get(side, 0), []).append((dp_MPa, {row.branch: row.fixed for row in of_test}))
+    of_file = file_checks(device, content, compensator, stated, zero)
+    return OutputChecks(checks=(*of_file, _law_dead_zones(rows, compensator)))
+
+
+def _file_for(folder: Path, manifest: OutputManifest, device: str) -> bytes:
+    """Return the one file beside the table, the compensator and git's; it is named after its device."""
+    names = sorted(manifest.files.keys() - {Compensator.FILE_NAME, TABLE, ".gitattributes"})
+    if len(names) != 1 or names[0].partition(".")[0] != device:
+        raise InputError(f"the manifest names {len(names)} files for {quoted(device)}, expected one of its name")
+    return read_bytes(folder / names[0], f"file for {device}")
+
+
+class Row(NamedTuple):
+    """A line of the table: a branch of one test, and the share of command to its knee by both compensations."""
+
+    side: str
+    dp_MPa: float
+    branch: str
+    fixed: float
+    law: float
+
+    def __str__(self) -> str:
+        return f"{self.law:.6f} on {self.branch} at {self.dp_MPa:.6f} MPa of the {self.side} side"
+
+
+def read_table(content: bytes) -> list[Row]:
+    """Return the lines of a table of dead zones; what is none is an `InputError` with the line."""
+    header, *lines = content.decode("ascii", "replace").splitlines() or [""]
+    if header != HEADER:
+        raise InputError(f"{TABLE} begins with {quoted(header)}, expected {HEADER}")
+    rows = []
+    for number, line in enumerate(lines, start=2):
+        found = LINE.fullmatch(line)
+        if found is None:
+            raise InputError(f"{TABLE}, line {number}, is {quoted(line)}, expected {HEADER}, with six decimals")
+        side, dp_MPa, branch, fixed, law = found.groups()
+        rows.append(Row(side, float(dp_MPa), branch, float(fixed), float(law)))
+    return rows
+
+
+def _law_dead_zones(rows: Sequence[Row], compensator: Compensator) -> Check:
+    """Compare every line with the design: its side, test and branch, and the share that the law leaves there."""
+    expected = [
+        Row(SIDE_NAMES[sign], test.dp_MPa or 0.0, branch, inf, share)
+        for sign in compensator.signals.signs
+        for test in compensator.valve.sides[SIDE_NAMES[sign]].tests
+        for branch, share in remaining_dead_zone(compensator, test, sign).items()
+    ]
+    if len(rows) != len(expected):
+        text = f"{len(rows)} lines, expected {len(expected)}: one for each branch of each test"
+        return LAW_DEAD_ZONES.check(holds=False, text=text)
+    for number, (row, wanted) in enumerate(zip(rows, expected, strict=True), start=2):
+        same = row.law == wanted.law or abs(row.law - wanted.law) <= ROUNDED
+        named = (row.side, row.branch) == (wanted.side, wanted.branch) and abs(row.dp_MPa - wanted.dp_MPa) <= ROUNDED
+        if not (named and same):
+            text = f"{TABLE}, line {number}: it states {row}, expected {wanted}"
+            return LAW_DEAD_ZONES.check(holds=False, text=text)
+    return LAW_DEAD_ZONES.check(holds=True, text=f"{len(rows)} lines, one for each branch of each test")

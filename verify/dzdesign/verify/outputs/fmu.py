@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from importlib.resources import files
 from importlib.util import find_spec
 from math import floor, isclose
 from pathlib import Path
@@ -21,14 +20,14 @@ from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify import requirements
 from dzdesign.verify.closed_loop.loop import BENCH_BACK_MPA, ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant
+from dzdesign.verify.evidence import OutputChecks, TriedInputs
 from dzdesign.verify.exhaustive.all_inputs import input_check, input_checks
 from dzdesign.verify.exhaustive.drive_check import drive_samples
 from dzdesign.verify.exhaustive.exact_drive import DriveModel
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs
-from dzdesign.verify.fmu.importer import binary_here, run_in_child
 from dzdesign.verify.loop_results import Side
-from dzdesign.verify.output_evidence import OutputChecks, TriedInputs
+from dzdesign.verify.outputs.fmu_importer import binary_here, run_in_child
 from dzdesign.verify.requirements import Check
 from dzdesign.verify.toolchain.compiled_core import ENDINGS, CompiledCore
 from dzdesign.verify.toolchain.machines import HOST, Machine, stored
@@ -132,7 +131,7 @@ class FmuCore(CompiledCore):
     def __init__(self, fmu: Unpacked, sign: int, binary: bytes) -> None:
         self._ending = ENDINGS[sign]
         self.name, self.block, self._binary = "core_of_fmu.c", None, binary
-        program = Path(str(files("dzdesign.verify.fmu"))) / "programs" / self.name
+        program = Path(__file__).parent / "programs" / self.name
         self.sources = {self.name: program.read_bytes()}
         of_side = {"COMPARE": "compare", "STATUS": "status", "BETA": "beta"}
         names = {name.upper(): name for name in (*CODES, "codes")}

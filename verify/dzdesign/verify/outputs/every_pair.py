@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from dzdesign.design.compensator import Compensator
-from dzdesign.verify.integers.exact_block import ExactBlock
+from dzdesign.verify.outputs.exact_block import ExactBlock
 
 #: Inputs by name -> outputs and what is remembered, by name.
 Program = Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
@@ -25,8 +25,9 @@ State = tuple[np.ndarray, np.ndarray]
 Piece = TypeVar("Piece")
 #: Pressures of a PLC, 0.1 bar, whose differences are tried with every command, and those tried at zero command.
 PLC_PRESSURES, PLC_AROUND = (0, 4000), (-300, 4300)
-#: Pressure drops whose law is made at once, inputs that a program is given at once, and processors that share them.
-PIECE, AT_ONCE, SIDE_BY_SIDE = 256, 1 << 17, min(os.cpu_count() or 1, 4)
+#: Pressure drops whose law is made at once, inputs that a program is given at once, one that starts anew for each, and
+#: processors that share them.
+PIECE, AT_ONCE, STARTED_ANEW, SIDE_BY_SIDE = 256, 1 << 17, 1 << 20, min(os.cpu_count() or 1, 4)
 #: Pressures that are tried with commands of all sizes: how many pairs, every which command, and the seed.
 SAMPLE, STRIDE, SEED = 256, 7, 61131
 #: Spreads the pairs of pressures that pressure drops are tried with: 2^16 over the golden ratio.
@@ -128,6 +129,7 @@ class EveryPair:
         #: What may be remembered: driven side and whether at rest; a new instance's first.
         sides, rests = (0, 1, -1) if self.both else (1,), (1, 0) if self.rests else (1,)
         self.states = [(side, rest) for side in sides for rest in rests]
+        self.at_once = AT_ONCE
         self.low, self.high = (0, first.code_max) if self.of_codes else PLC_PRESSURES
 
     def every_command(self, program: Program, place: int, drops: range | None = None) -> Tried:
@@ -146,7 +148,7 @@ class EveryPair:
         b, found = np.arange(low, high + 1), []
         for side, rest in self.states:
             stride = step if rest else 17 * step
-            rows = max(AT_ONCE // b.size, 1)
+            rows = max(self.at_once // b.size, 1)
             of_a = np.arange(low, high + 1, stride)
             pieces = [of_a[begin : begin + rows, None] for begin in range(0, of_a.size, rows)]
             state = (np.array(side), np.array(rest == 1))
@@ -196,7 +198,7 @@ class EveryPair:
         def tried(piece: slice) -> Tried:
             first, second, found = a[piece], b[piece], Tried()
             known = law.outputs(law.rows(first, second)[0])
-            rows = max(AT_ONCE // first.size, 1)
+            rows = max(self.at_once // first.size, 1)
             for begin in range(0, command.size, rows):
                 some = slice(begin, begin + rows)
                 state = (states[some, :1], states[some, 1:] == 1)

@@ -1,19 +1,28 @@
-"""The one check of text: a folder against what is generated now from its compensator.json.
+"""The folder of a firmware or of another output as it is given, and whether it holds what is generated now.
 
-The front door designs and generates again and hands the result over as a value, for this room imports nothing of the
-generator. What is compiled and run afterwards is that text, in a folder of its own.
+`reproduced` is the one check of text. The front door designs and generates again and hands the result over as a value,
+for this room imports nothing of the generator. What is compiled and run afterwards is that text, in its own folder.
 """
 
+import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import zip_longest
 from pathlib import Path, PurePosixPath
 
-from dzdesign.core.errors import and_more, quoted
-from dzdesign.core.folder_contents import digest_of
+from dzdesign.core.artefact_files import MANIFEST_NAME, check_inside, read_bytes
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import schema_of
+from dzdesign.core.documents import family_of
+from dzdesign.core.errors import InputError, and_more, quoted
+from dzdesign.core.folder_contents import digest_of, manifest_of
+from dzdesign.core.input_files import MOST_RECORDING, reason_of
 from dzdesign.core.scratch import scratch_folder
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareManifest
+from dzdesign.design.output_manifest import OutputManifest
 from dzdesign.verify.requirements import REPRODUCED, Check
 
 #: Folder of a firmware for files of the user's own, beside those that were generated.
@@ -32,6 +41,84 @@ BUILD_FILES = {"makefile", "gnumakefile", "cmakelists.txt", ".project", ".cproje
 #: Files that a sentence names, and characters of a line that it shows.
 MOST_NAMED, SHOWN = 3, 50
 AGAIN = "make the folder again with `dzdesign codegen`, or write a target for code of your own"
+
+
+def read_firmware_manifest(folder: Path) -> FirmwareManifest:
+    """Return the manifest of a firmware folder.
+
+    What is read, compiled and run afterwards are the files that it names, and C: each must be a file in this folder.
+    """
+    path = folder / MANIFEST_NAME
+    if folder.is_file() or (folder.is_dir() and not path.exists()):
+        found = "is a file" if folder.is_file() else f"has no {MANIFEST_NAME}"
+        raise InputError(f"'{folder}' {found}, expected the firmware folder that `dzdesign codegen` writes; name that")
+    manifest = read_artefact(read_bytes(path, "firmware manifest"), FirmwareManifest, str(path))
+    check_inside(folder, [*manifest.files, *manifest.core], f"'{path}'")
+    check_firmware_inside(folder)
+    return manifest
+
+
+def _check_readable(folder: Path) -> None:
+    def refuse(error: OSError) -> None:
+        if isinstance(error, FileNotFoundError):
+            return  # said by what reads a file of it
+        raise InputError(f"'{error.filename}' can't be read: {reason_of(error)}; change who may read it") from error
+
+    for place, _, names in os.walk(folder, onerror=refuse):
+        for name in names:
+            path = os.path.join(place, name)
+            if any("\ud800" <= letter <= "\udfff" for letter in name):
+                raise InputError(f"'{quotable(path)}' has a name that is no text in UTF-8; rename it, or take it away")
+            if os.path.exists(path) and not os.access(path, os.R_OK):
+                raise InputError(f"'{path}' can't be read: no permission; change who may read it")
+            if os.path.isfile(path) and os.path.getsize(path) > MOST_RECORDING:  # each is hashed
+                raise InputError(f"'{path}' is larger than {MOST_RECORDING >> 20} MiB; take it out of the firmware")
+
+
+def quotable(path: str) -> str:
+    """Return a name with a mark for each byte that is no text."""
+    return path.encode(errors="replace").decode()
+
+
+def read_compensator(folder: Path) -> Compensator:
+    """Return the compensator of a firmware folder."""
+    path = folder / "compensator.json"
+    return _compensator(read_bytes(path, "compensator of the firmware"), str(path))
+
+
+@lru_cache(maxsize=1)
+def _compensator(content: bytes, source: str) -> Compensator:
+    """Read a compensator once for all checks of a firmware; nothing changes one."""
+    return read_artefact(content, Compensator, source)
+
+
+def check_firmware_inside(folder: Path) -> None:
+    """Refuse a firmware folder whose C is not in it, or with a link: a build follows it, and no check looks behind.
+
+    Refused is too what can't be read, here and now, and a name that no text can hold: nothing could be said of it.
+    """
+    _check_readable(folder)
+    found = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.[ch]"))]
+    check_inside(folder, ["compensator.json", *found], f"'{folder}'")
+    home = os.path.realpath(folder)
+    for path in sorted(folder.rglob("*")):
+        if os.path.realpath(path) != os.path.join(home, path.relative_to(folder)):  # also a junction of Windows
+            raise InputError(f"'{path}' is a link, expected files and folders; replace it by what it points to")
+
+
+def holds_output(folder: Path) -> bool:
+    """Tell whether a folder is that of an output, and not of a C firmware or of nothing of ours."""
+    manifest = manifest_of(Path(folder))
+    return manifest is not None and family_of(manifest["schema"]) == family_of(schema_of(OutputManifest))
+
+
+def read_output_manifest(folder: Path) -> OutputManifest:
+    """Return the manifest of an output's folder; every file that it names must be one in this folder."""
+    path = folder / MANIFEST_NAME
+    manifest = read_artefact(read_bytes(path, "manifest of the output"), OutputManifest, str(path))
+    check_inside(folder, manifest.files, f"'{path}'")
+    check_firmware_inside(folder)
+    return manifest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,11 +144,19 @@ class Regenerated:
             yield scratch / "code"
 
 
-def reproduced(folder: Path, again: Regenerated) -> Check:
+def as_generated(again: Regenerated | None, same: Check | None) -> bool:
+    """Tell whether more of a folder is tried than its text: if that is what is generated now, or was not compared."""
+    return again is None or (bool(again.files) and (same is None or same.holds is not False))
+
+
+def reproduced(folder: Path, again: Regenerated | None) -> Check:
     """Tell whether a folder holds what is generated now; of what does not, the first difference.
 
-    Where the same text was generated from numbers of which nobody knows whether they follow, it is not checked.
+    Where the same text was generated from numbers of which nobody knows whether they follow, it is not checked, nor
+    where nothing was generated to compare it with.
     """
+    if again is None:
+        return REPRODUCED.check(holds=None, text="nothing was generated to compare the folder with")
     if again.fault:
         return REPRODUCED.check(holds=False, text=again.fault)
     if not again.files:

@@ -1,1 +1,0 @@
-"""The firmware folder: that it is whole, that manifest, board files and headers belong together."""
