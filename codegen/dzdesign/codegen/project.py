@@ -226,6 +226,7 @@ def target_files(
         "core_headers": core_headers(block=block is not None, current=current is not None),
         **block_values(compensator, block, target),
         "current": current,
+        "loads": block is not None and target.link is not None,
         "link_sources": link_names(target, ".c") if block else (),
         "link_headers": link_names(target, ".h") if block else (),
         "current_faults": FAULT_BITS,

@@ -49,10 +49,10 @@ def test_the_whole_firmware_compiles_against_the_users_headers(firmware_folder, 
         ("dz_hardware.c", "ETPS.bit.SOCAPRD", "ETPS.bit.SOCPRD"),
         ("dz_telemetry.c", "SciaRegs.SCIHBAUD", "SciaRegs.SCIBAUD"),
         ("dz_hardware.c", "&dz_isr", "&dz_state"),
-        ("dz_isr.c", "PIEACK_GROUP3", "PIEACK_GROUP_3"),
+        ("dz_hardware.c", "PIEACK_GROUP3", "PIEACK_GROUP_3"),
         ("main.c", "    InitFlash();", "    InitFlashMemory();"),
         ("main.c", "&RamfuncsRunStart", "RamfuncsRunStart"),
-        ("dz_isr.c", "u_adc = AdcMirror.ADCRESULT0;", "u_adc = AdcMirror.ADCRESULT0 * 1.5f;"),
+        ("dz_hardware.c", "codes[0] = AdcMirror.ADCRESULT0;", "codes[0] = AdcMirror.ADCRESULT0 * 1.5f;"),
     ],
 )
 def test_a_seeded_fault_against_the_headers_is_seen(firmware_folder, ware, file, old, new):
