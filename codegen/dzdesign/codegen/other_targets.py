@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES
-from dzdesign.codegen.earlier_firmware import refuse_another_design
+from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.project import TARGET_NAMES, TEXT_AS_IT_IS, target_named
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, schema_of, to_json_bytes
@@ -189,9 +189,9 @@ def write_output(output: Output, folder: Path, *, over_another: bool = False) ->
             refuse_another_design(Path(folder), output.compensator)
 
     check()  # of two at once, the other one may have written since
-    earlier = (manifest_of(Path(folder)) or {}).get("target")
+    earlier = target_in(Path(folder))
     write_folder(Path(folder), output.contents, output.manifest, check)
-    if earlier in (None, target):
+    if earlier in ("", target):
         return output
     note = f"the {earlier} output in '{folder}' was replaced by this {target}"
     note += "; to have both, give each its own folder with -o"

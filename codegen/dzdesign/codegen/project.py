@@ -22,8 +22,7 @@ from dzdesign.codegen.calibration.in_project import block_templates, block_value
 from dzdesign.codegen.calibration.layout import CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
-from dzdesign.codegen.core.constants import CoreFile, Values
-from dzdesign.codegen.core.status_bits import FAULT_BITS
+from dzdesign.codegen.core.constants import FAULT_BITS, CoreFile, Values
 from dzdesign.codegen.core_costs import MEASURED, STAND_IN
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.loading.files import LOAD_FILES, STORE, load_texts

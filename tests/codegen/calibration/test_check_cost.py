@@ -9,7 +9,7 @@ from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.core_costs import CHECK_INSTRUCTIONS
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 from tests.codegen.calibration.test_check import forms
-from tests.support.golden_firmware import BLOCK_GOLDENS
+from tests.support.loading.device import firmware_files
 from tests.support.paths import TESTS
 
 
@@ -39,7 +39,7 @@ def test_the_readme_states_the_instructions_of_the_longest_check():
 
 
 def test_no_check_of_a_block_at_the_start_is_watched_by_the_watchdog():
-    main = (BLOCK_GOLDENS / "f28335" / "f28335" / "main.c").read_text()
+    main = firmware_files()["main.c"]
     assert main.index("InitSysCtrl()") < main.index("dz_load_init(") < main.index("dz_watchdog_start()")
     loop = main[main.index("for (;;)") :]
     assert loop.index("service_watchdog_if_isr_ran();") < loop.index("dz_telemetry_poll();")

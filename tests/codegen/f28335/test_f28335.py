@@ -300,13 +300,3 @@ def test_the_interrupt_has_no_part_in_the_telemetry_and_is_never_held_off():
     assert code["main.c"].index("DINT") < code["main.c"].index("EINT") < code["main.c"].index("for (;;)")
     for name, text in code.items():  # a byte of the C28x has 16 bits, and its double 32 or 64
         assert not re.search(r"\b(u?int8_t|char|float|double|long)\b", text), name
-
-
-def test_the_table_of_registers_is_that_of_the_readme():
-    stated = dict(re.findall(r"\| `([A-Za-z0-9.]+)` \| ([0-9A-F]{4}) \|", texts_of("f28335", SUPPLY)["README.md"]))
-    other = {"CMPA": "TRIGGER_CMPA", "ETPS": "TRIGGER_ETPS"}
-    expected = {
-        register: f"{VALUES[SUPPLY][other.get(name, f'SECOND_{name}') if of == 'EPwm2Regs' else name]:04X}"
-        for register, of, name in ((each, *each.rpartition(".")[::2]) for each in stated)
-    }
-    assert stated == expected and len(stated) == 24

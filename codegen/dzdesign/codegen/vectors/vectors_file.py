@@ -1,6 +1,6 @@
 """vectors.csv: codes in, and what the core must answer, from the exact law in rationals."""
 
-from dzdesign.codegen.core.status_bits import STATUS_BITS
+from dzdesign.codegen.core.constants import STATUS_BITS
 from dzdesign.codegen.vectors.choosing import Codes, chosen_codes
 from dzdesign.design.compensator import Compensator
 
