@@ -176,17 +176,21 @@ def generate(
         law=compensator.law,
         core=tuple(sorted(core)),
         board=tuple(sorted(target.board | (board_of_blocks(target) if block else frozenset()))),
-        origin=FirmwareOrigin(
-            compensator_json=digest,
-            valve_json=compensator.valve_json_sha256,
-            ramp_tests=compensator.valve.made_from,
-        ),
+        origin=origin_of(compensator, digest),
         vectors=vectors,
         constants=tuple(constant for path in sorted(core) for constant in core[path].constants),
         files={path: sha256_of(text.encode()) for path, text in files.items()}
         | ({BLOCK_FILE: sha256_of(octets)} if octets else {}),
     )
     return Firmware(files=files, manifest=manifest, compensator=compensator, note=note, block=octets)
+
+
+def origin_of(compensator: Compensator, digest: str) -> FirmwareOrigin:
+    """Return from what the files of a compensator come whose document has this SHA-256."""
+    valve = compensator.valve
+    return FirmwareOrigin(
+        compensator_json=digest, valve_json=compensator.valve_json_sha256, ramp_tests=valve.made_from
+    )
 
 
 def block_core(built: BuiltFor) -> dict[str, str]:
