@@ -21,7 +21,7 @@ from dzdesign.derivation.account.scope import (
     under_law,
 )
 from dzdesign.derivation.account.statement import Condition, Ground, Kind, Outcome
-from tests.support.account_claims import BY_NUMBER
+from tests.derivation.account.claims import BY_NUMBER
 
 ONE, ZERO = sympy.S.One, sympy.S.Zero
 

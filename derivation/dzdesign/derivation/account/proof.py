@@ -13,10 +13,16 @@ import sympy
 from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.derivation.account.conditions import Finding, judge_condition
-from dzdesign.derivation.account.solving import NotDerivedError, Relation, Step, agree, solve_relations
+from dzdesign.derivation.account.solving import (
+    Finding,
+    NotDerivedError,
+    Relation,
+    Step,
+    agree,
+    judge_condition,
+    solve_relations,
+)
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
-from dzdesign.derivation.account.units import find_unit_error
 from dzdesign.derivation.symbols import Name
 
 
@@ -89,7 +95,7 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
         if statement.number in earlier:
             raise RequirementError(f"{statement.number} is stated twice")
         check_grounds(statement, earlier, order)
-        verdict, error = judge(statement, earlier, verdicts), find_unit_error(statement)
+        verdict, error = judge(statement, earlier, verdicts), statement.unit_error()
         # What does not follow may be wrong in its units too, nothing else may.
         verdict = replace(verdict, unit_error=error, as_expected=verdict.as_expected and not (error and verdict.holds))
         earlier[statement.number] = statement

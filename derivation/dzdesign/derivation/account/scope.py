@@ -25,7 +25,7 @@ BARE = Setting("drive", "the valve without compensator")
 FREE_BETA = Setting("drive", "the paper's law with any $beta$")
 #: The simulation model, Eqs. (19)-(24), which has no overlap.
 PLANT = Setting("drive", "the simulation model")
-#: What the firmware runs unless it is told otherwise (`transition.py`).
+#: What the firmware runs unless it is told otherwise (`scaling.py`).
 WITH_TRANSITION = Setting("drive", "the law `paper` with zero band and transition")
 FIXED_OPENING = Setting("spool", "a stop that fixes $x_max$ at every pressure drop (Assumption 3)")
 FREE_OPENING = Setting("spool", "a spool that does not meet its stop")
