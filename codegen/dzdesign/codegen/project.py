@@ -187,10 +187,8 @@ def generate(
 
 def origin_of(compensator: Compensator, digest: str) -> FirmwareOrigin:
     """Return from what the files of a compensator come whose document has this SHA-256."""
-    valve = compensator.valve
-    return FirmwareOrigin(
-        compensator_json=digest, valve_json=compensator.valve_json_sha256, ramp_tests=valve.made_from
-    )
+    ramp_tests = compensator.valve.made_from
+    return FirmwareOrigin(compensator_json=digest, valve_json=compensator.valve_json_sha256, ramp_tests=ramp_tests)
 
 
 def block_core(built: BuiltFor) -> dict[str, str]:
