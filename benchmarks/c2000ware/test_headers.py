@@ -14,8 +14,7 @@ from dzdesign.core.artefact_files import write_folder
 from dzdesign.design.firmware_manifest import Calibration
 from dzdesign.verify.compilation import HEADERS, PRELUDE, check_against_c2000ware
 from dzdesign.verify.toolchain.host_compiler import host_compiler
-from tests.codegen.f28335.test_f28335_current import CURRENT_VALUES, SUPPLY_VALUES
-from tests.codegen.f28335.test_f28335_target import START_VALUES
+from tests.codegen.f28335.test_f28335 import PLAIN, START_VALUES, SUPPLY, VALUES
 from tests.support.example_coil import SENSORS, with_current
 from tests.support.golden_firmware import golden_compensator
 
@@ -26,8 +25,8 @@ if not (WARE / HEADERS[0]).is_dir():
 SENSOR_OF = {"duty": None, "current": SENSORS["supply unknown"], "current, supply": SENSORS["supply measured"]}
 EXPECTED = {
     "duty": START_VALUES,
-    "current": START_VALUES | CURRENT_VALUES,
-    "current, supply": START_VALUES | CURRENT_VALUES | SUPPLY_VALUES,
+    "current": VALUES[PLAIN],
+    "current, supply": VALUES[SUPPLY],
 }
 #: Ours in the tests, TI's in C.
 REGISTERS = {
@@ -101,7 +100,7 @@ def test_the_set_up_leaves_the_documented_values_in_their_registers(drive, tmp_p
         "volatile struct SYS_CTRL_REGS SysCtrlRegs;\nvolatile struct GPIO_CTRL_REGS GpioCtrlRegs;\n"
         "volatile struct PIE_CTRL_REGS PieCtrlRegs;\nvolatile struct PIE_VECT_TABLE PieVectTable;\n"
         "volatile unsigned int IER;\n"
-        "void ServiceDog(void) {}\ninterrupt void dz_isr(void) {}\n"
+        "void ServiceDog(void) {}\n__interrupt void dz_isr(void) {}\n"
         "int main(void)\n{\n    memset((void *)&EPwm1Regs, 0xA5, sizeof EPwm1Regs);\n"
         "    AdcRegs.ADCTRL3.all = 0x00E0u; /* as InitAdc() leaves it */\n"
         "    dz_output_hold_low();\n    dz_hardware_init();\n" + shown + "    return 0;\n}\n",

@@ -2,7 +2,6 @@
 
 import dataclasses
 import re
-import subprocess
 from fractions import Fraction
 
 import numpy as np
@@ -10,16 +9,11 @@ import pytest
 
 from dzdesign.codegen.core.integer_form import integer_form
 from dzdesign.codegen.project import generate
-from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
-from dzdesign.design.designing import design
-from dzdesign.design.options import DesignOptions
 from dzdesign.design.side_design import finest_units
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import CommandSignal
-from dzdesign.verify.toolchain.host_compiler import STRICT, check_strictly, find_compilers
-from tests.support.paths import DEVICES
-from tests.support.synthetic import needs_compiler, with_side
+from tests.support.synthetic import with_side
 
 
 def evaluate(form, compensator, command: int, dp_code: int) -> int:
@@ -116,45 +110,12 @@ def test_same_input_same_bytes(example_compensator, example_firmware):
     assert dict(again.files) == dict(example_firmware.files)
 
 
-@pytest.mark.parametrize("law_name", ["paper", "target"])
-@needs_compiler
-def test_core_compiles_strictly_with_every_compiler(example_valve, law_name, tmp_path):
-    firmware = generate(design(example_valve, DesignOptions(law=law_name)), "f28335")
-    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
-    sources, compilers = sorted((tmp_path / "fw" / "core").glob("*.c")), find_compilers()
-    assert sources and compilers
-    for compiler in compilers:
-        for source in sources:
-            check_strictly(source, compiler)
-
-
 def test_core_has_no_floating_point_no_division_and_no_state(example_firmware):
     code = re.sub(r"/\*.*?\*/", "", example_firmware.files["core/dz_comp.c"], flags=re.DOTALL)
     assert not re.search(r"\b(float|double)\b|\d\.\d|%", code)
     assert "/" not in code.replace("#include", "")
     static_data = re.findall(r"^static (?!const )(?!(?:inline )?(?:struct )?\w+ \w+\()", code, flags=re.MULTILINE)
     assert static_data == []
-
-
-def test_generated_files_carry_the_hash_of_their_compensator_and_no_date(example_firmware):
-    """But for the user's to fill in: kept through the next generation, theirs would be the hash of another."""
-    digest = example_firmware.manifest.made_from[0].sha256
-    assert example_firmware.files[".gitattributes"] == "* -text\n"
-    for name, text in example_firmware.files.items():
-        if name not in ("compensator.json", ".gitattributes"):
-            board = name in example_firmware.manifest.board
-            assert (digest in text) is not board and ("Do not edit" in text) is not board, name
-            assert ("Yours to edit" in text[:300]) is board, name
-            assert not re.search(r"20\d\d-\d\d-\d\d", text), name
-
-
-def test_names_from_users_do_not_reach_the_c(example_valve):
-    tests = tuple(dataclasses.replace(test, source='*/ #error "x" \n.csv') for test in example_valve.positive.tests)
-    side = dataclasses.replace(example_valve.positive, tests=tests)
-    hostile = dataclasses.replace(example_valve, sides={"positive": side})
-    firmware = generate(design(hostile), "f28335")
-    for name, text in firmware.files.items():
-        assert name == "compensator.json" or '#error "x"' not in text
 
 
 def test_a_target_with_another_pwm_is_refused(example_compensator, wording):
@@ -172,25 +133,6 @@ def test_scalings_too_rich_for_the_integers_are_refused(example_compensator, wor
     )
     with wording.refusal(InputError):
         integer_form(awkward)
-
-
-@needs_compiler
-def test_core_and_hardware_link_as_one_program(example_firmware, tmp_path):
-    """The generated core takes the place of the stand-in: the ISR calls it on the model of the device."""
-    stub = DEVICES / "f28335"
-    for name, text in example_firmware.files.items():
-        target = tmp_path / name
-        target.parent.mkdir(exist_ok=True)
-        target.write_text(text)
-    command = [find_compilers()[0], *STRICT, "-c", f"-I{tmp_path / 'core'}", f"-I{stub}", f"-I{tmp_path / 'f28335'}"]
-    for source in ("core/dz_comp.c", "f28335/dz_isr.c", "f28335/dz_hardware.c"):
-        done = subprocess.run(
-            [*command, str(tmp_path / source), "-o", str(tmp_path / "one.o")],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
 
 
 def test_a_law_whose_divisor_cancels_needs_no_reciprocal(example_compensator):

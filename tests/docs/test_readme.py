@@ -22,6 +22,6 @@ def test_the_first_commands_are_those_that_ci_runs():
 
 def test_the_instructions_are_those_of_the_generated_readme():
     """tests/codegen/test_core_costs.py measures them."""
-    generated = (TESTS / "goldens/cortex-m4/cortex_m4/README.md").read_text("utf-8")
+    generated = (TESTS / "goldens_full/cortex-m4/cortex_m4/README.md").read_text("utf-8")
     (default,) = re.findall(r"^\| `dz_comp\(\)`, most instructions of a call \| (\d+) \|", generated, re.MULTILINE)
     assert f"With the default options a call takes {default} instructions on a Cortex-M4" in README

@@ -6,6 +6,8 @@ A check takes the function that runs the firmware through PWM periods, an event 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tests.support.c2000_devices import column
+
 #: One dictionary of facts a PWM period.
 Run = Callable[[str], list[dict]]
 #: PWM periods in which the current dies away, and those of the calibration.
@@ -27,11 +29,6 @@ def board_of(apart: int, half: int, full_V: float) -> Board:
     """Return the figures of a board whose converter has 12 bits over a range."""
     offset, half_codes = (volts * 4096 / full_V for volts in (0.15, 1.15))
     return Board(apart=apart, half=half, offset=8 * int(offset), half_sum=8 * half_codes)
-
-
-def column(ticks: list[dict], key: str) -> list:
-    """Return one fact of every period."""
-    return [tick[key] for tick in ticks]
 
 
 def check_sampling(run: Run, board: Board) -> None:

@@ -43,4 +43,4 @@ def walked_line(compensator: Compensator) -> str:
         for number in drive.outputs:
             for byte in (number & 0xFF, number >> 8):
                 value = (value ^ byte) * FNV_PRIME & 0xFFFFFFFF
-    return f"dz_drive walk FNV-1a-32 {value:08X} over {WALK_TICKS} ticks"
+    return f"dz_drive walk FNV-1a-32 {value:08X}"

@@ -1,4 +1,4 @@
-"""The generated F28335 firmware, built with the model of the device and run: what its tests share."""
+"""The generated F28335 firmware with the model of the device, where a test edits its files; TI's headers laid out."""
 
 import shutil
 import subprocess
@@ -7,35 +7,20 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dzdesign.codegen.banner import Banner
-from dzdesign.codegen.f28335.target import TARGET
-from dzdesign.codegen.project import target_files
-from dzdesign.design.current.choosing import CurrentSensor
-from tests.support.current_loops import current_texts
-from tests.support.example_coil import with_current
-from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
+from tests.support.c2000_devices import run, texts_of, write
+from tests.support.paths import DEVICES
 
-HERE = Path(__file__).parent / "f28335"
+__all__ = ["COMPILER", "HERE", "build", "c2000ware_stand_in", "needs_compiler", "render_firmware", "run"]
+HERE = DEVICES / "f28335"
 COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc, gcc or clang) on the path")
 
 
-def render_firmware(folder: Path, *signs: int, sensor: CurrentSensor | None = None) -> dict[str, Path]:
-    """Write the target's files below `folder`, by the real renderer; output path to file. One sign by default.
-
-    With a sensor of the current they control it, and its controller is the generated one.
-    """
-    compensator = golden_compensator("f28335", FULL if -1 in signs else GOLDENS)
-    core = {}
-    if sensor:
-        compensator = with_current(compensator, TARGET, sensor)
-        core = {f"f28335/{name}": text for name, text in current_texts(compensator.current_drive.loop).items()}
-    written = {}
-    for path, text in (target_files(compensator, TARGET, Banner(digest="1234567890abcdef")) | core).items():
-        written[path] = folder / path
-        written[path].parent.mkdir(parents=True, exist_ok=True)
-        written[path].write_text(text, encoding="utf-8", newline="\n")
-    return written
+def render_firmware(folder: Path) -> dict[str, Path]:
+    """Write the target's files below `folder`; output path to file."""
+    (folder / "f28335").mkdir(parents=True)
+    write(texts_of("f28335"), folder / "f28335")
+    return {f"f28335/{name}": folder / "f28335" / name for name in texts_of("f28335")}
 
 
 def build(firmware: dict[str, Path], *options: str) -> Path:
@@ -43,37 +28,12 @@ def build(firmware: dict[str, Path], *options: str) -> Path:
     folder = firmware["f28335/main.c"].parent
     program = folder / "driver"
     sources = [folder / name for name in ("dz_hardware.c", "dz_isr.c", "dz_telemetry.c", "dz_frame.c")]
-    sources += [HERE / "device.c", HERE / "current.c", HERE / "driver.c", *folder.glob("dz_current.c")]
+    sources += [HERE / "device.c", HERE / "current.c", HERE / "driver.c"]
     command = [COMPILER, "-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", *options]
     command += [f"-I{folder}", f"-I{HERE}", *map(str, sources), "-lm", "-o", str(program)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return program
-
-
-def run(program: Path, *words: str) -> list[str]:
-    done = subprocess.run([program, *words], capture_output=True, text=True, check=True, timeout=20)
-    return done.stdout.splitlines()
-
-
-def registers(program: Path, *left_behind: str) -> dict[str, int]:
-    lines = (line.split() for line in run(program, "registers", *left_behind))
-    return {words[0]: int(words[1], 16) for words in lines if len(words) == 2}
-
-
-def periods(program: Path, events: str, *start: str) -> list[dict]:
-    """One dictionary a PWM period, numbers as integers."""
-    ticks = []
-    for line in run(program, "run", events, *start):
-        if line.startswith("tick "):
-            facts = dict(word.split("=", 1) for word in line.split()[1:])
-            ticks.append({key: int(value) if value.isdigit() else value for key, value in facts.items()})
-    assert len(ticks) == len(events)
-    return ticks
-
-
-def column(ticks: list[dict], key: str) -> list:
-    return [tick[key] for tick in ticks]
 
 
 def c2000ware_stand_in(ware: Path, projectspec: Path) -> Path:
@@ -88,7 +48,7 @@ def c2000ware_stand_in(ware: Path, projectspec: Path) -> Path:
         folder.mkdir(parents=True)
     text = (HERE / "DSP28x_Project.h").read_text(encoding="utf-8")
     for old, new in (
-        ("#define interrupt\n", "typedef interrupt void (*PINT)(void);\n"),
+        ("#define __interrupt\n", "typedef interrupt void (*PINT)(void);\n"),
         ("typedef uint16_t Uint16;", "typedef unsigned int Uint16;"),
         ("#define SciaRegs (*device_scia())\nvolatile struct SCI_REGS *device_scia(void);",
          "extern volatile struct SCI_REGS SciaRegs;"),

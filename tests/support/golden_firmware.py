@@ -1,7 +1,7 @@
-"""The goldens: what every target's files were from one small compensator.json, and how they are made anew.
+"""The goldens: what targets' files were from one small compensator.json, and how they are made anew.
 
 The second set, `FULL`, has everything switched on: a valve of two unlike sides, a transition, ramps, dither, a largest
-output, 4-20 mA sensors of unlike spans.
+output, 4-20 mA sensors of unlike spans. A file that is the same for several targets stands once.
 """
 
 import difflib
@@ -9,9 +9,11 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
-from dzdesign.codegen.project import generate, target_named, targets
+from dzdesign.codegen.project import TARGET_NAMES, generate, target_named
+from dzdesign.codegen.target import folder_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.design.compensator import Compensator
@@ -25,9 +27,13 @@ from tests.support.paths import TESTS
 
 GOLDENS = TESTS / "goldens"
 FULL = TESTS / "goldens_full"
-#: One firmware in block form, of the second set's compensator.
-BLOCK_GOLDENS = TESTS / "goldens_block"
-FULL_TARGETS = ("cortex-m4", "f28335")
+#: What is kept, by root and target: folders of the firmware. Of the other targets it is their own folder, by default.
+KEPT = {
+    (GOLDENS, "host"): ("core", "host"),
+    (FULL, "f28335"): ("core", "f28335"),
+    (FULL, "cortex-m4"): ("cortex_m4",),
+}
+KEPT |= {(GOLDENS, name): (folder_of(name),) for name in TARGET_NAMES if name not in {target for _, target in KEPT}}
 #: Not compared: it is what goes in.
 INPUT = "compensator.json"
 #: Beside the targets.
@@ -62,6 +68,7 @@ def full_options(**changes) -> DesignOptions:
     return DesignOptions(**(chosen | changes))
 
 
+@cache
 def golden_compensator(target_name: str, root: Path = GOLDENS) -> Compensator:
     """The fixed compensator, with the scalings of a target that has its own."""
     target = target_named(target_name)
@@ -74,27 +81,27 @@ def golden_compensator(target_name: str, root: Path = GOLDENS) -> Compensator:
     return replace(designed, made_from=compensator.made_from)
 
 
-def golden_files(target_name: str, root: Path = GOLDENS) -> dict[str, str]:
-    """Generate a target's files from the fixed compensator."""
-    compensator = golden_compensator(target_name, root)
-    files = dict(generate(compensator, target_name).files)
+@cache
+def generated(target_name: str, root: Path = GOLDENS) -> Mapping[str, str]:
+    """Generate a target's files from the fixed compensator, without that itself."""
+    files = dict(generate(golden_compensator(target_name, root), target_name).files)
     del files[INPUT]
     return files
 
 
-def golden_block_files() -> dict[str, str]:
-    """Generate the f28335's firmware in block form from the second set's compensator; the block as C is among them."""
-    compensator = golden_compensator("f28335", FULL)
-    files = dict(generate(compensator, "f28335", "block").files)
-    del files[INPUT]
-    return files
+def golden_files(target_name: str, root: Path) -> dict[str, str]:
+    """Return the generated files of those folders that are kept."""
+    kept = KEPT[root, target_name]
+    return {path: text for path, text in generated(target_name, root).items() if path.partition("/")[0] in kept}
 
 
-def _write(folder: Path, files: Mapping[str, str]) -> None:
+def write(folder: Path, files: Mapping[str, str]) -> Path:
+    """Write files into a folder, and return it."""
     for name, text in files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8", newline="\n")
+    return folder
 
 
 def differences(folder: Path, files: Mapping[str, str]) -> str:
@@ -115,16 +122,15 @@ def differences(folder: Path, files: Mapping[str, str]) -> str:
 
 
 def update() -> None:
-    """Design the compensators anew from their valve.json, and write every target's files."""
-    every = tuple(target.name for target in targets())
-    for root, names, options in ((GOLDENS, every, None), (FULL, FULL_TARGETS, full_options())):
+    """Design the compensators anew from their valve.json, and write the files."""
+    for root, options in ((GOLDENS, None), (FULL, full_options())):
         content = (root / "valve.json").read_bytes()
         compensator = design(read_artefact(content, ValveModel, "valve.json"), options)
         (root / INPUT).write_bytes(to_json_bytes(compensator))
         for folder in root.iterdir():
             if folder.is_dir() and folder.name != "schemas":
                 shutil.rmtree(folder)
-        for target in names:
-            _write(root / target, golden_files(target, root))
-    shutil.rmtree(BLOCK_GOLDENS, ignore_errors=True)
-    _write(BLOCK_GOLDENS / "f28335", golden_block_files())
+    golden_compensator.cache_clear()
+    generated.cache_clear()
+    for root, target in KEPT:
+        write(root / target, golden_files(target, root))

@@ -20,15 +20,12 @@ ADC_BITS, CHANNELS = 12, 3
 CURRENT = CurrentSampling(tick_Hz=PWM_HZ, samples=8, before=7)
 CURRENT_ISR_S = Fraction(330, 10**6)  # from CTR = 0 to the interrupt
 CURRENT_READ_S = Fraction(10, 10**6)  # that the interrupt may take to read the codes, latency included
-#: What the projects of both build with.
-TOOLS = {
-    "cgt_version": "22.6.3.LTS",
-    # Where TI's Windows installer puts C2000Ware; the user changes this one line of the projectspec.
-    "c2000ware_default": "C:/ti/c2000/C2000Ware_26_01_00_00",
-}
-#: The C of every project, and what builds it; a target adds C of its own between them.
-SOURCES = ("main.c", "dz_hardware.c", "dz_hardware.h", "dz_isr.c", "dz_isr.h")
-PROJECT_FILES = ("dzdesign.projectspec", "Makefile", "README.md")
+#: What the projects of both build with, and where TI's Windows installer puts C2000Ware: the user changes this one line
+#: of the projectspec.
+TOOLS = {"cgt_version": "22.6.3.LTS", "c2000ware_default": "C:/ti/c2000/C2000Ware_26_01_00_00"}
+#: The C of every project whose template is its own, the rest of it, and what builds it, which both targets share.
+OF_THE_DEVICE = ("main.c", "dz_hardware.c", "dz_hardware.h")
+OF_BOTH = ("dz_isr.c", "dz_isr.h", "dzdesign.projectspec", "Makefile")
 
 
 def c2000_target(
@@ -46,6 +43,13 @@ def c2000_target(
 
     `sources` is the C that only it has, `block_sources` what it has besides in block form.
     """
+    own = (*OF_THE_DEVICE, *OF_BOTH[:2], *sources)
+    templates = {file: f"{file}.jinja" for file in (*own, "README.md")}
+    templates |= {file: f"c2000/{file}.jinja" for file in OF_BOTH}
+    listed = {
+        f"own_{kind}": " ".join(file for file in own if file.endswith(ending))
+        for kind, ending in (("sources", ".c"), ("headers", ".h"))
+    }
     return Target(
         name=name,
         description=description,
@@ -54,10 +58,10 @@ def c2000_target(
         sample_Hz=SAMPLE_HZ,
         tick_Hz=PWM_HZ,
         current_sampling=CURRENT,
-        templates={f"{name}/{file}": f"{file}.jinja" for file in (*SOURCES, *sources, *PROJECT_FILES)},
+        templates={f"{name}/{file}": template for file, template in templates.items()},
         block_templates={f"{name}/{file}": f"{file}.jinja" for file in block_sources},
         board=frozenset({f"{name}/dzdesign.projectspec"}),  # where the user's C2000Ware lies
-        context={**context, **TOOLS},
+        context={**context, **TOOLS, **listed},
         sector=sector,
         link=link,
     )

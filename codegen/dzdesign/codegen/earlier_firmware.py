@@ -1,11 +1,10 @@
 """What lies where a firmware is to be written: for which target, and whether it is of the same design."""
 
-import contextlib
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
-from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes
+from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of
 from dzdesign.core.documents import family_of
@@ -25,11 +24,8 @@ TOLD_APART = {"schema", "tool", "made_from", "costs", "options", "target", "valv
 
 
 def target_in(folder: Path) -> str:
-    """Return the target of the firmware that lies in a folder; nothing where there is none."""
-    with contextlib.suppress(InputError):
-        content = read_bytes(folder / MANIFEST_NAME, "firmware manifest")
-        return read_artefact(content, FirmwareManifest, MANIFEST_NAME).target
-    return ""
+    """Return the target of the firmware or other output that lies in a folder; nothing where there is none."""
+    return str((manifest_of(folder) or {}).get("target", ""))
 
 
 def refuse_another_design(folder: Path, compensator: Compensator) -> None:

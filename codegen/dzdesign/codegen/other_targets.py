@@ -11,8 +11,8 @@ from importlib import import_module
 from pathlib import Path
 
 from dzdesign.codegen.amplifier.device import DEVICE_NAMES
-from dzdesign.codegen.earlier_firmware import refuse_another_design
-from dzdesign.codegen.project import TARGET_NAMES, TEXT_AS_IT_IS, target_named
+from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
+from dzdesign.codegen.project import TARGET_NAMES, TEXT_AS_IT_IS, origin_of, target_named
 from dzdesign.core.artefact_files import sha256_of, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, schema_of, to_json_bytes
 from dzdesign.core.documents import family_of
@@ -21,7 +21,6 @@ from dzdesign.core.folder_contents import manifest_of
 from dzdesign.core.options import flag_of
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.design.output_manifest import OutputManifest
 
 
@@ -154,11 +153,7 @@ def generate_output(
         target_named(designed_for.name).check_designed_for(designed_for)
     document = to_json_bytes(compensator)
     digest = sha256_of(document)
-    origin = FirmwareOrigin(
-        compensator_json=digest,
-        valve_json=compensator.valve_json_sha256,
-        ramp_tests=compensator.valve.made_from,
-    )
+    origin = origin_of(compensator, digest)
     module = import_module(OTHER_TARGETS[target].module)
     made: Mapping[str, bytes] = module.output_files(compensator, origin, settings)
     note = module.note_of(compensator, settings) if hasattr(module, "note_of") else ""
@@ -189,9 +184,9 @@ def write_output(output: Output, folder: Path, *, over_another: bool = False) ->
             refuse_another_design(Path(folder), output.compensator)
 
     check()  # of two at once, the other one may have written since
-    earlier = (manifest_of(Path(folder)) or {}).get("target")
+    earlier = target_in(Path(folder))
     write_folder(Path(folder), output.contents, output.manifest, check)
-    if earlier in (None, target):
+    if earlier in ("", target):
         return output
     note = f"the {earlier} output in '{folder}' was replaced by this {target}"
     note += "; to have both, give each its own folder with -o"

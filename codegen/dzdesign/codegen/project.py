@@ -22,8 +22,7 @@ from dzdesign.codegen.calibration.files import (
 from dzdesign.codegen.calibration.layout import BuiltFor, CalibrationBlock
 from dzdesign.codegen.calibration.packing import OCTETS, pack
 from dzdesign.codegen.core.certificate_text import zero_command
-from dzdesign.codegen.core.constants import CoreFile, Values
-from dzdesign.codegen.core.status_bits import FAULT_BITS
+from dzdesign.codegen.core.constants import FAULT_BITS, CoreFile, Values
 from dzdesign.codegen.core_costs import MEASURED, STAND_IN
 from dzdesign.codegen.earlier_firmware import refuse_another_design, target_in
 from dzdesign.codegen.loading.protocol import LOAD_FILES, STORE, load_texts
@@ -177,17 +176,19 @@ def generate(
         law=compensator.law,
         core=tuple(sorted(core)),
         board=tuple(sorted(target.board | (board_of_blocks(target) if block else frozenset()))),
-        origin=FirmwareOrigin(
-            compensator_json=digest,
-            valve_json=compensator.valve_json_sha256,
-            ramp_tests=compensator.valve.made_from,
-        ),
+        origin=origin_of(compensator, digest),
         vectors=vectors,
         constants=tuple(constant for path in sorted(core) for constant in core[path].constants),
         files={path: sha256_of(text.encode()) for path, text in files.items()}
         | ({BLOCK_FILE: sha256_of(octets)} if octets else {}),
     )
     return Firmware(files=files, manifest=manifest, compensator=compensator, note=note, block=octets)
+
+
+def origin_of(compensator: Compensator, digest: str) -> FirmwareOrigin:
+    """Return from what the files of a compensator come whose document has this SHA-256."""
+    ramp_tests = compensator.valve.made_from
+    return FirmwareOrigin(compensator_json=digest, valve_json=compensator.valve_json_sha256, ramp_tests=ramp_tests)
 
 
 def block_core(built: BuiltFor) -> dict[str, str]:
@@ -226,6 +227,7 @@ def target_files(
         "core_headers": core_headers(block=block is not None, current=current is not None),
         **block_values(compensator, block, target),
         "current": current,
+        "loads": block is not None and target.link is not None,
         "link_sources": link_names(target, ".c") if block else (),
         "link_headers": link_names(target, ".h") if block else (),
         "current_faults": FAULT_BITS,

@@ -17,7 +17,7 @@ from dzdesign.design.target_inputs import Converter, TargetInputs
 RENDERER_NAMES = frozenset(
     {"banner", "project", "signals", "u_max_V", "drive", "limited", "at_zero", "bipolar", "wiring", "lot_setting"}
     | {"core_sources", "core_headers", "firmware_origin", "current", "current_faults"}
-    | {"link_sources", "link_headers"}
+    | {"link_sources", "link_headers", "loads"}
     | {"block", "block_files", "block_sources", "block_headers", "block_lines", "command_zero", "offset_ticks"}
     | {"sector", "region", "region_page", "region_file", "block_address", "block_words"}
 )

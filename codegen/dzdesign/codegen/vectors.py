@@ -10,7 +10,7 @@ from math import floor
 from random import Random
 from typing import NamedTuple
 
-from dzdesign.codegen.core.status_bits import STATUS_BITS
+from dzdesign.codegen.core.constants import STATUS_BITS
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.signals import CODE_LIMIT, WEIGHT_UNIT, CommandSignal, PressureSignal, Signals

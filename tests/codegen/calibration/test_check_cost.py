@@ -9,6 +9,7 @@ from dzdesign.codegen.calibration.packing import pack
 from dzdesign.codegen.core_costs import CHECK_INSTRUCTIONS
 from dzdesign.verify.toolchain.machines import CORTEX_M4
 from tests.codegen.calibration.test_check import forms
+from tests.support.loading.device import firmware_files
 from tests.support.paths import TESTS
 
 
@@ -35,3 +36,10 @@ def counted(built, block) -> int:
 def test_the_readme_states_the_instructions_of_the_longest_check():
     counts = {name: counted(built, block) for name, built, block in forms()}
     assert CHECK_INSTRUCTIONS - 200 < max(counts.values()) <= CHECK_INSTRUCTIONS, counts
+
+
+def test_no_check_of_a_block_at_the_start_is_watched_by_the_watchdog():
+    main = firmware_files()["main.c"]
+    assert main.index("InitSysCtrl()") < main.index("dz_load_init(") < main.index("dz_watchdog_start()")
+    loop = main[main.index("for (;;)") :]
+    assert loop.index("service_watchdog_if_isr_ran();") < loop.index("dz_telemetry_poll();")

@@ -1,17 +1,29 @@
-"""The f28335 firmware of block form on the model of the device: a block comes over SCI-A while the drive is at rest."""
+"""The f28335 firmware of block form on the model of the device: a block comes over SCI-A while the drive is at rest.
+
+While it is written into flash the output is held, and all that runs lies in RAM.
+"""
 
 import itertools
+import re
 from dataclasses import replace
 
 import pytest
 
+from dzdesign.codegen.banner import Banner
+from dzdesign.codegen.calibration.block import block_of
 from dzdesign.codegen.calibration.packing import pack, unpack
+from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.loading.protocol import Reason
 from dzdesign.codegen.loading.session import LoadSession, RefusedError
-from dzdesign.codegen.telemetry.frame import STATUS_CALIBRATION, STATUS_RELEASED, FrameReader
+from dzdesign.codegen.project import target_files
+from dzdesign.codegen.telemetry.frame import FRAME_OCTETS, STATUS_CALIBRATION, STATUS_RELEASED, FrameReader
+from tests.support.c2000_devices import seeded
+from tests.support.example_coil import SENSORS, with_current
+from tests.support.golden_firmware import FULL as FULL_SET
+from tests.support.golden_firmware import GOLDENS, golden_compensator
 from tests.support.loading.device import Device, DeviceLine, build_device, firmware_files
 from tests.support.loading.exchanges import crc_of_block, origin_of_block
-from tests.support.loading.files import COMPILER, blocks
+from tests.support.loading.files import COMPILER, DIGEST, blocks
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILER, reason="no C compiler (cc, gcc or clang) on the path")]
 ZERO, INTERLOCK = unpack(blocks()[0]).command_zero, unpack(blocks()[0]).interlock
@@ -202,9 +214,96 @@ def test_a_block_whose_zero_command_is_another_is_refused(start):
     ],
 )  # fmt: skip
 def test_a_seeded_fault_is_found(start, tmp_path, file, old, new, check):
-    files = firmware_files()
-    assert files[file].count(old) == 1
-    files[file] = files[file].replace(old, new)
-    faulty = build_device(files, tmp_path)
+    faulty = build_device(seeded(firmware_files(), (file, old, new)), tmp_path)
     with pytest.raises((AssertionError, RefusedError, pytest.fail.Exception)):
         check(lambda linked=None: start(linked or blocks()[0], faulty))
+
+
+FUNCTION = re.compile(r"^(?:static |__interrupt )?\w+ (\w+)\([^;]*?\)\n\{\n(.*?)^\}", re.MULTILINE | re.DOTALL)
+IN_RAM = re.compile(r'#pragma CODE_SECTION\((\w+), "\.TI\.ramfunc"\)')
+#: What dz_isr() calls besides while the output is not held; a store may be busy only while it is.
+NOT_HELD = {"calibrate", "control_current", "release_output", "dz_current_init", "dz_drive_sample", "dz_drive_tick"}
+
+
+def interrupt_of(sensor: str) -> dict[str, str]:
+    """Return the files of the interrupt of block form."""
+    made = golden_compensator("f28335", GOLDENS if sensor else FULL_SET)
+    made = with_current(made, TARGET, SENSORS[sensor]) if sensor else made
+    files = target_files(made, TARGET, Banner(digest=DIGEST), block_of(made, DIGEST))
+    return {name: files[f"f28335/{name}"] for name in ("dz_isr.c", "dz_hardware.c")}
+
+
+def check_in_ram(files: dict[str, str]) -> None:
+    text = "".join(files.values())
+    functions, in_ram = dict(FUNCTION.findall(text)), set(IN_RAM.findall(text))
+    assert {"dz_isr", "force_output_low", "rest", "show_drive", "take_sample", "dz_trip_output"} <= functions.keys()
+    of_interrupt = dict(FUNCTION.findall(files["dz_isr.c"])).keys() - {"dz_isr_init"}
+    reached, wanted = set(), {"dz_isr"}
+    while wanted:
+        name = wanted.pop()
+        reached.add(name)
+        called = set(re.findall(r"\b([a-z]\w+)\(", functions[name])) - {"if", "while", "for", "switch", "sizeof"}
+        called -= NOT_HELD if name == "dz_isr" else set()
+        assert called <= in_ram, f"{name} calls what lies in flash"
+        wanted |= called - reached
+    assert of_interrupt <= in_ram <= reached | of_interrupt | {"dz_untrip_output"}, "all of the interrupt, and no other"
+    assert not any("block->" in functions[name] or "*dz_active" in functions[name] for name in reached)
+
+
+@pytest.mark.parametrize("sensor", ["", *SENSORS])
+def test_all_that_runs_while_the_output_is_held_lies_in_ram(sensor):
+    check_in_ram(interrupt_of(sensor))
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        ("dz_isr.c", '#pragma CODE_SECTION(rest, ".TI.ramfunc");\n', ""),
+        ("dz_hardware.c", '#pragma CODE_SECTION(dz_trip_output, ".TI.ramfunc");\n', ""),
+        ("dz_isr.c", "    show_drive();\n    dz_write_compare_a(0u);", "    dz_drive_init(dz_active, &drive);\n"),
+    ],
+)  # fmt: skip
+def test_a_function_in_flash_is_found(edit):
+    with pytest.raises(AssertionError):
+        check_in_ram(seeded(interrupt_of(""), edit))
+
+
+class Eventful(DeviceLine):
+    """A line on which the drive is told something after so many looks at it, and noise stands between requests."""
+
+    def __init__(self, device, told: str, at: int, noise: bytes = b"") -> None:
+        super().__init__(device)
+        self.told, self.at, self.noise = told, at, noise
+
+    def write(self, octets: bytes) -> None:
+        if len(self.seen) >= self.at and self.told:
+            self.device.tell(self.told)
+            self.told = ""
+        super().write(self.noise + octets)
+
+
+def test_a_drive_that_is_enabled_on_the_way_stays_held_until_the_load_is_over(start):
+    device, zero = start(), 2048
+    device.tell("trip 1")
+    device.tell(f"command {zero}")
+    assert device.run(20)["released"] == 0
+    line = Eventful(device, "trip 0", 20)
+    LoadSession(line).load(blocks()[1], crc_of_block(blocks()[1]), origin_of_block(blocks()[1]))
+    assert not line.told, "the trip input was closed on the way"
+    first = next(place for place, state in enumerate(line.seen) if state["held"])
+    during = [state for state in line.seen[first:-1]]
+    assert all(state["held"] and state["ost"] and not state["released"] for state in during)
+    assert not any(state["duty"] or state["duty_b"] for state in line.seen)
+    state = device.run(20)
+    assert (state["held"], state["released"], state["used"], state["wrong_reads"], state["fault"]) == (0, 1, 0, 0, 0)
+
+
+def test_telemetry_that_comes_back_between_requests_spoils_no_load(start):
+    """As from a line that echoes, or a monitor that sends what it read: frames, their beginnings, and zeros."""
+    device = start()
+    at_command(device, ZERO)
+    frame = bytes.fromhex("a55a02") + bytes(range(FRAME_OCTETS - 3))
+    for noise in (frame, frame[:7], b"\xc3", b"\xc3\x3c\x01\x05\xff", bytes(40)):
+        line = Eventful(device, "", 0, noise)
+        LoadSession(line).load(blocks()[2], crc_of_block(blocks()[2]), origin_of_block(blocks()[2]))
+        assert device.run(6)["wrong_reads"] == 0

@@ -152,7 +152,7 @@ def test_telemetry_on_the_device_model(firmware, check):
         ("SCICTL1.all = SCI_RUNS", "SCICTL1.all = SCI_TRANSMITS", check_stream),
         ("SCIHBAUD = DZ_SCI_BRR >> 8", "SCIHBAUD = DZ_SCI_BRR", check_stream),
         ("    dz_telemetry.ticks += (uint16_t)(ticks", "    dz_telemetry.ticks = (uint16_t)(ticks", check_stream),
-        ("dz_beta(state.p_a_adc, state.p_b_adc)", "dz_beta(state.p_b_adc, state.p_a_adc)", check_stream),
+        ("dz_beta(state->p_a_adc, state->p_b_adc)", "dz_beta(state->p_b_adc, state->p_a_adc)", check_stream),
         ("(uint16_t)(dz_telemetry.due + DZ_FRAME_TICKS)", "ticks + 1u", check_stream),
     ],
 )

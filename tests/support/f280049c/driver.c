@@ -40,16 +40,18 @@ static void run(const char *events)
     for (; *events != '\0'; events++)
     {
         const struct tick tick = device_period(*events);
-        printf("tick event=%c output=%s duty=%u served=%u cmpa=%u without=%u released=%u fault=%u duty_b=%u tripped_b=%u", *events,
+        printf("tick event=%c output=%s duty=%u served=%u cmpa=%u without=%u released=%u fault=%u duty_b=%u forced=%u forced_b=%u cmpb=%u",
+               *events,
                tick.output, (unsigned)tick.duty, tick.served, (unsigned)model.cmpa[0], dz_state.ticks_without_sample,
-               dz_state.released, dz_state.fault, (unsigned)tick.duty_b, (unsigned)model.tripped[1]);
+               dz_state.released, dz_state.fault, (unsigned)tick.duty_b, (unsigned)model.tripped[0], (unsigned)model.tripped[1],
+               (unsigned)model.cmpa[1]);
 #ifdef DZ_FAULT_CALIBRATION
         printf(" calibration=%u", dz_state.calibration);
 #endif
 #ifdef DZ_CURRENT_REST_TICKS
-        printf(" converted=%u before=%u first=%u apart=%u current=%u sum=%u offset=%u current_faults=%u set_point=%u forced=%u",
+        printf(" converted=%u before=%u first=%u apart=%u current=%u sum=%u offset=%u current_faults=%u set_point=%u",
                tick.converted, tick.before, tick.first, tick.apart, tick.current_mA, dz_state.current_sum,
-               dz_state.current_offset, dz_state.current_faults, dz_state.set_point, (unsigned)model.tripped[0]);
+               dz_state.current_offset, dz_state.current_faults, dz_state.set_point);
 #endif
         puts("");
     }

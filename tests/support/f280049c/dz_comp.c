@@ -9,7 +9,7 @@ uint16_t dz_comp(uint16_t u_adc, uint16_t p_a_adc, uint16_t p_b_adc)
 
 void dz_drive_init(struct dz_drive *drive)
 {
-    const struct dz_drive at_rest = {0u, 0u, 0u, 0, 0u, 0u};
+    const struct dz_drive at_rest = {0u, 0u, 0u, 0, 0u, 0u, 0u};
     *drive = at_rest;
 }
 

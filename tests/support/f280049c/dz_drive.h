@@ -8,6 +8,7 @@ struct dz_drive
     uint16_t compare_b;
     uint16_t law;
     int16_t side;
+    uint16_t status;
     uint16_t samples, ticks; /* since the drive was at rest */
 };
 void dz_drive_init(struct dz_drive *drive);

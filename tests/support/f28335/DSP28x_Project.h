@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#define interrupt
+#define __interrupt
 
 #ifndef DSP28_DATA_TYPES
 #define DSP28_DATA_TYPES

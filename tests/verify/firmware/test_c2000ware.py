@@ -48,8 +48,10 @@ def test_the_whole_firmware_compiles_against_the_users_headers(firmware_folder, 
     [
         ("dz_hardware.c", "ETPS.bit.SOCAPRD", "ETPS.bit.SOCPRD"),
         ("dz_hardware.c", "&dz_isr", "&dz_state"),
+        ("dz_hardware.c", "PIEACK_GROUP3", "PIEACK_GROUP_3"),
         ("main.c", "    InitFlash();", "    InitFlashMemory();"),
-        ("dz_isr.c", "u_adc = AdcMirror.ADCRESULT0;", "u_adc = AdcMirror.ADCRESULT0 * 1.5f;"),
+        ("main.c", "&RamfuncsRunStart", "RamfuncsRunStart"),
+        ("dz_hardware.c", "codes[0] = AdcMirror.ADCRESULT0;", "codes[0] = AdcMirror.ADCRESULT0 * 1.5f;"),
     ],
 )
 def test_a_seeded_fault_against_the_headers_is_seen(firmware_folder, ware, file, old, new):

@@ -56,6 +56,7 @@ typedef uint64_t Uint64;
 typedef float float32;
 typedef long double float64;
 #define interrupt
+#define __interrupt
 #define cregister
 #define far
 #define near

@@ -34,15 +34,20 @@ from dzdesign.codegen.core.certificate_text import (
     equation_of,
     zero_command,
 )
-from dzdesign.codegen.core.constants import LITERALS, CoreFile, Define, Values, c_comment, defines
-from dzdesign.codegen.core.integer_form import INT32_MAX
-from dzdesign.codegen.core.misra import misra_lines
-from dzdesign.codegen.core.status_bits import (
+from dzdesign.codegen.core.constants import (
+    LITERALS,
+    CoreFile,
+    Define,
+    Values,
+    c_comment,
     current_fault_bits,
+    defines,
     difference_place,
     drive_status_constants,
+    misra_lines,
     status_constants,
 )
+from dzdesign.codegen.core.integer_form import INT32_MAX
 from dzdesign.codegen.target import Target
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.law import law

@@ -9,7 +9,7 @@ from textwrap import wrap
 
 from dzdesign.codegen.calibration.layout import NO_INTERLOCK, NO_RAMP, BuiltFor, CalibrationBlock, Words, members
 from dzdesign.codegen.calibration.packing import text_of
-from dzdesign.codegen.core.command_shares import in_unit, share_of_command
+from dzdesign.codegen.core.certificate_text import in_unit, share_of_command
 from dzdesign.codegen.core.constants import COLUMNS, c_comment
 from dzdesign.codegen.core.integer_form import integer_form
 from dzdesign.derivation.law import law

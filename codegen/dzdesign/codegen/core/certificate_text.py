@@ -1,4 +1,4 @@
-"""What the files say of the law: where it comes from, its compare values at zero command, their certificate."""
+"""What the files say of the law: where it comes from, shares of its command, its values at zero, their certificate."""
 
 from textwrap import wrap
 
@@ -17,6 +17,20 @@ KAPPA_ROUNDING, U_MIN0_ROUNDING = "rounded to nearest", "rounded down with a mar
 def equation_of(chosen: Law) -> str:
     """Return where a law comes from, as a reader looks for it."""
     return f"Eq. {chosen.equation}" if chosen.equation.startswith("(") else chosen.equation.replace("(", "Eq. (")
+
+
+def share_of_command(compensator: Compensator, codes: int, sign: int = 1) -> str:
+    """Return so many codes of command as a share of full command, and in the unit that a person sees."""
+    share = codes / compensator.signals.command.span(sign)
+    return f"{share:.2%} of command" + in_unit(compensator, share)
+
+
+def in_unit(compensator: Compensator, share: float) -> str:
+    """Return a share of full command or drive in the unit that a person sees, behind a comma; nothing in percent."""
+    units = compensator.valve.recorded_units.of_controller
+    if units.command.unit == "%":
+        return ""
+    return f", {units.text(share * float(compensator.u_max_V), '.4g dV')}"
 
 
 def zero_command(compensator: Compensator, sign: int) -> tuple[int, int]:

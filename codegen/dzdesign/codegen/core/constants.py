@@ -1,6 +1,11 @@
-"""A `#define` of the generated C, and where it is from; C's comment and the manifest's entry print it."""
+"""A `#define` of the generated C, and where it is from; C's comment and the manifest's entry print it.
 
-from collections.abc import Mapping, Sequence
+Those of the status words of law, drive and current controller are here: a bit for each fault, by a convention and from
+no datum. So is what the core's banners say of MISRA C:2012: hardware files of the targets are outside of it, as
+registers and the vendors' headers decide what they look like.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 
@@ -76,3 +81,90 @@ def c_comment(text: str, columns: int = COLUMNS) -> list[str]:
 def defines(constants: Sequence[Define]) -> list[str]:
     """Return the lines of several `#define`s, each with its comment."""
     return [line for constant in constants for line in constant.lines()]
+
+
+#: Bits of the law's status word, and what each says.
+STATUS_BITS = {
+    "COMMAND": "command outside its valid codes, so the valve is let go",
+    "PRESSURE_A": "pressure A outside its valid codes, so the smallest beta is used",
+    "PRESSURE_B": "pressure B outside its valid codes, so the smallest beta is used",
+    "DIFFERENCE": "valid pressures, but their drop too far below zero, so the smallest beta is used",
+    "ABOVE": "pressure drop above the highest tested one: no fault, but no recording either",
+}
+#: Bits that the drive adds to those of the law, each with its place.
+DRIVE_BITS = {
+    "WAITING": (5, "the drive waits: for valid commands, and with the interlock for zero command"),
+    "HELD": (6, "the smallest beta is used until the pressures have been valid for long enough"),
+    "LATCHED": (7, "a fault that stays until dz_drive_init()"),
+}
+#: The drive's bit of a block that was refused.
+CALIBRATION_BIT = {"CALIBRATION": (8, "dz_calibration_check() refused the block: the output is released")}
+#: Bits of the current controller's word of faults.
+FAULT_BITS = {
+    "NO_OFFSET": "the offset of the current's codes is not calibrated yet",
+    "SENSOR": "that offset is too far from the designed one",
+    "OPEN": "no current where one must flow: wire or coil open",
+    "SHORT": "the current is beyond the converter's range",
+    "OVER": "the current stayed above its limit",
+}
+
+
+def status_constants() -> list[Define]:
+    """Return the bits of the law's status word."""
+    return [*_bits("DZ_STATUS", ((place, *each) for place, each in enumerate(STATUS_BITS.items())), "the status word")]
+
+
+def drive_status_constants(*, block: bool) -> list[Define]:
+    """Return the bits that the drive adds."""
+    bits = DRIVE_BITS | (CALIBRATION_BIT if block else {})
+    return [*_bits("DZ_STATUS", ((place, name, text) for name, (place, text) in bits.items()),
+                   "the drive's status word")]  # fmt: skip
+
+
+def current_fault_bits() -> list[Define]:
+    """Return the bits of the controller's word of faults."""
+    return [*_bits("DZ_CURRENT", ((place, *each) for place, each in enumerate(FAULT_BITS.items())), "the faults")]
+
+
+def difference_place() -> Define:
+    """Return the place of a status bit, by which the one above it is shifted down to be masked with it."""
+    place = list(STATUS_BITS).index("DIFFERENCE")
+    return Define(symbol="DIFFERENCE_PLACE", value=place, equation="place of DZ_STATUS_DIFFERENCE in the status word",
+                  engineering=f"bit {place}", rounding="a convention")  # fmt: skip
+
+
+def _bits(prefix: str, bits: Iterable[tuple[int, str, str]], of: str) -> Iterable[Define]:
+    for place, name, text in bits:
+        yield Define(symbol=f"{prefix}_{name}", value=1 << place, equation=f"bit {place} of {of}",
+                     engineering=text, rounding="a convention")  # fmt: skip
+
+
+#: How it is checked.
+MISRA_CHECK = "MISRA C:2012: nothing found by cppcheck 2.10 (--platform=avr8 --std=c99 --addon=misra) in this file"
+_FOR_CALLERS = "they are for those who call it; not every firmware needs all of them."
+#: Every deviation, by the name of its file: rule, symbols and reason.
+DEVIATIONS = {
+    "dz_calibration.h": "deviation from rule 2.5 (advisory) in DZ_CURRENT_SAMPLES, DZ_CALIBRATION_SUPPLY_NODES, "
+    "DZ_CALIBRATION_SUPPLY_MASK, DZ_CALIBRATION_CURRENT: they are for current control; not every firmware has it.",
+    "dz_drive.h": "deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, DZ_STATUS_CALIBRATION: "
+    + _FOR_CALLERS,
+}
+#: The same of a firmware with the numbers of its valve in it.
+FIXED_DEVIATIONS = {
+    "dz_valve.h": "deviation from rule 5.9 (advisory) in dz_valve: each source has the numbers as constants of its "
+    "own, so that a compiler folds them into the code.",
+    "dz_calibration.h": "deviation from rule 2.5 (advisory) in DZ_COMPARE_MAX, DZ_ADC_CODE_MAX, DZ_SAMPLE_HZ, "
+    "DZ_TICK_HZ, DZ_CURRENT_SAMPLES: " + _FOR_CALLERS,
+    "dz_drive.h": "deviation from rule 2.5 (advisory) in DZ_DRIVE_TICKS_PER_SAMPLE, DZ_DRIVE_COMMAND_ZERO: "
+    + _FOR_CALLERS,
+    "dz_current.h": "deviation from rule 2.5 (advisory) in DZ_CURRENT_OFFSET_TICKS: " + _FOR_CALLERS,
+}
+
+
+def misra_lines(file: str = "", *, fixed: bool = False) -> list[str]:
+    """Return the comment lines on MISRA C:2012 of a file of the core; without a name those of one that is clean."""
+    deviations = FIXED_DEVIATIONS if fixed else DEVIATIONS
+    if file not in deviations:
+        return wrap(f"{MISRA_CHECK}.", COLUMNS - 3)
+    deviation = wrap(deviations[file], COLUMNS - 5, initial_indent="  ", subsequent_indent="  ")
+    return [*wrap(f"{MISRA_CHECK} but for", COLUMNS - 3), *deviation]

@@ -39,7 +39,7 @@ def timing() -> dict[str, str]:
     return {
         **pwm_timing(SYSCLK_HZ, WATCHDOG_HZ, SOCA_PRESCALE_MAX),
         "sysclk_hz": str(SYSCLK_HZ),
-        "sysclk_mhz": printed(Fraction(SYSCLK_HZ, 10**6)),
+        "clock_mhz": printed(Fraction(SYSCLK_HZ, 10**6)),
     }
 
 
@@ -62,23 +62,42 @@ def converter() -> dict[str, str]:
         "sequence_us": printed(sequence_s * 10**6),
         "sequence_of_four_us": printed(of_four_s * 10**6),
         **current,
+        "held_us": printed(window_s * 10**6),
+        "current_timeout_ticks": "2",  # a flag comes with the last of eight codes
         "adc_codes": str(2**ADC_BITS),
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": printed(ADC_SPAN_V),
     }
 
 
-#: device.h and the linker files expect these of the compiler, as TI's own project files for this part set them.
-OPTIONS = {
+WARE, DRIVERLIB = "device_support/f28004x/common", "driverlib/f28004x/driverlib"
+#: Device, headers of TI's that the C includes, options and files of TI's that its project takes, below C2000Ware.
+#: device.h and the linker files expect these options of the compiler, as TI's own project files for this part set them.
+PROJECT = {
+    "device": "TMS320F280049C",
+    "device_headers": "driverlib.h device.h",
+    "serve_watchdog": "SysCtl_serviceWatchdog",
+    "trip_inputs": "input X-BAR 1, TZ1;input X-BAR 2, TZ2",
+    "ram_functions": "clear_flag",
+    "output_format": "ELF",
     "compiler_options": "-v28 -ml -mt --float_support=fpu32 --tmu_support=tmu0 --abi=eabi -O2 --c99 -g "
     "--gen_func_subsections=on --diag_warning=225 --diag_suppress=10063",
     "linker_options": "--stack_size=0x3F8 --entry_point=code_start --rom_model",
+    "library": "libc.a",
+    "ti_folders": "driverlib/f28004x device_support/f28004x",
+    "ti_includes": f"{DRIVERLIB} {WARE}/include",
+    "ti_sources": f"{WARE}/source/device.c {WARE}/source/f28004x_codestartbranch.asm",
+    "ti_flash_sources": "",
+    "ti_linked": f"{DRIVERLIB}/ccs/Release/driverlib_eabi.lib",
+    "ti_ram_linker_file": f"{WARE}/cmd/28004x_generic_ram_lnk.cmd",
+    "ti_flash_linker_file": f"{WARE}/cmd/28004x_generic_flash_lnk.cmd",
+    "ti_debug_target": f"{WARE}/targetConfigs/TMS320F280049C.ccxml",
 }
 
 TARGET = c2000_target(
     "f280049c",
     "TI TMS320F280049C at 100 MHz: DriverLib, ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
-    {**timing(), **converter(), **OPTIONS},
+    {**timing(), **converter(), **PROJECT},
     converter=Converter(
         full_V=ADC_SPAN_V,
         levels=2**ADC_BITS,

@@ -68,7 +68,7 @@ def timing() -> dict[str, str]:
     rest_s = Fraction(1, PWM_HZ) - ISR_DELAY_S
     return {
         **figures,
-        "sysclkout_mhz": printed(sysclkout_hz / 10**6),
+        "clock_mhz": printed(sysclkout_hz / 10**6),
         "check_instructions": str(CHECK_INSTRUCTIONS),
         "check_cycles": str(CHECK_CYCLES),
         "flash_cycles": str(FLASH_CYCLES),
@@ -118,6 +118,7 @@ def converter() -> dict[str, str]:
         "delay_to_last_edge_us": in_us(to_edge_s + (held_periods - 1) * period_s),
         "sequence_of_four_us": printed(of_four_s * 10**6),
         **current,
+        "current_timeout_ticks": "1",  # a sequencer tells of each code
         "adc_codes": str(2**ADC_BITS),
         "adc_code_max": str(2**ADC_BITS - 1),
         "adc_span_v": str(ADC_SPAN_V),
@@ -163,10 +164,38 @@ def serial_line() -> dict[str, str]:
     }
 
 
+WARE = "device_support/f2833x"
+SOURCES = ("Adc.c", "DefaultIsr.c", "MemCopy.c", "PieCtrl.c", "PieVect.c", "SysCtrl.c")
+ASSEMBLY = ("ADC_cal.asm", "CodeStartBranch.asm", "usDelay.asm")
+#: Device, headers of TI's that the C includes, options and files of TI's that its project takes, below C2000Ware.
+PROJECT = {
+    "device": "TMS320F28335",
+    "device_headers": "DSP28x_Project.h",
+    "serve_watchdog": "ServiceDog",
+    "trip_inputs": "TZ1;TZ2",
+    "ram_functions": "",
+    "output_format": "COFF",
+    "compiler_options": "-v28 -ml -mt --float_support=fpu32 --abi=coffabi -O2 --c99 -g --define=LARGE_MODEL "
+    "--diag_warning=225 --diag_suppress=10063",
+    "linker_options": "--stack_size=0x380 --entry_point=code_start --rom_model",
+    "library": "rts2800_fpu32.lib",
+    "ti_folders": WARE,
+    "ti_includes": f"{WARE}/headers/include {WARE}/common/include",
+    "ti_sources": " ".join(
+        [f"{WARE}/headers/source/DSP2833x_GlobalVariableDefs.c"]
+        + [f"{WARE}/common/source/DSP2833x_{name}" for name in SOURCES + ASSEMBLY]
+    ),
+    "ti_flash_sources": f"{WARE}/common/source/DSP2833x_CSMPasswords.asm",
+    "ti_linked": f"{WARE}/headers/cmd/DSP2833x_Headers_nonBIOS.cmd",
+    "ti_ram_linker_file": f"{WARE}/common/cmd/28335_RAM_lnk.cmd",
+    "ti_flash_linker_file": f"{WARE}/common/cmd/F28335.cmd",
+    "ti_debug_target": f"{WARE}/common/targetConfigs/TMS320F28335.ccxml",
+}
+
 TARGET = c2000_target(
     "f28335",
     "TI TMS320F28335 at 150 MHz: ePWM1 at 2.5 kHz, ADC at 1.25 kHz, CCS project and makefile",
-    {**timing(), **converter(), **serial_line(), **frame_context()},
+    {**timing(), **converter(), **serial_line(), **frame_context(), **PROJECT},
     converter=Converter(full_V=Fraction(ADC_SPAN_V), levels=2**ADC_BITS),
     sources=("dz_telemetry.c", "dz_telemetry.h", "dz_frame.c", "dz_frame.h"),
     block_sources=("dz_active.c", "dz_active.h"),

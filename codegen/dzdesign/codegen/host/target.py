@@ -3,18 +3,8 @@
 from dzdesign.codegen.target import Target
 from dzdesign.design.current.circuit import CurrentSampling
 
-FILES = ("dz_host.c", "dz_host.h", "selftest.c", "dz_host.def", "dz_host.map", "dz_host.exp", "Makefile")
-SHARED_FILES = ("dz_selftest.c", "dz_selftest.h")
-#: What the library shows (of two solenoids `dz_comp_negative` too): the three lists of exports are printed from it.
-EXPORTS = (
-    "dz_comp",
-    "dz_comp_many",
-    "dz_compare_max",
-    "dz_adc_code_max",
-    "dz_drive_init",
-    "dz_drive_sample",
-    "dz_drive_tick",
-)
+FILES = ("dz_host.c", "dz_host.h", "selftest.c", "dz_selftest.c", "dz_selftest.h")
+OTHER_FILES = ("CMakeLists.txt", "README.md")
 
 TARGET = Target(
     name="host",
@@ -24,10 +14,6 @@ TARGET = Target(
     takes_any_signals=True,
     current_sampling=CurrentSampling(),
     has_timer=False,
-    templates={f"host/{file}": f"{file}.jinja" for file in (*FILES, *SHARED_FILES, "CMakeLists.txt", "README.md")},
-    context={
-        "exports_for_windows": "\n".join(f"    {name}" for name in EXPORTS),
-        "exports_for_linux": "\n".join(f"        {name};" for name in EXPORTS),
-        "exports_for_macos": "\n".join(f"_{name}" for name in EXPORTS),
-    },
+    templates={f"host/{file}": f"{file}.jinja" for file in (*FILES, *OTHER_FILES)},
+    context={},
 )

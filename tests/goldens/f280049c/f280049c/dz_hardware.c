@@ -16,6 +16,20 @@
 #error "device.h sets another clock than this firmware was generated for"
 #endif
 
+static void clear_flag(ADC_IntNumber number);
+
+/* What dz_isr() calls. In the FLASH build it runs from RAM, without wait states; TI's linker file places .TI.ramfunc. */
+#ifdef __TI_COMPILER_VERSION__
+#pragma CODE_SECTION(dz_read_sample, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_write_compare_a, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_trip_output, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_untrip_output, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_output_tripped, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_trip_inputs_high, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_interrupt_done, ".TI.ramfunc");
+#pragma CODE_SECTION(clear_flag, ".TI.ramfunc");
+#endif
+
 void dz_output_hold_low(void)
 {
     /* TZ1 comes from the input X-BAR. Its reset value is GPIO0, which is the PWM pin itself. */
@@ -126,4 +140,68 @@ void dz_watchdog_start(void)
     SysCtl_setWatchdogPrescaler(SYSCTL_WD_PRESCALE_1);
     SysCtl_serviceWatchdog();
     SysCtl_enableWatchdog();
+}
+
+/* The flag of an ADC interrupt, once; its overflow would keep the flag from coming again. */
+static void clear_flag(ADC_IntNumber number)
+{
+    ADC_clearInterruptStatus(ADCA_BASE, number);
+    if (ADC_getInterruptOverflowStatus(ADCA_BASE, number))
+    {
+        ADC_clearInterruptOverflowStatus(ADCA_BASE, number);
+        ADC_clearInterruptStatus(ADCA_BASE, number);
+    }
+}
+
+uint16_t dz_read_sample(uint16_t codes[DZ_SAMPLE_CODES])
+{
+    uint16_t finished = 0u;
+
+    if (ADC_getInterruptStatus(ADCA_BASE, ADC_INT_NUMBER1) && !ADC_isBusy(ADCA_BASE))
+    {
+        codes[0] = ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER0);
+        codes[1] = ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER1);
+        codes[2] = ADC_readResult(ADCARESULT_BASE, ADC_SOC_NUMBER2);
+        clear_flag(ADC_INT_NUMBER1);
+        finished = 1u;
+    }
+    return finished;
+}
+
+/* A new compare value is loaded at CTR = 0. If it is 0, it can miss its own compare event there and the old action
+ * lasts for one period more: full duty at zero command (0-100 % duty: SPRAAI1). The continuous force, loaded
+ * at the same instant, keeps the pin low whatever the counter does. */
+void dz_write_compare_a(uint16_t compare)
+{
+    EPWM_setCounterCompareValue(EPWM1_BASE, EPWM_COUNTER_COMPARE_A, compare);
+    EPWM_setActionQualifierContSWForceAction(EPWM1_BASE, EPWM_AQ_OUTPUT_A,
+                                             (compare == 0u) ? EPWM_AQ_SW_OUTPUT_LOW : EPWM_AQ_SW_DISABLED);
+}
+
+void dz_trip_output(void)
+{
+    EPWM_forceTripZoneEvent(EPWM1_BASE, EPWM_TZ_FORCE_EVENT_OST);
+}
+
+void dz_untrip_output(void)
+{
+    EPWM_clearTripZoneFlag(EPWM1_BASE, EPWM_TZ_FLAG_OST);
+}
+
+uint16_t dz_output_tripped(void)
+{
+    const uint16_t flags = EPWM_getTripZoneFlagStatus(EPWM1_BASE);
+
+    return ((flags & EPWM_TZ_FLAG_OST) != 0u) ? 1u : 0u;
+}
+
+uint16_t dz_trip_inputs_high(void)
+{
+    return (GPIO_readPin(DZ_TRIP_PIN) != 0u) ? 1u : 0u;
+}
+
+void dz_interrupt_done(void)
+{
+    EPWM_clearEventTriggerInterruptFlag(EPWM1_BASE);
+    Interrupt_clearACKGroup(INTERRUPT_ACK_GROUP3);
 }

@@ -25,10 +25,10 @@ extern "C" {
 
 /* ADCCLK = 50 MHz; sample window 50 SYSCLK cycles = 0.5 us. */
 #define DZ_ADC_WINDOW 50u
+#define DZ_TICKS_PER_SAMPLE 2u
 
 /* A new sample is due every 2 PWM periods (1250 Hz);
  * 8 periods = 3.2 ms without one is a fault. */
-#define DZ_TICKS_PER_SAMPLE 2u
 #define DZ_SAMPLE_TIMEOUT_TICKS 8u
 
 #define DZ_PWM_PIN 0u   /* GPIO0: EPWM1A, to the valve's driver */
@@ -36,7 +36,7 @@ extern "C" {
 
 /* Faults, one bit each. A fault is kept until the next reset; the output is low while any bit is set. */
 #define DZ_FAULT_NO_SAMPLE 0x0001u  /* the converter gave no usable sample in time */
-#define DZ_FAULT_TRIP_INPUT 0x0002u /* the trip pin went low while the output was in use */
+#define DZ_FAULT_TRIP_INPUT 0x0002u /* GPIO12 (TZ1) went low while the output was in use */
 #define DZ_FAULT_WATCHDOG 0x0004u   /* the last reset came from the watchdog: power-cycle to clear */
 #define DZ_FAULT_CLOCK 0x0008u      /* crystal missing, or PLL not set for 100 MHz */
 
@@ -46,14 +46,36 @@ void dz_output_hold_low(void);
 /* Faults that are known before the first sample, or 0. */
 uint16_t dz_start_faults(void);
 
-/* ADC A, ePWM1 and pins, in this order. Call it with interrupts off. */
+/* Converter, ePWM1 and pins. Call it with interrupts off. */
 void dz_hardware_init(void);
 
 /* EPWM1's interrupt to dz_isr(). The caller enables interrupts with EINT. */
 void dz_interrupt_init(void);
 
-/* From here on SysCtl_serviceWatchdog() must come within 13.1 ms. */
+/* From here on SysCtl_serviceWatchdog() must be called within 13.1 ms. */
 void dz_watchdog_start(void);
+
+/* Of dz_isr() alone; all of these run from RAM. */
+
+/* Codes of a sample: command, pressure A, pressure B. */
+#define DZ_SAMPLE_CODES 3u
+
+/* 1 with the codes of a finished sample, once; 0 if there is none. */
+uint16_t dz_read_sample(uint16_t codes[DZ_SAMPLE_CODES]);
+
+/* Compare value of the next period; 0 keeps the pin low. */
+void dz_write_compare_a(uint16_t compare);
+
+/* The trip zone holds the output low, or lets it go. */
+void dz_trip_output(void);
+void dz_untrip_output(void);
+
+/* 1 if the trip zone holds the output low; 1 if no trip input is low. */
+uint16_t dz_output_tripped(void);
+uint16_t dz_trip_inputs_high(void);
+
+/* The next interrupt may come. */
+void dz_interrupt_done(void);
 
 #ifdef __cplusplus
 }

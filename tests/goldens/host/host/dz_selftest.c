@@ -10,8 +10,7 @@
 #define FNV_PRIME UINT32_C(0x01000193)
 #define LAST_CODE UINT16_C(65535)
 
-const struct dz_selftest_grid dz_selftest_grid = {"grid", 13u, 61u};
-const struct dz_selftest_grid dz_selftest_sample = {"sample", 273u, 195u};
+static const char *const names[DZ_SELFTESTS] = {"dz_comp sample", "dz_comp grid", "dz_drive walk"};
 
 /* The code after this one in the grid; not for LAST_CODE, which has none. */
 static uint16_t next_code(uint16_t code, uint16_t step)
@@ -46,9 +45,14 @@ static uint32_t with_byte(uint32_t hash, uint32_t byte)
     return (hash ^ byte) * FNV_PRIME;
 }
 
-struct dz_selftest_result dz_selftest_run(const struct dz_selftest_grid *grid)
+static uint32_t with_number(uint32_t hash, uint16_t number)
 {
-    struct dz_selftest_result result = {FNV_OFFSET, 0u};
+    return with_byte(with_byte(hash, number & 0xFFu), (uint32_t)number >> 8);
+}
+
+static uint32_t grid_hash(uint16_t command_step, uint16_t pressure_step)
+{
+    uint32_t hash = FNV_OFFSET;
     uint16_t u_adc = 0u;
     uint16_t p_a_adc = 0u;
     uint16_t p_b_adc = 0u;
@@ -56,76 +60,28 @@ struct dz_selftest_result dz_selftest_run(const struct dz_selftest_grid *grid)
 
     while (more != 0u)
     {
-        const uint32_t compare = dz_comp(u_adc, p_a_adc, p_b_adc);
-
-        result.hash = with_byte(with_byte(result.hash, compare & 0xFFu), compare >> 8);
-        result.calls++;
+        hash = with_number(hash, dz_comp(u_adc, p_a_adc, p_b_adc));
         if (p_b_adc != LAST_CODE)
         {
-            p_b_adc = next_code(p_b_adc, grid->pressure_step);
+            p_b_adc = next_code(p_b_adc, pressure_step);
         }
         else if (p_a_adc != LAST_CODE)
         {
             p_b_adc = 0u;
-            p_a_adc = next_code(p_a_adc, grid->pressure_step);
+            p_a_adc = next_code(p_a_adc, pressure_step);
         }
         else if (u_adc != LAST_CODE)
         {
             p_b_adc = 0u;
             p_a_adc = 0u;
-            u_adc = next_code(u_adc, grid->command_step);
+            u_adc = next_code(u_adc, command_step);
         }
         else
         {
             more = 0u;
         }
     }
-    return result;
-}
-
-static char *put_text(char *end, const char *text)
-{
-    while (*text != '\0')
-    {
-        *end = *text;
-        end++;
-        text++;
-    }
-    return end;
-}
-
-/* Numbers by hand, because not every target has printf. */
-static char *put_hexadecimal(char *end, uint32_t value)
-{
-    uint16_t shift = 32u;
-
-    while (shift != 0u)
-    {
-        shift = (uint16_t)(shift - 4u);
-        *end = "0123456789ABCDEF"[(value >> shift) & 0xFu];
-        end++;
-    }
-    return end;
-}
-
-static char *put_decimal(char *end, uint32_t value)
-{
-    char digits[10];
-    uint16_t count = 0u;
-
-    while ((value != 0u) || (count == 0u))
-    {
-        digits[count] = "0123456789"[value % 10u];
-        count++;
-        value /= 10u;
-    }
-    while (count != 0u)
-    {
-        count--;
-        *end = digits[count];
-        end++;
-    }
-    return end;
+    return hash;
 }
 
 /* The walk of dz_selftest.h: its position, its aim, and the state of its random numbers. */
@@ -175,11 +131,6 @@ static uint16_t next_pressure(struct walk *walk, uint16_t least, uint16_t count)
     return (draw(walk, 32u) == 0u) ? draw(walk, (uint16_t)(DZ_ADC_CODE_MAX + 2u)) : usual;
 }
 
-static uint32_t with_number(uint32_t hash, uint16_t number)
-{
-    return with_byte(with_byte(hash, number & 0xFFu), (uint32_t)number >> 8);
-}
-
 static uint32_t walked_hash(void)
 {
     struct walk walk = {1u, 0u, 0u, 0u};
@@ -204,27 +155,30 @@ static uint32_t walked_hash(void)
     return hash;
 }
 
-void dz_selftest_drive_line(char line[DZ_SELFTEST_LINE])
+static char *put_text(char *end, const char *text)
 {
-    char *end = put_text(line, "dz_drive walk FNV-1a-32 ");
-
-    end = put_hexadecimal(end, walked_hash());
-    end = put_text(end, " over ");
-    end = put_decimal(end, DZ_SELFTEST_WALK);
-    end = put_text(end, " ticks\n");
-    *end = '\0';
+    while (*text != '\0')
+    {
+        *end = *text;
+        end++;
+        text++;
+    }
+    return end;
 }
 
-void dz_selftest_line(const struct dz_selftest_grid *grid, char line[DZ_SELFTEST_LINE])
+/* The number by hand, because not every target has printf. */
+void dz_selftest_line(uint16_t test, char line[DZ_SELFTEST_LINE])
 {
-    const struct dz_selftest_result result = dz_selftest_run(grid);
-    char *end = put_text(line, "dz_comp ");
+    const uint32_t hash = (test == 0u) ? grid_hash(273u, 195u) : (test == 1u) ? grid_hash(13u, 61u) : walked_hash();
+    char *end = put_text(put_text(line, names[test]), " FNV-1a-32 ");
+    uint16_t shift = 32u;
 
-    end = put_text(end, grid->name);
-    end = put_text(end, " FNV-1a-32 ");
-    end = put_hexadecimal(end, result.hash);
-    end = put_text(end, " over ");
-    end = put_decimal(end, result.calls);
-    end = put_text(end, " compare values\n");
+    while (shift != 0u)
+    {
+        shift = (uint16_t)(shift - 4u);
+        *end = "0123456789ABCDEF"[(hash >> shift) & 0xFu];
+        end++;
+    }
+    end = put_text(end, "\n");
     *end = '\0';
 }

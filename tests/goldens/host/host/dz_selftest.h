@@ -2,14 +2,26 @@
 /* Compensator SHA-256: a15dd28ff1e1d2cfea52135ac6be9297f558f03a4ce9ed3b316348aafbe4fb34 */
 /* Valve identified from: synthetic_1.csv, synthetic_3.csv, synthetic_5.csv */
 
-/* One number for the results of dz_comp() over a grid of inputs: two machines that print the same number agree.
+/* Numbers for what the core answers: two machines that print the same numbers agree.
  *
- * A grid with steps s and t takes, in this order and the last fastest,
+ * "dz_comp sample" with the steps s = 273 and t = 195 (the corners and some between), and "dz_comp grid" with 13 and 61: the results
+ * of dz_comp() over the inputs, in this order and the last fastest,
  *     u_adc    0, 1, s, 2 s, ... below DZ_ADC_CODE_MAX, then DZ_ADC_CODE_MAX, DZ_ADC_CODE_MAX + 1, 65535
  *     p_a_adc  the same with t
  *     p_b_adc  the same with t
- * The number is the 32-bit FNV-1a hash (offset basis 0x811C9DC5, prime 0x01000193) of all compare values, two bytes
- * each, the low one first. */
+ *
+ * "dz_drive walk": dz_drive through DZ_SELFTEST_WALK ticks, a sample every DZ_DRIVE_TICKS_PER_SAMPLE of them from the first on. With r
+ * the next number of r = (1664525 r + 1013904223) modulo 2^32, from r = 1 on, taken anew for each code,
+ *     u_adc    every 64th sample another aim: (r >> 16) modulo (DZ_ADC_CODE_MAX + 1), zero command where that is odd; each sample
+ *              a quarter of the way there is gone (rounded towards where it stands), and (r >> 16) modulo 9 less 4 codes are
+ *              added for noise, within the converter's range; of the samples with (r >> 16) modulo 256 equal to 0 the command
+ *              is 65535
+ *     p_a_adc  DZ_ADC_CODE_MAX / 3 + (r >> 16) modulo (DZ_ADC_CODE_MAX / 2); of the samples with (r >> 16) modulo 32 equal to 0
+ *              (r >> 16) modulo (DZ_ADC_CODE_MAX + 2)
+ *     p_b_adc  the same with DZ_ADC_CODE_MAX / 4 and DZ_ADC_CODE_MAX / 8
+ *
+ * A number is the 32-bit FNV-1a hash (offset basis 0x811C9DC5, prime 0x01000193) of all compare values, or of each tick's compare_a,
+ * compare_b and status, two bytes each, the low one first. */
 #ifndef DZ_SELFTEST_H
 #define DZ_SELFTEST_H
 
@@ -19,43 +31,12 @@
 extern "C" {
 #endif
 
-struct dz_selftest_grid
-{
-    const char *name;
-    uint16_t command_step;  /* s, 2 or more */
-    uint16_t pressure_step; /* t, 2 or more */
-};
-
-struct dz_selftest_result
-{
-    uint32_t hash;
-    uint32_t calls;
-};
-
-extern const struct dz_selftest_grid dz_selftest_grid;   /* for a fast machine */
-extern const struct dz_selftest_grid dz_selftest_sample; /* for a slow one: the corners and some between */
-
-struct dz_selftest_result dz_selftest_run(const struct dz_selftest_grid *grid);
-
-/* The walk: dz_drive through DZ_SELFTEST_WALK ticks, a sample every DZ_DRIVE_TICKS_PER_SAMPLE of them from the first on. With r
- * the next number of r = (1664525 r + 1013904223) modulo 2^32, from r = 1 on, taken anew for each code,
- *     u_adc    every 64th sample another aim: (r >> 16) modulo (DZ_ADC_CODE_MAX + 1), zero command where that is odd; each sample
- *              a quarter of the way there is gone (rounded towards where it stands), and (r >> 16) modulo 9 less 4 codes are
- *              added for noise, within the converter's range; of the samples with (r >> 16) modulo 256 equal to 0 the command
- *              is 65535
- *     p_a_adc  DZ_ADC_CODE_MAX / 3 + (r >> 16) modulo (DZ_ADC_CODE_MAX / 2); of the samples with (r >> 16) modulo 32 equal to 0
- *              (r >> 16) modulo (DZ_ADC_CODE_MAX + 2)
- *     p_b_adc  the same with DZ_ADC_CODE_MAX / 4 and DZ_ADC_CODE_MAX / 8
- * Of every tick compare_a, compare_b and status are hashed, two bytes each, the low one first. */
+#define DZ_SELFTESTS 3u
 #define DZ_SELFTEST_WALK UINT16_C(20000)
-
 #define DZ_SELFTEST_LINE 64u /* longest line, with its end */
 
-/* Writes `dz_comp grid FNV-1a-32 0123ABCD over 123 compare values`, a line feed and the terminating 0. */
-void dz_selftest_line(const struct dz_selftest_grid *grid, char line[DZ_SELFTEST_LINE]);
-
-/* Writes `dz_drive walk FNV-1a-32 0123ABCD over 20000 ticks` likewise. */
-void dz_selftest_drive_line(char line[DZ_SELFTEST_LINE]);
+/* Writes `dz_comp sample FNV-1a-32 0123ABCD`, the line of one of the tests, a line feed and the terminating 0. */
+void dz_selftest_line(uint16_t test, char line[DZ_SELFTEST_LINE]);
 
 #ifdef __cplusplus
 }

@@ -10,11 +10,15 @@
 int main(void)
 {
     char line[DZ_SELFTEST_LINE];
+    uint16_t test;
 
-    dz_selftest_line(&dz_selftest_sample, line);
-    (void)fputs(line, stdout);
-    dz_selftest_line(&dz_selftest_grid, line);
-    (void)fputs(line, stdout);
-    dz_selftest_drive_line(line);
-    return (fputs(line, stdout) < 0) ? 1 : 0;
+    for (test = 0u; test < DZ_SELFTESTS; test++)
+    {
+        dz_selftest_line(test, line);
+        if (fputs(line, stdout) < 0)
+        {
+            return 1;
+        }
+    }
+    return 0;
 }

@@ -117,13 +117,13 @@ static uint32_t interrupts_answer(void)
 int main(void)
 {
     char line[DZ_SELFTEST_LINE];
+    uint16_t test;
 
-    dz_selftest_line(&dz_selftest_sample, line);
-    print(line);
-    dz_selftest_line(&dz_selftest_grid, line);
-    print(line);
-    dz_selftest_drive_line(line);
-    print(line);
+    for (test = 0u; test < DZ_SELFTESTS; test++)
+    {
+        dz_selftest_line(test, line);
+        print(line);
+    }
     if (interrupts_answer() == 0u)
     {
         print("dz_tick: wrong compare values\n");

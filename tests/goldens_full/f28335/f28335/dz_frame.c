@@ -28,7 +28,7 @@ static uint16_t put_32(uint16_t *octets, uint16_t at, uint32_t value)
 }
 
 /* Bit by bit: 22 octets a frame need no table. */
-static uint16_t crc_of(const uint16_t *octets, uint16_t from, uint16_t to)
+uint16_t dz_frame_crc(const uint16_t *octets, uint16_t from, uint16_t to)
 {
     uint16_t crc = CRC_START;
     uint16_t at;
@@ -62,5 +62,5 @@ void dz_frame_pack(const struct dz_frame *frame, uint16_t octets[DZ_FRAME_OCTETS
     at = put_16(octets, at, frame->compare_a);
     at = put_16(octets, at, frame->compare_b);
     at = put_16(octets, at, frame->status);
-    (void)put_16(octets, at, crc_of(octets, CRC_FROM, at));
+    (void)put_16(octets, at, dz_frame_crc(octets, CRC_FROM, at));
 }

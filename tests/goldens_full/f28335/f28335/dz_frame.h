@@ -48,6 +48,9 @@ struct dz_frame
 /* Writes the frame, one octet (0 to 255) per element: a byte of the C28x has 16 bits. */
 void dz_frame_pack(const struct dz_frame *frame, uint16_t octets[DZ_FRAME_OCTETS]);
 
+/* The CRC of octets[from] to octets[to - 1]. */
+uint16_t dz_frame_crc(const uint16_t *octets, uint16_t from, uint16_t to);
+
 #ifdef __cplusplus
 }
 #endif

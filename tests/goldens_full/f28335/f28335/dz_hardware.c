@@ -15,6 +15,18 @@
 #define DZ_WDFLAG 0x0080u      /* WDCR: the watchdog caused the last reset */
 #define DZ_WDCR_ENABLE 0x0028u /* WDCHK = 101, WDDIS = 0, WDPS = /1 */
 
+/* What dz_isr() calls. In the FLASH build it runs from RAM, without wait states; TI's linker file places .TI.ramfunc. */
+#ifdef __TI_COMPILER_VERSION__
+#pragma CODE_SECTION(dz_read_sample, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_write_compare_a, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_write_compare_b, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_trip_output, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_untrip_output, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_output_tripped, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_trip_inputs_high, ".TI.ramfunc");
+#pragma CODE_SECTION(dz_interrupt_done, ".TI.ramfunc");
+#endif
+
 void dz_output_hold_low(void)
 {
     EALLOW;
@@ -200,4 +212,72 @@ void dz_watchdog_start(void)
     SysCtrlRegs.SCSR = 0x0000u;
     SysCtrlRegs.WDCR = DZ_WDCR_ENABLE;
     EDIS;
+}
+
+uint16_t dz_read_sample(uint16_t codes[DZ_SAMPLE_CODES])
+{
+    uint16_t finished = 0u;
+
+    if ((AdcRegs.ADCST.bit.INT_SEQ1 != 0u) && (AdcRegs.ADCST.bit.SEQ1_BSY == 0u))
+    {
+        codes[0] = AdcMirror.ADCRESULT0; /* right-justified, without wait states */
+        codes[1] = AdcMirror.ADCRESULT1;
+        codes[2] = AdcMirror.ADCRESULT2;
+        /* The sequencer continues where it stopped unless it is reset; a reset while it is busy would spoil the
+         * sequence, hence only here, 20 us after CTR = 0 with the next start at least a period away. */
+        AdcRegs.ADCST.bit.INT_SEQ1_CLR = 1u;
+        AdcRegs.ADCTRL2.bit.RST_SEQ1 = 1u;
+        finished = 1u;
+    }
+    return finished;
+}
+
+/* A new CMPA is loaded at CTR = 0. If it is 0, it can miss its own compare event there and the old action lasts
+ * for one period more: full duty at zero command (0-100 % duty: SPRAAI1). The continuous force, loaded
+ * at the same instant, keeps the pin low whatever the counter does. */
+void dz_write_compare_a(uint16_t compare)
+{
+    EPwm1Regs.CMPA.half.CMPA = compare;
+    EPwm1Regs.AQCSFRC.bit.CSFA = (compare == 0u) ? DZ_FORCE_LOW : DZ_FORCE_NONE;
+}
+
+void dz_write_compare_b(uint16_t compare)
+{
+    EPwm2Regs.CMPA.half.CMPA = compare;
+    EPwm2Regs.AQCSFRC.bit.CSFA = (compare == 0u) ? DZ_FORCE_LOW : DZ_FORCE_NONE;
+}
+
+void dz_trip_output(void)
+{
+    EALLOW;
+    EPwm1Regs.TZFRC.bit.OST = 1u;
+    EPwm2Regs.TZFRC.bit.OST = 1u;
+    EDIS;
+}
+
+void dz_untrip_output(void)
+{
+    /* A debugger halt stops the counter at the end of its period, where the pin has gone low (README). */
+    EPwm1Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;
+    EPwm2Regs.TBCTL.bit.FREE_SOFT = DZ_STOP_AT_PERIOD;
+    EALLOW;
+    EPwm1Regs.TZCLR.bit.OST = 1u;
+    EPwm2Regs.TZCLR.bit.OST = 1u;
+    EDIS;
+}
+
+uint16_t dz_output_tripped(void)
+{
+    return ((EPwm1Regs.TZFLG.bit.OST != 0u) || (EPwm2Regs.TZFLG.bit.OST != 0u)) ? 1u : 0u;
+}
+
+uint16_t dz_trip_inputs_high(void)
+{
+    return (GpioDataRegs.GPADAT.bit.GPIO12 != 0u) ? 1u : 0u;
+}
+
+void dz_interrupt_done(void)
+{
+    EPwm1Regs.ETCLR.bit.INT = 1u;
+    PieCtrlRegs.PIEACK.all = PIEACK_GROUP3; /* whole: a read-modify-write would acknowledge every group */
 }

@@ -45,7 +45,7 @@ extern "C" {
 
 /* Faults, one bit each. A fault is kept until the next reset; the output is low while any bit is set. */
 #define DZ_FAULT_NO_SAMPLE 0x0001u  /* the converter gave no usable sample in time */
-#define DZ_FAULT_TRIP_INPUT 0x0002u /* TZ1 (GPIO12) went low while the output was in use */
+#define DZ_FAULT_TRIP_INPUT 0x0002u /* GPIO12 (TZ1) went low while the output was in use */
 #define DZ_FAULT_WATCHDOG 0x0004u   /* the last reset came from the watchdog: power-cycle to clear */
 #define DZ_FAULT_CLOCK 0x0008u      /* crystal missing, or PLL not set for 150 MHz */
 
@@ -55,14 +55,37 @@ void dz_output_hold_low(void);
 /* Faults that are known before the first sample, or 0. */
 uint16_t dz_start_faults(void);
 
-/* All registers of clock, ePWM1, pins and ADC. Call it after InitAdc(), with interrupts off. */
+/* Converter, ePWM1, ePWM2 and pins. Call it with interrupts off, after InitAdc(). */
 void dz_hardware_init(void);
 
-/* EPWM1_INT to dz_isr(), PIE group 3. The caller enables interrupts with EINT. */
+/* EPWM1's interrupt to dz_isr(). The caller enables interrupts with EINT. */
 void dz_interrupt_init(void);
 
 /* From here on ServiceDog() must be called within 4.37 ms. */
 void dz_watchdog_start(void);
+
+/* Of dz_isr() alone; all of these run from RAM. */
+
+/* Codes of a sample: command, pressure A, pressure B. */
+#define DZ_SAMPLE_CODES 3u
+
+/* 1 with the codes of a finished sample, once; 0 if there is none. */
+uint16_t dz_read_sample(uint16_t codes[DZ_SAMPLE_CODES]);
+
+/* Compare value of the next period; 0 keeps the pin low. */
+void dz_write_compare_a(uint16_t compare);
+void dz_write_compare_b(uint16_t compare);
+
+/* The trip zone holds the output low, or lets it go. */
+void dz_trip_output(void);
+void dz_untrip_output(void);
+
+/* 1 if the trip zone holds the output low; 1 if no trip input is low. */
+uint16_t dz_output_tripped(void);
+uint16_t dz_trip_inputs_high(void);
+
+/* The next interrupt may come. */
+void dz_interrupt_done(void);
 
 #ifdef __cplusplus
 }

@@ -76,12 +76,23 @@ static uint16_t read_state(struct dz_state *copy)
     return whole;
 }
 
+static uint16_t law_status(const struct dz_state *state)
+{
+    return (state->side < 0) ? dz_status_negative(state->u_adc, state->p_a_adc, state->p_b_adc)
+                             : dz_status(state->u_adc, state->p_a_adc, state->p_b_adc);
+}
+
+static uint16_t beta_of(const struct dz_state *state)
+{
+    return (state->side < 0) ? dz_beta_negative(state->p_a_adc, state->p_b_adc)
+                             : dz_beta(state->p_a_adc, state->p_b_adc);
+}
+
 static uint16_t status_of(const struct dz_state *state)
 {
     uint16_t status = state->fault;
 
-    status |= (uint16_t)(((state->side < 0) ? dz_status_negative(state->u_adc, state->p_a_adc, state->p_b_adc)
-                                            : dz_status(state->u_adc, state->p_a_adc, state->p_b_adc)) << 8);
+    status |= (uint16_t)(law_status(state) << 8);
     status |= (uint16_t)(state->status << 8);
     if (state->released != 0u)
     {
@@ -107,8 +118,7 @@ static void start_frame(void)
         frame.u_adc = state.u_adc;
         frame.p_a_adc = state.p_a_adc;
         frame.p_b_adc = state.p_b_adc;
-        frame.beta = (state.side < 0) ? dz_beta_negative(state.p_a_adc, state.p_b_adc)
-                                      : dz_beta(state.p_a_adc, state.p_b_adc);
+        frame.beta = beta_of(&state);
         frame.compare_a = state.compare_a;
         frame.compare_b = state.compare_b;
         frame.status = status_of(&state);

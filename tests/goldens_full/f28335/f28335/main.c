@@ -48,8 +48,7 @@ int main(void)
 
     for (;;)
     {
-        /* Neither waits for anything, so neither blocks the other. */
         service_watchdog_if_isr_ran();
-        dz_telemetry_poll();
+        dz_telemetry_poll(); /* neither waits for anything, so neither blocks the other */
     }
 }

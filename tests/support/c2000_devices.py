@@ -1,0 +1,103 @@
+"""The generated firmware of both C2000 boards on the models of the devices.
+
+A form of it is compiled once in a session; of a seeded fault only the file that it is in.
+"""
+
+import subprocess
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from pathlib import Path
+
+from dzdesign.codegen.banner import Banner
+from dzdesign.codegen.project import target_files, target_named
+from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
+from tests.support.current_loops import current_texts
+from tests.support.example_coil import SENSORS, with_current
+from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator
+from tests.support.paths import DEVICES
+
+BOARDS = ("f28335", "f280049c")
+ONE, TWO = "one solenoid", "two solenoids"
+DIGEST = "1234567890abcdef"
+#: What of the model is compiled with the firmware; driver.c includes main.c.
+MODEL = {"f28335": ("device.c", "current.c", "driver.c"), "f280049c": ("device.c", "dz_comp.c", "driver.c")}
+#: Runs periods, an event each; then what the start is like (W: after a watchdog reset, C: without crystal).
+Run = Callable[..., list[dict]]
+#: File, what stands in it, and what stands there with the fault.
+Edit = tuple[str, str, str]
+_SCRATCH = tempfile.TemporaryDirectory(prefix="dzdesign-devices-")
+
+
+@cache
+def texts_of(board: str, form: str = ONE) -> Mapping[str, str]:
+    """Return the files around the core by name, with `form` a sensor of `SENSORS` the current controller too."""
+    compensator, core = golden_compensator(board, FULL if form == TWO else GOLDENS), {}
+    if sensor := SENSORS.get(form):
+        compensator = with_current(compensator, target_named(board), sensor)
+        core = current_texts(compensator.current_drive.loop)
+    made = target_files(compensator, target_named(board), Banner(digest=DIGEST))
+    return {path.rpartition("/")[2]: text for path, text in made.items()} | core
+
+
+def write(texts: Mapping[str, str], folder: Path) -> None:
+    """Write texts into a folder."""
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
+
+
+def seeded(texts: Mapping[str, str], edit: Edit) -> dict[str, str]:
+    """Return texts with a fault at the first place where it can be; there must be one."""
+    file, old, new = edit
+    before, found, after = texts[file].partition(old)
+    assert found, f"{old!r} is not in {file}"
+    return {**texts, file: before + new + after}
+
+
+@cache
+def program(board: str, form: str = ONE, edit: Edit | None = None, options: tuple[str, ...] = ()) -> Path:
+    """Return the compiled firmware; a call that does not fit the types of TI's stand-ins is an error."""
+    folder = Path(tempfile.mkdtemp(dir=_SCRATCH.name))
+    texts = texts_of(board, form)
+    base = program(board, form, None, options).parent if edit and edit[0].endswith(".c") else folder
+    write({edit[0]: seeded(texts, edit)[edit[0]]} if base != folder else seeded(texts, edit) if edit else texts, folder)
+    units = [base / name for name in texts if name.endswith(".c") and name != "main.c"]
+    units += [DEVICES / board / name for name in MODEL[board]]
+    changed = {edit[0].replace("main.c", "driver.c")} if base != folder else {unit.name for unit in units}
+    for unit in (unit for unit in units if unit.name in changed):
+        source = folder / unit.name if unit.parent == base else unit
+        include = [f"-I{each}" for each in dict.fromkeys((folder, base, DEVICES / board))]
+        compiled(*options, *include, "-c", source, "-o", folder / f"{unit.stem}.o")
+    objects = [(folder if unit.name in changed else base) / f"{unit.stem}.o" for unit in units]
+    compiled(*objects, "-lm", "-o", folder / "program")
+    return folder / "program"
+
+
+def compiled(*words: str | Path) -> None:
+    """Compile with all warnings as errors; a seeded fault may leave something unused."""
+    command = [host_compiler(), *STRICT, "-Wenum-conversion", "-Wno-unused-function", "-Wno-pedantic", *words]
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def run(program: Path, *words: str) -> list[str]:
+    done = subprocess.run([program, *words], capture_output=True, text=True, check=True, timeout=20)
+    return done.stdout.splitlines()
+
+
+def periods(program: Path, events: str, *start: str) -> list[dict]:
+    """One dictionary a PWM period, numbers as integers."""
+    lines = [line.split()[1:] for line in run(program, "run", events, *start) if line.startswith("tick ")]
+    assert len(lines) == len(events)
+    ticks = (dict(word.split("=", 1) for word in words) for words in lines)
+    return [{key: int(value) if value.isdigit() else value for key, value in tick.items()} for tick in ticks]
+
+
+def running(board: str, form: str = ONE, edit: Edit | None = None) -> Run:
+    """Return the function that runs a firmware through periods; `.args[0]` is its program."""
+    return partial(periods, program(board, form, edit))
+
+
+def column(ticks: list[dict], key: str) -> list:
+    """Return one fact of every period."""
+    return [tick[key] for tick in ticks]
