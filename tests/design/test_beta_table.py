@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.offset.beta_table import STEP_CODES, TableMargins, best_nodes, between_nodes
-from dzdesign.design.offset.exact_row import ExactRow
+from dzdesign.design.beta_table import STEP_CODES, TableMargins, best_nodes, between_nodes
+from dzdesign.design.exact_row import ExactRow
 
 COUNT = 300
 

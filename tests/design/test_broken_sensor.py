@@ -97,5 +97,5 @@ def test_the_default_signals_take_neither_end_of_the_converter_for_a_pressure():
         for sensor in (made.pressure_a, made.pressure_b):
             assert 0 < sensor.valid_codes[0] < sensor.zero_code
             assert sensor.full_code < sensor.valid_codes[1] < made.code_max
-        assert made.hidden_excess(1) == made.hidden_shortfall(1) == ()
+        assert all(made.hidden_failures(1, reads_high=high) == () for high in (True, False))
     assert options_of({}, target_named("f28335").inputs()).signals == Signals()

@@ -11,16 +11,16 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.costs import costs_of, design_warnings
 from dzdesign.design.current import drive as current_drive
-from dzdesign.design.current.choosing import (
+from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling, CurrentSensor
+from dzdesign.design.current.drive import (
     LEAST_PHASE_DEG,
-    CurrentSensor,
+    CurrentRequest,
     choose_loop,
+    design_current_drive,
     gains_of,
     sensor_line,
     worst_step,
 )
-from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
-from dzdesign.design.current.drive import CurrentRequest, design_current_drive
 from dzdesign.design.current.responses import (
     Coils,
     Gains,

@@ -9,12 +9,12 @@ import pytest
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
-from dzdesign.design.machine.allowance import allowance_of
-from dzdesign.design.offset.offset_ceiling import offset_ceiling
+from dzdesign.design.machine import allowance_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.options import IdentifyOptions

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.machine.allowance import allowance_of
-from dzdesign.design.offset import exact_row
-from dzdesign.design.offset import offset_ceiling as ceilings
-from dzdesign.design.offset.above_tests import OffsetAbove
-from dzdesign.design.offset.exact_row import ExactRow, least_of
-from dzdesign.design.offset.offset_ceiling import OffsetCurve, certified_row, certified_V, offset_ceiling, offset_row
+from dzdesign.design import ceiling as ceilings
+from dzdesign.design import exact_row
+from dzdesign.design.ceiling import OffsetAbove, OffsetCurve, certified_row, certified_V, offset_ceiling, offset_row
+from dzdesign.design.exact_row import ExactRow, least_of
+from dzdesign.design.machine import allowance_of
 from dzdesign.design.options import DesignOptions
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 

@@ -8,8 +8,8 @@ import pytest
 from dzdesign.codegen.project import DEFAULT_TARGET, target_named
 from dzdesign.design.costs_at_tests import corners_of, remaining_dead_zone
 from dzdesign.design.designing import design
-from dzdesign.design.hysteresis_choices import hysteresis_choices
 from dzdesign.design.options import options_of
+from dzdesign.design.redesign import hysteresis_choices
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.terminal.choices_table import print_choices
 from tests.support.repeatable_valves import identify

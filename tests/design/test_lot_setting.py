@@ -7,11 +7,11 @@ import pytest
 from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
+from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import lot_setting
-from dzdesign.design.machine.allowance import allowance_of
-from dzdesign.design.offset.offset_ceiling import offset_ceiling
+from dzdesign.design.machine import allowance_of
 from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.design.signal_text import command_signal, parse_signal
 from dzdesign.design.signals import Signals

@@ -11,18 +11,16 @@ from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.dither import Dither, DrivenDither
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
+from dzdesign.design import ceiling
+from dzdesign.design.ceiling import AboveChoice, offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import colder_coil
 from dzdesign.design.designing import design
-from dzdesign.design.lot_margins import lot_margins, prove_lot
-from dzdesign.design.lot_setting import lot_setting
-from dzdesign.design.machine.allowance import check_bench_current, dither_reserve, recorded_full_A
-from dzdesign.design.offset import above_tests
-from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.offset.offset_ceiling import offset_ceiling
+from dzdesign.design.lot_setting import lot_margins, lot_setting, prove_lot
+from dzdesign.design.machine import check_bench_current, dither_reserve, recorded_full_A
 from dzdesign.design.options import options_of
-from dzdesign.design.redesign_check import prove_certificates, prove_derived
+from dzdesign.design.redesign import prove_certificates, prove_derived
 from tests.support.machine_oracle import worst_margin_mV
 
 TARGET = target_named("f28335").inputs()
@@ -315,5 +313,5 @@ class TestTheBenchsGaugeAboveTheTests:
         bare = DECLARED["amplifier"] | {"amplifier": "0 %", "oil": "0 %", "ageing": "0 %", "pressure_error": "0 %"}
         chosen = options(bare | {"bench_pressure_error": "0.4 MPa", "pressure_converter": "0 + 0 + 0 codes"})
         assert self.margin_mV(design(example_valve, chosen)) >= 0
-        monkeypatch.setattr(above_tests, "_drawn_together", lambda bound, _: bound)
+        monkeypatch.setattr(ceiling, "_drawn_together", lambda bound, _: bound)
         assert self.margin_mV(design(example_valve, chosen)) < 0

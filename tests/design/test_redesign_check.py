@@ -16,7 +16,7 @@ from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import lot_setting
 from dzdesign.design.options import options_of
-from dzdesign.design.redesign_check import prove_derived
+from dzdesign.design.redesign import prove_derived
 from dzdesign.identify.identification import identify
 from tests.support.synthetic import Truth, synthetic_ramp
 

@@ -65,9 +65,8 @@ def test_a_valve_without_an_opening_branch_has_no_transition_unless_asked(exampl
     [("0..10 V x 0.3", 19), ("-10..10 V x 0.15 + 1.5 V", 34), ("4..20 mA on 150 ohm", 25)],
 )
 def test_the_gain_error_counts_as_far_as_zero_lies_up_the_converters_range(signal, band):
-    from dzdesign.design.signal_text import command_signal, parse_signal
+    from dzdesign.design.signal_text import command_error_of, command_signal, parse_signal
     from dzdesign.design.target_inputs import Converter
-    from dzdesign.design.zero_band import command_error_of
 
     command = command_signal(parse_signal(signal, "--command-signal"), Converter())
     assert command_error_of("", Converter(), command).zero_band_codes == band
@@ -83,9 +82,9 @@ def test_the_errors_are_those_of_the_targets_data_sheet(name, error):
 
 
 def test_a_declared_error_is_rounded_up_to_codes():
+    from dzdesign.design.signal_text import command_error_of
     from dzdesign.design.signals import CommandSignal
     from dzdesign.design.target_inputs import Converter
-    from dzdesign.design.zero_band import command_error_of
 
     error = command_error_of("0.4 % + 0.1 %", Converter(), CommandSignal())
     assert (error.offset_codes, error.noise_codes) == (17, 5)  # 16.4 and 4.1 codes of 4095

@@ -8,7 +8,7 @@ from dzdesign.codegen.calibration.block import current_block, numbers_of
 from dzdesign.codegen.calibration.built_for import built_for
 from dzdesign.codegen.calibration.files import texts, valve_files
 from dzdesign.codegen.calibration.numbers import ValvePage
-from dzdesign.design.current.loop import CurrentLoop, SupplyCorrection
+from dzdesign.design.current.circuit import CurrentLoop, SupplyCorrection
 from tests.support.core_variants import variant
 
 PLAIN = CurrentLoop(

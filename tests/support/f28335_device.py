@@ -10,7 +10,7 @@ import pytest
 from dzdesign.codegen.banner import Banner
 from dzdesign.codegen.f28335.target import TARGET
 from dzdesign.codegen.project import target_files
-from dzdesign.design.current.choosing import CurrentSensor
+from dzdesign.design.current.circuit import CurrentSensor
 from tests.support.current_loops import current_texts
 from tests.support.example_coil import with_current
 from tests.support.golden_firmware import FULL, GOLDENS, golden_compensator

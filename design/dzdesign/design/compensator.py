@@ -21,12 +21,10 @@ from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot_valves import LotValve
-from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Allowance, Machine, allowance_of, dither_reserve
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
-from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.design.zero_band import CommandError
+from dzdesign.design.target_inputs import CommandError, TargetInputs
 from dzdesign.identify.valve.model import ValveModel
 
 #: The last valve and its hash: a design makes several compensators of one valve, each of which states the hash.

@@ -7,10 +7,9 @@ import numpy as np
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import corners_of, costs_at_tests, last_opening
+from dzdesign.design.coverage import above_in_words, below_in_words
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.machine.allowance import premise_of_bench_current
-from dzdesign.design.machine.machine import COPPER_PER_K, REFERENCE_C
-from dzdesign.design.offset.above_tests import above_in_words, below_in_words
+from dzdesign.design.machine import COPPER_PER_K, REFERENCE_C, premise_of_bench_current
 from dzdesign.design.pressure_inputs import ACCEPTED, hidden_failure, unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.reading_flow import default_reading_flow

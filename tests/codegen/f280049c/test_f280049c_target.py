@@ -19,7 +19,7 @@ from dzdesign.codegen.f280049c import target as f280049c
 from dzdesign.codegen.f280049c.target import TARGET
 from dzdesign.codegen.project import target_files
 from dzdesign.core.errors import DzdesignError
-from dzdesign.design.current.choosing import CurrentSensor
+from dzdesign.design.current.circuit import CurrentSensor
 from dzdesign.verify.toolchain.host_compiler import STRICT, host_compiler
 from tests.support.current_loops import current_texts
 from tests.support.example_coil import with_current

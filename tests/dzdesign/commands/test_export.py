@@ -22,7 +22,7 @@ from tests.support.amplifier_readers import dead_zone, over_compensated, read_fi
 from tests.support.paths import GOLDENS
 
 #: Without the proof of the compensator's numbers, which takes a second.
-UNPROVEN = ("dzdesign.design.redesign_check.prove_derived", lambda compensator: None)
+UNPROVEN = ("dzdesign.design.redesign.prove_derived", lambda compensator: None)
 FILES = {"west": "valve.txt", "cia408": "valve.dcf", "rmc75": "valve.rmc", "beckhoff": "valve.st", "csv": "valve.csv"}
 
 

@@ -15,8 +15,8 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.design.coverage import reach_of_certificate
 from dzdesign.design.designing import design
-from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.identify.data_quality import knee_errors
 from dzdesign.identify.data_quality.catalogue import catalogue, most_serious_first, warn

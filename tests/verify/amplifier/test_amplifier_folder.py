@@ -10,7 +10,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.regeneration import regenerated
 from dzdesign.verify.amplifier import output_checks
 from dzdesign.verify.amplifier.checks import DEAD_ZONES, READ_BACK, SAFE

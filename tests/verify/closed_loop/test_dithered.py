@@ -14,10 +14,9 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
-from dzdesign.design.designing import design
-from dzdesign.design.hysteresis_choices import hysteresis_choices, hysteresis_left
+from dzdesign.design.designing import LEVELS, design
 from dzdesign.design.options import options_of
-from dzdesign.design.play import LEVELS
+from dzdesign.design.redesign import hysteresis_choices, hysteresis_left
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of
 from dzdesign.verify.closed_loop.loop import ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant, read_plant

@@ -10,7 +10,7 @@ from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.designing import design
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Machine
 from dzdesign.design.options import options_of
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, drive_corners, resistance_ratio
 from dzdesign.verify.closed_loop.firmware_loop import scenes_of

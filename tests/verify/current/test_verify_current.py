@@ -7,8 +7,8 @@ import pytest
 
 from dzdesign.codegen.project import generate, target_named
 from dzdesign.core.artefact_files import write_folder
-from dzdesign.design.current.choosing import CurrentSensor, choose_loop, gains_of
-from dzdesign.design.current.circuit import CoilCircuit
+from dzdesign.design.current.circuit import CoilCircuit, CurrentSensor
+from dzdesign.design.current.drive import choose_loop, gains_of
 from dzdesign.design.current.responses import Gains, margins
 from dzdesign.design.designing import design
 from dzdesign.design.options import options_of

@@ -2,7 +2,7 @@
 
 from dzdesign.codegen.calibration.layout import NO_INTERLOCK
 from dzdesign.codegen.core.integer_form import INT32_MAX
-from dzdesign.design.current.loop import LARGEST_ERROR, LARGEST_GAIN
+from dzdesign.design.current.circuit import LARGEST_ERROR, LARGEST_GAIN
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
 from dzdesign.design.signals import LARGEST_DIFFERENCE, WEIGHT_SHIFT
 

@@ -18,7 +18,7 @@ import numpy as np
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CoilCircuit
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Machine
 from dzdesign.verify.closed_loop.dead_zone import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, ClosedLoop, RampSequence
 from dzdesign.verify.closed_loop.plant import Plant

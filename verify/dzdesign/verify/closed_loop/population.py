@@ -17,7 +17,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Machine
 from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, ZeroDrives, drawn_machine, worst_ends
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RECORD_S
 from dzdesign.verify.closed_loop.scene import SETTLE_S, Scene

@@ -7,9 +7,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.current.choosing import CurrentSensor
-from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
-from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentLoop, CurrentSampling, CurrentSensor
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.state_check import PROGRAMS, tick_macro
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function

@@ -5,8 +5,7 @@ from math import inf, log, sqrt
 
 import numpy as np
 
-from dzdesign.design.current.circuit import CoilCircuit, Corner
-from dzdesign.design.current.loop import CORRECTION_SHIFT
+from dzdesign.design.current.circuit import CORRECTION_SHIFT, CoilCircuit, Corner
 from dzdesign.verify.current.coil_simulation import CoilLoop
 
 

@@ -11,7 +11,7 @@ from math import floor
 
 import numpy as np
 
-from dzdesign.design.current.loop import CORRECTION_SHIFT, CurrentLoop
+from dzdesign.design.current.circuit import CORRECTION_SHIFT, CurrentLoop
 
 HALF = Fraction(1, 2)
 #: Bits of the faults.

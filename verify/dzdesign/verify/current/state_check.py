@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.current.circuit import CurrentLoop
 from dzdesign.verify.current.exact_controller import (
     NO_OFFSET,
     OPEN,

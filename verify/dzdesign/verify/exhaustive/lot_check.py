@@ -10,7 +10,7 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot_margins import NAMED
+from dzdesign.design.lot_setting import NAMED
 from dzdesign.verify.evidence import InputCheck, LotCheck
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import Differences

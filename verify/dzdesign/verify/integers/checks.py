@@ -12,7 +12,7 @@ import numpy as np
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify.exhaustive.all_inputs import input_check, input_checks
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import PreparedInputs, differences

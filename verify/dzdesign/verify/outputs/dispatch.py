@@ -12,7 +12,7 @@ from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, schema_of, to_js
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify.firmware.folder import read_compensator
 from dzdesign.verify.firmware.reproduced import Regenerated, reproduced

@@ -7,7 +7,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of
 from dzdesign.core.documents import family_of
 from dzdesign.core.folder_contents import manifest_of
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify.firmware.folder import check_firmware_inside
 
 
