@@ -12,12 +12,11 @@ from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.design.certificate import prove_certificates
-from dzdesign.design.designing import design
-from dzdesign.design.options import DesignOptions
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.exhaustive.above_tests import check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import differences
+from tests.support.designs import designed
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -83,7 +82,7 @@ def closing_V(valve, dp_MPa: float, bend: float) -> float:
 class TestDrive:
     @pytest.mark.parametrize("choice", ["lower", "release"])
     def test_within_the_premise_no_drive_lies_above_the_truth_and_the_status_says_above(self, valve, core_of, choice):
-        made = design(valve, DesignOptions(above=choice))
+        made = designed(valve, above=choice)
         curve = valve.positive.certified["closing"]
         at_zero = core_of(made)
         # Of a threshold that is known to run one way nothing is certified; straight on is what it is continued by.
@@ -95,11 +94,11 @@ class TestDrive:
         assert at_zero(4.9)[1] == 0
 
     def test_held_it_lies_above_a_falling_truth(self, valve, core_of):
-        drive, status = core_of(design(valve, DesignOptions(above="hold")))(15.0)
+        drive, status = core_of(designed(valve, above="hold"))(15.0)
         assert drive > closing_V(valve, 15.0, 0.0) and status == 16
 
     def test_what_is_beyond_the_premise_is_outside_the_promise_and_said(self, valve, core_of):
-        made, curve = design(valve, DesignOptions()), valve.positive.certified["closing"]
+        made, curve = designed(valve), valve.positive.certified["closing"]
         drive, _ = core_of(made)(10.0)
         if curve.premise == "monotone":
             (line,) = (each for each in made.costs if each.startswith("above"))
@@ -110,14 +109,14 @@ class TestDrive:
             assert "certified if" in line and ("curvature at most M" in line or "straight" in line)
 
     def test_the_tests_keep_their_offset(self, valve):
-        held, lowered, released = (design(valve, DesignOptions(above=each)) for each in ("hold", "lower", "release"))
+        held, lowered, released = (designed(valve, above=each) for each in ("hold", "lower", "release"))
         for dp in TESTED:
             code = round(held.signals.dp_code(Fraction(dp)))
             offsets = [float(each.beta(code) * each.positive.u_min0_over_u_max) for each in (held, lowered, released)]
             assert min(offsets) > max(offsets) - 1e-3
 
     def test_let_go_nothing_but_one_unit_is_left_two_segments_above_the_tests(self, valve):
-        made = design(valve, DesignOptions(above="release"))
+        made = designed(valve, above="release")
         last = round(made.signals.dp_code(Fraction(5)))
         node = last // made.beta_step_codes + 2
         assert set(made.positive.beta[node:]) == {1} and made.positive.beta[node - 1] > 1
@@ -127,19 +126,19 @@ class TestDrive:
 
 def test_of_one_test_the_offset_is_held_and_said_to_be():
     valve = identify([synthetic_ramp(1.0, Truth())], IdentifyOptions(meter_lag=0.0))
-    made = design(valve, DesignOptions())
+    made = designed(valve)
     assert valve.positive.certified["closing"].above is None
     assert len(set(made.positive.beta)) == 1 and made.positive.certificate.released_from_MPa is None
     (line,) = (each for each in made.costs if each.startswith("above"))
     assert "a single test gives no slope" in line and "nothing is certified" in line
-    assert min(design(valve, DesignOptions(above="release")).positive.beta) == 1
+    assert min(designed(valve, above="release").positive.beta) == 1
 
 
 def test_a_rising_threshold_known_to_run_one_way_is_certified_where_it_is_held():
     ramps = [synthetic_ramp(dp, Truth(knee_rising=threshold_V(dp, rising=True), slope=4 * dp**0.5, noise=0.02))
              for dp in TESTED]  # fmt: skip
     valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="monotone"))
-    made = design(valve, DesignOptions())
+    made = designed(valve)
     assert valve.positive.trend == "increasing" and valve.positive.certified["closing"].above.certified
     assert float(made.positive.certificate.holds_to_MPa) > 19 and made.positive.certificate.released_from_MPa is None
     (line,) = (each for each in made.costs if each.startswith("below"))
@@ -151,7 +150,7 @@ def lowered():
     """A compensator under a declared curvature, without a transition."""
     ramps = [synthetic_ramp(dp, Truth(knee_rising=threshold_V(dp), slope=4 * dp**0.5, noise=0.02)) for dp in TESTED]
     valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="smooth", curvature=M * 1e-12))
-    return design(valve, DesignOptions(transition=Fraction(0)))
+    return designed(valve, transition="off")
 
 
 class TestFaults:
@@ -175,7 +174,7 @@ class TestFaults:
         assert check_above(exact, found, drive).over_compensated > 0
 
     def test_an_offset_that_is_not_let_go(self, lowered):
-        released = design(lowered.valve, DesignOptions(transition=Fraction(0), above="release"))
+        released = designed(lowered.valve, transition="off", above="release")
         exact, found, drive = self.drives(released)
         drive[-3:] = 5
         assert check_above(exact, found, drive).not_released > 0

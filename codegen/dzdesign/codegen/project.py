@@ -35,8 +35,8 @@ from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
+from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.coverage import reach_of_certificate
 from dzdesign.design.firmware_manifest import BLOCK_FILE, VECTORS_NAME, Calibration, FirmwareManifest, FirmwareOrigin
 from dzdesign.design.target_inputs import Converter
 

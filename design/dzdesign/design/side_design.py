@@ -11,6 +11,7 @@ from dzdesign.design.beta_table import STEP_CODES, choose_beta_table, released_f
 from dzdesign.design.budget import budget_of
 from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
 from dzdesign.design.certificate import certify, guarded_curve, hold_below
+from dzdesign.design.design_choices import Above
 from dzdesign.design.exact_row import ExactRow
 from dzdesign.design.machine import Allowance
 from dzdesign.design.options import DesignOptions
@@ -154,37 +155,23 @@ def opening_offset(side: SideModel, options: DesignOptions) -> OffsetCurve:
 
 
 def opening_ceiling(
-    opening: OffsetCurve,
-    certified: OffsetCurve,
-    tested: range,
-    *,
-    released_from: int | None,
-    signals: Signals,
-    u_max: Fraction,
-    sign: int,
+    opening: OffsetCurve, guarded: OffsetCurve, tested: range, above: Above, allowance: Allowance, u_max: Fraction
 ) -> OffsetCeiling:
     """Return the opening threshold at every pressure code: no bound, so rounding to codes does not count.
 
-    Above the tests it comes down by as much as the certified offset: a transition, and the hysteresis that a play takes
+    Above the tests it comes down by as much as the guarded offset: a transition, and the hysteresis that a play takes
     out of it, stay as they are at the last test. Where the offset is released, only that height is left of it.
     """
-    last = signals.largest_difference(sign)
+    signals, last = allowance.signals, allowance.signals.largest_difference(allowance.sign)
     limit = offset_row(opening, signals, 0, last)
-    if certified.above is not None and tested.stop <= last:
-        let_go = last + 1 if released_from is None else min(released_from, last + 1)
-        limit = limit[: tested.stop].followed_by(
-            _less_what_is_lowered(limit[tested.stop :], certified, signals, range(tested.stop, let_go))
-        )
+    if guarded.above is not None and tested.stop <= last:
+        let_go = min(released_from(above, tested) or last + 1, last + 1)
+        height = limit[tested.stop :].line(Fraction(1), guarded.offset_V[-1])
+        held = height[: let_go - tested.stop]
+        if held:
+            held = held.plus(offset_row(guarded, signals, tested.stop, let_go - 1))
+        limit = limit[: tested.stop].followed_by(held).followed_by(height[len(held) :])
     return OffsetCeiling(limit=limit.line(1 / u_max), certified=tested)
-
-
-def _less_what_is_lowered(opening: ExactRow, certified: OffsetCurve, signals: Signals, codes: range) -> ExactRow:
-    """Return what is left above the tests of the opening threshold there; behind the codes the offset is released."""
-    height = opening.line(Fraction(1), certified.offset_V[-1])
-    if not codes:
-        return height
-    lowered = offset_row(certified, signals, codes.start, codes.stop - 1)
-    return height[: len(codes)].plus(lowered).followed_by(height[len(codes) :])
 
 
 def side_law(
@@ -214,10 +201,7 @@ def side_law(
     beta = table(ceiling, above=options.above if goes_on else None)
     transition_beta = None
     if opening is not None:
-        let_go = released_from(options.above, tested) if goes_on else None
-        under = opening_ceiling(
-            opening, certified, tested, released_from=let_go, signals=signals, u_max=u_max, sign=allowance.sign
-        )
+        under = opening_ceiling(opening, certified, tested, options.above, allowance, u_max)
         upper = table(under, above="lower" if goes_on else None)
         transition_beta = tuple(map(max, upper, beta))
     return SideLaw(

@@ -16,8 +16,8 @@ from dzdesign.derivation.presentation.content import DerivationReport, Entry
 from dzdesign.derivation.presentation.prose import Words
 from dzdesign.derivation.presentation.report import closure, compose
 from dzdesign.derivation.presentation.writers import HtmlWriter
+from dzdesign.design.certificate import above_in_words, below_in_words
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.coverage import above_in_words, below_in_words
 from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
 from dzdesign.identify.valve.model import SIDES
 from dzdesign.report.artefacts import laws_of
