@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.pressure_inputs import hidden_failure, wiring_in_words
@@ -90,14 +89,6 @@ def test_one_side_alone_needs_no_direction(two_sides):
     made = designed_as(two_sides, drop("pP", "pA"), drop("pP", "pB"), command_signal="0..10 V x 0.3")
     (line,) = wiring_in_words(made)
     assert line == "pressure inputs: A = Druck P, B = Druck A | links, as recorded at positive commands"
-
-
-@pytest.mark.parametrize("target", ["f28335", "cortex-m4"])
-def test_the_wiring_table_names_the_recorded_columns(two_sides, target):
-    made = designed_as(two_sides, drop(*AB), drop(*AB, sign=-1))
-    (readme,) = (text for name, text in generate(made, target).files.items() if name.endswith("/README.md"))
-    assert "| pressure A = Druck A \\| links, 0 MPa" in readme and "| pressure B = Druck B, 0 MPa" in readme
-    assert "Negative commands: the pressure drop is B minus A, as recorded (Druck B - Druck A \\| links)." in readme
 
 
 @pytest.mark.parametrize(

@@ -108,7 +108,8 @@ def choose_loop(
             "--rated-current and --supply"
         )
     gains = choose_gains(circuit, sampling, sensor.supply_divider > 0)
-    sums = _Sums(circuit=circuit, sensor=sensor, converter=converter, sampling=sampling)
+    rated_V, full_V, samples = sensor.V_per_A * circuit.rated_A, float(converter.full_V), sampling.samples
+    _refuse_sensor(sensor, rated_V, converter, samples)
     counts = circuit.rated_A / circuit.nominal_V  # of the PWM for a count of current, over V/A
     real = {name: getattr(gains, name) * counts for name in ("proportional", "integral", "feed_forward")}
     gain_shift = min(13, floor(log(LARGEST_GAIN / max(real.values()), 2)))
@@ -117,7 +118,19 @@ def choose_loop(
             f"the current loop needs gains from {min(real.values()):.2g} to {max(real.values()):.2g} counts a count, "
             "which 13 bits do not hold; check the coil's resistance, inductance and rated current"
         )
-    current_gain, current_shift = sums.gain(compare_max)
+    # Counts of current for a code of a period's sum; and that sum of a share of the rated current, less the offset.
+    exact = compare_max / (samples * rated_V * converter.levels / full_V)
+    current_shift = min(15, floor(log(65535 / exact, 2)))
+    if current_shift < 1:
+        raise InputError("the current's sensor is too weak: raise the shunt or its gain")
+    current_gain = round(exact * 2**current_shift)
+
+    def above(share: float) -> int:
+        return round(samples * (share * rated_V * converter.levels / full_V))
+
+    offset = samples * converter.code(Fraction(sensor.offset_V))
+    # The load is shorted below what the controller's 31 bits hold.
+    by_bits = ((LARGEST_ERROR << current_shift) - (1 << current_shift)) // current_gain
     hot = max(circuit.corners(), key=lambda corner: corner.resistance_ohm / corner.supply_V)
     open_duty = circuit.duty(hot, OPEN_TIMES * OPEN_SHARE * circuit.rated_A)
     slowest_s = max(corner.inductance_H / corner.resistance_ohm for corner in circuit.corners())
@@ -125,20 +138,20 @@ def choose_loop(
         full_counts=compare_max,
         rate=min(compare_max, 65535),
         compare_limit=compare_max if compare_limit is None else compare_limit,
-        samples=sampling.samples,
+        samples=samples,
         current_gain=current_gain,
         current_shift=current_shift,
         gain_shift=gain_shift,
         **{name: round(value * 2**gain_shift) for name, value in real.items()},
         integral_limit=3 << (compare_max.bit_length() - 2),  # two bits are one instruction
         release=0,
-        offset_nominal=sums.offset,
-        offset_tolerance=round(OFFSET_SHARE * converter.levels) * sampling.samples,
+        offset_nominal=offset,
+        offset_tolerance=round(OFFSET_SHARE * converter.levels) * samples,
         offset_shift=OFFSET_SHIFT,
-        short_sum=sums.short(current_gain, current_shift),
-        over_sum=sums.above(OVER_SHARE),
+        short_sum=min(floor(SHORT_RANGE * converter.levels) * samples, offset + above(SHORT_SHARE), by_bits),
+        over_sum=above(OVER_SHARE),
         over_ticks=ceil(OVER_S * sampling.tick_Hz),
-        open_sum=max(1, sums.above(OPEN_SHARE)),
+        open_sum=max(1, above(OPEN_SHARE)),
         open_compare=ceil(open_duty * compare_max),
         open_ticks=ceil(OPEN_PATIENCE * slowest_s * log(OPEN_TIMES / (OPEN_TIMES - 1)) * sampling.tick_Hz),
         supply=_supply_correction(circuit, sensor, converter),
@@ -200,62 +213,23 @@ def worst_step(steps: Sequence[StepResponse]) -> tuple[StepResponse, StepRespons
     return max(steps, key=lambda step: step.rise_s), max(steps, key=lambda step: step.overshoot)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Sums:
-    """Sums of codes of a period for currents."""
-
-    circuit: CoilCircuit
-    sensor: CurrentSensor
-    converter: Converter
-    sampling: CurrentSampling
-
-    def __post_init__(self) -> None:
-        top_V, full_V = self.sensor.offset_V + OVER_SHARE * self.rated_V, float(self.converter.full_V)
-        if top_V > SHORT_RANGE * full_V:
-            raise InputError(
-                f"at {OVER_SHARE:.0%} of the rated current its sensor gives {top_V:.4g} V, expected at most "
-                f"{SHORT_RANGE * full_V:.4g} V of the converter's {full_V:g} V; lower the shunt or its gain"
-            )
-        least_V = OFFSET_SHARE * full_V
-        if not self.sensor.offset_V > least_V:
-            raise InputError(
-                f"without current its sensor gives {self.sensor.offset_V:g} V, expected more than {least_V:.3g} V: an "
-                "offset below the converter's zero is not seen, so that the calibration leaves it in the current; "
-                "shift the sensor, such as '0..1.2 A on 2 ohm + 0.15 V'"
-            )
-        if self.sampling.samples * self.converter.code_max > 65535:
-            raise InputError(f"{self.sampling.samples} samples of the current do not fit a sum of 16 bits")
-
-    @property
-    def rated_V(self) -> float:
-        """Voltage of the rated current, without the offset."""
-        return self.sensor.V_per_A * self.circuit.rated_A
-
-    @property
-    def offset(self) -> int:
-        """Sum without current."""
-        return self.sampling.samples * self.converter.code(Fraction(self.sensor.offset_V))
-
-    def above(self, share: float) -> int:
-        """Return the sum of a share of the rated current, less the offset."""
-        codes = share * self.rated_V * self.converter.levels / float(self.converter.full_V)
-        return round(self.sampling.samples * codes)
-
-    def gain(self, full_counts: int) -> tuple[int, int]:
-        """Return counts of current for a code of the sum, as an integer and its binary places."""
-        exact = full_counts / (
-            self.sampling.samples * self.rated_V * self.converter.levels / float(self.converter.full_V)
+def _refuse_sensor(sensor: CurrentSensor, rated_V: float, converter: Converter, samples: int) -> None:
+    """Refuse a sensor that gives the rated current, or none, a voltage that the converter can't tell."""
+    top_V, full_V = sensor.offset_V + OVER_SHARE * rated_V, float(converter.full_V)
+    if top_V > SHORT_RANGE * full_V:
+        raise InputError(
+            f"at {OVER_SHARE:.0%} of the rated current its sensor gives {top_V:.4g} V, expected at most "
+            f"{SHORT_RANGE * full_V:.4g} V of the converter's {full_V:g} V; lower the shunt or its gain"
         )
-        shift = min(15, floor(log(65535 / exact, 2)))
-        if shift < 1:
-            raise InputError("the current's sensor is too weak: raise the shunt or its gain")
-        return round(exact * 2**shift), shift
-
-    def short(self, current_gain: int, current_shift: int) -> int:
-        """Return the sum from which the load is shorted: below what the controller's 31 bits hold."""
-        by_range = floor(SHORT_RANGE * self.converter.levels) * self.sampling.samples
-        by_bits = ((LARGEST_ERROR << current_shift) - (1 << current_shift)) // current_gain
-        return min(by_range, self.offset + self.above(SHORT_SHARE), by_bits)
+    least_V = OFFSET_SHARE * full_V
+    if not sensor.offset_V > least_V:
+        raise InputError(
+            f"without current its sensor gives {sensor.offset_V:g} V, expected more than {least_V:.3g} V: an "
+            "offset below the converter's zero is not seen, so that the calibration leaves it in the current; "
+            "shift the sensor, such as '0..1.2 A on 2 ohm + 0.15 V'"
+        )
+    if samples * converter.code_max > 65535:
+        raise InputError(f"{samples} samples of the current do not fit a sum of 16 bits")
 
 
 def _supply_correction(circuit: CoilCircuit, sensor: CurrentSensor, converter: Converter) -> SupplyCorrection | None:
@@ -342,7 +316,7 @@ class CurrentDrive:
         circuit, loop = self.circuit, self.loop
         low, high = circuit.supply_V
         measured = "measured" if loop.supply else "not measured"
-        return (
+        lines = [
             f"drive: current control, full drive is {units.text(circuit.rated_A, 'g A')}; coil "
             f"{circuit.resistance_ohm:g} + "
             f"{circuit.series_ohm:g} ohm (x {_ends(circuit.resistance_factors)}), {1e3 * circuit.inductance_H:g} mH (x "
@@ -351,8 +325,15 @@ class CurrentDrive:
             f"the worst corner; 10 to 90 % in {1e3 * self.rise_s:.1f} ms at the slowest ({1e3 * self.least_rise_s:.1f} "
             f"ms with the switch on all the time), overshoot up to {self.overshoot:.1%}; 90 to 10 % takes up to "
             f"{1e3 * self.fall_s:.0f} ms, as the freewheeling diode alone brakes",
-            *self._weak_in_words(units),
-        )
+        ]
+        weakest = min(circuit.corners(), key=lambda corner: corner.supply_V / corner.resistance_ohm)
+        if circuit.duty(weakest, circuit.rated_A) >= 1:  # no supply drives the rated current there, so it has no step
+            most = units.text(weakest.supply_V / weakest.resistance_ohm, ".3g A")
+            lines.append(
+                f"at {weakest.supply_V:g} V the hottest coil of {weakest.resistance_ohm:.3g} ohm carries {most} at "
+                "most, so that full command has less than the rated current; step and margins are of the others"
+            )
+        return tuple(lines)
 
     def release_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
         """Warn of a current that passes the set point that it is released to; of none say nothing."""
@@ -364,18 +345,6 @@ class CurrentDrive:
             f"{units.text(self.release_overshoot_A, '.2g A')} ({share:.1%} of the rated current), even from the lowest "
             "initial output. The valve may open briefly at zero command; declare narrower ranges of inductance, "
             "resistance or supply, or measure the supply",
-        )
-
-    def _weak_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
-        """Say what flows at most where no supply drives the rated current; those corners have no step."""
-        circuit = self.circuit
-        weakest = min(circuit.corners(), key=lambda corner: corner.supply_V / corner.resistance_ohm)
-        if circuit.duty(weakest, circuit.rated_A) < 1:
-            return ()
-        most_A, at_V = weakest.supply_V / weakest.resistance_ohm, weakest.supply_V
-        return (
-            f"at {at_V:g} V the hottest coil of {weakest.resistance_ohm:.3g} ohm carries {units.text(most_A, '.3g A')} "
-            "at most, so that full command has less than the rated current; step and margins are of the others",
         )
 
 
