@@ -20,7 +20,7 @@ from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import Converter, TargetInputs
 
 #: Options that only current control has a use for, and those that it needs.
-OF_CURRENT = ("coil", "rated_current", "current_signal", "supply_signal")
+OF_CURRENT = ("coil", "rated_current", "current_signal", "supply_signal", "current_error", "bench_current")
 NEEDED = ("coil", "rated_current", "supply", "current_signal")
 #: Of the ends of a sensor's range: that of the decimal numbers in them.
 ROUNDING = 1e-9
@@ -32,9 +32,7 @@ DEFAULT_OIL, DEFAULT_AGEING = 0.002, 0.005
 #: Codes of the converter that the controlled current may be off: one in steady state, one of the calibrated offset.
 CURRENT_CODES = 2
 #: Options that say something of a machine, but do not declare one.
-FURTHER = (
-    "current_error", "bench_current", "pressure_error", "bench_pressure_error", "pressure_converter", "oil", "ageing",
-)  # fmt: skip
+FURTHER = ("pressure_error", "bench_pressure_error", "pressure_converter", "oil", "ageing")
 
 
 def current_request(text: Mapping[str, str], read: Mapping[str, Any], target: TargetInputs) -> CurrentRequest | None:
@@ -145,9 +143,6 @@ def _drive(given: set[str], current: CurrentRequest | None) -> DriveKind | None:
                 "give one of them, and the accuracy of the latter with --current-error"
             )
         return "current"
-    for name in ("current_error", "bench_current"):
-        if name in given:
-            raise InputError(f"{flag_of(name)} is for --drive current, but --drive is duty; give --drive current")
     if "amplifier" in given:
         return "amplifier"
     declared = {"coil_temperature", "supply"} & given

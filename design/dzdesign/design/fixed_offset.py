@@ -16,7 +16,7 @@ from dzdesign.core.worded import worded
 from dzdesign.design.ceiling import deepest_MPa
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import falling_corners, remaining_dead_zone
+from dzdesign.design.costs_at_tests import falling_corners, flow_at_end, remaining_dead_zone
 from dzdesign.design.side_law import Component
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.certified_bound import BoundPiece
@@ -243,18 +243,11 @@ def _at_test(compensator: Compensator, characteristic: Characteristic, test: Tes
             if knee is not None
         },
         law=remaining_dead_zone(compensator, test, sign),
-        fixed_end_L_min=_flow_at_end(compensator, test, by_fixed),
-        law_end_L_min=_flow_at_end(compensator, test, by_law),
+        fixed_end_L_min=flow_at_end(compensator, test, by_fixed),
+        law_end_L_min=flow_at_end(compensator, test, by_law),
     )
 
 
 def _left(characteristic: Characteristic, knee: Fraction) -> float:
     found = characteristic.command_at(knee)
     return float("inf") if found is None else float(found)
-
-
-def _flow_at_end(compensator: Compensator, test: TestResult, drive: float) -> float | None:
-    """Return the flow on closing that a drive makes, as the straight part of the test has it, L/min."""
-    if not compensator.transition_end or test.u_knee_falling_V is None:
-        return None
-    return test.slope_L_min_V * max(drive * float(compensator.u_max_V) - test.u_knee_falling_V, 0.0)
