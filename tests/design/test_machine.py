@@ -18,9 +18,9 @@ from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import lot_margins, lot_setting, prove_lot
 from dzdesign.design.machine import check_bench_current, dither_reserve, recorded_full_A
 from dzdesign.design.redesign import prove_certificates, prove_derived
+from tests.design.machine_oracle import worst_margin_mV
 from tests.support import designs
 from tests.support.designs import CURRENT, MACHINES
-from tests.support.machine_oracle import worst_margin_mV
 
 CONVERTER = target_named("f28335").converter
 OF_ALL = (
