@@ -19,7 +19,7 @@ from dzdesign.codegen.calibration.files import block_core_files, texts
 from dzdesign.codegen.calibration.layout import CalibrationBlock
 from dzdesign.codegen.calibration.packing import pack
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.current.circuit import CurrentLoop
 from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.verify.current.controller_states import check_states, hashes_on
 from dzdesign.verify.current.current_checks import read_controller

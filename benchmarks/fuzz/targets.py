@@ -20,8 +20,7 @@ from dzdesign.core.artefact_types import schema_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.units import SI_UNIT, parse_quantity
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
 from dzdesign.design.signal_text import parse_signal
 from dzdesign.identify.reading.column_labels import find_columns, parse_columns
 from dzdesign.identify.reading.low_flow_table import read_low_flow

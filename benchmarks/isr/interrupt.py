@@ -17,8 +17,7 @@ from tried_inputs import Codes, tried_inputs
 
 from dzdesign.codegen.project import generate
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.current.choosing import CurrentSensor
-from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling, CurrentSensor
 from dzdesign.design.current.drive import CurrentRequest, design_current_drive
 from dzdesign.design.target_inputs import Converter
 

@@ -7,15 +7,8 @@ from time import perf_counter
 
 from scoreboard import Row, print_rows, say
 
-from dzdesign.design.current.choosing import (
-    LEAST_PHASE_DEG,
-    CurrentSensor,
-    choose_loop,
-    gains_of,
-    sensor_line,
-    worst_step,
-)
-from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
+from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling, CurrentSensor
+from dzdesign.design.current.drive import LEAST_PHASE_DEG, choose_loop, gains_of, sensor_line, worst_step
 from dzdesign.design.current.responses import step_responses, worst_margins
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.coil import CoilLoop, CoilSimulation

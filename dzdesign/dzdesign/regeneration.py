@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from dzdesign.codegen.other_targets import Output
     from dzdesign.codegen.project import Firmware
     from dzdesign.design.compensator import Compensator
-    from dzdesign.design.firmware_manifest import FirmwareManifest
-    from dzdesign.design.output_manifest import OutputManifest
+    from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
     from dzdesign.verify.folder import Regenerated
 
     Manifest = FirmwareManifest | OutputManifest
@@ -74,7 +73,7 @@ def _not_derived(compensator: "Compensator") -> str:
 
     A number that does not follow is an `InputError`; another version of dzdesign may have chosen it just as well.
     """
-    from dzdesign.design.redesign_check import prove_derived, refuse_without_options
+    from dzdesign.design.redesign import prove_derived, refuse_without_options
 
     try:
         prove_derived(compensator)

@@ -4,20 +4,23 @@ import ctypes
 import subprocess
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
 
 from dzdesign.codegen.project import generate
 from dzdesign.core.artefact_files import write_folder
+from dzdesign.core.artefact_reading import read_artefact
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.certificate import prove_certificates
-from dzdesign.design.designing import design
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.compensator import Compensator
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.exhaustive.all_inputs import check_above
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import differences
+from tests.support.designs import designed
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, synthetic_ramp
 
@@ -47,10 +50,18 @@ def valve(request):
 
 
 @pytest.fixture(scope="module")
+def made(valve):
+    """Its designs, by what is chosen above the tests."""
+    return {above: designed(valve, above=above) for above in ("hold", "lower", "release")}
+
+
+@pytest.fixture(scope="module")
 def core_of(tmp_path_factory):
     """The compiled core of a compensator: drive, V, and status at zero command and a pressure drop."""
 
-    def call(compensator):
+    @cache
+    def compiled(compensator_json: bytes):
+        compensator = read_artefact(compensator_json, Compensator, "compensator.json")
         folder = tmp_path_factory.mktemp("core") / "fw"
         firmware = generate(compensator, "host")
         write_folder(folder, firmware.files, firmware.manifest)
@@ -68,7 +79,7 @@ def core_of(tmp_path_factory):
 
         return at_zero
 
-    return call
+    return lambda compensator: compiled(to_json_bytes(compensator))
 
 
 def closing_V(valve, dp_MPa: float, bend: float) -> float:
@@ -80,12 +91,16 @@ def closing_V(valve, dp_MPa: float, bend: float) -> float:
     return threshold_V(dp_MPa, bend) - hysteresis
 
 
+def lines(compensator, begin: str) -> list[str]:
+    return [each for each in compensator.costs if each.startswith(begin)]
+
+
 class TestDrive:
     @pytest.mark.parametrize("choice", ["lower", "release"])
-    def test_within_the_premise_no_drive_lies_above_the_truth_and_the_status_says_above(self, valve, core_of, choice):
-        made = design(valve, DesignOptions(above=choice))
-        curve = valve.positive.certified["closing"]
-        at_zero = core_of(made)
+    def test_within_the_premise_no_drive_lies_above_the_truth_and_the_status_says_above(
+        self, valve, made, core_of, choice
+    ):  # fmt: skip
+        curve, at_zero = valve.positive.certified["closing"], core_of(made[choice])
         # Of a threshold that is known to run one way nothing is certified; straight on is what it is continued by.
         assert curve.above.certified == (curve.premise != "monotone")
         for bend in {"line": (0.0,), "smooth": (0.0, M, -M), "monotone": (0.0,)}[curve.premise]:
@@ -94,55 +109,49 @@ class TestDrive:
                 assert drive <= max(closing_V(valve, dp, bend), 0.0) + 1e-4 and status == 16, (bend, dp)
         assert at_zero(4.9)[1] == 0
 
-    def test_held_it_lies_above_a_falling_truth(self, valve, core_of):
-        drive, status = core_of(design(valve, DesignOptions(above="hold")))(15.0)
+    def test_held_it_lies_above_a_falling_truth(self, valve, made, core_of):
+        drive, status = core_of(made["hold"])(15.0)
         assert drive > closing_V(valve, 15.0, 0.0) and status == 16
 
-    def test_what_is_beyond_the_premise_is_outside_the_promise_and_said(self, valve, core_of):
-        made, curve = design(valve, DesignOptions()), valve.positive.certified["closing"]
-        drive, _ = core_of(made)(10.0)
-        if curve.premise == "monotone":
-            (line,) = (each for each in made.costs if each.startswith("above"))
+    def test_what_is_beyond_the_premise_is_outside_the_promise_and_said(self, valve, made, core_of):
+        premise, (line,) = valve.positive.certified["closing"].premise, lines(made["lower"], "above")
+        if premise == "monotone":
             assert "Not certified" in line
         else:
-            assert drive > closing_V(valve, 10.0, -30 * M)
-            (line,) = (each for each in made.costs if each.startswith("above"))
+            assert core_of(made["lower"])(10.0)[0] > closing_V(valve, 10.0, -30 * M)
             assert "certified if" in line and ("curvature at most M" in line or "straight" in line)
 
-    def test_the_tests_keep_their_offset(self, valve):
-        held, lowered, released = (design(valve, DesignOptions(above=each)) for each in ("hold", "lower", "release"))
+    def test_the_tests_keep_their_offset(self, made):
         for dp in TESTED:
-            code = round(held.signals.dp_code(Fraction(dp)))
-            offsets = [float(each.beta(code) * each.positive.u_min0_over_u_max) for each in (held, lowered, released)]
+            code = round(made["hold"].signals.dp_code(Fraction(dp)))
+            offsets = [float(each.beta(code) * each.positive.u_min0_over_u_max) for each in made.values()]
             assert min(offsets) > max(offsets) - 1e-3
 
-    def test_let_go_nothing_but_one_unit_is_left_two_segments_above_the_tests(self, valve):
-        made = design(valve, DesignOptions(above="release"))
-        last = round(made.signals.dp_code(Fraction(5)))
-        node = last // made.beta_step_codes + 2
-        assert set(made.positive.beta[node:]) == {1} and made.positive.beta[node - 1] > 1
-        assert made.positive.certificate.released_from_MPa == made.signals.dp_MPa(node * made.beta_step_codes)
-        assert made.positive.transition_beta is not None and min(made.positive.transition_beta) > 1
+    def test_let_go_nothing_but_one_unit_is_left_two_segments_above_the_tests(self, made):
+        released = made["release"]
+        side, node = released.positive, round(released.signals.dp_code(Fraction(5))) // released.beta_step_codes + 2
+        assert set(side.beta[node:]) == {1} and side.beta[node - 1] > 1 and min(side.transition_beta) > 1
+        assert side.certificate.released_from_MPa == released.signals.dp_MPa(node * released.beta_step_codes)
 
 
 def test_of_one_test_the_offset_is_held_and_said_to_be():
     valve = identify([synthetic_ramp(1.0, Truth())], IdentifyOptions(meter_lag=0.0))
-    made = design(valve, DesignOptions())
+    made = designed(valve)
     assert valve.positive.certified["closing"].above is None
     assert len(set(made.positive.beta)) == 1 and made.positive.certificate.released_from_MPa is None
-    (line,) = (each for each in made.costs if each.startswith("above"))
+    (line,) = lines(made, "above")
     assert "a single test gives no slope" in line and "nothing is certified" in line
-    assert min(design(valve, DesignOptions(above="release")).positive.beta) == 1
+    assert min(designed(valve, above="release").positive.beta) == 1
 
 
 def test_a_rising_threshold_known_to_run_one_way_is_certified_where_it_is_held():
     ramps = [synthetic_ramp(dp, Truth(knee_rising=threshold_V(dp, rising=True), slope=4 * dp**0.5, noise=0.02))
              for dp in TESTED]  # fmt: skip
     valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="monotone"))
-    made = design(valve, DesignOptions())
+    made = designed(valve)
     assert valve.positive.trend == "increasing" and valve.positive.certified["closing"].above.certified
     assert float(made.positive.certificate.holds_to_MPa) > 19 and made.positive.certificate.released_from_MPa is None
-    (line,) = (each for each in made.costs if each.startswith("below"))
+    (line,) = lines(made, "below")
     assert "possible" in line
 
 
@@ -151,7 +160,7 @@ def lowered():
     """A compensator under a declared curvature, without a transition."""
     ramps = [synthetic_ramp(dp, Truth(knee_rising=threshold_V(dp), slope=4 * dp**0.5, noise=0.02)) for dp in TESTED]
     valve = identify(ramps, IdentifyOptions(meter_lag=0.0, curve="smooth", curvature=M * 1e-12))
-    return design(valve, DesignOptions(transition=Fraction(0)))
+    return designed(valve, transition="off")
 
 
 class TestFaults:
@@ -175,7 +184,7 @@ class TestFaults:
         assert check_above(exact, found, drive).over_compensated > 0
 
     def test_an_offset_that_is_not_let_go(self, lowered):
-        released = design(lowered.valve, DesignOptions(transition=Fraction(0), above="release"))
+        released = designed(lowered.valve, transition="off", above="release")
         exact, found, drive = self.drives(released)
         drive[-3:] = 5
         assert check_above(exact, found, drive).not_released > 0

@@ -5,22 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.codegen.project import target_named
-from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.costs import costs_of, design_warnings
 from dzdesign.design.current import drive as current_drive
-from dzdesign.design.current.choosing import (
+from dzdesign.design.current.circuit import Corner, CurrentSampling, CurrentSensor
+from dzdesign.design.current.drive import (
     LEAST_PHASE_DEG,
-    CurrentSensor,
+    CurrentRequest,
     choose_loop,
+    design_current_drive,
     gains_of,
     sensor_line,
     worst_step,
 )
-from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
-from dzdesign.design.current.drive import CurrentRequest, design_current_drive
 from dzdesign.design.current.responses import (
     Coils,
     Gains,
@@ -33,9 +31,8 @@ from dzdesign.design.current.responses import (
     step_responses,
     worst_margins,
 )
-from dzdesign.design.designing import design
-from dzdesign.design.options import options_of
 from dzdesign.verify.exhaustive.zero_command import counted_dither
+from tests.support.designs import CURRENT, designed
 from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
 
 on_both = pytest.mark.parametrize("name", SENSORS)
@@ -171,14 +168,6 @@ def test_a_sensor_beyond_the_converter_is_refused(sensor):
         choose_loop(COIL, sensor, CONVERTER, SAMPLING, compare_max=60000)
 
 
-@pytest.mark.parametrize("changed", [{"rated_A": 0.0}, {"supply_V": (32.0, 18.0)}, {"series_ohm": -1.0}])
-def test_a_circuit_that_is_none_is_refused(changed):
-    with pytest.raises(RuleError):
-        CoilCircuit(
-            **{"resistance_ohm": 3.5, "inductance_H": 0.04, "rated_A": 1.0, "supply_V": (18.0, 32.0), **changed}
-        )
-
-
 @pytest.mark.parametrize("changed", [{"rated_A": 50.0}, {"supply_V": (1.0, 1000.0)}])
 def test_a_current_that_no_supply_drives_in_time_is_refused(changed):
     circuit = replace(COIL, **changed)
@@ -226,9 +215,7 @@ def wave_peak(corner: Corner, loop, set_point: int, counts: int, ticks: int) -> 
 
 def test_the_current_overshoots_the_dither_and_the_offset_keeps_that_free(example_valve):
     """The set point's peak of 600 counts is passed by a third at half the inductance and the highest supply."""
-    texts = {"coil": "3.5 ohm 40 mH", "rated_current": "1 A", "supply": "18..32 V", "drive": "current"}
-    texts |= {"current_signal": "0..1.2 A on 2 ohm + 0.15 V", "dither": "150 Hz 1 %"}
-    made = design(example_valve, options_of(texts, target_named("host").inputs()))
+    made = designed(example_valve, "host", **CURRENT, dither="150 Hz 1 %")
     drive, set_point = made.current_drive, made.compare(0, 200)
     corner = Corner(3.5 * 0.75 + 0.5, 0.02, 32.0)
     over = wave_peak(corner, drive.loop, set_point, 600, made.drive_functions.dither_ticks) - set_point - 600

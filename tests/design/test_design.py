@@ -1,31 +1,38 @@
-"""The compensator's exactness and its certificate, argued again from the ramp tests."""
+"""The compensator's exactness, its certificate and its transition, argued again from the ramp tests and in the loop."""
 
 import dataclasses
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from dzdesign.codegen.project import generate
+from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import RuleError, to_json_bytes
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
+from dzdesign.design.costs_at_tests import read_dead_zone
 from dzdesign.design.designing import design
 from dzdesign.design.drive_functions import DriveFunctions
-from dzdesign.design.machine.allowance import allowance_of
-from dzdesign.design.offset.offset_ceiling import offset_ceiling
-from dzdesign.design.options import DesignOptions
+from dzdesign.design.machine import allowance_of
 from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.options import IdentifyOptions
+from dzdesign.regeneration import regenerated
+from dzdesign.verify.closed_loop.loop import RampSequence
+from dzdesign.verify.verification import verify
+from tests.support.designs import designed as designed_for
 from tests.support.repeatable_valves import identify
-from tests.support.synthetic import Truth, signals_with_span, synthetic_ramp, with_side
+from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp, with_side
 
 
 def compensator_of(threshold_at, pressures=(0.5, 1.0, 2.0, 3.0, 5.0), law_name="paper", **options):
     tests = [synthetic_ramp(dp, Truth(knee_rising=threshold_at(dp), slope=4 * dp**0.5)) for dp in pressures]
     valve = identify(tests)
-    return valve, design(valve, DesignOptions(law=law_name, **options))
+    return valve, designed_for(valve, law=law_name, **options)
 
 
 THRESHOLDS = {
@@ -42,7 +49,6 @@ def designed(request):
     return (*compensator_of(threshold), threshold)
 
 
-@pytest.mark.slow
 def test_zero_command_stays_under_the_true_closing_threshold_at_every_pressure_code(designed):
     valve, compensator, threshold = designed
     low, high = valve.positive.valid_dp_MPa
@@ -76,14 +82,14 @@ def test_law_paper_is_equation_18(example_compensator):
 
 
 def test_law_target_keeps_the_gain(example_valve):
-    c = design(example_valve, DesignOptions(law="target"))
+    c = designed_for(example_valve, law="target")
     rises = {Fraction(4095, 4000) * (c.drive(4095, code) - c.drive(95, code)) for code in (0, 300, 1000)}
     assert rises == {c.positive.drive_range_over_u_max}
 
 
 def test_halves_round_up():
     signals = Signals(command=CommandSignal(full_code=2), compare_max=1)
-    _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,), transition=Fraction(0))
+    _, compensator = compensator_of(lambda dp: 5.0, pressures=(1.0,), transition="off")
     exact = with_side(
         dataclasses.replace(compensator, signals=signals, drive_functions=DriveFunctions(compare_limit=1)),
         drive_range_over_u_max=Fraction(1, 2),
@@ -120,13 +126,7 @@ def test_a_valve_file_that_contradicts_itself_is_refused(example_valve, wording)
     greedy = dataclasses.replace(guarded_curve(side, "closing", "hold"), offset_V=(Fraction(6), Fraction(6)))
     greedy = dataclasses.replace(greedy, dp_MPa=(greedy.dp_MPa[0], greedy.dp_MPa[-1]))
     with pytest.raises(RequirementError):
-        offset_ceiling(greedy, Fraction(10), allowance_of(DesignOptions().signals))
-
-
-def test_span_must_reach_the_tested_pressures(example_valve, wording):
-    with pytest.raises(InputError) as caught:
-        design(example_valve, DesignOptions(signals=signals_with_span(Fraction(4))))
-    wording("design: a short span", str(caught.value))
+        offset_ceiling(greedy, Fraction(10), allowance_of(Signals()))
 
 
 def test_a_law_that_would_fall_with_command_is_refused():
@@ -135,7 +135,7 @@ def test_a_law_that_would_fall_with_command_is_refused():
     valve = identify(tests, IdentifyOptions(dp0=3e6))
     side = dataclasses.replace(valve.positive, k_x_max_over_u_max=2e-3)
     with pytest.raises(InputError, match="would fall with rising command"):
-        design(dataclasses.replace(valve, sides={"positive": side}), DesignOptions(below_dp0="extend"))
+        designed_for(dataclasses.replace(valve, sides={"positive": side}), below_dp0="extend")
 
 
 def test_loss_against_the_certified_curve_is_small(example_valve, example_compensator):
@@ -162,4 +162,68 @@ def test_a_valve_without_its_falling_branch_needs_a_word(wording):
     with pytest.raises(InputError) as caught:
         design(valve)
     wording("design: no falling branch", str(caught.value))
-    assert design(valve, DesignOptions(guard="opening")).positive.certificate.guard == "opening"
+    assert designed_for(valve, guard="opening").positive.certificate.guard == "opening"
+
+
+@pytest.fixture(scope="module")
+def with_transition(example_valve):
+    return designed_for(example_valve, transition="1 %")
+
+
+def test_it_runs_from_the_certified_offset_to_the_opening_law_without_a_step(with_transition, example_valve):
+    plain = designed_for(example_valve, transition="off")
+    band, end = with_transition.zero_band_codes, with_transition.transition_end
+    assert (band, end) == (19, 51)
+    u_max = float(with_transition.u_max_V)
+    for dp_code in range(0, 1100, 50):
+        drives = [with_transition.drive(command, dp_code) for command in range(end + 3)]
+        # Zero command: the same certified curve as without a transition, to within the nodes' rounding.
+        assert float(abs(drives[0] - plain.drive(0, dp_code))) * u_max < 1e-3
+        rises = [right - left for left, right in pairwise(drives)]
+        assert not any(rises[:band]) and all(rise > 0 for rise in rises[band:])
+        assert len(set(rises[band:end])) == 1 and len(set(rises[end:])) == 1  # two straight parts that meet
+        # Beyond the transition the law goes on as a law of the opening threshold's beta, Eq. (18).
+        for command in (end, end + 2, 2000, 4095):
+            side, beta, share = with_transition.positive, with_transition.law_beta(dp_code), Fraction(command, 4095)
+            law = (beta * side.drive_range_over_u_max - beta + 1) * share + beta * side.u_min0_over_u_max
+            assert with_transition.drive(command, dp_code) == law
+
+
+def test_the_transition_ends_at_or_above_the_opening_threshold_at_every_test(with_transition, example_valve):
+    signals = with_transition.signals
+    for test in example_valve.positive.tests:
+        code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
+        assert float(with_transition.drive(with_transition.transition_end, code)) * 10 > test.u_knee_rising_V
+
+
+def test_a_dither_stands_under_the_certified_bound_at_its_top(example_valve):
+    plain = designed_for(example_valve, transition="off")
+    dithered = designed_for(example_valve, transition="off", dither="150 Hz 1 %")
+    peak = dithered.drive_functions.dither_counts
+    assert peak == 600
+    for dp_code in range(150, 1000, 10):
+        assert dithered.compare(0, dp_code) + peak <= plain.compare(0, dp_code) + 2
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_the_closed_loop_has_no_leak_one_per_cent_of_dead_zone_and_reads_what_design_says(
+    example_valve, tmp_path
+):
+    """The goal with hysteresis, PWM resolved, on the recorded characteristic.
+
+    Two ways to the reading: the law turned round at the recorded threshold, and the generated C driving the flow.
+    """
+    compensator = designed_for(example_valve, transition="1 %", reading_flow="0.8 L/min")
+    firmware = generate(compensator, "f28335")
+    write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
+    again = regenerated(tmp_path / "fw")
+    found = verify(tmp_path / "fw", again=again, sequence=RampSequence(rest=0.5, ramp=40.0, top=0.5))
+    assert found.holds, [check for check in found.evidence.checks if not check.holds]
+    for test, loop in zip(example_valve.positive.tests, found.loops, strict=True):
+        result, said = loop.result, read_dead_zone(compensator, test)
+        assert result.q_zero_L_min <= 1e-9 and result.residual_opening <= 24 / 4095 + 0.008
+        assert result.reading_flow_L_min == 0.8 and result.ideal_line == pytest.approx(0.8 / result.q_max_L_min)
+        assert result.reading_opening == pytest.approx(said["opening"], abs=2e-3)
+        assert result.reading_closing == pytest.approx(said["closing"], abs=2e-3)
+        assert result.residual_opening < result.reading_opening < result.reading_opening_without

@@ -1,21 +1,15 @@
 """One setting for many valves: certified for each, the valve's own where all are alike, refused where there is none."""
 
-from fractions import Fraction
-
 import pytest
 
-from dzdesign.codegen.project import target_named
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
+from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
-from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import lot_setting
-from dzdesign.design.machine.allowance import allowance_of
-from dzdesign.design.offset.offset_ceiling import offset_ceiling
-from dzdesign.design.options import DesignOptions, options_of
-from dzdesign.design.signal_text import command_signal, parse_signal
-from dzdesign.design.signals import Signals
+from dzdesign.design.machine import allowance_of
 from dzdesign.identify.valve.model import ValveModel
+from tests.support.designs import BOTH_SIGNS, designed
 from tests.support.paths import GOLDENS_FULL
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, synthetic_ramp
@@ -26,10 +20,6 @@ BOTH_SIDES = GOLDENS_FULL / "valve.json"
 def valve(knee, pressures=(1.0, 2.5, 5.0), *, seed=0):
     tests = [synthetic_ramp(dp, Truth(knee_rising=knee(dp)), seed=seed, rate_Hz=10.0, ramp_s=60.0) for dp in pressures]
     return identify(tests)
-
-
-def designed(valve, options=None, **texts):
-    return design(valve, options or options_of(texts, target_named("f28335").inputs()))
 
 
 @pytest.fixture(scope="module")
@@ -67,42 +57,23 @@ def test_of_valves_that_are_alike_it_is_their_own(falling):
 
 @pytest.mark.slow
 def test_both_signs():
-    content = BOTH_SIDES.read_bytes()
-    signals = Signals()
-    command = command_signal(parse_signal("-10..10 V x 0.15 + 1.5 V", "command"), _converter(signals), inverted=False)
-    options = DesignOptions(transition=Fraction(0), signals=_with_command(signals, command), negative_dp="recorded")
-    each = designed(read_artefact(content, ValveModel, "valve.json"), options)
+    found = read_artefact(BOTH_SIDES.read_bytes(), ValveModel, "valve.json")
+    each = designed(found, transition="off", command_signal=BOTH_SIGNS)
     common = lot_setting({"a": each, "b": each}).compensator
     assert (common.positive, common.negative) == (each.positive, each.negative)
     assert highest_over(common, each, "negative", -1) <= 0
 
 
-def _converter(signals):
-    from dzdesign.codegen.project import target_named
-
-    return target_named("f28335").inputs().converter
-
-
-def _with_command(signals, command):
-    from dataclasses import replace
-
-    return replace(signals, command=command)
-
-
 @pytest.mark.slow
 def test_what_has_no_common_setting_is_told_why(falling, rising, wording):
     low, high = (designed(valve(lambda dp: 5.4 - 0.05 * dp, pressures)) for pressures in ((0.5, 1.0), (2.0, 4.0)))
-    with pytest.raises(InputError) as caught:
-        lot_setting({"low": low, "high": high})
-    wording("a lot setting: no common pressure drop", str(caught.value))
-    with pytest.raises(InputError) as caught:
-        lot_setting({"low": low})
-    wording("a lot setting: one valve", str(caught.value))
-    other = designed(rising.valve, law="target")
-    with pytest.raises(InputError) as caught:
-        lot_setting({"a": falling, "b": other})
-    wording("a lot setting: another law", str(caught.value))
     with_transition = designed(falling.valve, transition="2 %")
-    with pytest.raises(InputError) as caught:
-        lot_setting({"a": with_transition, "b": with_transition})
-    wording("a lot setting: a transition", str(caught.value))
+    for what, batch in {
+        "no common pressure drop": {"low": low, "high": high},
+        "one valve": {"low": low},
+        "another law": {"a": falling, "b": designed(rising.valve, law="target")},
+        "a transition": {"a": with_transition, "b": with_transition},
+    }.items():
+        with pytest.raises(InputError) as caught:
+            lot_setting(batch)
+        wording(f"a lot setting: {what}", str(caught.value))

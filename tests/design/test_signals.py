@@ -1,4 +1,4 @@
-"""Signals as engineers write them, the codes they become, and the drive functions as integers."""
+"""Signals as engineers write them, and the codes they become."""
 
 import random
 import re
@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import pytest
 
+from dzdesign.codegen.project import targets
 from dzdesign.core.errors import InputError
-from dzdesign.design.designing import design
-from dzdesign.design.options import DesignOptions
 from dzdesign.design.signal_text import command_signal, live_zero_signal, parse_signal, pressure_signal
 from dzdesign.design.signals import CommandSignal, PressureSignal, Signals
 from dzdesign.design.target_inputs import Converter
+from tests.support.designs import options
 
 ADC = Converter()
 
@@ -120,45 +120,6 @@ def test_sensors_too_unlike_are_refused(wording):
     wording("a signal: sensors too unlike", str(caught.value))
 
 
-def test_the_integers_of_the_drive_functions():
-    options = DesignOptions(
-        signals=Signals(command=command("-10..10 V x 0.15 + 1.5 V")),
-        transition=Fraction(1, 100), ramp_up_s=(0.5, 0.8), dither_Hz=150.0, dither_peak=Fraction(1, 100),
-        output_max=Fraction(9, 10),
-    )  # fmt: skip
-    functions = options.drive_functions(options.transition_codes())
-    assert options.transition_codes() == 16  # 1 % of 2047 codes is 20: the power of two below
-    # 0.5 s are 625 samples: 2047 codes * 65536 / 625; of negative commands 2048 codes in 1000.
-    assert functions.ramp_up == (round(2047 * 65536 / 625), round(2048 * 65536 / 1000)) and functions.ramp_down == (
-        0,
-        0,
-    )
-    assert (functions.dither_counts, functions.dither_ticks) == (600, 8)  # 2500 Hz / 16 = 156 Hz
-    # Of the F28335's converter: 15 codes of offset, half of 30 of the gain, 4 of noise; from rest 5 more.
-    assert (options.error.zero_band_codes, functions.leave_zero_codes) == (34, 39)
-    assert (functions.compare_limit, DesignOptions().drive_functions(32).leave_zero_codes) == (54000, 24)
-    assert DesignOptions().drive_functions(0).leave_zero_codes == 0  # one sign has no other solenoid
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"transition": Fraction(1, 5)}, "the transition is 20.000%, expected 0 to 10%"),
-        ({"transition": Fraction(1, 10**5)}, "is 0 codes of the command"),
-        ({"dither_Hz": 150.0}, "a dither needs both"),
-        ({"dither_Hz": 50.0, "dither_peak": Fraction(1, 100)}, "expected 100 to 300 Hz"),
-        ({"output_max": Fraction(0)}, "the largest output"),
-        ({"ramp_up_s": (1e4, 0.0)}, "a ramp takes 10000 s"),
-        ({"guard": "closed"}, "did you mean 'closing'"),
-        ({"below_dp0": "hod"}, "did you mean 'hold'"),
-    ],
-)
-def test_choices_that_cannot_be(options, words):
-    with pytest.raises(InputError) as error:
-        DesignOptions(**options).transition_codes()
-    assert words in str(error.value)
-
-
 def test_a_current_of_both_signs_has_its_zero_between():
     both = command("4..20 mA on 150 ohm = -10..10 V")
     # 12 mA on 150 ohm are 1.8 V of 3 V: 2457.6 codes.
@@ -178,7 +139,19 @@ def test_what_a_command_cannot_stand_for(meaning):
         command(f"4..20 mA on 150 ohm = {meaning}")
 
 
-def test_a_full_command_other_than_the_valves_is_refused(example_valve):
-    options = DesignOptions(signals=Signals(), full_command_V=Fraction(5))
-    with pytest.raises(InputError, match="stands for 5 V"):
-        design(example_valve, options)
+def test_noise_at_the_end_of_a_signal_is_no_failure():
+    """A code below zero command let the valve go, and the spool would have hammered."""
+    found = command("0..10 V x 0.25 + 0.2 V")
+    low, high = found.valid_codes
+    margin = (found.full_code - found.zero_code) / 20
+    assert found.zero_code - low == pytest.approx(margin, abs=2) == high - found.full_code
+
+
+def test_the_default_signals_take_neither_end_of_the_converter_for_a_pressure():
+    for target in targets():
+        made = options(target.name).signals
+        for each in (made.pressure_a, made.pressure_b):
+            assert 0 < each.valid_codes[0] < each.zero_code
+            assert each.full_code < each.valid_codes[1] < made.code_max
+        assert all(made.hidden_failures(1, reads_high=high) == () for high in (True, False))
+    assert options().signals == Signals()

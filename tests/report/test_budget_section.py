@@ -10,8 +10,8 @@ import pytest
 from dzdesign.codegen.project import target_named
 from dzdesign.core.chosen_units import read_units
 from dzdesign.core.recorded_units import AS_COMPUTED
+from dzdesign.design.certificate import not_counted
 from dzdesign.design.designing import design
-from dzdesign.design.machine.accounting import not_counted
 from dzdesign.design.options import options_of
 from dzdesign.report.figure import figure_style
 from dzdesign.report.sections.budget import budget_section

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from dzdesign.codegen.calibration.acceptance import LARGEST_CODES, LARGEST_DROP
 from dzdesign.codegen.calibration.layout import NODE_MASK, SUPPLY_MASK
-from dzdesign.design.current.loop import LARGEST_ERROR
+from dzdesign.design.current.circuit import LARGEST_ERROR
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
 from dzdesign.design.signals import WEIGHT_SHIFT
 

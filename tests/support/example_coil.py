@@ -5,10 +5,8 @@ from functools import cache
 
 from dzdesign.codegen.target import Target
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.current.choosing import CurrentSensor, choose_loop
-from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
-from dzdesign.design.current.drive import CurrentRequest, design_current_drive
-from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.current.circuit import CoilCircuit, CurrentLoop, CurrentSampling, CurrentSensor
+from dzdesign.design.current.drive import CurrentRequest, choose_loop, design_current_drive
 from dzdesign.design.target_inputs import Converter
 
 COIL = CoilCircuit(resistance_ohm=3.5, inductance_H=0.04, rated_A=1.0, supply_V=(18.0, 32.0))

@@ -12,8 +12,7 @@ from dzdesign.core.errors import InputError, and_more, quoted
 from dzdesign.core.folder_contents import manifest_of
 from dzdesign.core.options import flag_of
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
 
 #: What a folder holds, by the type of its manifest.
 WORDS = {FirmwareManifest: "firmware", OutputManifest: "output"}

@@ -21,7 +21,7 @@ from dzdesign.core.folder_contents import manifest_of
 from dzdesign.core.options import flag_of
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,9 +34,9 @@ from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.core.strict_templates import strict_templates
+from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import BLOCK_FILE, VECTORS_NAME, Calibration, FirmwareManifest, FirmwareOrigin
-from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.design.target_inputs import Converter
 
 if TYPE_CHECKING:

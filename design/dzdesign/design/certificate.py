@@ -11,13 +11,15 @@ from math import ceil
 import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.worded import in_units
+from dzdesign.design.beta_table import STEP_CODES, TableMargins
+from dzdesign.design.budget import budget_of
+from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, offset_above, offset_ceiling, offset_row
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.accounting import budget_of
-from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.offset.beta_table import STEP_CODES, TableMargins
-from dzdesign.design.offset.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
-from dzdesign.design.side_law import Certificate
+from dzdesign.design.design_choices import Above
+from dzdesign.design.machine import Machine
+from dzdesign.design.side_law import Budget, Certificate
 from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.guard_curve import CertifiedCurve, Guard
 from dzdesign.identify.valve.side_model import SideModel
@@ -62,42 +64,45 @@ def certify(
     )
 
 
+def certified(compensator: Compensator, side: SideModel, sign: int) -> tuple[Certificate, Budget]:
+    """Return certificate and budget of a compensator's law of a sign for a side of a valve, proved."""
+    law, guard = compensator.side(sign), compensator.side(sign).certificate.guard
+    curve = guarded_curve(side, guard, compensator.below_dp0, compensator.above, compensator.machine)
+    allowance = compensator.allowance(sign)
+    certificate = certify(
+        side,
+        curve,
+        offset_ceiling(curve, compensator.u_max_V, allowance),
+        guard=guard,
+        signals=compensator.signals,
+        u_max_V=compensator.u_max_V,
+        u_min0=law.u_min0_over_u_max,
+        table=law.beta,
+        denominator=compensator.beta_denominator,
+    )
+    return certificate, budget_of(side, curve, compensator.u_max_V, allowance, guard, compensator.machine)
+
+
 def prove_certificates(compensator: Compensator) -> None:
     """Prove the certificates of a compensator again, from the valve in it; refuse the first statement that differs."""
-    signals = compensator.signals
-    for sign in signals.signs:
+    for sign in compensator.signals.signs:
         name = SIDE_NAMES[sign]
         law, model = compensator.side(sign), compensator.valve.sides.get(name)
         if model is None:
             raise InputError(f"the compensator drives the {name} side, but its valve has none; design it again")
-        stated = law.certificate
-        above = AboveChoice.on(compensator.machine, compensator.above, STEP_CODES)
-        curve = guarded_curve(model, stated.guard, compensator.below_dp0, above)
-        allowance = compensator.allowance(sign)
-        ceiling = offset_ceiling(curve, compensator.u_max_V, allowance)
         try:
-            proved = certify(
-                model,
-                curve,
-                ceiling,
-                guard=stated.guard,
-                signals=signals,
-                u_max_V=compensator.u_max_V,
-                u_min0=law.u_min0_over_u_max,
-                table=law.beta,
-                denominator=compensator.beta_denominator,
-            )
+            proved, budget = certified(compensator, model, sign)
         except RequirementError as error:
             reason = in_units(error, compensator.valve.recorded_units)
             raise InputError(f"the {name} side's certificate does not hold: {reason}; design it again") from error
         for field in fields(Certificate):
-            claim, found = getattr(stated, field.name), getattr(proved, field.name)
+            claim, found = getattr(law.certificate, field.name), getattr(proved, field.name)
             if claim != found:
                 raise InputError(
                     f"the {name} side's certificate says {field.name} = {_words(claim)}, but {_words(found)} follows "
                     "from its valve; design it again"
                 )
-        if law.budget != budget_of(model, curve, compensator.u_max_V, allowance, stated.guard, compensator.machine):
+        if law.budget != budget:
             raise InputError(
                 f"the {name} side's budget is not the one that follows from its valve and its machine; design it again"
             )
@@ -109,10 +114,12 @@ def _words(value: object) -> str:
     return f"{float(value):.6g}" if isinstance(value, Fraction) else str(value)
 
 
-def guarded_curve(side: SideModel, guard: str, below_dp0: str, above: AboveChoice | None = None) -> OffsetCurve:
+def guarded_curve(
+    side: SideModel, guard: str, below_dp0: str, above: Above = "hold", machine: Machine | None = None
+) -> OffsetCurve:
     """Return the certified offset of the threshold that is to be guarded, or say what to do if there is none.
 
-    Without a choice `above` the tests the last offset is held there.
+    What it does above the tests is chosen, and there an error of the machine's bench counts more.
     """
     if not side.curve.dp_MPa:
         raise InputError(
@@ -125,7 +132,7 @@ def guarded_curve(side: SideModel, guard: str, below_dp0: str, above: AboveChoic
         offset_V=tuple(Fraction(repr(value)) for value in curve.offset_V),
         certified=curve.bound(side.trend or "flat"),
         hold_below_MPa=hold_below(side, below_dp0),
-        above=above.of(curve) if above else None,
+        above=offset_above(curve, above, machine),
     )
 
 
@@ -156,25 +163,25 @@ def _remedy(side: SideModel, guard: str) -> str:
     )
 
 
-def _smallest_margin(margins: TableMargins, certified: range, *, lets_go: bool) -> Fraction:
+def _smallest_margin(margins: TableMargins, tested: range, *, lets_go: bool) -> Fraction:
     """Return the least distance over u_max between ceiling and offset on the certified codes.
 
     On no code it is negative: those outside the tests may be read at a tested pressure drop. But for an offset that is
     let go above them, which is the least that the table has.
     """
     codes = np.arange(len(margins.limit))
-    let_go = (codes >= certified.stop) & (margins.numerators <= STEP_CODES) & lets_go
+    let_go = (codes >= tested.stop) & (margins.numerators <= STEP_CODES) & lets_go
     held = codes[~let_go]
     if held.size and (least := margins.least(held)) < 0:
         raise RequirementError(f"the offset exceeds the certified one by {float(-least):.2e} of u_max")
-    if certified:
-        return margins.least(codes[certified.start : certified.stop])
+    if tested:
+        return margins.least(codes[tested.start : tested.stop])
     least = margins.least(codes)
     return max(least, Fraction(0)) if let_go.any() else least
 
 
 def _above(
-    curve: OffsetCurve, certified: range, signals: Signals, margins: TableMargins
+    curve: OffsetCurve, tested: range, signals: Signals, margins: TableMargins
 ) -> tuple[Fraction, Fraction | None]:
     """Return up to which pressure drop the certificate holds, and from which the offset is released, MPa.
 
@@ -182,12 +189,12 @@ def _above(
     threshold. An offset that is released is one unit of beta.
     """
     tests_end, count = curve.dp_MPa[-1], len(margins.limit)
-    if curve.above is None or certified.stop >= count:
+    if curve.above is None or tested.stop >= count:
         return tests_end, None
-    last = _holds_to(certified.stop, signals, margins) if curve.above.certified else None
+    last = _holds_to(tested.stop, signals, margins) if curve.above.certified else None
     holds_to = tests_end if last is None else max(signals.dp_MPa(last), tests_end)
-    driven = np.flatnonzero(margins.numerators[certified.stop :] > STEP_CODES)
-    released_from = certified.stop + (int(driven[-1]) + 1 if driven.size else 0)
+    driven = np.flatnonzero(margins.numerators[tested.stop :] > STEP_CODES)
+    released_from = tested.stop + (int(driven[-1]) + 1 if driven.size else 0)
     return holds_to, max(signals.dp_MPa(released_from), tests_end) if released_from < count else None
 
 
@@ -202,12 +209,93 @@ def _holds_to(first: int, signals: Signals, margins: TableMargins) -> int | None
 
 
 def _losses_V(
-    curve: OffsetCurve, certified: range, signals: Signals, margins: TableMargins, u_max_V: Fraction
+    curve: OffsetCurve, tested: range, signals: Signals, margins: TableMargins, u_max_V: Fraction
 ) -> list[float]:
     """Return by how much the table's offset lies under the certified curve at each certified code, V."""
-    codes, unit_V = certified or range(1), margins.unit * u_max_V
+    codes, unit_V = tested or range(1), margins.unit * u_max_V
     offset = offset_row(curve, signals, codes.start, codes.stop - 1)
     table = margins.numerators[codes.start : codes.stop].tolist()
     up, unit = unit_V.numerator, unit_V.denominator
     triples = zip(offset.numerators, offset.denominators, table, strict=True)
     return [(value * unit - beta * up * by) / (by * unit) for value, by, beta in triples]
+
+
+def reach_of_certificate(compensator: Compensator) -> str:
+    """Return a sentence on what the certificate counts of a machine, or that it counts nothing of one."""
+    if compensator.machine is None:
+        return (
+            "The certificate covers the valve as recorded: no machine was declared, so coil temperature, "
+            "supply voltage, pressure sensors, oil and ageing are not counted."
+        )
+    parts = []
+    for sign in compensator.signals.signs:
+        budget, name = compensator.side(sign).budget, SIDE_NAMES[sign]
+        side = "" if compensator.negative is None else f"{name} commands: "
+        if budget is not None:
+            parts.append(side + taken_off(budget, compensator.valve.recorded_units.of_side(name)))
+    return f"The certificate covers the valve as recorded and the declared machine: {'; '.join(parts)}."
+
+
+def taken_off(budget: Budget, units: RecordedUnits) -> str:
+    """Return by how much the offset's ceiling lies under the recorded threshold at most, and for what mostly."""
+    place = max(range(len(budget.dp_MPa)), key=lambda at: budget.combined_mV[at])
+    largest = budget.largest
+    return (
+        f"its budget takes {units.text(budget.combined_mV[place], '.0f mV')} from the recorded threshold at "
+        f"{units.text(budget.dp_MPa[place], '.2f MPa')}; its largest component is {largest.component} "
+        f"({largest.origin}), {units.text(largest.contribution_mV[place], '.0f mV')}"
+    )
+
+
+def not_counted(compensator: Compensator | None) -> tuple[str, ...]:
+    """Return lines on what of a machine the certificate leaves out."""
+    if compensator is None or compensator.machine is None:
+        return (
+            "The machine: another coil temperature or supply than on the bench, errors of its pressure sensors and of "
+            "their converters beyond rounding, the oil and ageing. `dzdesign design` counts them where they are "
+            "declared.",
+            "Failures that the signals hide, and the spread between valves of a type.",
+        )
+    return (
+        "A machine outside what was declared: the budget counts that, and nothing beyond it.",
+        "Defaults of the budget that nobody measured on this machine; each is named in its table.",
+        "Failures that the signals hide, and the spread between valves of a type.",
+    )
+
+
+def above_in_words(choice: Above, certificate: Certificate, side: SideModel, units: RecordedUnits) -> str:
+    """Return what the law does above the tests, up to where that is certified, and on what premise."""
+    curve, last = side.certified[certificate.guard], units.text(float(certificate.dp_MPa[1]), ".2f MPa")
+    if choice == "hold" or (choice == "lower" and curve.above is None):
+        why = "" if choice == "hold" else " (a single test gives no slope for lowering it)"
+        return (
+            f"above {last} the offset of the highest test is held{why} and nothing is certified: where the threshold "
+            "falls, flow at zero command is possible"
+        )
+    released = certificate.released_from_MPa
+    text = f"above {last} the offset falls with the continued bound"
+    if choice == "release":
+        text = f"above {last} the offset is released"
+    if released is not None:
+        at = units.text(float(released), ".3g MPa")
+        text += f" and is zero from {at} on. There the full dead zone is back"
+    holds_to = certificate.holds_to_MPa
+    if curve.above is None:
+        return f"{text}. Not certified: a single test gives no slope"
+    rests = curve.above.in_words(curve.premise, side.trend or "flat", units)
+    if released is not None and holds_to >= released > certificate.dp_MPa[1]:  # no offset is left beyond
+        return f"{text}. Up to there this offset is {rests}"
+    if holds_to > certificate.dp_MPa[1]:
+        return f"{text}. Up to {units.text(float(holds_to), '.3g MPa')} this offset is {rests}"
+    return f"{text}. {rests[0].upper()}{rests[1:]}"
+
+
+def below_in_words(certificate: Certificate, side: SideModel, units: RecordedUnits) -> str:
+    """Return what the law does below the lowest test, and what is known of the threshold there."""
+    first = units.text(float(certificate.dp_MPa[0]), ".2f MPa")
+    text = f"below {first} the offset of the lowest test is held and nothing is certified"
+    if side.trend == "increasing":
+        return f"{text}: the threshold grows with the pressure drop, so flow at zero command is possible there"
+    if side.trend == "decreasing":
+        return f"{text}. A threshold that keeps rising towards zero pressure drop stays above this offset"
+    return text

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
-from math import lcm
 from threading import local
 from typing import Annotated, ClassVar, Literal
 
@@ -15,17 +14,22 @@ from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
-from dzdesign.derivation.scaling import drive, evaluate_law_command, evaluate_line, evaluate_share, evaluate_transition
+from dzdesign.derivation.scaling import (
+    Line,
+    drive,
+    evaluate_law_command,
+    evaluate_line,
+    evaluate_share,
+    evaluate_transition,
+)
 from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions
 from dzdesign.design.lot_valves import LotValve
-from dzdesign.design.machine.allowance import Allowance, allowance_of, dither_reserve
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Allowance, Machine, allowance_of, dither_reserve
 from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
-from dzdesign.design.target_inputs import TargetInputs
-from dzdesign.design.zero_band import CommandError
+from dzdesign.design.target_inputs import CommandError, TargetInputs
 from dzdesign.identify.valve.model import ValveModel
 
 #: The last valve and its hash: a design makes several compensators of one valve, each of which states the hash.
@@ -40,25 +44,9 @@ def sha256_of_valve(valve: ValveModel) -> str:
     return digest
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LineInBeta:
-    """Counts at a command: ``(start + code * slope) / unit``, each a number at beta 0 and what a beta of 1 adds."""
-
-    start: tuple[int, int]
-    slope: tuple[int, int]
-    unit: int
-
-    def counts(self, code: int | Fraction, beta: Fraction) -> Fraction:
-        """Return the counts of the law at codes of command, from zero, and a beta."""
-        codes, parts = code.numerator, code.denominator
-        none, more = (start * parts + codes * slope for start, slope in zip(self.start, self.slope, strict=True))
-        up = none * beta.denominator + more * beta.numerator
-        return Fraction(up, self.unit * parts * beta.denominator)
-
-
 @lru_cache(maxsize=64)
-def line_in_beta(name: str, kappa: Fraction, u_min0_over_u_max: Fraction, n_adc: int, n_full: int) -> LineInBeta:
-    """Return the law of a name as such a line, from the law itself at three betas.
+def line_in_beta(name: str, kappa: Fraction, u_min0_over_u_max: Fraction, n_adc: int, n_full: int) -> tuple[Line, Line]:
+    """Return the law of a name in counts at beta 0, and what a beta of 1 adds; from the law itself at three betas.
 
     The arguments are those of `evaluate_line`; a law that is not straight in beta is a `RequirementError`.
     """
@@ -70,10 +58,7 @@ def line_in_beta(name: str, kappa: Fraction, u_min0_over_u_max: Fraction, n_adc:
     ]
     if any(2 * one != none + two for none, one, two in zip(*at, strict=True)):
         raise RequirementError(f"the law '{name}' is not straight in beta")
-    parts = [part for line in at[:2] for part in (line.start, line.slope)]
-    unit = lcm(*(part.denominator for part in parts))
-    start, slope, start_one, slope_one = (part.numerator * (unit // part.denominator) for part in parts)
-    return LineInBeta(start=(start, start_one - start), slope=(slope, slope_one - slope), unit=unit)
+    return at[0], Line(slope=at[1].slope - at[0].slope, start=at[1].start - at[0].start)
 
 
 Codes = Annotated[int, Meta(ge=0, le=65535)]
@@ -157,30 +142,24 @@ class Compensator(ShownInNotebooks, Artefact):
         object.__setattr__(self, "lot_sha256", sha256_of(lot_json) if self.lot else None)
 
     def _check_codes(self) -> None:
-        """Check that the whole numbers suit the firmware's arithmetic."""
+        """Check that the whole numbers suit the firmware's arithmetic, and go with each other."""
         powers = ["beta_denominator", "beta_step_codes"] + ["transition_codes"] * bool(self.transition_codes)
         for name in powers:
             value = getattr(self, name)
             if value < 1 or value & (value - 1):
                 raise RuleError(f"{name} is {value}, expected a power of two, so that the firmware needs no division")
-        if not 0 <= self.reverse_codes <= self.signals.code_max // 20:
-            raise RuleError(f"reverse_codes is {self.reverse_codes}, expected noise about zero: up to 5 % of the span")
         if (self.negative is None) != (len(self.signals.signs) == 1):
             raise RuleError("a command of both signs needs a law for both sides, one of one sign for one")
         limit, command = self.drive_functions.compare_limit, self.signals.command
         if limit > self.signals.compare_max:
             raise RuleError(f"the compare limit is {limit}, above full drive, {self.signals.compare_max}")
         longest = max(abs(code - command.zero_code) for code in command.valid_codes)
-        if (drive := self.current_drive) is not None:
-            if self.negative is not None:
-                raise RuleError("current control is for one solenoid, expected a command of one sign")
-            if (drive.loop.full_counts, drive.sampling.tick_Hz) != (self.signals.compare_max, self.signals.tick_Hz):
-                raise RuleError("the current loop's full drive or PWM rate is not that of the signals")
         if self.drive_functions.has_ramp and longest > RAMPED_CODES:
             raise RuleError(f"a ramp counts up to {RAMPED_CODES} codes of command from zero on; use a shorter signal")
 
     def _check_side(self, sign: int) -> None:
-        side = self.side(sign)
+        """Check that the tables of a side cover every code that the firmware may look up."""
+        side, functions, span = self.side(sign), self.drive_functions, self.signals.command.span(sign)
         if len(side.beta) != self.nodes(sign):
             raise RuleError(f"beta has {len(side.beta)} nodes, expected {self.nodes(sign)} for every code")
         if not all(0 < numerator < 2 * self.beta_denominator for numerator in side.law_beta + side.beta):
@@ -189,24 +168,9 @@ class Compensator(ShownInNotebooks, Artefact):
             raise RuleError("a transition needs the opening threshold's beta, and its codes of command")
         if bool(self.transition_codes) != bool(self.zero_band_codes):
             raise RuleError("a zero band and a transition belong together, expected both or neither")
-        if self.transition_codes and self.drive_functions.leave_zero_codes <= self.zero_band_codes:
-            raise RuleError("the drive must leave its rest beyond the zero band, so that noise at its end is not seen")
-        if self.drive_functions.has_play:
-            self._check_play(sign)
-        if (taken := self.transition_end) > self.signals.command.span(sign) // 10:
-            raise RuleError(
-                f"zero band and transition take {taken} codes, expected at most a tenth of the command, "
-                f"{self.signals.command.span(sign)} codes"
-            )
-
-    def _check_play(self, sign: int) -> None:
-        functions = self.drive_functions
-        nodes = functions.play_counts[0 if sign > 0 else 1]
-        needed = self.signals.command.span(sign) // functions.play_step_codes + 2
-        if not self.transition_codes or len(nodes) != needed:
-            raise RuleError(f"a play has {len(nodes)} nodes, expected {needed} for every command, and a transition")
-        if max(nodes) * functions.play_codes * self.transition_codes >= 2**31:
-            raise RuleError("the play's width over its codes and the transition's needs more than 31 bits")
+        needed = span // functions.play_step_codes + 2
+        if functions.has_play and len(nodes := functions.play_counts[0 if sign > 0 else 1]) != needed:
+            raise RuleError(f"a play has {len(nodes)} nodes, expected {needed} for every command")
 
     @property
     def positive(self) -> SideLaw:
@@ -277,9 +241,13 @@ class Compensator(ShownInNotebooks, Artefact):
         side, signals, beta = self.side(sign), self.signals, self.law_beta(dp_code, sign)
         from_zero = signals.command.from_zero(command_code, sign)
         span, u_min0 = signals.command.span(sign), side.u_min0_over_u_max
-        line = line_in_beta(self.law, side.drive_range_over_u_max, u_min0, span, signals.compare_max)
+        none, more = line_in_beta(self.law, side.drive_range_over_u_max, u_min0, span, signals.compare_max)
+
+        def line(code: int | Fraction) -> Fraction:
+            return Fraction(none.start + code * none.slope + beta * (more.start + code * more.slope))
+
         if from_zero >= self.transition_end:
-            return line.counts(from_zero, beta)
+            return line(from_zero)
         ends = {"zero_band": self.zero_band_codes, "end": self.transition_end}
         lowered = evaluate_transition(
             beta_opening=beta,
@@ -288,7 +256,7 @@ class Compensator(ShownInNotebooks, Artefact):
             share_of_transition=evaluate_share(from_zero, **ends),
             n_full=signals.compare_max,
         )
-        return Fraction(line.counts(evaluate_law_command(from_zero, **ends), beta) - lowered)
+        return Fraction(line(evaluate_law_command(from_zero, **ends)) - lowered)
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return the exact u_O/u_max of the law at a code pair, before limiting to 0...1."""

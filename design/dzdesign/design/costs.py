@@ -5,12 +5,11 @@ from fractions import Fraction
 
 import numpy as np
 
+from dzdesign.design.certificate import above_in_words, below_in_words
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import corners_of, costs_at_tests, last_opening
 from dzdesign.design.drive_functions import RAMP_UNIT
-from dzdesign.design.machine.allowance import premise_of_bench_current
-from dzdesign.design.machine.machine import COPPER_PER_K, REFERENCE_C
-from dzdesign.design.offset.above_tests import above_in_words, below_in_words
+from dzdesign.design.machine import COPPER_PER_K, REFERENCE_C, Machine, premise_of_bench_current
 from dzdesign.design.pressure_inputs import ACCEPTED, hidden_failure, unseen_failures
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.reading_flow import default_reading_flow
@@ -55,74 +54,59 @@ def colder_coil(compensator: Compensator, sign: int) -> ColderCoil:
     return max(found, key=lambda each: each.flow_L_min)
 
 
-def colder_coil_in_words(compensator: Compensator, sign: int) -> str:
-    """Return it as a line for a person."""
-    found, units = colder_coil(compensator, sign), compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
-    lowered = units.text(1e3 * found.lowered_V, ".0f mV")
-    flow = units.text(found.flow_L_min, ".2f L/min") if found.seen else "less than the recordings show"
-    return (
-        "the certificate covers only the valve as recorded: no machine is declared. Without current control, a coil at "
-        f"{REFERENCE_C - COLDER_K} degC instead of {REFERENCE_C} degC lowers the threshold by {lowered}. At zero "
-        f"command the valve then passes {flow} at {units.text(found.dp_MPa, '.2f MPa')}. Declare one of: "
-        "--coil-temperature with --supply; --amplifier; --drive current"
-    )
-
-
 def machine_costs(compensator: Compensator, sign: int) -> list[str]:
     """Return the lines of one side; the premises of the machine stand with positive commands."""
     machine, budget = compensator.machine, compensator.side(sign).budget
-    if machine is None or budget is None:
-        return [colder_coil_in_words(compensator, sign)]
     units = compensator.valve.recorded_units.of_side(SIDE_NAMES[sign])
-    taken = [
-        threshold - ceiling for threshold, ceiling in zip(budget.threshold_V, budget.ceiling_V, strict=True)
-    ]
+    if machine is None or budget is None:
+        found = colder_coil(compensator, sign)
+        flow = units.text(found.flow_L_min, ".2f L/min") if found.seen else "less than the recordings show"
+        return [
+            "the certificate covers only the valve as recorded: no machine is declared. Without current control, a "
+            f"coil at {REFERENCE_C - COLDER_K} degC instead of {REFERENCE_C} degC lowers the threshold by "
+            f"{units.text(1e3 * found.lowered_V, '.0f mV')}. At zero command the valve then passes {flow} at "
+            f"{units.text(found.dp_MPa, '.2f MPa')}. Declare one of: --coil-temperature with --supply; --amplifier; "
+            "--drive current"
+        ]
+    taken_mV = max(budget.combined_mV)
     lines = [
-        f"the budget takes {units.text(1e3 * max(taken), '.0f mV')} from the threshold at most "
-        f"({max(taken) / float(compensator.u_max_V):.2%} of command); the largest part: {budget.largest.component}, "
-        f"{budget.largest.price:.2%}"
+        f"the budget takes {units.text(taken_mV, '.0f mV')} from the threshold at most "
+        f"({taken_mV / 1e3 / float(compensator.u_max_V):.2%} of command); the largest part: "
+        f"{budget.largest.component}, {budget.largest.price:.2%}"
     ]
-    lines += _other_end(compensator, sign)
-    lines += _jump(compensator, sign)
-    drive = compensator.current_drive
-    if drive is not None and sign > 0:
-        premise = premise_of_bench_current(compensator.valve, drive.circuit.rated_A, machine.bench_full_A)
+    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
+    # The machine that opens last, which the transition does not reach.
+    last = [share for test in tests if (share := last_opening(compensator, test, sign)) is not None]
+    if last:
+        longest = "the valve does not open at any command; control the current, or declare narrower ranges"
+        if max(last) <= 1:
+            longest = f"the dead zone on opening is there up to {max(last):.2%} of command"
+        lines.append(
+            f"at the other end of the machine the threshold is {float(machine.largest_factor):.3f} times the bench's: "
+            f"{longest}"
+        )
+    if compensator.transition_codes:
+        lines.append(_jump(compensator, machine, sign))
+    if compensator.current_drive is not None and sign > 0:
+        rated_A = compensator.current_drive.circuit.rated_A
+        premise = premise_of_bench_current(compensator.valve, rated_A, machine.bench_full_A)
         lines += [premise] if premise else []
     return lines
 
 
-def _other_end(compensator: Compensator, sign: int) -> list[str]:
-    """Say how long the dead zone is on the machine that opens last, which the transition does not reach."""
-    if compensator.machine is None:
-        return []
-    factor = float(compensator.machine.largest_factor)
-    tests = compensator.valve.sides[SIDE_NAMES[sign]].tests
-    found = [share for test in tests if (share := last_opening(compensator, test, sign)) is not None]
-    if not found:
-        return []
-    words = f"at the other end of the machine the threshold is {factor:.3f} times the bench's: "
-    if max(found) > 1:
-        words += "the valve does not open at any command; control the current, or declare narrower ranges"
-    else:
-        words += f"the dead zone on opening is there up to {max(found):.2%} of command"
-    return [words]
-
-
-def _jump(compensator: Compensator, sign: int) -> list[str]:
-    """Say what the transition's end passes on the machine that opens earliest; nothing without a transition."""
-    if compensator.machine is None or not compensator.transition_codes:
-        return []
-    factor, found = float(compensator.machine.least_factor), []
+def _jump(compensator: Compensator, machine: Machine, sign: int) -> str:
+    """Say what the transition's end passes on the machine that opens earliest."""
+    factor, found = float(machine.least_factor), []
     for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
         dp_code = round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa))))
         at_end_V = corners_of(compensator, dp_code, sign).at_end * float(compensator.u_max_V)
         found.append(float(test.recorded.opening.flow_at(np.array([at_end_V / factor]))[0]))
     share = compensator.transition_end / compensator.signals.command.span(sign)
     flow = compensator.valve.recorded_units.text(max(found), ".2f L/min")
-    return [
+    return (
         f"the transition ends at the bench's opening threshold: on the machine that opens earliest ({factor:.3f} times "
         f"the bench's threshold) a command of {share:.2%} passes up to {flow}; --transition off does without that jump"
-    ]
+    )
 
 
 def costs_of(compensator: Compensator) -> tuple[str, ...]:
@@ -149,7 +133,11 @@ def costs_of(compensator: Compensator) -> tuple[str, ...]:
             f"from the first flow seen down to the onset: below {units.text(least, '.3g L/min')} not all of the "
             "recordings show a flow"
         )
-    lines += _unseen_stop(compensator)
+    if any(warning.code == "flow-clipped" for warning in valve.warnings):
+        lines.append(
+            "flow-clipped: the meter's range ended below the largest flow of a test. If no other test shows a stop of "
+            "the valve, the drive range and the largest output are those of a flow that goes on straight"
+        )
     return (*lines, *_left_out(compensator), *_released(compensator), *_cost_of_options(compensator))
 
 
@@ -160,15 +148,6 @@ def design_warnings(compensator: Compensator) -> tuple[str, ...]:
     without a look at these is told them again.
     """
     return (*hidden_failures(compensator), *_left_out(compensator), *_released(compensator))
-
-
-def _unseen_stop(compensator: Compensator) -> list[str]:
-    if not any(warning.code == "flow-clipped" for warning in compensator.valve.warnings):
-        return []
-    return [
-        "flow-clipped: the meter's range ended below the largest flow of a test. If no other test shows a stop of the "
-        "valve, the drive range and the largest output are those of a flow that goes on straight"
-    ]
 
 
 def _released(compensator: Compensator) -> tuple[str, ...]:

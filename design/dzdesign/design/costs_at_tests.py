@@ -113,13 +113,10 @@ def costs_at_tests(compensator: Compensator, sign: int) -> tuple[CostAtTest, ...
 def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> CostAtTest:
     side, u_max = SIDE_NAMES[sign], float(compensator.u_max_V)
     corners = corners_of(compensator, _code_of(compensator, test), sign)
+    corners_of_falling = falling_corners(compensator, _code_of(compensator, test), sign)
     offset_V, left = corners.offset * u_max, remaining_dead_zone(compensator, test, sign)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     above = {name: offset_V - knee for name, knee in knees.items() if knee is not None and knee < offset_V}
-    at_end = None
-    if corners.end and test.u_knee_falling_V is not None:
-        at_end_V = falling_corners(compensator, _code_of(compensator, test), sign).at_end * u_max
-        at_end = test.slope_L_min_V * max(at_end_V - test.u_knee_falling_V, 0.0)
     limit = compensator.drive_functions.compare_limit / compensator.signals.compare_max
     opens = max(corners.offset, (test.u_knee_rising_V or 0.0) / u_max)
     if limit <= opens:
@@ -136,7 +133,7 @@ def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> Cost
         onset={name: share for name, share in left.items() if name not in above},
         above_knee_V=above,
         allowed_L_min={} if allowed is None else {compensator.side(sign).certificate.guard: allowed},
-        at_end_L_min=at_end,
+        at_end_L_min=flow_at_end(compensator, test, corners_of_falling.at_end),
         reading_flow_L_min=compensator.reading_flow_L_min,
         read=read_dead_zone(compensator, test, sign),
         ideal=ideal_line(compensator.reading_flow_L_min, test.recorded.q_max_L_min),
@@ -144,6 +141,16 @@ def _cost_at_test(compensator: Compensator, test: TestResult, sign: int) -> Cost
         full=min(limit, corners.full),
         limited_from=corners.command_at(limit) if limit < corners.full else None,
     )
+
+
+def flow_at_end(compensator: Compensator, test: TestResult, drive: float) -> float | None:
+    """Return the flow on closing that a drive makes at the transition's end, by the straight part of a test, L/min.
+
+    None without a transition, or without a falling branch.
+    """
+    if not compensator.transition_end or test.u_knee_falling_V is None:
+        return None
+    return test.slope_L_min_V * max(drive * float(compensator.u_max_V) - test.u_knee_falling_V, 0.0)
 
 
 def remaining_dead_zone(compensator: Compensator, test: TestResult, sign: int = 1) -> dict[str, float]:

@@ -1,17 +1,20 @@
-"""What `design` was asked for, in the engineer's words: kept in compensator.json, so that it can be designed again.
+"""Every option of `design`, declared once; compensator.json keeps what was asked for, so that it can be designed again.
 
-Light on imports: the command line reads the options here.
+Light on imports: the command line reads the options here. What an option's text means without the target it is for is
+read here too; the rest, such as a signal's codes, in `dzdesign.design.options` and `dzdesign.design.declared`.
 """
 
-from collections.abc import Mapping
+import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, get_args
+from fractions import Fraction
+from typing import Annotated, Any, Literal, get_args
 
+from dzdesign.core.errors import InputError, quoted
+from dzdesign.core.option_readers import quantity, quantity_range, with_tolerance
 from dzdesign.core.options import CONNECTIONS, DRIVE, LAW, MACHINE, Option, Text, arguments_of
+from dzdesign.core.units import parse_quantity
 from dzdesign.derivation.laws import LAW_NAMES
-
-if TYPE_CHECKING:
-    from dzdesign.design.target_inputs import TargetInputs
+from dzdesign.identify.constants import L_MIN
 
 #: What to do below the reference pressure drop: beta = 1 as in Eq. (7), or what the tests there say.
 BelowDp0 = Literal["hold", "extend"]
@@ -25,6 +28,122 @@ NEGATIVE_DP: tuple[NegativeDp, ...] = get_args(NegativeDp)
 HYSTERESIS = ("keep", "play")
 ON_OFF = ("on", "off")
 DRIVES = ("duty", "current")
+#: Largest transition, of full command.
+LARGEST_TRANSITION = Fraction(1, 10)
+#: Beyond any flow that a valve of a control passes.
+MOST_L_MIN = 1e6
+#: Decimals of a number that is read from a text.
+DIGITS = 9
+NUMBER = r"\d+(?:\.\d+)?(?:[eE]-?\d+)?"
+RANGE = rf"(?:\s*x\s*(?P<{{0}}low>{NUMBER})\s*\.\.\s*(?P<{{0}}high>{NUMBER}))?"
+COIL = re.compile(
+    rf"(?P<ohm>{NUMBER})(?:\s*\+\s*(?P<series>{NUMBER}))?\s*(?P<ohms>[a-zΩ]+){RANGE.format('r')}"
+    rf"\s*,?\s*(?P<henry>{NUMBER})\s*(?P<henries>[uµm]?H){RANGE.format('l')}"
+)
+DEGREES = r"[-+]?\d{1,6}(?:\.\d{0,9})?"
+TEMPERATURES = re.compile(
+    rf"\s*(?P<low>{DEGREES})\s*(?:(?:\.\.|to)\s*(?P<high>{DEGREES})\s*)?(?P<unit>(?:deg|°)?\s?[CF])\s*", re.ASCII
+)
+CODES = re.compile(r"\s*(\d{1,4})\s*\+\s*(\d{1,4})\s*\+\s*(\d{1,4})\s*codes?\s*", re.ASCII)
+
+
+def read_share(text: str, option: str) -> Fraction:
+    """Return a share, exact to a billionth."""
+    return Fraction(round(parse_quantity(text, "ratio", option) * 10**DIGITS), 10**DIGITS)
+
+
+def _transition(text: str, option: str) -> Fraction | None:
+    """Read ``auto`` (None), ``off`` (0) or a share."""
+    if text in ("auto", "off"):
+        return Fraction(0) if text == "off" else None
+    share = read_share(text, option)
+    if not 0 <= share <= LARGEST_TRANSITION:
+        raise InputError(f"the transition is {float(share):.3%}, expected 0 to {float(LARGEST_TRANSITION):.0%}")
+    return share
+
+
+def _output_max(text: str, option: str) -> Fraction:
+    share = read_share(text, option)
+    if not 0 < share <= 1:
+        raise InputError(f"the largest output is {float(share):.3%}, expected more than 0, up to 100 %")
+    return share
+
+
+def _reading_flow(text: str, option: str) -> float:
+    flow = round(parse_quantity(text, "flow", option) / L_MIN, 7)
+    if not 0 < flow <= MOST_L_MIN:
+        expected = "more than zero" if flow <= 0 else f"at most {MOST_L_MIN:g} L/min"
+        raise InputError(f"the reading flow is {flow:g} L/min, expected {expected}, such as '0.6 L/min'")
+    return flow
+
+
+def _times(text: str, option: str) -> tuple[float, float]:
+    """Read one time, or two with a slash between: of positive and of negative commands."""
+    parts = [parse_quantity(part.strip(), "time", option) for part in text.split("/")]
+    if len(parts) > 2:
+        raise InputError(f"{option} is '{text}', expected a time, or two such as '0.5 s / 0.8 s'")
+    return parts[0], parts[-1]
+
+
+def read_error(text: str, option: str) -> float:
+    """Return a relative error."""
+    value = parse_quantity(text, "ratio", option)
+    if not 0 <= value <= 0.5:
+        raise InputError(f"{option} is {quoted(text)}, expected 0 to 50 %")
+    return round(value, DIGITS)
+
+
+def _temperatures(text: str, option: str) -> tuple[float, float]:
+    """Read one temperature, or two, in degrees Celsius or Fahrenheit."""
+    found = TEMPERATURES.fullmatch(text)
+    if found is None:
+        raise InputError(f"{option} is {quoted(text)}, expected a temperature or two, such as '-20..80 degC'")
+    ends = [Fraction(found["low"]), Fraction(found["high"] or found["low"])]
+    if found["unit"].endswith("F"):
+        ends = [(end - 32) * 5 / 9 for end in ends]
+    if ends[0] > ends[1]:
+        raise InputError(f"{option} is {quoted(text)}, expected the lower end first")
+    low, high = (round(float(end), DIGITS) for end in ends)
+    return low, high
+
+
+def _temperature(text: str, option: str) -> float:
+    low, high = _temperatures(text, option)
+    if low != high:
+        raise InputError(f"{option} is {quoted(text)}, expected one temperature")
+    return low
+
+
+def _converter_errors(text: str, option: str) -> tuple[int, ...]:
+    """Read offset, gain error and peak noise of a converter, codes."""
+    found = CODES.fullmatch(text)
+    if found is None:
+        raise InputError(
+            f"{option} is {quoted(text)}, expected offset, gain error and noise, such as '15 + 30 + 4 codes'"
+        )
+    return tuple(map(int, found.groups()))
+
+
+def _coil(text: str, option: str) -> dict[str, Any]:
+    """Read a coil as arguments of `CoilCircuit`."""
+    coil = COIL.fullmatch(text.strip())
+    if coil is None:
+        raise InputError(
+            f"{option} is '{text}', expected resistance and inductance, such as '3.5 ohm 40 mH' or "
+            "'3.5 + 0.5 ohm x 0.75..1.35, 40 mH x 0.5..1.5'"
+        )
+    ohms = "ohm" if coil["ohms"] in ("ohm", "ohms", "Ω") else coil["ohms"]
+    unit = parse_quantity(f"1 {ohms}", "resistance", option)
+    factors = {
+        f"{name}_factors": (float(coil[f"{letter}low"]), float(coil[f"{letter}high"]))
+        for name, letter in (("resistance", "r"), ("inductance", "l"))
+        if coil[f"{letter}low"]
+    }
+    return factors | {
+        "resistance_ohm": float(coil["ohm"]) * unit,
+        "inductance_H": parse_quantity(f"{coil['henry']} {coil['henries']}", "inductance", option),
+        **({"series_ohm": float(coil["series"]) * unit} if coil["series"] else {}),
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,10 +153,10 @@ class DesignChoices:
     drive: Annotated[Text, Option("D", DRIVE, "duty", choices=DRIVES)] = None
     """Output of the law. duty: the PWM's share of the supply voltage. current: the set point of a current loop in the
     firmware, for one solenoid, with the rated current as full drive."""
-    coil: Annotated[Text, Option("C", DRIVE, example="3.5 ohm 40 mH")] = None
+    coil: Annotated[Text, Option("C", DRIVE, example="3.5 ohm 40 mH", read=_coil)] = None
     """Coil for --drive current, such as "3.5 ohm 40 mH". The form "3.5 + 0.5 ohm x 0.75..1.35, 40 mH x 0.5..1.5" adds
     the resistance of switch and shunt and the ranges, here with their defaults."""
-    rated_current: Annotated[Text, Option("I", DRIVE, example="1 A")] = None
+    rated_current: Annotated[Text, Option("I", DRIVE, example="1 A", read=quantity("current"))] = None
     """Current at full drive, for --drive current."""
     current_signal: Annotated[Text, Option("S", DRIVE, example="0..1.2 A on 2 ohm + 0.15 V")] = None
     """Signal of the current sensor at the converter, for --drive current, such as "0..1.2 A on 2 ohm + 0.15 V". The
@@ -45,23 +164,23 @@ class DesignChoices:
     supply_signal: Annotated[Text, Option("S", DRIVE, example="0..36 V x 0.075")] = None
     """Signal of the supply voltage at the converter, for --drive current, such as "0..36 V x 0.075" (default: not
     measured). Measuring it makes the current loop faster."""
-    coil_temperature: Annotated[Text, Option("T", MACHINE, example="-20..80 degC")] = None
+    coil_temperature: Annotated[Text, Option("T", MACHINE, example="-20..80 degC", read=_temperatures)] = None
     """Lowest and highest coil temperature of the machine, such as "-20..80 degC". Together with --supply it declares a
     machine whose coil is driven by the duty directly."""
-    bench_coil: Annotated[Text, Option("T", MACHINE, example="20 degC")] = None
+    bench_coil: Annotated[Text, Option("T", MACHINE, example="20 degC", read=_temperature)] = None
     """Coil temperature during the recording of the ramps (default: 20 degC)."""
-    supply: Annotated[Text, Option("V", MACHINE, example="18..32 V")] = None
+    supply: Annotated[Text, Option("V", MACHINE, example="18..32 V", read=quantity_range("voltage"))] = None
     """Lowest and highest supply voltage of the coil."""
-    bench_supply: Annotated[Text, Option("V", MACHINE, example="24 V")] = None
+    bench_supply: Annotated[Text, Option("V", MACHINE, example="24 V", read=quantity("voltage"))] = None
     """Supply voltage during the recording of the ramps (default: 12, 24 or 48 V, the one within --supply)."""
-    amplifier: Annotated[Text, Option("E", MACHINE, example="1 %")] = None
+    amplifier: Annotated[Text, Option("E", MACHINE, example="1 %", read=read_error)] = None
     """Accuracy of a current-controlling amplifier between PWM and coil, such as "1 %" (default: none, the duty drives
     the coil). It is the deviation from the bench over coil temperature and supply, relative to the value and not to
     full scale."""
-    current_error: Annotated[Text, Option("E", MACHINE, example="1 %")] = None
+    current_error: Annotated[Text, Option("E", MACHINE, example="1 %", read=read_error)] = None
     """Accuracy of the current under --drive current, relative to its value (default: 1 % and the gain error of the
     target's converter). It includes the shunt, its amplifier and the converter's gain."""
-    bench_current: Annotated[Text, Option("I", MACHINE, example="1 A +- 1 %")] = None
+    bench_current: Annotated[Text, Option("I", MACHINE, example="1 A +- 1 %", read=with_tolerance("current"))] = None
     """Coil current at full command on the bench, with its accuracy, for --drive current, such as "1 A +- 1 %" (default:
     the rated current, to 1 %)."""
     pressure_error: Annotated[Text, Option("E", MACHINE, example="0.1 %")] = None
@@ -69,18 +188,20 @@ class DesignChoices:
     pressure, such as "0.1 %" or "0.02 MPa", or "0.1 % / 0.5 %" for A and B."""
     bench_pressure_error: Annotated[Text, Option("E", MACHINE, example="0.02 MPa")] = None
     """Error of the recorded pressure drop, as a pressure or as a share of the span (default: two sensors of 0.1 %)."""
-    pressure_converter: Annotated[Text, Option("E", MACHINE, example="15 + 30 + 4 codes")] = None
+    pressure_converter: Annotated[
+        Text, Option("E", MACHINE, example="15 + 30 + 4 codes", read=_converter_errors)
+    ] = None
     """Offset, gain error at the top of the range and peak noise of the converter on each pressure channel, such as
     "15 + 30 + 4 codes" (default: the target's data sheet)."""
-    oil: Annotated[Text, Option("E", MACHINE, example="0.2 %")] = None
+    oil: Annotated[Text, Option("E", MACHINE, example="0.2 %", read=read_error)] = None
     """Change of the threshold with the oil temperature, relative to its value (default: 0.2 %)."""
-    ageing: Annotated[Text, Option("E", MACHINE, example="0.5 %")] = None
+    ageing: Annotated[Text, Option("E", MACHINE, example="0.5 %", read=read_error)] = None
     """Change of the threshold by ageing, relative to its value (default: 0.5 %)."""
     law: Annotated[Text, Option("LAW", LAW, "paper", choices=LAW_NAMES)] = None
     """Law of the compensator. `dzdesign derive` states each law."""
     guard: Annotated[Text, Option("G", LAW, "closing", choices="dzdesign.design.options:GUARDS")] = None
     """Threshold that the certificate protects: closing, mean or opening."""
-    transition: Annotated[Text, Option("C", LAW, "auto", example="1 %")] = None
+    transition: Annotated[Text, Option("C", LAW, "auto", example="1 %", read=_transition)] = None
     """Share of the command, behind the zero band, over which the drive runs from the closing threshold to the opening
     one. auto: 1 %, or 16 codes if that is more. off: no transition and no zero band, with the offset of the closing
     threshold throughout."""
@@ -92,10 +213,10 @@ class DesignChoices:
     above: Annotated[Text, Option("A", LAW, "lower", choices=ABOVE)] = None
     """Offset above the highest tested pressure drop. hold: it stays the same, without a certificate there. lower: it
     follows the bound that the curve's premise continues. release: it goes to zero, and the dead zone returns."""
-    reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min")] = None
+    reading_flow: Annotated[Text, Option("Q", LAW, example="0.6 L/min", read=_reading_flow)] = None
     """Flow at which dead zones are read, in addition to the onset (default: the meter's floor, or the noise level of a
     meter without one)."""
-    output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %")] = None
+    output_max: Annotated[Text, Option("C", LAW, "100 %", example="95 %", read=_output_max)] = None
     """Largest drive, in percent of full drive."""
     accept: Annotated[Text, Option("CODE", LAW, choices="dzdesign.design.options:ACCEPTABLE")] = None
     """Warnings to accept, separated by commas (default: none, the design is refused). branch-order: the valve seems to
@@ -106,7 +227,9 @@ class DesignChoices:
     ohm = -10..10 V"."""
     polarity: Annotated[Text, Option("P", CONNECTIONS, "normal", choices=POLARITIES)] = None
     """Polarity of the command. normal: more signal is more command. inverted: more signal is less command."""
-    pressure_span: Annotated[Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa")] = None
+    pressure_span: Annotated[
+        Text, Option("P", CONNECTIONS, "20 MPa", example="20 MPa", read=quantity("pressure"))
+    ] = None
     """Span of both pressure sensors."""
     pressure_a: Annotated[Text, Option("S", CONNECTIONS, example="4..20 mA on 140 ohm")] = None
     """Signal of the sensor upstream of the metering edge, such as "4..20 mA on 140 ohm = 25 MPa". The default is 4..20
@@ -117,9 +240,9 @@ class DesignChoices:
     """Pressure drop at negative commands, of the two pressure inputs. recorded: as the recordings show it, and same if
     they do not. same: A minus B, as at positive commands. swapped: B minus A. wired: the machine switches the inputs,
     so that A minus B is the metering drop at both signs."""
-    ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
+    ramp_up: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None
     """Time from zero to full command, such as "0.5 s", or "0.5 s / 0.8 s" for positive and negative commands."""
-    ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s")] = None
+    ramp_down: Annotated[Text, Option("T", DRIVE, "0 s", example="0.5 s", read=_times)] = None
     """Time from full command to zero."""
     hysteresis: Annotated[Text, Option("H", DRIVE, "keep", choices=HYSTERESIS)] = None
     """Treatment of the valve's hysteresis. keep: no change. play: a falling command is driven lower by the width of the
@@ -139,11 +262,3 @@ class DesignChoices:
 
 #: Text of each option where it is not given. Of signals none: they span the target's whole converter.
 DEFAULTS = {argument.name: argument.option.default for argument in arguments_of(DesignChoices)}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRequest:
-    """The target of the design, and name and text of every option; a default if none was given."""
-
-    target: "TargetInputs"
-    options: Mapping[str, str]

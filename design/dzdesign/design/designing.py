@@ -1,7 +1,18 @@
-"""`design`: a `ValveModel` and an engineer's choices in, a proved `Compensator` out."""
+"""`design`: a `ValveModel` and an engineer's choices in, a proved `Compensator` out.
 
+Where it is asked for, the drive has an inverse play operator. A valve with hysteresis is a play in its input: on the
+way back it waits until the drive has fallen by the play's width. So on a falling command the drive goes ahead by that
+width, and the spool follows at once. What is taken begins with the transition and is whole at its end: zero command has
+the certified offset, whatever the width. Over the command the width is the recorded one: towards full command, where
+every ramp turns, the branches of real valves come together.
+"""
+
+from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
 
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
 from dzdesign.core.errors import InputError
@@ -9,19 +20,14 @@ from dzdesign.core.worded import errors_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
+from dzdesign.design.beta_table import STEP_CODES
 from dzdesign.design.compensator import Compensator, sha256_of_valve
 from dzdesign.design.costs import costs_of
-from dzdesign.design.machine.allowance import allowance_of, check_bench_current, dither_reserve
-from dzdesign.design.offset.beta_table import STEP_CODES
+from dzdesign.design.costs_at_tests import corners_of
+from dzdesign.design.machine import allowance_of, check_bench_current, dither_reserve
 from dzdesign.design.options import DesignOptions
-from dzdesign.design.play import with_play
 from dzdesign.design.pressure_inputs import ACCEPTED, refuse_hidden_failures, with_negative_drop
-from dzdesign.design.side_design import (
-    finest_units,
-    fits,
-    refuse_two_signs,
-    side_law,
-)
+from dzdesign.design.side_design import finest_that_fit, finest_units, refuse_two_signs, side_law
 from dzdesign.design.side_law import Sides
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.model import ValveModel
@@ -29,6 +35,14 @@ from dzdesign.identify.valve.reading_flow import default_reading_flow
 
 #: Share of the sensor's span by which the difference may read negative before it counts as a failed sensor.
 REVERSE_SHARE = Fraction(1, 100)
+#: Codes of travel over which the drive goes over to the other branch, behind those that noise may make.
+PLAY_CODES = 8
+#: Most segments of the width over the command.
+SEGMENTS = 16
+#: Shares of the largest flow at which the recorded branches are compared.
+LEVELS = tuple(level / 100 for level in range(5, 100))
+#: Share of command over whose end the width is carried on to full command.
+LAST = 0.05
 
 
 def design(valve: ValveModel, options: DesignOptions | None = None) -> Compensator:
@@ -72,12 +86,11 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
         side = valve.positive if sign > 0 else valve.sides["negative"]
         allowance = allowance_of(signals, options.machine, sign=sign, dither_counts=reserve)
         laws[sign] = side_law(side, options, u_max, units, transition_codes, allowance)
-    request = options.request
     compensator = Compensator(
         tool=THIS_TOOL,
         made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=sha256_of_valve(valve)),),
-        target=request.target if request else None,
-        options=request.options if request else None,
+        target=options.target,
+        options=options.texts,
         law=options.law,
         below_dp0=options.below_dp0,
         above=options.above,
@@ -101,20 +114,9 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
         prove_monotone(compensator, sign)
     if ACCEPTED not in options.accept:
         refuse_hidden_failures(compensator)
-    compensator = _with_play(compensator, options)
+    if options.play:
+        compensator = with_play(compensator, options.dither_text)
     return replace(compensator, costs=costs_of(compensator))
-
-
-def _with_play(compensator: Compensator, options: DesignOptions) -> Compensator:
-    """Add the inverse play if it is asked for; not where a dither takes the same hysteresis out."""
-    if not options.play:
-        return compensator
-    if compensator.drive_functions.dither_counts and compensator.valve.dither is None:
-        raise InputError(
-            "--hysteresis play takes out the recorded hysteresis, and --dither most of the same once more; give one of "
-            f'them, or record ramps with that dither: identify --dithered "{options.dither_text}"'
-        )
-    return with_play(compensator)
 
 
 def _full_command(valve: ValveModel, options: DesignOptions) -> Fraction:
@@ -134,8 +136,9 @@ def _transition_codes(valve: ValveModel, options: DesignOptions) -> int:
     if options.transition is None and not options.play and any(side.opening_curve is None for side in sides):
         return 0
     codes = options.transition_codes()
-    while options.transition is None and codes > options.error.least_transition and not fits(options.signals, codes):
-        codes //= 2
+    if options.transition is None:
+        while codes > options.error.least_transition and not finest_that_fit(options.signals, codes):
+            codes //= 2
     return codes
 
 
@@ -159,3 +162,83 @@ def prove_monotone(compensator: Compensator, sign: int) -> None:
             f"u_max = {float(side.drive_range_over_u_max):.3f} at beta = {float(max(betas)):.3f}"
             + (f"; use --law {' or '.join(others)}" if others else "")
         )
+
+
+def with_play(compensator: Compensator, dither: str) -> Compensator:
+    """Return a compensator with a transition whose drive takes out the recorded hysteresis of its valve.
+
+    A dither, in words, that was not there as the ramps were recorded takes out the same hysteresis: it is refused.
+    """
+    signals = compensator.signals
+    if compensator.drive_functions.dither_counts and compensator.valve.dither is None:
+        raise InputError(
+            "--hysteresis play takes out the recorded hysteresis, and --dither most of the same once more; give one of "
+            f'them, or record ramps with that dither: identify --dithered "{dither}"'
+        )
+    longest = max(signals.command.span(sign) for sign in signals.signs)
+    step = 1 << (-(-(longest + 1) // SEGMENTS) - 1).bit_length()
+    nodes = [play_nodes(compensator, sign, step) if sign in signals.signs else () for sign in (1, -1)]
+    if not all(any(nodes[0 if sign > 0 else 1]) for sign in signals.signs):
+        raise InputError(
+            "the opening threshold does not lie above the certified offset at every pressure, so no hysteresis can be "
+            "taken out; leave out --hysteresis play"
+        )
+    functions = replace(
+        compensator.drive_functions,
+        play_counts=(nodes[0], nodes[1]),
+        play_step_codes=step,
+        play_codes=PLAY_CODES,
+        play_noise_codes=compensator.command_error.noise_codes,
+    )
+    return replace(compensator, drive_functions=functions)
+
+
+def play_nodes(compensator: Compensator, sign: int, step: int) -> tuple[int, ...]:
+    """Return the hysteresis, the median a side's tests, at commands `step` codes apart, counts.
+
+    It is never wider than what the transition spans: that would drive a falling command below the certified offset.
+    """
+    curves = [curve for curve in _recorded_widths(compensator, sign) if len(curve) > 1]
+    if not curves:
+        raise InputError(
+            "--hysteresis play needs the valve's hysteresis, of which no test has both branches; record the falling "
+            "branch too, or leave it out"
+        )
+    span = compensator.signals.command.span(sign)
+    at = np.arange(span // step + 2) * step / span
+    widths = np.median([_width_at(at, np.array(curve)) for curve in curves], axis=0)
+    counts = np.round(widths / float(compensator.u_max_V) * compensator.signals.compare_max)
+    return tuple(int(value) for value in np.clip(counts, 0, narrowest_transition(compensator, sign)))
+
+
+def _recorded_widths(compensator: Compensator, sign: int) -> Iterator[list[tuple[float, float]]]:
+    """Yield for each test the command of the law, a share, and how far the recorded branches lie apart there, V."""
+    for test in compensator.valve.sides[SIDE_NAMES[sign]].tests:
+        if test.u_knee_rising_V is None or test.u_knee_falling_V is None:
+            continue
+        opening, closing = test.recorded.opening, test.recorded.closing
+        corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+        found = []
+        for level in LEVELS:
+            up, down = (each.command_at(level * test.recorded.q_max_L_min) for each in (opening, closing))
+            if up is not None and down is not None:
+                found.append((corners.command_at(up / float(compensator.u_max_V)), up - down))
+        rising = [place for place, (left, right) in enumerate(pairwise(found)) if left[0] < right[0] < 1]
+        yield [found[place] for place in rising]
+
+
+def _width_at(share: np.ndarray, curve: np.ndarray) -> np.ndarray:
+    """Return the width at commands from its (share, V): held below them, and carried on above as over their end."""
+    known, width = curve.T
+    near = known >= known[-1] - LAST
+    slope = np.polyfit(known[near], width[near], 1)[0] if near.sum() > 1 else 0.0
+    beyond = np.maximum(width[-1] + slope * (share - known[-1]), 0.0)
+    widths: np.ndarray = np.where(share > known[-1], beyond, np.interp(share, known, width))
+    return widths
+
+
+def narrowest_transition(compensator: Compensator, sign: int) -> int:
+    """Return the least distance of the opening law from the certified offset, counts: all pressures, rounded down."""
+    law = compensator.side(sign)
+    gap = min(upper - lower for upper, lower in zip(law.law_beta, law.beta, strict=True))
+    return int(Fraction(gap, compensator.beta_denominator) * law.u_min0_over_u_max * compensator.signals.compare_max)

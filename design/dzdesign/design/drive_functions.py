@@ -14,11 +14,11 @@ from dzdesign.design.signals import Signals
 RAMP_UNIT = 1 << 16
 #: Codes of command from zero that a ramp counts in 32 bits.
 RAMPED_CODES = (1 << 31) // RAMP_UNIT - 1
-
 #: Samples that the firmware counts up to.
 MOST_FAULT_SAMPLES = 10_000
 
-Step = Annotated[int, Meta(ge=0, le=2**30)]
+LARGEST_STEP = 2**30
+Step = Annotated[int, Meta(ge=0, le=LARGEST_STEP)]
 Counts = Annotated[int, Meta(ge=0, le=65535)]
 
 
@@ -63,31 +63,12 @@ class DriveFunctions:
     see zero for `fault_samples` consecutive samples before it follows. Null: no interlock."""
 
     def __post_init__(self) -> None:
-        for name, value, limit in (
-            ("leave_zero_codes", self.leave_zero_codes, 32767),
-            ("dither_counts", self.dither_counts, 65535),
-            ("compare_limit", self.compare_limit, 65535),
-            ("play_noise_codes", self.play_noise_codes, 4095),
-            ("interlock_codes", self.interlock_codes or 0, 32767),
-            *(("play_counts", value, 65535) for nodes in self.play_counts for value in nodes),
-            *(("ramp_up", value, 2**30) for value in self.ramp_up),
-            *(("ramp_down", value, 2**30) for value in self.ramp_down),
-        ):
-            if not 0 <= value <= limit:
-                raise RuleError(f"{name} is {value}, expected 0 to {limit}")
-        if not 1 <= self.fault_samples <= MOST_FAULT_SAMPLES:
-            raise RuleError(f"fault_samples is {self.fault_samples}, expected 1 to {MOST_FAULT_SAMPLES}")
-        if not 1 <= self.dither_ticks <= 32767:
-            raise RuleError(
-                f"dither_ticks is {self.dither_ticks}, expected 1 to 32767 PWM periods: a wave is twice that"
-            )
-
-        for name, value, limit in (
-            ("play_codes", self.play_codes, 32),
-            ("play_step_codes", self.play_step_codes, 4096),
-        ):
-            if not 1 <= value <= limit or value & (value - 1):
-                raise RuleError(f"{name} is {value}, expected a power of two from 1 to {limit}")
+        for name, steps in (("ramp_up", self.ramp_up), ("ramp_down", self.ramp_down)):
+            if not 0 <= min(steps) <= max(steps) <= LARGEST_STEP:
+                raise RuleError(f"{name} is {max(steps)}, expected 0 to {LARGEST_STEP}")
+        for name, value in (("play_codes", self.play_codes), ("play_step_codes", self.play_step_codes)):
+            if value & (value - 1):
+                raise RuleError(f"{name} is {value}, expected a power of two")
 
     def dither(self, signals: Signals) -> DrivenDither:
         """Return the dither that the drive makes with a PWM."""

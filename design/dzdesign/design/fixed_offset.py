@@ -13,12 +13,11 @@ from itertools import pairwise
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
+from dzdesign.design.ceiling import deepest_MPa
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.costs_at_tests import falling_corners, remaining_dead_zone
-from dzdesign.design.machine.budget import Component
-from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.offset.beta_table import STEP_CODES
+from dzdesign.design.costs_at_tests import falling_corners, flow_at_end, remaining_dead_zone
+from dzdesign.design.side_law import Component
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.certified_bound import BoundPiece
 from dzdesign.identify.valve.ramp_result import TestResult
@@ -113,8 +112,8 @@ def fixed_offset(compensator: Compensator, sign: int = 1) -> FixedOffset:
     allowance = compensator.allowance(sign)
     model = compensator.valve.sides[SIDE_NAMES[sign]]
     # Above the tests the bound goes down: a gauge that read too little there had tests at higher pressure drops.
-    above = AboveChoice.on(compensator.machine, "lower", STEP_CODES)
-    curve = guarded_curve(model, compensator.side(sign).certificate.guard, compensator.below_dp0, above)
+    guard, machine = compensator.side(sign).certificate.guard, compensator.machine
+    curve = guarded_curve(model, guard, compensator.below_dp0, "lower", machine)
     pieces = [*(curve.certified.pieces if curve.certified else ()), *_of_the_lot(compensator, sign)]
     bounds = [(piece.at(place), place) for piece in pieces for place in _lowest_places(piece)]
     if error_MPa := allowance.pressures_MPa.get(BENCH_ERROR):
@@ -135,11 +134,8 @@ def _lowest_places(piece: BoundPiece) -> Iterator[Fraction]:
     """Yield where a piece of the bound may be lowest, MPa: its ends, and where its sag is deepest if that is inside."""
     yield piece.from_MPa
     yield piece.to_MPa
-    if piece.curvature > 0:
-        slope = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa)
-        deepest = (piece.from_MPa + piece.to_MPa) / 2 - slope / piece.curvature
-        if piece.from_MPa < deepest < piece.to_MPa:
-            yield deepest
+    if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < piece.to_MPa:
+        yield deepest
 
 
 def _of_the_lot(compensator: Compensator, sign: int) -> Iterator[BoundPiece]:
@@ -247,18 +243,11 @@ def _at_test(compensator: Compensator, characteristic: Characteristic, test: Tes
             if knee is not None
         },
         law=remaining_dead_zone(compensator, test, sign),
-        fixed_end_L_min=_flow_at_end(compensator, test, by_fixed),
-        law_end_L_min=_flow_at_end(compensator, test, by_law),
+        fixed_end_L_min=flow_at_end(compensator, test, by_fixed),
+        law_end_L_min=flow_at_end(compensator, test, by_law),
     )
 
 
 def _left(characteristic: Characteristic, knee: Fraction) -> float:
     found = characteristic.command_at(knee)
     return float("inf") if found is None else float(found)
-
-
-def _flow_at_end(compensator: Compensator, test: TestResult, drive: float) -> float | None:
-    """Return the flow on closing that a drive makes, as the straight part of the test has it, L/min."""
-    if not compensator.transition_end or test.u_knee_falling_V is None:
-        return None
-    return test.slope_L_min_V * max(drive * float(compensator.u_max_V) - test.u_knee_falling_V, 0.0)

@@ -1,4 +1,4 @@
-"""One setting for many valves: the largest offset that over-compensates none of them.
+"""One setting for many valves: the largest offset that over-compensates none of them, and the proof of that.
 
 Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That is proved as for one
 valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling where one was tested. That it lies
@@ -15,32 +15,49 @@ from math import ceil, floor
 
 import numpy as np
 
-from dzdesign.core.errors import InputError, RequirementError
+from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.worded import worded
-from dzdesign.design.certificate import certify, guarded_curve, prove_certificates
+from dzdesign.design.beta_table import between_nodes, choose_beta_table
+from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, deepest_MPa, offset_ceiling
+from dzdesign.design.certificate import certified, guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import design, prove_monotone
-from dzdesign.design.lot_margins import LotMargin, prove_lot
+from dzdesign.design.exact_row import ExactRow, least_of
 from dzdesign.design.lot_valves import LotValve
-from dzdesign.design.machine.accounting import budget_of
-from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.offset.beta_table import STEP_CODES, choose_beta_table
-from dzdesign.design.offset.exact_row import ExactRow, least_of
-from dzdesign.design.offset.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling
+from dzdesign.design.machine import Allowance
 from dzdesign.design.options import options_of
 from dzdesign.design.side_design import finest_units, left_by_machine, offset_at_reference, over, travel
 from dzdesign.design.side_law import Certificate, SideLaw, Sides
-from dzdesign.design.signals import SIDE_NAMES
+from dzdesign.design.signals import SIDE_NAMES, Signals
+from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.side_model import SideModel
 
 #: Of u_max: a valve whose ceiling comes this near to the least one of all holds the setting down.
 CLEAR = 1e-6
+#: Over-compensated valves that a sentence names.
+NAMED = 5
+#: Drives that are this near to the nearest one by doubles, V, are compared exactly.
+CLOSE_V = 1e-9
 #: What all compensators of a batch must have in common.
 SHARED = (
     "law", "below_dp0", "above", "signals", "u_max_V", "beta_denominator",
     "transition_codes", "command_error", "drive_functions", "current_drive", "machine",
 )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LotMargin:
+    """How far the offset of a lot setting stays under the bound of one valve."""
+
+    #: Of the valve.
+    name: str
+    #: Of the command, where that is least.
+    sign: int
+    #: Pressure drop, where it is least.
+    dp_MPa: Fraction
+    #: The least distance; negative of a valve that is over-compensated.
+    margin_V: Fraction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,10 +125,14 @@ def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     )
     for side in sides:
         prove_monotone(compensator, side.sign)
-    prove_certificates(compensator)
+        certificate, budget = certified(compensator, side.models[carrier], side.sign)
+        laws[side.sign] = replace(laws[side.sign], certificate=certificate, budget=budget)
+    compensator = replace(compensator, sides=Sides(positive=laws[1], negative=laws.get(-1)))
     margins = prove_lot(compensator)
     proved = {
-        name: tuple(_certified(side, name, laws[side.sign], first) for side in sides if name in side.binding)
+        name: tuple(
+            certified(compensator, side.models[name], side.sign)[0] for side in sides if name in side.binding
+        )
         for name in batch if any(name in side.binding for side in sides)
     }
     line = (
@@ -193,8 +214,10 @@ def _side(batch: Mapping[str, Compensator], first: Compensator, sign: int) -> _S
     signals, allowance = first.signals, first.allowance(sign)
     models = {name: each.valve.sides[SIDE_NAMES[sign]] for name, each in batch.items()}
     guard = first.side(sign).certificate.guard
-    above = AboveChoice.on(first.machine, first.above, STEP_CODES)
-    curves = {name: guarded_curve(model, guard, first.below_dp0, above) for name, model in models.items()}
+    curves = {
+        name: guarded_curve(model, guard, first.below_dp0, first.above, first.machine)
+        for name, model in models.items()
+    }
     low, high = _common_interval([curves])
     doubles, least = [], list[ExactRow]()
     for curve in curves.values():  # of many valves the exact rows would fill the memory
@@ -226,7 +249,7 @@ def _carriers(batch: Mapping[str, Compensator], sides: Sequence[_Side]) -> list[
 
 
 def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
-    """Choose the common coefficients and table of one side; certified for the carrier."""
+    """Choose the common coefficients and table of one side, in the direction of the carrier's threshold."""
     model, u_max = side.models[carrier], first.u_max_V
     reference = Fraction(repr(model.reference.dp_MPa))
     top = min(curve.at(reference) for curve in side.curves.values())
@@ -241,32 +264,97 @@ def _law(side: _Side, carrier: str, first: Compensator) -> SideLaw:
         model.trend,
         denominator=first.beta_denominator,
         above_one=model.trend == "increasing" or first.below_dp0 == "extend",
-        above=AboveChoice(choice=first.above, step_codes=STEP_CODES) if goes_on else None,
+        above=first.above if goes_on else None,
     )
     # The longest travel: full command fully opens every valve.
     longest = max(travel(each, u_max, top) for each in side.models.values())
-    law = SideLaw(
+    return SideLaw(  # certificate and budget are those of this law as soon as it is in the carrier's compensator
         drive_range_over_u_max=over(longest, "nearest", scale),
         u_min0_over_u_max=u_min0,
         beta=table,
         certificate=first.side(side.sign).certificate,
     )
-    guard, allowance = law.certificate.guard, first.allowance(side.sign)
-    budget = budget_of(model, side.curves[carrier], u_max, allowance, guard, first.machine)
-    return replace(law, certificate=_certified(side, carrier, law, first), budget=budget)
 
 
-def _certified(side: _Side, name: str, law: SideLaw, first: Compensator) -> Certificate:
-    """Prove the common law for one valve, on the whole interval that it was tested over."""
-    curve = side.curves[name]
-    return certify(
-        side.models[name],
-        curve,
-        offset_ceiling(curve, first.u_max_V, first.allowance(side.sign)),
-        guard=first.side(side.sign).certificate.guard,
-        signals=first.signals,
-        u_max_V=first.u_max_V,
-        u_min0=law.u_min0_over_u_max,
-        table=law.beta,
-        denominator=first.beta_denominator,
-    )
+def lot_margins(compensator: Compensator) -> tuple[LotMargin, ...]:
+    """Return each valve's margin, exactly, at every code of its own tested interval, worst side, worst code.
+
+    A code stands for all pressures that may have made it; rounding, dither and the machine count as in a ceiling.
+    """
+    signals = compensator.signals
+    margins: dict[str, LotMargin] = {}
+    for sign in signals.signs:
+        law = compensator.side(sign)
+        allowance = compensator.allowance(sign)
+        low, high = window = allowance.window
+        count = signals.largest_difference(sign) + 1
+        numerators = between_nodes(law.beta, count, compensator.beta_step_codes)
+        scale = compensator.beta_denominator * compensator.beta_step_codes
+        unit_V = law.u_min0_over_u_max * compensator.u_max_V / scale
+        for valve in compensator.lot:
+            side = valve.side(sign)
+            if side is None:
+                raise InputError(f"'{valve.name}' of the lot has no bounds of the negative side; run `batch` again")
+            for piece in side.bound().pieces:
+                left, right = piece.from_MPa, piece.to_MPa
+                first = max(ceil(signals.dp_code(left)) - high, 0)
+                last = min(floor(signals.dp_code(right)) - low, numerators.size - 1)
+                if first > last and left == right:  # one test, between two codes: both of them count
+                    first, last = last, min(first, numerators.size - 1)
+                if first > last:
+                    continue
+                drive_V = numerators[first : last + 1] * float(unit_V)
+                nearest = first + _nearest(piece, allowance, first, drive_V)
+                over, code = max(
+                    (
+                        int(numerators[code]) * unit_V - allowance.factor * _least(piece, signals, int(code), window),
+                        -int(code),
+                    )
+                    for code in nearest
+                )
+                code = -code
+                margin = -over - allowance.kept * compensator.u_max_V
+                if valve.name not in margins or margin < margins[valve.name].margin_V:
+                    margins[valve.name] = LotMargin(
+                        name=valve.name, sign=sign, dp_MPa=signals.dp_MPa(code), margin_V=margin
+                    )
+    return tuple(margins.values())
+
+
+def _least(piece: BoundPiece, signals: Signals, code: int, error: tuple[int, int]) -> Fraction:
+    """Return the least bound over the pressure drops that a code may stand for, as far as the piece reaches, V."""
+    low, high = (signals.dp_MPa(code + each) for each in error)
+    return piece.least(max(min(low, piece.to_MPa), piece.from_MPa), min(max(high, piece.from_MPa), piece.to_MPa))
+
+
+def _nearest(piece: BoundPiece, allowance: Allowance, first: int, drive_V: np.ndarray) -> np.ndarray:
+    """Return which drives, from the code `first` on, may come nearest to a piece: by doubles, to `CLOSE_V`."""
+    signals = allowance.signals
+    codes = first + np.arange(drive_V.size)
+    zero, step = float(signals.dp_MPa(0)), float(signals.dp_MPa(1) - signals.dp_MPa(0))
+    from_MPa, to_MPa = float(piece.from_MPa), float(piece.to_MPa)
+    low, high = (np.clip(zero + step * (codes + each), from_MPa, to_MPa) for each in allowance.window)
+    places = [low, high]
+    if piece.curvature > 0:
+        places.append(np.clip(float(deepest_MPa(piece)), low, high))
+    bound = CertifiedBound(pieces=(piece,))
+    least = np.min([bound.in_doubles(place) for place in places], axis=0)
+    left_V = float(allowance.factor) * least - drive_V
+    near: np.ndarray = np.flatnonzero(left_V <= left_V.min() + CLOSE_V)
+    if piece.curvature == 0 and piece.low_V == piece.high_V:  # a step: the largest drive comes nearest, the first of it
+        return np.array([int(drive_V.argmax())])
+    return near
+
+
+def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:
+    """Prove that a lot setting over-compensates no valve of its lot, and return the margins."""
+    margins = lot_margins(compensator)
+    above = sorted((each for each in margins if each.margin_V < 0), key=lambda each: each.margin_V)
+    if above:
+        worst, units = above[0], compensator.valve.recorded_units
+        raise RequirementError(
+            f"the lot setting over-compensates {len(above)} of {len(margins)} valves of its lot: "
+            f"{and_more([each.name for each in above], NAMED)}; {worst.name} by "
+            f"{units.text(-1e3 * float(worst.margin_V), '.3f mV')} at {units.text(float(worst.dp_MPa), '.2f MPa')}"
+        )
+    return margins

@@ -209,12 +209,10 @@ def hidden_failure(compensator: Compensator, sign: int) -> HiddenFailure | None:
     largest reading. Codes that a sound signal never makes give the smallest beta; those of such a failure can not.
     """
     model, side = compensator.valve.sides[SIDE_NAMES[sign]], compensator.side(sign)
-    if model.trend == "increasing":
-        failures = compensator.signals.hidden_excess(sign, broken_code(compensator))
-    elif model.trend == "decreasing":
-        failures = compensator.signals.hidden_shortfall(sign, broken_code(compensator))
-    else:
+    if model.trend not in ("increasing", "decreasing"):
         return None
+    rising = model.trend == "increasing"
+    failures = compensator.signals.hidden_failures(sign, broken_code(compensator), reads_high=rising)
     if not failures:
         return None
     largest = max(side.beta) / compensator.beta_denominator

@@ -7,13 +7,13 @@ from math import gcd
 
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import worded
+from dzdesign.design.beta_table import STEP_CODES, choose_beta_table, released_from
+from dzdesign.design.budget import budget_of
+from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
 from dzdesign.design.certificate import certify, guarded_curve, hold_below
-from dzdesign.design.machine.accounting import budget_of
-from dzdesign.design.machine.allowance import Allowance
-from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.offset.beta_table import STEP_CODES, choose_beta_table
-from dzdesign.design.offset.exact_row import ExactRow
-from dzdesign.design.offset.offset_ceiling import OffsetCeiling, OffsetCurve, offset_ceiling, offset_row
+from dzdesign.design.design_choices import Above
+from dzdesign.design.exact_row import ExactRow
+from dzdesign.design.machine import Allowance
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.side_law import SideLaw
 from dzdesign.design.signals import Signals
@@ -44,13 +44,13 @@ def finest_units(signals: Signals, transition_codes: int) -> Units:
     and M counts of the PWM. What M has in common with the denominator cancels, and what remains of M goes with the
     table B or with the factor in c, each of which has 31 bits.
     """
-    units = _finest_that_fit(signals, transition_codes)
+    units = finest_that_fit(signals, transition_codes)
     if units is not None:
         return units
     spans = " and ".join(str(signals.command.span(sign)) for sign in signals.signs)
     what = f"a full command of {spans} codes over {signals.compare_max} counts"
     shorter = transition_codes
-    while shorter and _finest_that_fit(signals, shorter) is None:
+    while shorter and finest_that_fit(signals, shorter) is None:
         shorter //= 2
     if shorter:
         share = shorter / min(signals.command.span(sign) for sign in signals.signs)
@@ -64,12 +64,8 @@ def finest_units(signals: Signals, transition_codes: int) -> Units:
     )
 
 
-def fits(signals: Signals, transition_codes: int) -> bool:
-    """Tell whether the law with such a transition fits the firmware's arithmetic."""
-    return _finest_that_fit(signals, transition_codes) is not None
-
-
-def _finest_that_fit(signals: Signals, transition_codes: int) -> Units | None:
+def finest_that_fit(signals: Signals, transition_codes: int) -> Units | None:
+    """Return the finest units with which the law fits the firmware's arithmetic; None where none do."""
     spans = [signals.command.span(sign) for sign in signals.signs]
     finest, coarsest = sum((BETA_BITS[0], COEFFICIENT_BITS[0])), sum((BETA_BITS[1], COEFFICIENT_BITS[1]))
     for total in range(finest, coarsest - 1, -1):
@@ -159,37 +155,23 @@ def opening_offset(side: SideModel, options: DesignOptions) -> OffsetCurve:
 
 
 def opening_ceiling(
-    opening: OffsetCurve,
-    certified: OffsetCurve,
-    tested: range,
-    *,
-    released_from: int | None,
-    signals: Signals,
-    u_max: Fraction,
-    sign: int,
+    opening: OffsetCurve, guarded: OffsetCurve, tested: range, above: Above, allowance: Allowance, u_max: Fraction
 ) -> OffsetCeiling:
     """Return the opening threshold at every pressure code: no bound, so rounding to codes does not count.
 
-    Above the tests it comes down by as much as the certified offset: a transition, and the hysteresis that a play takes
+    Above the tests it comes down by as much as the guarded offset: a transition, and the hysteresis that a play takes
     out of it, stay as they are at the last test. Where the offset is released, only that height is left of it.
     """
-    last = signals.largest_difference(sign)
+    signals, last = allowance.signals, allowance.signals.largest_difference(allowance.sign)
     limit = offset_row(opening, signals, 0, last)
-    if certified.above is not None and tested.stop <= last:
-        let_go = last + 1 if released_from is None else min(released_from, last + 1)
-        limit = limit[: tested.stop].followed_by(
-            _less_what_is_lowered(limit[tested.stop :], certified, signals, range(tested.stop, let_go))
-        )
+    if guarded.above is not None and tested.stop <= last:
+        let_go = min(released_from(above, tested) or last + 1, last + 1)
+        height = limit[tested.stop :].line(Fraction(1), guarded.offset_V[-1])
+        held = height[: let_go - tested.stop]
+        if held:
+            held = held.plus(offset_row(guarded, signals, tested.stop, let_go - 1))
+        limit = limit[: tested.stop].followed_by(held).followed_by(height[len(held) :])
     return OffsetCeiling(limit=limit.line(1 / u_max), certified=tested)
-
-
-def _less_what_is_lowered(opening: ExactRow, certified: OffsetCurve, signals: Signals, codes: range) -> ExactRow:
-    """Return what is left above the tests of the opening threshold there; behind the codes the offset is released."""
-    height = opening.line(Fraction(1), certified.offset_V[-1])
-    if not codes:
-        return height
-    lowered = offset_row(certified, signals, codes.start, codes.stop - 1)
-    return height[: len(codes)].plus(lowered).followed_by(height[len(codes) :])
 
 
 def side_law(
@@ -204,8 +186,7 @@ def side_law(
     signals = options.signals
     if "branch-order" not in options.accept:
         refuse_crossed_branches(side)
-    above = AboveChoice.on(options.machine, options.above, STEP_CODES)
-    certified = guarded_curve(side, options.guard, options.below_dp0, above)
+    certified = guarded_curve(side, options.guard, options.below_dp0, options.above, options.machine)
     opening = opening_offset(side, options) if transition_codes else None
     reference = Fraction(repr(side.reference.dp_MPa))
     ceiling = offset_ceiling(certified, u_max, allowance)
@@ -217,14 +198,11 @@ def side_law(
     u_min0 = offset_at_reference(top / u_max, signals, units.coefficient)
     above_one = side.trend == "increasing" or options.below_dp0 == "extend"
     table = partial(choose_beta_table, u_min0=u_min0, trend=side.trend, denominator=units.beta, above_one=above_one)
-    beta = table(ceiling, above=above if goes_on else None)
+    beta = table(ceiling, above=options.above if goes_on else None)
     transition_beta = None
     if opening is not None:
-        released_from = above.released_from(tested) if goes_on else None
-        under = opening_ceiling(
-            opening, certified, tested, released_from=released_from, signals=signals, u_max=u_max, sign=allowance.sign
-        )
-        upper = table(under, above=AboveChoice(choice="lower", step_codes=STEP_CODES) if goes_on else None)
+        under = opening_ceiling(opening, certified, tested, options.above, allowance, u_max)
+        upper = table(under, above="lower" if goes_on else None)
         transition_beta = tuple(map(max, upper, beta))
     return SideLaw(
         drive_range_over_u_max=over(travel(side, u_max, top), "nearest", units.coefficient),

@@ -1,13 +1,16 @@
 """Signals as an engineer writes them, such as ``4..20 mA on 150 ohm = 25 MPa``, turned into converter codes."""
 
+import re
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 
+from dzdesign.core.artefact_types import RuleError
 from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.signal_ranges import Meaning, read_signal_range
-from dzdesign.core.units import measures, si_factor
+from dzdesign.core.units import measures, parse_quantity, si_factor
 from dzdesign.design.signals import CommandSignal, PressureSignal
-from dzdesign.design.target_inputs import Converter
+from dzdesign.design.target_inputs import CommandError, Converter
 
 #: A sound signal may pass its ends by as much as the field's 3.6 mA and 21 mA pass those of 4-20 mA.
 BELOW_LIVE_ZERO = Fraction(9, 10)
@@ -16,6 +19,7 @@ ABOVE_SPAN = Fraction(21, 20)
 LARGEST_A, SHUNT_STEP_OHM = Fraction(21, 1000), 10
 EXAMPLE = "'0..10 V x 0.3', '-10..10 V x 0.12 + 1.5 V' or '4..20 mA on 150 ohm = 25 MPa'"
 COMMAND_EXAMPLE = "'4..20 mA on 150 ohm = -10..10 V'"
+ERROR_EXPECTED = "expected the offset and the noise's peak, such as '15 + 4 codes' or '0.4 % + 0.1 %'"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,3 +199,32 @@ def _span_MPa(signal: PinSignal, meaning: Meaning) -> Fraction:
             f"the pressure signal '{signal.text}' begins at {float(meaning.bottom):g} {meaning.unit}, expected 0"
         )
     return Fraction(round(meaning.top * Fraction(repr(factor))), 10**6)
+
+
+def command_error_of(text: str, converter: Converter, command: CommandSignal) -> CommandError:
+    """Read the declared error, or take the converter's where the text is empty.
+
+    Of the gain error what it makes at the code of zero command counts: nothing of a signal that begins at code 0, half
+    of it of one that has zero in the middle.
+    """
+    if not text:
+        at_zero = Fraction(command.zero_code, converter.code_max)
+        offset, noise = converter.offset_codes + round(converter.gain_codes * at_zero), max(converter.noise_codes, 1)
+        return CommandError(offset_codes=offset, noise_codes=noise)
+    parts = [part.strip() for part in text.split("+")]
+    if len(parts) != 2:
+        raise InputError(f"--command-error is '{text}', {ERROR_EXPECTED}")
+    if re.search(r"codes?$", parts[1]) and re.fullmatch(r"\d+(\.\d+)?", parts[0]):
+        parts[0] += " codes"
+    try:
+        offset, noise = (_codes(part, command) for part in parts)
+        return CommandError(offset_codes=offset, noise_codes=noise)
+    except (ValueError, ZeroDivisionError, RuleError) as error:
+        raise InputError(f"--command-error is '{text}', {ERROR_EXPECTED} ({error})") from error
+
+
+def _codes(part: str, command: CommandSignal) -> int:
+    """Return codes of command, a fraction of one as a whole."""
+    if re.search(r"codes?$", part):
+        return ceil(Fraction(re.sub(r"\s*codes?$", "", part)))
+    return ceil(Fraction(repr(parse_quantity(part, "ratio", "--command-error"))) * command.span(1))

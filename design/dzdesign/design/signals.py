@@ -174,39 +174,25 @@ class Signals:
         turn = -1 if sign < 0 and self.swapped else 1
         return turn * (a * WEIGHT_UNIT - b * self.weight_b) >> WEIGHT_SHIFT
 
-    def hidden_excess(self, sign: int, broken_code: int = 0) -> tuple[str, ...]:
-        """Return the failures of a sensor that make the pressure difference read too high with codes that are valid.
+    def hidden_failures(self, sign: int, broken_code: int = 0, *, reads_high: bool) -> tuple[str, ...]:
+        """Return the failures of a sensor that make the pressure difference read too high, or too low, by valid codes.
 
-        A broken wire reads up to `broken_code`: what the converter makes of no voltage.
+        A broken wire reads up to `broken_code`: what the converter makes of no voltage. Of the sensor ahead that is a
+        drop of nothing while the pressure behind is next to none: a valve that is open to tank. A sensor behind that
+        reads its converter's top makes a negative difference, which is a failure by itself, unless the one ahead spans
+        more.
         """
         sensors = {"A": self.pressure_a, "B": self.pressure_b}
-        ahead, behind = self._ahead_and_behind(sign)
-        found = []
-        if sensors[behind].valid_codes[0] <= broken_code:
-            found.append(f"a broken wire of sensor {behind}")
-        if sensors[ahead].valid_codes[1] == self.code_max:
-            found.append(f"a reading of sensor {ahead} above its span")
-        return tuple(found)
-
-    def hidden_shortfall(self, sign: int, broken_code: int = 0) -> tuple[str, ...]:
-        """Return the failures of a sensor that make the pressure difference read too low with codes that are valid.
-
-        A broken wire reads up to `broken_code`. Ahead that is a drop of nothing while the pressure behind is next to
-        none: a valve that is open to tank. A sensor behind that reads its converter's top makes a negative difference,
-        which is a failure by itself, unless the one ahead spans more.
-        """
-        sensors = {"A": self.pressure_a, "B": self.pressure_b}
-        ahead, behind = self._ahead_and_behind(sign)
-        found = []
-        if sensors[ahead].valid_codes[0] <= broken_code:
-            found.append(f"a broken wire of sensor {ahead}")
+        ahead, behind = ("B", "A") if sign < 0 and self.swapped else ("A", "B")
+        broken, above = (behind, ahead) if reads_high else (ahead, behind)
         full = {ahead: sensors[ahead].full_code, behind: self.code_max}
-        if sensors[behind].valid_codes[1] == self.code_max and self.difference(full["A"], full["B"], sign) > 0:
-            found.append(f"a reading of sensor {behind} above its span")
+        found = []
+        if sensors[broken].valid_codes[0] <= broken_code:
+            found.append(f"a broken wire of sensor {broken}")
+        positive = reads_high or self.difference(full["A"], full["B"], sign) > 0
+        if positive and sensors[above].valid_codes[1] == self.code_max:
+            found.append(f"a reading of sensor {above} above its span")
         return tuple(found)
-
-    def _ahead_and_behind(self, sign: int) -> tuple[str, str]:
-        return ("B", "A") if sign < 0 and self.swapped else ("A", "B")
 
     def largest_difference(self, sign: int) -> int:
         """Return the largest difference that sound codes make."""

@@ -1,4 +1,7 @@
-"""What `design` needs to know of a target: its analogue-digital converter, its timer, how often it samples."""
+"""What `design` needs to know of a target: its analogue-digital converter, its timer, how often it samples.
+
+And the error that a converter makes of a command: its code at zero says which codes count as zero.
+"""
 
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -89,3 +92,41 @@ class TargetInputs:
                 f"the current is sampled in {self.current_sampling.tick_Hz} PWM periods a second, expected "
                 f"{self.tick_Hz}"
             )
+
+
+#: Largest error of the command that is believed, codes of any converter.
+LARGEST_ERROR = 4095
+#: A narrower transition makes volts of a code's noise, codes; and in peaks of the declared noise.
+LEAST_TRANSITION, LEAST_TRANSITION_NOISE = 16, 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandError:
+    """Error of the command's code at zero: a lasting one, and one that changes from sample to sample."""
+
+    offset_codes: Annotated[int, Meta(ge=0, le=LARGEST_ERROR)]
+    """Largest static error at zero command."""
+    noise_codes: Annotated[int, Meta(ge=1, le=LARGEST_ERROR)]
+    """Peak noise on top of the static error."""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.offset_codes <= LARGEST_ERROR or not 1 <= self.noise_codes <= LARGEST_ERROR:
+            raise RuleError(
+                f"the command's error is {self.offset_codes} + {self.noise_codes} codes, expected an offset of 0 to "
+                f"{LARGEST_ERROR} and a noise of 1 to {LARGEST_ERROR}: no converter is without noise"
+            )
+
+    @property
+    def zero_band_codes(self) -> int:
+        """Codes that a zero command may read: within them the drive goes back to rest."""
+        return self.offset_codes + self.noise_codes
+
+    @property
+    def leave_zero_codes(self) -> int:
+        """Codes that a command must exceed for the drive to leave its rest: a spike of twice the noise does not."""
+        return self.zero_band_codes + self.noise_codes + 1
+
+    @property
+    def least_transition(self) -> int:
+        """Fewest codes of a transition."""
+        return max(LEAST_TRANSITION, LEAST_TRANSITION_NOISE * self.noise_codes)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.design.output_manifest import setting_words
+from dzdesign.design.firmware_manifest import setting_words
 from dzdesign.report.lot.summary import LOT_SETTING, VALVES, LotFirmware, LotSummary
 from dzdesign.report.lot.words import checked_line, cost_lines, lot_budget_lines, span, untested_lines
 from dzdesign.terminal.page import Table, new_console, put_line, put_table

@@ -10,7 +10,7 @@ EXAMPLES = ("dzdesign design valve.json", "dzdesign design valve.json --hysteres
 
 def run(arguments: Arguments, json: bool) -> int:
     """Design a compensator and print its law, certificate and costs."""
-    from dzdesign.design.hysteresis_choices import hysteresis_choices
+    from dzdesign.design.redesign import hysteresis_choices
     from dzdesign.terminal.choices_table import print_choices
     from dzdesign.terminal.tables import print_compensator
 

@@ -14,7 +14,7 @@ SCHEMAS = {
     "valve": ("dzdesign.identify.valve.model:ValveModel", "valve.json", "identify"),
     "compensator": ("dzdesign.design.compensator:Compensator", "compensator.json", "design"),
     "firmware": ("dzdesign.design.firmware_manifest:FirmwareManifest", "manifest.json of a firmware", "codegen"),
-    "output": ("dzdesign.design.output_manifest:OutputManifest", "manifest.json of another output", "codegen"),
+    "output": ("dzdesign.design.firmware_manifest:OutputManifest", "manifest.json of another output", "codegen"),
     "evidence": ("dzdesign.verify.evidence:Evidence", "verification.json", "verify"),
     "output-evidence": ("dzdesign.verify.evidence:OutputEvidence", "evidence.json of another output", "verify"),
     "calibration": (

@@ -55,7 +55,7 @@ def design_options(choices: DesignChoices, target: str) -> "DesignOptions":
         if "/" in (getattr(choices, name) or "")
     ]
     if useless:
-        command = options.request.options["command_signal"] if options.request else ""
+        command = (options.texts or {}).get("command_signal", "")
         raise InputError(
             f"{useless[0]} is for a command of both signs, but {command!r} has one; leave it out, or give "
             "a --command-signal such as '-10..10 V x 0.12 + 1.5 V'"

@@ -92,8 +92,7 @@ def generate(arguments: GenerateArguments) -> "Firmware | Output":
     from dzdesign.codegen.other_targets import OTHER_TARGETS, check_target_name
     from dzdesign.codegen.project import DEFAULT_TARGET
     from dzdesign.core.artefact_types import schema_of
-    from dzdesign.design.firmware_manifest import FirmwareManifest
-    from dzdesign.design.output_manifest import OutputManifest
+    from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
 
     target = arguments.target or DEFAULT_TARGET
     check_target_name(target)
@@ -163,7 +162,7 @@ def _compensator(arguments: GenerateArguments, target: str) -> "tuple[Compensato
     from dzdesign.design.compensator import SCHEMA as COMPENSATOR_SCHEMA
     from dzdesign.design.compensator import Compensator
     from dzdesign.design.designing import design as design_valve
-    from dzdesign.design.redesign_check import refuse_without_options
+    from dzdesign.design.redesign import refuse_without_options
     from dzdesign.identify.valve.model import SCHEMA as VALVE_SCHEMA
     from dzdesign.identify.valve.model import ValveModel
 

@@ -30,7 +30,7 @@ def given_compensator(given: "Compensator | AnyPath") -> tuple["Compensator", st
 
 def refuse_underived(compensator: "Compensator", source: str, *, of_file: bool) -> None:
     """Refuse a compensator whose numbers do not follow: what is made of it goes to a device without a `verify`."""
-    from dzdesign.design.redesign_check import prove_derived, refuse_without_options
+    from dzdesign.design.redesign import prove_derived, refuse_without_options
 
     if of_file:
         refuse_without_options(compensator, source.strip("'"))

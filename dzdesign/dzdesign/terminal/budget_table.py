@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
     from dzdesign.core.recorded_units import RecordedUnits
     from dzdesign.design.compensator import Compensator
-    from dzdesign.design.machine.budget import Budget, BudgetLine
+    from dzdesign.design.side_law import Budget, BudgetLine
 
 #: Units of a half-width that a person may see in another one.
 SHOWN_UNITS = ("mV", "MPa")
@@ -17,7 +17,7 @@ SHOWN_UNITS = ("mV", "MPa")
 
 def print_budgets(compensator: "Compensator", console: "Console | None" = None) -> None:
     """Print the budget of each side: what each component takes from the threshold, and what it costs."""
-    from dzdesign.design.machine.budget import ADDED_IN_FULL
+    from dzdesign.design.side_law import ADDED_IN_FULL
     from dzdesign.design.signals import SIDE_NAMES
 
     console = console or new_console()

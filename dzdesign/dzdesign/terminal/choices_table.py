@@ -8,7 +8,7 @@ from dzdesign.terminal.page import new_console, put_line, put_rows
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from dzdesign.design.hysteresis_choices import HysteresisChoice
+    from dzdesign.design.redesign import HysteresisChoice
 
 DITHER = (
     "Dither also reduces the hysteresis, but it shifts the thresholds. If the amplifier uses dither, record the ramps "

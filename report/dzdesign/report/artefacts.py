@@ -18,8 +18,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.folder_contents import digest_of, manifest_of
 from dzdesign.core.recorded_units import AS_COMPUTED, RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
 from dzdesign.design.side_law import SideLaw
 from dzdesign.identify.valve.model import SIDES, ValveModel, Warning_
 from dzdesign.verify.closed_loop.ramps import Curves, read_curves

@@ -11,8 +11,7 @@ from dzdesign.core.documents import family_of
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.folder_contents import board_of, digest_of, manifest_of
 from dzdesign.core.verdicts import verdict_words
-from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.output_manifest import OutputManifest, setting_words
+from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest, setting_words
 from dzdesign.report.artefacts import Chain
 from dzdesign.report.cells import Cell, counted, table_of, verdict, whole
 from dzdesign.report.page import Headline, MadeOutput, MadeOutputs, Section

@@ -9,8 +9,8 @@ from dzdesign.assess.limits import LIMITED
 from dzdesign.assess.options import Set
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import DOES_NOT_HOLD, NOT_CHECKED, verdict_words
+from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain, laws_of
 from dzdesign.report.cells import counted, whole

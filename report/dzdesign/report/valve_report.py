@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from dzdesign.design.machine.accounting import not_counted
+from dzdesign.design.certificate import not_counted
 from dzdesign.report.artefacts import Chain, chain_of_evidence, read_chain
 from dzdesign.report.figure import figure_style
 from dzdesign.report.outputs import outputs_in, outputs_sections, with_outputs

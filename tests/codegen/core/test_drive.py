@@ -18,8 +18,7 @@ from dzdesign.design.designing import design
 from dzdesign.design.options import DesignOptions
 from dzdesign.design.side_law import Sides
 from dzdesign.design.signal_text import command_signal, parse_signal
-from dzdesign.design.target_inputs import Converter
-from dzdesign.design.zero_band import CommandError
+from dzdesign.design.target_inputs import CommandError, Converter
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.drive_check import drive_samples as sequence
 from dzdesign.verify.exhaustive.exact_drive import STEP_UNIT, DriveModel

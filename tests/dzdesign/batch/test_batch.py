@@ -27,10 +27,10 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import UNPLACED
+from dzdesign.design.ceiling import DECIMALS
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.design.lot_setting import lot_setting
-from dzdesign.design.offset.offset_ceiling import DECIMALS
 from dzdesign.report.artefacts import read_chain
 from dzdesign.report.lot.table import read_manifest
 from dzdesign.stages.identify import IdentifyChoices

@@ -27,7 +27,7 @@ from tests.support.paths import ROOT
 
 VALVE = ROOT / "tests" / "goldens" / "valve.json"
 #: Without the proof of the compensator's numbers, which takes a second.
-UNPROVEN = ("dzdesign.design.redesign_check.prove_derived", lambda compensator: None)
+UNPROVEN = ("dzdesign.design.redesign.prove_derived", lambda compensator: None)
 
 
 @pytest.fixture(scope="module")

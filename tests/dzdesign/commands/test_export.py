@@ -20,7 +20,7 @@ from dzdesign.terminal.export_tables import print_export
 from tests.support.paths import GOLDENS
 
 #: Without the proof of the compensator's numbers, which takes a second.
-UNPROVEN = ("dzdesign.design.redesign_check.prove_derived", lambda compensator: None)
+UNPROVEN = ("dzdesign.design.redesign.prove_derived", lambda compensator: None)
 FILES = {"west": "valve.txt", "cia408": "valve.dcf", "rmc75": "valve.rmc", "beckhoff": "valve.st", "csv": "valve.csv"}
 
 

@@ -15,8 +15,8 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import sha256_of, to_json
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.designing import design
-from dzdesign.design.machine.accounting import reach_of_certificate
 from dzdesign.design.options import DesignOptions, options_of
 from dzdesign.identify.data_quality import knee_errors
 from dzdesign.identify.data_quality.catalogue import catalogue, most_serious_first, warn
@@ -176,7 +176,7 @@ class TestBranchOrder:
 
     def test_only_what_stops_a_design_can_be_accepted(self, wording):
         with wording.refusal(InputError):
-            DesignOptions(accept=("branch-ordr",))
+            options_of({"accept": "branch-ordr"}, target_named("f28335").inputs())
 
 
 def test_a_side_that_the_firmware_leaves_out_is_said_from_identify_to_the_report(wording):

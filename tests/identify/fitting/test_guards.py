@@ -17,7 +17,6 @@ from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.options import DesignOptions
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes
 from dzdesign.identify.side import identify_side
@@ -25,6 +24,7 @@ from dzdesign.identify.valve.guard_curve import GUARDS
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs
 from tests.support.attacked_firmware import sealed
+from tests.support.designs import options
 from tests.support.repeatable_valves import REPEATABLE, identify
 from tests.support.synthetic import L_MIN, MPA, Truth, needs_compiler, synthetic_ramp
 
@@ -227,7 +227,7 @@ class TestDesign:
     @pytest.mark.parametrize("trend", ["convex", "increasing"])
     def test_zero_command_stays_under_the_true_threshold_at_every_pressure_code(self, name, trend):
         valve = identify(ramps(OPENS[trend]))
-        compensator = design(valve, DesignOptions(guard=name))
+        compensator = design(valve, options(guard=name))
         certificate = compensator.positive.certificate
         assert certificate.guard == name and certificate.smallest_margin_V >= 0
         low = valve.positive.valid_dp_MPa[0]
@@ -241,7 +241,7 @@ class TestDesign:
     @pytest.mark.slow
     def test_the_offset_rises_from_guard_to_guard_and_flow_at_zero_command_is_said(self):
         valve = identify(ramps(OPENS["decreasing"]))
-        made = [design(valve, DesignOptions(guard=name)) for name in GUARDS]
+        made = [design(valve, options(guard=name)) for name in GUARDS]
         offsets = [compensator.drive(0, 300) for compensator in made]
         assert offsets == sorted(offsets) and len(set(offsets)) == 3
         said = [any("flow at zero command on closing" in line for line in compensator.costs) for compensator in made]
@@ -260,11 +260,11 @@ class TestDesign:
         tests = ramps(OPENS["flat"], falling=falling)
         valve = identify([falling_only(test) for test in tests] if falling else tests)
         with wording.refusal(InputError):
-            design(valve, DesignOptions(guard=asked))
+            design(valve, options(guard=asked))
 
     def test_an_unknown_guard_is_refused(self, wording):
         with wording.refusal(InputError):
-            DesignOptions(guard="meen")
+            options(guard="meen")
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
 from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify.outputs import amplifier
 from dzdesign.verify.outputs.verification import verify_output
 from dzdesign.verify.requirements import DEAD_ZONES, LAW_DEAD_ZONES, READ_BACK, REPRODUCED, SAFE

@@ -12,8 +12,8 @@ from msgspec import UNSET
 from dzdesign.api import identify
 from dzdesign.core.dither import Dither
 from dzdesign.core.errors import InputError
-from dzdesign.design.hysteresis_choices import hysteresis_choices, hysteresis_left
-from dzdesign.design.play import LEVELS
+from dzdesign.design.designing import LEVELS
+from dzdesign.design.redesign import hysteresis_choices, hysteresis_left
 from dzdesign.verify.closed_loop.loop import ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant, read_plant
 from dzdesign.verify.closed_loop.scenarios import run_scenarios

@@ -10,7 +10,7 @@ import pytest
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.costs import hidden_failures
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Machine
 from dzdesign.identify.identification import identify
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED, coil_and_supply, drive_corners, resistance_ratio

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dzdesign.design.current.choosing import sensor_line
 from dzdesign.design.current.circuit import Corner
+from dzdesign.design.current.drive import sensor_line
 from dzdesign.design.current.responses import run_loop
 from dzdesign.verify.current.coil import CoilLoop, CoilSimulation
 from dzdesign.verify.current.controller_states import OPEN, OVER, SHORT

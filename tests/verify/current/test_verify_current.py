@@ -5,8 +5,8 @@ from fractions import Fraction
 
 import pytest
 
-from dzdesign.design.current.choosing import CurrentSensor, choose_loop, gains_of
-from dzdesign.design.current.circuit import CoilCircuit
+from dzdesign.design.current.circuit import CoilCircuit, CurrentSensor
+from dzdesign.design.current.drive import choose_loop, gains_of
 from dzdesign.design.current.responses import Gains, margins
 from dzdesign.verify.analysis import machine_code
 from dzdesign.verify.current import corner_runs

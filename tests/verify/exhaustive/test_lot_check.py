@@ -16,11 +16,10 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.designing import design
-from dzdesign.design.lot_margins import lot_margins, prove_lot
-from dzdesign.design.lot_setting import lot_setting
+from dzdesign.design.lot_setting import lot_margins, lot_setting, prove_lot
 from dzdesign.design.lot_valves import Lacking, LotSide, common_interval, lacking_in, without_narrow
 from dzdesign.design.options import options_of
-from dzdesign.design.redesign_check import prove_derived
+from dzdesign.design.redesign import prove_derived
 from dzdesign.identify.identification import identify
 from dzdesign.verify.exhaustive.all_inputs import check_all_inputs, check_lot, lot_checked
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

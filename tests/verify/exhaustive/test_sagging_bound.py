@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from dzdesign.core.errors import RequirementError
+from dzdesign.design.ceiling import offset_ceiling
 from dzdesign.design.certificate import guarded_curve
 from dzdesign.design.designing import design
-from dzdesign.design.offset.offset_ceiling import offset_ceiling
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 from dzdesign.verify.exhaustive.test_vectors import differences

@@ -21,8 +21,7 @@ from dzdesign.core.folder_contents import digest_of, manifest_of
 from dzdesign.core.input_files import MOST_RECORDING, reason_of
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.firmware_manifest import FirmwareManifest
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import FirmwareManifest, OutputManifest
 from dzdesign.verify.requirements import REPRODUCED, Check
 
 #: Folder of a firmware for files of the user's own, beside those that were generated.

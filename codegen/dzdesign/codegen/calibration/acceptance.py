@@ -18,7 +18,7 @@ from dzdesign.codegen.calibration.layout import (
     SideBlock,
 )
 from dzdesign.codegen.core.integer_form import INT32_MAX, INT64_MAX
-from dzdesign.design.current.loop import LARGEST_ERROR, LARGEST_GAIN
+from dzdesign.design.current.circuit import LARGEST_ERROR, LARGEST_GAIN
 from dzdesign.design.drive_functions import MOST_FAULT_SAMPLES
 from dzdesign.design.signals import LARGEST_DIFFERENCE, WEIGHT_SHIFT
 

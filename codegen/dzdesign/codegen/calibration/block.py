@@ -25,7 +25,7 @@ from dzdesign.codegen.core.integer_form import INT32_MAX, WORD_BITS, IntegerForm
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.current.loop import CurrentLoop
+from dzdesign.design.current.circuit import CurrentLoop
 from dzdesign.design.signals import SIDE_NAMES, WEIGHT_SHIFT
 
 #: Nodes that stand for pressures that can't be right.

@@ -52,7 +52,7 @@ from dzdesign.codegen.target import Target
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.law import law
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.current.loop import CORRECTION_SHIFT
+from dzdesign.design.current.circuit import CORRECTION_SHIFT
 from dzdesign.design.drive_functions import RAMP_UNIT
 from dzdesign.design.signals import WEIGHT_SHIFT
 

@@ -5,9 +5,8 @@ from textwrap import wrap
 from dzdesign.codegen.banner import lot_in_words
 from dzdesign.codegen.core.constants import COLUMNS
 from dzdesign.derivation.law import Law
+from dzdesign.design.certificate import above_in_words, below_in_words, taken_off
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.accounting import taken_off
-from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.design.signals import SIDE_NAMES
 
 #: Of the numerators over a power of two, by design/dzdesign/design/designing.py.

@@ -19,7 +19,7 @@ from dzdesign.codegen.integers.form import Form, Limbs, Node
 from dzdesign.codegen.integers.interface import Interface, interface_named
 from dzdesign.codegen.telemetry.frame import beta_factor
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.signals import CODE_LIMIT
 
 #: Function of each sign of command.

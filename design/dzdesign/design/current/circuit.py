@@ -1,4 +1,4 @@
-"""The coil, its supply and how its current is sampled: what a current loop is designed for."""
+"""The coil, its supply, its sensor and their sampling: what a current loop is designed for; and the loop's integers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,10 +6,19 @@ from itertools import product
 from math import log, sqrt
 from typing import Annotated, NamedTuple
 
+import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
 
+#: Largest gain: with an error of `LARGEST_ERROR` counts, full command and the integral the sum stays within 31 bits.
+LARGEST_GAIN = 8191
+LARGEST_ERROR = 90_000
+#: The correction of a supply's voltage has this many binary places.
+CORRECTION_SHIFT = 14
+
+Count = Annotated[int, Meta(ge=0, le=65535)]
+Gain = Annotated[int, Meta(ge=0, le=LARGEST_GAIN)]
 Factors = Annotated[tuple[float, float], Meta(description="Least and largest factor.")]
 
 
@@ -126,3 +135,140 @@ class CurrentSampling:
     def delay_s(self) -> float:
         """From the middle of the samples to the middle of the period in which the output acts."""
         return (1.5 - (self.before / self.samples - 0.5)) * self.period_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentSensor:
+    """Voltage at the converter's pin for a current, and for the supply where that is measured."""
+
+    V_per_A: Annotated[float, quantity("V/A", gt=0)]
+    """Shunt resistance times amplifier gain."""
+    offset_V: Annotated[float, quantity("V", ge=0)] = 0.0
+    """Voltage at the pin at zero current."""
+    supply_divider: Annotated[float, quantity("1", ge=0)] = 0.0
+    """Ratio of the supply's voltage divider; 0 if the supply is not measured."""
+
+    def __post_init__(self) -> None:
+        if not self.V_per_A > 0 or self.offset_V < 0 or not 0 <= self.supply_divider < 1:
+            raise RuleError(
+                "the current's sensor needs a positive gain, an offset of zero or more, a divider below one"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorLine:
+    """The straight lines from a current, and from the supply's voltage, to a code before it is rounded down."""
+
+    V_per_A: float
+    offset_V: float
+    codes_per_V: float
+    code_max: int
+    supply_divider: float
+
+    def codes(self, volts: np.ndarray) -> np.ndarray:
+        """Return the codes of voltages at the pin."""
+        rounded: np.ndarray = np.clip(np.floor(volts * self.codes_per_V), 0, self.code_max)
+        return rounded
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SupplyCorrection:
+    """Nominal supply voltage over the measured one, linear between nodes over the converter's codes."""
+
+    valid_codes: tuple[Count, Count]
+    """Range of the supply's codes; a code outside is replaced with the nearest one inside."""
+    step_codes: Annotated[int, Meta(ge=1, le=4096)]
+    """Codes between two nodes, a power of two."""
+    nodes: tuple[Count, ...]
+    """Nominal over measured voltage times 16384, at valid_codes[0] and at each further step."""
+
+    def __post_init__(self) -> None:
+        low, high = self.valid_codes
+        if not 0 <= low < high:
+            raise RuleError(f"the supply's codes {low} to {high} do not rise")
+        if self.step_codes < 1 or self.step_codes & (self.step_codes - 1):
+            raise RuleError(f"step_codes is {self.step_codes}, expected a power of two")
+        needed = (high - low) // self.step_codes + 2
+        if len(self.nodes) != needed:
+            raise RuleError(f"the supply's correction has {len(self.nodes)} nodes, expected {needed}")
+        if max(self.nodes) * self.step_codes >= 2**31 or max(self.nodes) > 65535 or min(self.nodes) < 1:
+            raise RuleError("a node of the supply's correction is outside 1 to 65535, or too far from the next")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurrentLoop:
+    """An integer PI controller with feed-forward, limit, anti-windup and detection of faults.
+
+    Set points are counts: `full_counts` stands for the rated current. The converter's codes come as the sum of those
+    taken in a PWM period.
+    """
+
+    full_counts: Annotated[int, Meta(ge=1, le=65535)]
+    """Set point of the rated current, in counts."""
+    compare_limit: Count
+    """Largest compare value of the PWM."""
+    rate: Annotated[int, Meta(ge=1, le=65535)]
+    """Largest change of the set point in a PWM period, in counts."""
+    samples: Annotated[int, Meta(ge=1, le=16)]
+    """Current samples in a PWM period, a power of two."""
+    current_gain: Annotated[int, Meta(ge=1, le=65535)]
+    """Counts of current per unit of the code sum after offset correction, times 2^current_shift."""
+    current_shift: Annotated[int, Meta(ge=1, le=15)]
+    """Fractional bits of current_gain."""
+    gain_shift: Annotated[int, Meta(ge=1, le=13)]
+    """Fractional bits of the three controller gains."""
+    proportional: Gain
+    """PWM counts per count of error, times 2^gain_shift."""
+    integral: Gain
+    """PWM counts per count of error that are added in every PWM period, times 2^gain_shift."""
+    feed_forward: Gain
+    """PWM counts per count of set point, times 2^gain_shift."""
+    integral_limit: Count
+    """Largest magnitude of the integral, in PWM counts."""
+    release: Count
+    """PWM counts by which the output stays below the integral, which starts at 0 on release."""
+    offset_nominal: Count
+    """Designed code sum at zero current."""
+    offset_tolerance: Count
+    """Largest deviation from offset_nominal that calibration removes."""
+    offset_shift: Annotated[int, Meta(ge=0, le=12)]
+    """The offset is averaged over 2^offset_shift PWM periods."""
+    short_sum: Count
+    """Code sum from which a short circuit is detected at once."""
+    over_sum: Count
+    """Code sum after offset correction from which the current is too high."""
+    over_ticks: Annotated[int, Meta(ge=1, le=65535)]
+    """Consecutive PWM periods with too high a current that make a fault."""
+    open_sum: Count
+    """Code sum after offset correction below which the current counts as absent."""
+    open_compare: Count
+    """Compare value from which a current is expected."""
+    open_ticks: Annotated[int, Meta(ge=1, le=65535)]
+    """Consecutive PWM periods without an expected current that make a fault."""
+    supply: SupplyCorrection | None = None
+    """Correction for the supply voltage, if it is measured."""
+
+    def __post_init__(self) -> None:
+        if self.samples & (self.samples - 1) or not 1 <= self.samples <= 16:
+            raise RuleError(f"samples is {self.samples}, expected a power of two up to 16: the sum has 16 bits")
+        if self.largest_current > LARGEST_ERROR:
+            raise RuleError(
+                f"the sensor's range is {self.largest_current} counts of current, expected at most {LARGEST_ERROR}: "
+                "one and a half times the rated current of 60000 counts"
+            )
+        if self.integral_limit << self.gain_shift > 65535 * 8192:
+            raise RuleError("the integral's limit and the gains' binary places need more than 31 bits")
+        if self.release > self.integral_limit:
+            raise RuleError(f"release is {self.release}, expected at most the integral's limit {self.integral_limit}")
+        if self.offset_nominal + self.offset_tolerance > 65535:
+            raise RuleError("the offset's tolerance reaches past the end of the sum")
+        if not 0 < self.open_sum < self.over_sum < self.short_sum <= 65535:
+            raise RuleError("the sums of open load, over-current and short must rise in this order")
+        for name in ("over_ticks", "open_ticks", "rate"):
+            if not 1 <= getattr(self, name) <= 65535:
+                raise RuleError(f"{name} is {getattr(self, name)}, expected 1 to 65535")
+
+    @property
+    def largest_current(self) -> int:
+        """Counts of current of the largest sum that is no short, without an offset: beyond it the output is off."""
+        return (self.short_sum * self.current_gain + (1 << (self.current_shift - 1))) >> self.current_shift

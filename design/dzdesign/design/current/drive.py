@@ -1,76 +1,267 @@
-"""`CurrentDrive`: current control as `design` chose it, with its margins, its steps, and what it makes of a dither."""
+"""`CurrentDrive`: coil, supply, sampling and sensor in; the current loop that meets its margins at every corner out."""
 
-from dataclasses import dataclass
-from math import ceil, isfinite
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import ceil, floor, isfinite, log
 from typing import Annotated
 
-import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
 from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.design.current.choosing import (
-    LEAST_PHASE_DEG,
-    SHORT_SHARE,
+from dzdesign.design.current.circuit import (
+    CORRECTION_SHIFT,
+    LARGEST_ERROR,
+    LARGEST_GAIN,
+    CoilCircuit,
+    CurrentLoop,
+    CurrentSampling,
     CurrentSensor,
-    allowed_at_release_A,
-    choose_loop,
-    gains_of,
-    sensor_line,
-    worst_step,
-)
-from dzdesign.design.current.circuit import CoilCircuit, CurrentSampling
-from dzdesign.design.current.loop import CurrentLoop
-from dzdesign.design.current.responses import (
-    STEP_S,
     SensorLine,
+    SupplyCorrection,
+)
+from dzdesign.design.current.responses import (
+    SEARCH_GRID,
+    STEP_S,
+    Gains,
+    StepResponse,
+    dither_departure,
     released_overshoot_A,
-    run_loop,
     step_responses,
     worst_margins,
 )
 from dzdesign.design.target_inputs import Converter
 
-#: Set points about which the wave is tried, of the rated current; for how long, until it has settled and after.
-SHARES = (0.25, 0.5, 0.75)
-SETTLED_S, SEEN_S = 0.2, 0.1
+#: Phase margin that the gains are chosen for, and the least that a loop may have.
+CHOSEN_PHASE_DEG, LEAST_PHASE_DEG = 55.0, 45.0
+#: The integral's time constant over that of the declared coil.
+INTEGRAL_TIME = 2.0
+#: Overshoot of a step that the set point's rate is chosen for, and the rates that are tried: PWM periods for the rated
+#: current.
+CHOSEN_OVERSHOOT = 0.08
+RATE_PERIODS = (4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 25, 32, 40, 50, 64, 80, 100, 125, 160, 200, 250, 320, 400, 500)
+#: How far the output begins below the integral, in 64ths of the largest power of two in the PWM's range (a constant of
+#: few bits is one instruction); and the overshoot that a release may have, codes.
+RELEASES = (0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64)
+RELEASED_CODES = 0.5
+#: Share of the rated current above which it is too high, and for how long it may be, s.
+OVER_SHARE, OVER_S = 1.2, 2e-3
+#: Shares of the converter's range and of the rated current beyond which the load counts as shorted, the lower one.
+SHORT_RANGE, SHORT_SHARE = 0.98, 1.45
+#: Share of the rated current below which none seems to flow, and how many times that must flow where one is missed.
+OPEN_SHARE, OPEN_TIMES, OPEN_PATIENCE = 0.02, 3.0, 4.0
+#: Of the converter's range, by which the sensor's zero may be off.
+OFFSET_SHARE = 0.02
+OFFSET_SHIFT = 6
+#: Codes of the supply between two nodes of its correction.
+SUPPLY_STEP = 64
+#: Of the supply's range, by which a measured one may leave it before it counts as its end.
+SUPPLY_BEYOND = 0.1
+STEPS_OF_SEARCH = 16
 
 
-def dither_departure(
-    loop: CurrentLoop,
-    circuit: CoilCircuit,
-    sampling: CurrentSampling,
-    sensor: SensorLine,
-    *,
-    counts: int,
-    ticks: int,
-) -> tuple[int, int]:
-    """Return by how many counts the current's peak lies above the set point's at most, and below it at most.
+def choose_gains(circuit: CoilCircuit, sampling: CurrentSampling, supply_measured: bool) -> Gains:
+    """Return the largest gains with the phase margin that is asked for at every corner.
 
-    The certificate keeps the dither's peak free under the threshold: of a controlled current its own, which overshoots
-    the wave's steps or does not reach their top, the largest mean of a PWM period at the worst corner. Both are 0 or
-    more; `counts` is the wave's peak, `ticks` the PWM periods of half of it.
+    The feed-forward is that of the corner that needs least: more would overshoot there. The integral brings the rest.
     """
-    above, below = [0.0], [0.0]
-    for share in SHARES if counts else ():
-        set_point, tops = round(share * loop.full_counts), (share + counts / loop.full_counts) * circuit.rated_A
-        able = [corner for corner in circuit.corners() if circuit.duty(corner, tops) < 1]
-        if not able or not counts < set_point <= loop.full_counts - counts:
-            continue
-        settled, seen = (round(seconds * sampling.tick_Hz) for seconds in (SETTLED_S, SEEN_S))
-        wave = _wave(set_point, counts, ticks, settled + seen)
-        means, _ = run_loop(loop, circuit, able, sampling, sensor, wave)
-        peaks = means[settled:].max(axis=0) * loop.full_counts / circuit.rated_A - set_point - counts
-        above.append(float(peaks.max()))
-        below.append(float(-peaks.min()))
-    return ceil(max(above)), ceil(max(below))
+    nominal = circuit.nominal
+    per_period = sampling.period_s * nominal.resistance_ohm / nominal.inductance_H / INTEGRAL_TIME
+
+    def gains(proportional: float) -> Gains:
+        return Gains(
+            proportional=proportional,
+            integral=proportional * per_period,
+            feed_forward=min(
+                corner.resistance_ohm * (1 if supply_measured else circuit.nominal_V / corner.supply_V)
+                for corner in circuit.corners()
+            ),
+            supply_measured=supply_measured,
+        )
+
+    low, high = 1e-3 * nominal.resistance_ohm, 1e4 * nominal.resistance_ohm
+    for _ in range(STEPS_OF_SEARCH):
+        middle = (low * high) ** 0.5
+        if worst_margins(circuit, sampling, gains(middle), SEARCH_GRID)[0].phase_deg >= CHOSEN_PHASE_DEG:
+            low = middle
+        else:
+            high = middle
+    return gains(low)
 
 
-def _wave(set_point: int, counts: int, ticks: int, periods: int) -> np.ndarray:
-    up: np.ndarray = np.arange(periods) % (2 * ticks) < ticks
-    wave: np.ndarray = set_point + np.where(up, counts, -counts)
-    return wave
+def choose_loop(
+    circuit: CoilCircuit,
+    sensor: CurrentSensor,
+    converter: Converter,
+    sampling: CurrentSampling,
+    *,
+    compare_max: int,
+    compare_limit: int | None = None,
+) -> CurrentLoop:
+    """Return the current loop in integers; a coil or a sensor that allows none is an `InputError`."""
+    if circuit.duty(circuit.nominal, circuit.rated_A) >= 1:
+        raise InputError(
+            f"the coil carries at most {circuit.nominal_V / circuit.nominal.resistance_ohm:.3g} A at "
+            f"{circuit.nominal_V:.3g} V, expected more than the rated current of {circuit.rated_A:g} A; check --coil, "
+            "--rated-current and --supply"
+        )
+    gains = choose_gains(circuit, sampling, sensor.supply_divider > 0)
+    rated_V, full_V, samples = sensor.V_per_A * circuit.rated_A, float(converter.full_V), sampling.samples
+    _refuse_sensor(sensor, rated_V, converter, samples)
+    counts = circuit.rated_A / circuit.nominal_V  # of the PWM for a count of current, over V/A
+    real = {name: getattr(gains, name) * counts for name in ("proportional", "integral", "feed_forward")}
+    gain_shift = min(13, floor(log(LARGEST_GAIN / max(real.values()), 2)))
+    if gain_shift < 1 or round(real["integral"] * 2**gain_shift) < 8:
+        raise InputError(
+            f"the current loop needs gains from {min(real.values()):.2g} to {max(real.values()):.2g} counts a count, "
+            "which 13 bits do not hold; check the coil's resistance, inductance and rated current"
+        )
+    # Counts of current for a code of a period's sum; and that sum of a share of the rated current, less the offset.
+    exact = compare_max / (samples * rated_V * converter.levels / full_V)
+    current_shift = min(15, floor(log(65535 / exact, 2)))
+    if current_shift < 1:
+        raise InputError("the current's sensor is too weak: raise the shunt or its gain")
+    current_gain = round(exact * 2**current_shift)
+
+    def above(share: float) -> int:
+        return round(samples * (share * rated_V * converter.levels / full_V))
+
+    offset = samples * converter.code(Fraction(sensor.offset_V))
+    # The load is shorted below what the controller's 31 bits hold.
+    by_bits = ((LARGEST_ERROR << current_shift) - (1 << current_shift)) // current_gain
+    hot = max(circuit.corners(), key=lambda corner: corner.resistance_ohm / corner.supply_V)
+    open_duty = circuit.duty(hot, OPEN_TIMES * OPEN_SHARE * circuit.rated_A)
+    slowest_s = max(corner.inductance_H / corner.resistance_ohm for corner in circuit.corners())
+    loop = CurrentLoop(
+        full_counts=compare_max,
+        rate=min(compare_max, 65535),
+        compare_limit=compare_max if compare_limit is None else compare_limit,
+        samples=samples,
+        current_gain=current_gain,
+        current_shift=current_shift,
+        gain_shift=gain_shift,
+        **{name: round(value * 2**gain_shift) for name, value in real.items()},
+        integral_limit=3 << (compare_max.bit_length() - 2),  # two bits are one instruction
+        release=0,
+        offset_nominal=offset,
+        offset_tolerance=round(OFFSET_SHARE * converter.levels) * samples,
+        offset_shift=OFFSET_SHIFT,
+        short_sum=min(floor(SHORT_RANGE * converter.levels) * samples, offset + above(SHORT_SHARE), by_bits),
+        over_sum=above(OVER_SHARE),
+        over_ticks=ceil(OVER_S * sampling.tick_Hz),
+        open_sum=max(1, above(OPEN_SHARE)),
+        open_compare=ceil(open_duty * compare_max),
+        open_ticks=ceil(OPEN_PATIENCE * slowest_s * log(OPEN_TIMES / (OPEN_TIMES - 1)) * sampling.tick_Hz),
+        supply=_supply_correction(circuit, sensor, converter),
+    )
+    line = sensor_line(sensor, converter)
+    return _with_release(_with_rate(loop, circuit, sampling, line), circuit, sampling, line)
+
+
+def sensor_line(sensor: CurrentSensor, converter: Converter) -> SensorLine:
+    """Return the codes of a current and of a supply."""
+    return SensorLine(
+        V_per_A=sensor.V_per_A,
+        offset_V=sensor.offset_V,
+        codes_per_V=converter.levels / float(converter.full_V),
+        code_max=converter.code_max,
+        supply_divider=sensor.supply_divider,
+    )
+
+
+def _with_rate(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, line: SensorLine) -> CurrentLoop:
+    """Return the loop with the fastest set point whose step does not overshoot too far at any corner."""
+    for periods in RATE_PERIODS:
+        tried = replace(loop, rate=max(1, loop.full_counts // periods))
+        if worst_step(step_responses(tried, circuit, sampling, line, ends_only=True))[1].overshoot <= CHOSEN_OVERSHOOT:
+            return tried
+    raise InputError(
+        f"the current overshoots by more than {CHOSEN_OVERSHOOT:.0%} however slowly the set point moves; declare "
+        "narrower ranges of resistance, inductance or supply, or measure the supply"
+    )
+
+
+def _with_release(loop: CurrentLoop, circuit: CoilCircuit, sampling: CurrentSampling, line: SensorLine) -> CurrentLoop:
+    """Return the loop whose output begins low enough that no current overshoots as the drive is released.
+
+    What the integral takes up on the way would carry the current past the offset, where the valve opens. It comes up
+    from below instead, within some time constants of the integral. Where even the lowest beginning is too high it is
+    taken, and `CurrentDrive.release_overshoot_A` says what is left.
+    """
+    unit = max((1 << (loop.full_counts.bit_length() - 1)) // 64, 1)
+    allowed_A = allowed_at_release_A(line)
+    low, high = -1, len(RELEASES) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        tried = replace(loop, release=RELEASES[middle] * unit)
+        if released_overshoot_A(tried, circuit, sampling, line) <= allowed_A:
+            high = middle
+        else:
+            low = middle
+    return replace(loop, release=RELEASES[high] * unit)
+
+
+def allowed_at_release_A(line: SensorLine) -> float:
+    """Return the overshoot of a release that is none: what the sensor does not show."""
+    return RELEASED_CODES / (line.V_per_A * line.codes_per_V)
+
+
+def worst_step(steps: Sequence[StepResponse]) -> tuple[StepResponse, StepResponse]:
+    """Return the slowest step, and the one that overshoots most."""
+    return max(steps, key=lambda step: step.rise_s), max(steps, key=lambda step: step.overshoot)
+
+
+def _refuse_sensor(sensor: CurrentSensor, rated_V: float, converter: Converter, samples: int) -> None:
+    """Refuse a sensor that gives the rated current, or none, a voltage that the converter can't tell."""
+    top_V, full_V = sensor.offset_V + OVER_SHARE * rated_V, float(converter.full_V)
+    if top_V > SHORT_RANGE * full_V:
+        raise InputError(
+            f"at {OVER_SHARE:.0%} of the rated current its sensor gives {top_V:.4g} V, expected at most "
+            f"{SHORT_RANGE * full_V:.4g} V of the converter's {full_V:g} V; lower the shunt or its gain"
+        )
+    least_V = OFFSET_SHARE * full_V
+    if not sensor.offset_V > least_V:
+        raise InputError(
+            f"without current its sensor gives {sensor.offset_V:g} V, expected more than {least_V:.3g} V: an "
+            "offset below the converter's zero is not seen, so that the calibration leaves it in the current; "
+            "shift the sensor, such as '0..1.2 A on 2 ohm + 0.15 V'"
+        )
+    if samples * converter.code_max > 65535:
+        raise InputError(f"{samples} samples of the current do not fit a sum of 16 bits")
+
+
+def _supply_correction(circuit: CoilCircuit, sensor: CurrentSensor, converter: Converter) -> SupplyCorrection | None:
+    if not sensor.supply_divider:
+        return None
+    codes_per_V = sensor.supply_divider * converter.levels / float(converter.full_V)
+    low = floor(circuit.supply_V[0] * (1 - SUPPLY_BEYOND) * codes_per_V)
+    high = ceil(circuit.supply_V[1] * (1 + SUPPLY_BEYOND) * codes_per_V)
+    if high > converter.code_max:
+        raise InputError(
+            f"a supply of {circuit.supply_V[1] * (1 + SUPPLY_BEYOND):.4g} V is beyond the converter's "
+            f"{float(converter.full_V):g} V; lower the divider of {sensor.supply_divider:g}"
+        )
+    nodes = (high - low) // SUPPLY_STEP + 2
+    factors = (
+        circuit.nominal_V * codes_per_V / (low + 0.5 + node * SUPPLY_STEP) * (1 << CORRECTION_SHIFT)
+        for node in range(nodes)
+    )
+    return SupplyCorrection(
+        valid_codes=(low, high), step_codes=SUPPLY_STEP, nodes=tuple(min(round(factor), 65535) for factor in factors)
+    )
+
+
+def gains_of(loop: CurrentLoop, circuit: CoilCircuit) -> Gains:
+    """Return the gains that the integers are, in units of the circuit."""
+    unit = circuit.nominal_V / circuit.rated_A / (1 << loop.gain_shift)
+    return Gains(
+        proportional=loop.proportional * unit,
+        integral=loop.integral * unit,
+        feed_forward=loop.feed_forward * unit,
+        supply_measured=loop.supply is not None,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +316,7 @@ class CurrentDrive:
         circuit, loop = self.circuit, self.loop
         low, high = circuit.supply_V
         measured = "measured" if loop.supply else "not measured"
-        return (
+        lines = [
             f"drive: current control, full drive is {units.text(circuit.rated_A, 'g A')}; coil "
             f"{circuit.resistance_ohm:g} + "
             f"{circuit.series_ohm:g} ohm (x {_ends(circuit.resistance_factors)}), {1e3 * circuit.inductance_H:g} mH (x "
@@ -134,8 +325,15 @@ class CurrentDrive:
             f"the worst corner; 10 to 90 % in {1e3 * self.rise_s:.1f} ms at the slowest ({1e3 * self.least_rise_s:.1f} "
             f"ms with the switch on all the time), overshoot up to {self.overshoot:.1%}; 90 to 10 % takes up to "
             f"{1e3 * self.fall_s:.0f} ms, as the freewheeling diode alone brakes",
-            *self._weak_in_words(units),
-        )
+        ]
+        weakest = min(circuit.corners(), key=lambda corner: corner.supply_V / corner.resistance_ohm)
+        if circuit.duty(weakest, circuit.rated_A) >= 1:  # no supply drives the rated current there, so it has no step
+            most = units.text(weakest.supply_V / weakest.resistance_ohm, ".3g A")
+            lines.append(
+                f"at {weakest.supply_V:g} V the hottest coil of {weakest.resistance_ohm:.3g} ohm carries {most} at "
+                "most, so that full command has less than the rated current; step and margins are of the others"
+            )
+        return tuple(lines)
 
     def release_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
         """Warn of a current that passes the set point that it is released to; of none say nothing."""
@@ -147,18 +345,6 @@ class CurrentDrive:
             f"{units.text(self.release_overshoot_A, '.2g A')} ({share:.1%} of the rated current), even from the lowest "
             "initial output. The valve may open briefly at zero command; declare narrower ranges of inductance, "
             "resistance or supply, or measure the supply",
-        )
-
-    def _weak_in_words(self, units: RecordedUnits) -> tuple[str, ...]:
-        """Say what flows at most where no supply drives the rated current; those corners have no step."""
-        circuit = self.circuit
-        weakest = min(circuit.corners(), key=lambda corner: corner.supply_V / corner.resistance_ohm)
-        if circuit.duty(weakest, circuit.rated_A) < 1:
-            return ()
-        most_A, at_V = weakest.supply_V / weakest.resistance_ohm, weakest.supply_V
-        return (
-            f"at {at_V:g} V the hottest coil of {weakest.resistance_ohm:.3g} ohm carries {units.text(most_A, '.3g A')} "
-            "at most, so that full command has less than the rated current; step and margins are of the others",
         )
 
 

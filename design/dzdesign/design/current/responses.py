@@ -1,4 +1,4 @@
-"""The current loop's margins at every corner, and the steps of its set point, the PWM resolved.
+"""The current loop's margins at every corner, and what a set point makes of the current, the PWM resolved.
 
 The controller stands here in the loop's integers as doubles: they hold every number that occurs, so the compare values
 are those of the firmware (a test holds it to that).
@@ -7,11 +7,18 @@ are those of the firmware (a test holds it to that).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import ceil
 
 import numpy as np
 
-from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
-from dzdesign.design.current.loop import CORRECTION_SHIFT, CurrentLoop
+from dzdesign.design.current.circuit import (
+    CORRECTION_SHIFT,
+    CoilCircuit,
+    Corner,
+    CurrentLoop,
+    CurrentSampling,
+    SensorLine,
+)
 
 #: Frequencies that are looked at, up to half the PWM's.
 GRID, SEARCH_GRID = 4_000, 600
@@ -134,22 +141,6 @@ class StepResponse:
     least_s: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensorLine:
-    """The straight lines from a current, and from the supply's voltage, to a code before it is rounded down."""
-
-    V_per_A: float
-    offset_V: float
-    codes_per_V: float
-    code_max: int
-    supply_divider: float
-
-    def codes(self, volts: np.ndarray) -> np.ndarray:
-        """Return the codes of voltages at the pin."""
-        rounded: np.ndarray = np.clip(np.floor(volts * self.codes_per_V), 0, self.code_max)
-        return rounded
-
-
 class Coils:
     """Coils at several corners side by side, each with its current."""
 
@@ -267,3 +258,44 @@ def released_overshoot_A(
     periods = round(RELEASED_S * sampling.tick_Hz)
     means, _ = run_loop(loop, circuit, [corner for corner, _ in tried], sampling, sensor, [counts] * periods)
     return float((means - counts / loop.full_counts * circuit.rated_A).max())
+
+
+#: Set points about which the wave is tried, of the rated current; for how long, until it has settled and after.
+SHARES = (0.25, 0.5, 0.75)
+SETTLED_S, SEEN_S = 0.2, 0.1
+
+
+def dither_departure(
+    loop: CurrentLoop,
+    circuit: CoilCircuit,
+    sampling: CurrentSampling,
+    sensor: SensorLine,
+    *,
+    counts: int,
+    ticks: int,
+) -> tuple[int, int]:
+    """Return by how many counts the current's peak lies above the set point's at most, and below it at most.
+
+    The certificate keeps the dither's peak free under the threshold: of a controlled current its own, which overshoots
+    the wave's steps or does not reach their top, the largest mean of a PWM period at the worst corner. Both are 0 or
+    more; `counts` is the wave's peak, `ticks` the PWM periods of half of it.
+    """
+    above, below = [0.0], [0.0]
+    for share in SHARES if counts else ():
+        set_point, tops = round(share * loop.full_counts), (share + counts / loop.full_counts) * circuit.rated_A
+        able = [corner for corner in circuit.corners() if circuit.duty(corner, tops) < 1]
+        if not able or not counts < set_point <= loop.full_counts - counts:
+            continue
+        settled, seen = (round(seconds * sampling.tick_Hz) for seconds in (SETTLED_S, SEEN_S))
+        wave = _wave(set_point, counts, ticks, settled + seen)
+        means, _ = run_loop(loop, circuit, able, sampling, sensor, wave)
+        peaks = means[settled:].max(axis=0) * loop.full_counts / circuit.rated_A - set_point - counts
+        above.append(float(peaks.max()))
+        below.append(float(-peaks.min()))
+    return ceil(max(above)), ceil(max(below))
+
+
+def _wave(set_point: int, counts: int, ticks: int, periods: int) -> np.ndarray:
+    up: np.ndarray = np.arange(periods) % (2 * ticks) < ticks
+    wave: np.ndarray = set_point + np.where(up, counts, -counts)
+    return wave

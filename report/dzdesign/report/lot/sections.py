@@ -7,7 +7,7 @@ from dataclasses import astuple, fields, replace
 
 from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.design.output_manifest import setting_words
+from dzdesign.design.firmware_manifest import setting_words
 from dzdesign.report.cells import (
     Cell,
     Table,

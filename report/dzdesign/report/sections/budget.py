@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
+from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.machine.accounting import reach_of_certificate
-from dzdesign.design.machine.budget import ADDED_IN_FULL, Budget, BudgetLine
+from dzdesign.design.side_law import ADDED_IN_FULL, Budget, BudgetLine
 from dzdesign.identify.plots.style import CYCLE
 from dzdesign.report.artefacts import laws_of
 from dzdesign.report.cells import Cell, Table, in_number_font, number, recorded, table_of

@@ -15,9 +15,9 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.content import DerivationReport, Entry, Words
 from dzdesign.derivation.presentation.report import closure, compose
 from dzdesign.derivation.presentation.writers import HtmlWriter
+from dzdesign.design.certificate import above_in_words, below_in_words
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
-from dzdesign.design.offset.above_tests import above_in_words, below_in_words
 from dzdesign.identify.valve.model import SIDES
 from dzdesign.report.artefacts import laws_of
 from dzdesign.report.cells import Cell, Table, recorded, table_of

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Machine
 from dzdesign.verify.closed_loop.drive_corners import COPPER_AT_C, holds_current, resistance_ratio
 from dzdesign.verify.closed_loop.loop import ClosedLoop, ReadingErrors
 from dzdesign.verify.closed_loop.plant import Plant

@@ -17,7 +17,7 @@ import numpy as np
 
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.current.circuit import CoilCircuit
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Machine
 from dzdesign.verify.closed_loop.plant import Plant
 from dzdesign.verify.closed_loop.ramps import FLOW_SHARE, dead_zone
 from dzdesign.verify.closed_loop.scene import Scene

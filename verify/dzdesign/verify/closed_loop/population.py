@@ -19,7 +19,7 @@ import numpy as np
 from dzdesign.core.artefact_files import read_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.toml_documents import read_toml
-from dzdesign.design.machine.machine import Machine
+from dzdesign.design.machine import Machine
 from dzdesign.verify.closed_loop.drawn_machine import COMPONENTS, ZeroDrives, drawn_machine
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN, RECORD_S
 from dzdesign.verify.closed_loop.plant import LONGEST_KEY

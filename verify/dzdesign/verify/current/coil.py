@@ -13,9 +13,14 @@ import numpy as np
 
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.current.choosing import CurrentSensor
-from dzdesign.design.current.circuit import CoilCircuit, Corner, CurrentSampling
-from dzdesign.design.current.loop import CORRECTION_SHIFT, CurrentLoop
+from dzdesign.design.current.circuit import (
+    CORRECTION_SHIFT,
+    CoilCircuit,
+    Corner,
+    CurrentLoop,
+    CurrentSampling,
+    CurrentSensor,
+)
 from dzdesign.design.target_inputs import Converter
 from dzdesign.verify.current.controller_states import PROGRAMS, tick_macro
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function

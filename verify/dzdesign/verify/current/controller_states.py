@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.current.loop import CORRECTION_SHIFT, CurrentLoop
+from dzdesign.design.current.circuit import CORRECTION_SHIFT, CurrentLoop
 from dzdesign.verify.current.results import ControllerStates
 from dzdesign.verify.toolchain.compiled_library import CompiledLibrary, Function
 from dzdesign.verify.toolchain.machines import HOST, Machine

@@ -16,7 +16,7 @@ import numpy as np
 from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.lot_margins import NAMED
+from dzdesign.design.lot_setting import NAMED
 from dzdesign.design.lot_valves import LotSide
 from dzdesign.identify.valve.above_tests import AboveTests
 from dzdesign.verify import requirements

@@ -13,7 +13,7 @@ from dzdesign.core.errors import InputError, quoted
 from dzdesign.core.option_readers import percent
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import remaining_dead_zone
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.verify.evidence import OutputChecks
 from dzdesign.verify.outputs.amplifier_files import FileLaw, read_file

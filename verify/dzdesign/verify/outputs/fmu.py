@@ -16,7 +16,7 @@ from dzdesign.core.artefact_files import sha256_of
 from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify import requirements
 from dzdesign.verify.closed_loop.loop import BENCH_BACK_MPA, ClosedLoop
 from dzdesign.verify.closed_loop.plant import Plant

@@ -24,7 +24,7 @@ from dzdesign.core.processes.programs import find_program
 from dzdesign.core.processes.running import run_program
 from dzdesign.core.scratch import scratch_folder
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.verify.evidence import OutputChecks, TriedInputs
 from dzdesign.verify.exhaustive.all_inputs import input_check, input_checks
 from dzdesign.verify.exhaustive.exact_law import ExactLaw

@@ -9,7 +9,7 @@ from dzdesign.core.artefact_types import THIS_TOOL, schema_of, to_json_bytes
 from dzdesign.core.errors import InputError, nearest, quoted
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.design.compensator import Compensator
-from dzdesign.design.output_manifest import OutputManifest
+from dzdesign.design.firmware_manifest import OutputManifest
 from dzdesign.design.pressure_inputs import not_covered
 from dzdesign.verify import requirements
 from dzdesign.verify.evidence import OutputChecks, OutputEvidence, TriedInputs

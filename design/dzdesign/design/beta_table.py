@@ -3,19 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.design.offset.above_tests import AboveChoice
-from dzdesign.design.offset.exact_row import ExactRow
-from dzdesign.design.offset.offset_ceiling import OffsetCeiling
-
-if TYPE_CHECKING:
-    import cvxpy as cp
-    from scipy.sparse import csr_array
+from dzdesign.design.ceiling import OffsetCeiling
+from dzdesign.design.design_choices import Above
+from dzdesign.design.exact_row import ExactRow
 
 #: Pressure codes between neighbouring nodes: a power of two, so that the firmware finds a node by a shift.
 STEP_CODES = 64
@@ -42,99 +36,35 @@ def best_nodes(limit: np.ndarray, worth: np.ndarray, trend: str | None, last: in
     RequirementError
         If no nodes lie under the limits.
     """
-    weights = _node_weights(limit.size)
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_array, vstack
+
+    codes = np.arange(limit.size)
+    index, share = codes // STEP_CODES, (codes % STEP_CODES) / STEP_CODES
+    entries = np.concatenate([1 - share, share]), (np.tile(codes, 2), np.concatenate([index, index + 1]))
+    weights = csr_array(entries, shape=(limit.size, int(index[-1]) + 2))
     gain = weights.T @ worth
     gain[-1] += worth[-1]
-    return _programme(limit.size, trend, last, top).solved(limit, gain)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Programme:
-    """The programme as cvxpy translates it: ``rows @ x <= most``, the first `equal` rows equal to it."""
-
-    rows: "csr_array"
-    equal: int
-    #: Largest values; of a limit the rows that have it, one for each code.
-    most: np.ndarray
-    of_limit: np.ndarray
-
-    def solved(self, limit: np.ndarray, gain: np.ndarray) -> list[float]:
-        """Return the best nodes.
-
-        A simplex ends in a vertex: no interior-point fuzz to round away. It starts again: from the last valve's vertex
-        it could end in another one, and a table would depend on what was designed before it.
-        """
-        from scipy.optimize import linprog
-
-        most = self.most.copy()
-        most[self.of_limit] = limit
-        rows, equal = self.rows, self.equal
-        try:
-            found = linprog(
-                -gain, A_ub=rows[equal:], b_ub=most[equal:], A_eq=rows[:equal] if equal else None,
-                b_eq=most[:equal] if equal else None, bounds=(None, None), method="highs-ds",
-            )  # fmt: skip
-            reason = "" if found.success else NOT_SOLVED.get(found.status, "numerical difficulties")
-        except ValueError:  # a limit that is no number
-            reason = "model refused"
-        if reason:
-            raise RequirementError(f"no table of beta lies under the certified offset (solver: {reason})")
-        return [float(node) for node in found.x]
-
-
-@lru_cache(maxsize=16)
-def _programme(count: int, trend: str | None, last: int, top: float) -> _Programme:
-    """State the programme once for all valves of one form: translating it takes longer than solving it."""
-    import cvxpy as cp
-
-    weights = _node_weights(count)
-    beta = cp.Variable(weights.shape[1])
-    limit = cp.Parameter(count, value=np.zeros(count))
-    constraints = [weights @ beta <= limit, beta <= top, *_one_way(beta, trend, last)]
-    problem = cp.Problem(cp.Maximize(cp.sum(beta)), constraints)
-    most = _translated(problem)["b"]
-    limit.value = np.arange(1.0, count + 1.0)
-    data = _translated(problem)
-    moved = data["b"] - most
-    of_limit = np.argsort(moved, kind="stable")[-count:]
-    if not np.array_equal(moved[of_limit], limit.value) or np.count_nonzero(moved) != count:
-        raise RuntimeError("cvxpy states the limits of the table otherwise than row by row")
-    return _Programme(rows=data["A"].tocsr(), equal=data["dims"].zero, most=most, of_limit=of_limit)
-
-
-def _translated(problem: "cp.Problem") -> dict[str, Any]:
-    """Return the cone form of the programme, whose rows are those that SciPy's simplex takes."""
-    import cvxpy as cp
-
-    data: dict[str, Any] = problem.get_problem_data(cp.CLARABEL)[0]
-    return data
-
-
-@lru_cache(maxsize=16)
-def _node_weights(count: int) -> "csr_array":
-    """Return by how much each node counts at each of so many codes, linear between the nodes: (codes, nodes)."""
-    from scipy.sparse import csr_array
-
-    codes = np.arange(count)
-    index, share = codes // STEP_CODES, (codes % STEP_CODES) / STEP_CODES
-    return csr_array(
-        (np.concatenate([1 - share, share]), (np.tile(codes, 2), np.concatenate([index, index + 1]))),
-        shape=(count, int(index[-1]) + 2),
-    )
-
-
-def _one_way(beta: "cp.Variable", trend: str | None, last: int) -> list["cp.Constraint"]:
-    """Return that beta runs the way of the trend up to the node `last`, and falls behind it.
-
-    The tests end between that node and the next, which lies above them: where they rise it may be either way.
-    """
-    import cvxpy as cp
-
-    steps = cp.diff(beta[: last + 1]) if last else np.zeros(1)
-    of_trend = {"decreasing": steps <= 0, "increasing": steps >= 0}.get(trend or "", steps == 0)
-    falls_from = last + 1 if trend == "increasing" else last
-    found = [of_trend] if last else []
-    return [*found, cp.diff(beta[falls_from:]) <= 0] if falls_from + 1 < beta.size else found
+    nodes = np.eye(gain.size)
+    steps, way = np.diff(nodes, axis=0), {"decreasing": 1, "increasing": -1}.get(trend or "", 0)
+    # The tests end between the node `last` and the next, which lies above them: where they rise it may be either way.
+    falling = steps[last + 1 if trend == "increasing" else last :]
+    one_way, constant = (way * steps[:last], None) if way else (steps[:0], csr_array(steps[:last]))
+    most = np.concatenate([limit, np.full(gain.size, top), np.zeros(len(one_way) + len(falling))])
+    rows = csr_array(vstack([weights, csr_array(np.concatenate([nodes, one_way, falling]))]))
+    try:
+        # A simplex ends in a vertex: no interior-point fuzz to round away. It starts again: from the last valve's
+        # vertex it could end in another one, and a table would depend on what was designed before it.
+        found = linprog(
+            -gain, A_ub=rows, b_ub=most, A_eq=constant, b_eq=None if constant is None else np.zeros(last),
+            bounds=(None, None), method="highs-ds",
+        )  # fmt: skip
+        reason = "" if found.success else NOT_SOLVED.get(found.status, "numerical difficulties")
+    except ValueError:  # a limit that is no number
+        reason = "model refused"
+    if reason:
+        raise RequirementError(f"no table of beta lies under the certified offset (solver: {reason})")
+    return [float(node) for node in found.x]
 
 
 def between_nodes(nodes: Sequence[int], count: int, step_codes: int = STEP_CODES) -> np.ndarray:
@@ -201,13 +131,25 @@ class TableMargins:
 SOLVER_MARGIN = 1e-7
 #: Worth of a code above the tests beside one of a tested pressure drop.
 WORTH_ABOVE = 0.01
+#: Segments of the table in which an offset that is released comes down, beside that in which the tests end: a table is
+#: linear between its nodes, and the tests keep their offset.
+RELEASE_SEGMENTS = 1
 
 
-def _with_release(ceiling: OffsetCeiling, least: Fraction, above: AboveChoice) -> OffsetCeiling:
+def released_from(above: Above, tested: range) -> int | None:
+    """Return the code from which an offset is released that was tested at codes in a range; None: it is not.
+
+    It is that of a node of the table: the offset comes down in the segment before it, under the continued bound.
+    """
+    if above != "release":
+        return None
+    return ((tested.stop - 1) // STEP_CODES + 1 + RELEASE_SEGMENTS) * STEP_CODES
+
+
+def _with_release(ceiling: OffsetCeiling, least: Fraction, above: Above) -> OffsetCeiling:
     """Return a ceiling that above the tests leaves room for the least offset, and for no other where it is released."""
     count, tested = len(ceiling.limit), ceiling.certified.stop
-    released_from = above.released_from(ceiling.certified)
-    end = count if released_from is None else min(released_from, count)
+    end = min(released_from(above, ceiling.certified) or count, count)
     limit = ceiling.limit[:tested].followed_by(ceiling.limit[tested:end].at_least(least))
     let_go = ExactRow.joined([([least.numerator] * (count - end), least.denominator)])
     return OffsetCeiling(limit=limit.followed_by(let_go), certified=ceiling.certified)
@@ -220,7 +162,7 @@ def choose_beta_table(
     *,
     denominator: int,
     above_one: bool,
-    above: AboveChoice | None = None,
+    above: Above | None = None,
 ) -> tuple[int, ...]:
     """Choose the nodes of beta that give the largest offset under the ceiling: a linear programme, then integers.
 
@@ -236,7 +178,7 @@ def choose_beta_table(
         Of the nodes.
     above_one : bool
         Whether beta may exceed 1: where the threshold grows with dP, or the tests below dP0 are followed.
-    above : AboveChoice, optional
+    above : {"lower", "release"}, optional
         What is to happen above the tests: there beta falls, whatever the trend, and what it has at the tests comes
         first. Without it the trend goes on to the last code.
 

@@ -1,6 +1,11 @@
 """The certified offset over the pressure drop, exactly from valve.json; at every code; and what may be put out of it.
 
 At consecutive codes a curve is a polynomial on each stretch between its nodes: whole numbers over one denominator.
+
+Above the highest tested pressure drop the offset is held, lowered with the continued bound, or released. Released means
+a beta of one unit: the compensation ends, and the command drives the valve on. A drive of zero would shut a valve that
+a pressure spike reaches at full command, which is a motion of its own; without an offset the dead zone is back, and
+nothing else.
 """
 
 from bisect import bisect_left
@@ -8,18 +13,96 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import accumulate
 from math import ceil, floor, lcm
 
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.worded import worded
-from dzdesign.design.machine.allowance import Allowance
-from dzdesign.design.offset.above_tests import OffsetAbove
-from dzdesign.design.offset.exact_row import ExactRow
+from dzdesign.design.design_choices import Above
+from dzdesign.design.exact_row import ExactRow
+from dzdesign.design.machine import Allowance, Machine
 from dzdesign.design.signals import Signals
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
+from dzdesign.identify.valve.guard_curve import CertifiedCurve
 
 #: valve.json has seven decimals, so a sum of two of its numbers is right to this, in V.
 DECIMALS = Fraction(1, 10**6)
+#: Beyond the span of any sensor.
+FURTHEST_MPa = 1000
+NONE = Fraction(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetAbove:
+    """How the offset goes on above the last test: under the continued bound, never rising, never below zero."""
+
+    #: From the last test on.
+    bound: CertifiedBound
+    certified: bool
+    #: Offset at the last test, V, and the least of it and the bound up to the end of each piece.
+    last_V: Fraction
+    least_V: tuple[Fraction, ...]
+
+    @classmethod
+    def under(cls, bound: CertifiedBound, last_V: Fraction, *, certified: bool) -> "OffsetAbove":
+        """Return the largest such offset."""
+        lows = (piece.least(piece.from_MPa, piece.to_MPa) for piece in bound.pieces)
+        least = tuple(accumulate(lows, min, initial=last_V))
+        return cls(bound=bound, certified=certified, last_V=last_V, least_V=least)
+
+    def at(self, dp_MPa: Fraction) -> Fraction:
+        """Return the offset at a pressure drop above the last test, V."""
+        pieces = self.bound.pieces
+        if dp_MPa > pieces[-1].to_MPa:
+            return Fraction(0)
+        place = bisect_left(pieces, dp_MPa, key=lambda piece: piece.to_MPa)
+        return max(min(self.least_V[place], pieces[place].least(pieces[place].from_MPa, dp_MPa)), Fraction(0))
+
+    def bound_at(self, dp_MPa: Fraction) -> Fraction | None:
+        """Return the certified bound there, V; None where there is none, and 0 where it says nothing any more."""
+        found = self.bound.at(dp_MPa) if self.certified else None
+        return None if found is None else max(found, Fraction(0))
+
+
+def offset_above(curve: CertifiedCurve, choice: Above, machine: Machine | None) -> OffsetAbove | None:
+    """Return how the offset of a curve goes on above its last test; None: it is held.
+
+    One test says nothing of a slope, so its offset can't be lowered: it is held, and nothing is certified there. An
+    error of the bench's gauge counts above the tests too, where it grows with the pressure drop.
+    """
+    continued = curve.above
+    if choice == "hold" or not curve.offset_dp_MPa or (choice == "lower" and continued is None):
+        return None
+    last_MPa, last_V = (Fraction(repr(values[-1])) for values in (curve.offset_dp_MPa, curve.offset_V))
+    if continued is not None:
+        error_MPa = Fraction(repr(machine.bench_pressure_error_MPa)) if machine else NONE
+        bound = _drawn_together(continued.bound(), error_MPa)
+        return OffsetAbove.under(bound, last_V, certified=continued.certified)
+    held = BoundPiece(last_MPa, last_MPa + FURTHEST_MPa, last_V, last_V, NONE)
+    return OffsetAbove.under(CertifiedBound(pieces=(held,)), last_V, certified=False)
+
+
+def _drawn_together(bound: CertifiedBound, error_MPa: Fraction) -> CertifiedBound:
+    """Return a bound above the tests where each pressure drop of the bench was wrong by up to an error at the last one.
+
+    A gauge's gain is wrong by as much at each test, so the drop at which a threshold truly is goes on as far beyond the
+    last test as the drop that was read, times 1 + error / last; the error at the last test itself counts as elsewhere.
+    Errors that change their sign from test to test are those of no gauge.
+    """
+    last = bound.dp_MPa[0]
+    factor = 1 + error_MPa / last
+    return CertifiedBound(
+        pieces=tuple(
+            BoundPiece(
+                last + (piece.from_MPa - last) / factor,
+                last + (piece.to_MPa - last) / factor,
+                piece.low_V,
+                piece.high_V,
+                piece.curvature * factor**2,
+            )
+            for piece in bound.pieces
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +170,6 @@ def certified_V(curve: OffsetCurve, dp_MPa: Fraction) -> Fraction:
 
 #: Coefficients of 1, x and x².
 Polynomial = tuple[Fraction, Fraction, Fraction]
-NONE = Fraction(0)
 #: Curve, signals, first and last code of the latest rows. Found again by comparing: a hash of that many fractions takes
 #: longer.
 KNOWN: deque[tuple[OffsetCurve, Signals, int, int, ExactRow]] = deque(maxlen=8)
@@ -156,7 +238,7 @@ def _corners(curve: OffsetCurve) -> list[Fraction]:
     pieces = list(curve.certified.pieces) if curve.certified else []
     if curve.above is not None:
         pieces += curve.above.bound.pieces
-        corners |= {_deepest_MPa(piece) for piece in curve.above.bound.pieces if piece.curvature > 0}
+        corners |= {deepest_MPa(piece) for piece in curve.above.bound.pieces if piece.curvature > 0}
     return sorted(corners | {end for piece in pieces for end in (piece.from_MPa, piece.to_MPa)})
 
 
@@ -183,7 +265,7 @@ def _stretch_above(curve: OffsetCurve, inside_MPa: Fraction) -> _Stretch:
     place = bisect_left(above.bound.pieces, inside_MPa, key=lambda piece: piece.to_MPa)
     piece = above.bound.pieces[place]
     passed = [above.least_V[place], piece.at(piece.from_MPa)]
-    if piece.curvature > 0 and piece.from_MPa < (deepest := _deepest_MPa(piece)) < inside_MPa:
+    if piece.curvature > 0 and piece.from_MPa < (deepest := deepest_MPa(piece)) < inside_MPa:
         passed.append(piece.at(deepest))
     polynomial = _of_piece(piece)
     return _Stretch(
@@ -193,7 +275,7 @@ def _stretch_above(curve: OffsetCurve, inside_MPa: Fraction) -> _Stretch:
     )
 
 
-def _deepest_MPa(piece: BoundPiece) -> Fraction:
+def deepest_MPa(piece: BoundPiece) -> Fraction:
     """Return where a sag is deepest, inside the piece or not, MPa."""
     slope = (piece.high_V - piece.low_V) / (piece.to_MPa - piece.from_MPa)
     return (piece.from_MPa + piece.to_MPa) / 2 - slope / piece.curvature
