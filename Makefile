@@ -25,7 +25,6 @@ coverage: $(STAMP)
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/codespell
-	$(BIN)/python -m tests.docs.prose_lint
 
 # After a change of what codegen writes: tests/goldens anew, then the tests that compile and run them. Read the diff.
 goldens: $(STAMP)

@@ -20,7 +20,7 @@ LEAST = {"formulas": 3000, "scopes": 80, "grounds": 400}
 def print_mutants(*, quick: bool, seed: int) -> list[Row]:
     """Print and return the rows of the account's mutants."""
     from dzdesign.derivation.account.account import verify_statements
-    from tests.support.account_mutants import score_mutations
+    from tests.derivation.account.mutants import score_mutations
 
     verdicts = verify_statements()
     share = 0.1 if quick else 1.0

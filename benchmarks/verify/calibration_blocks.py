@@ -13,9 +13,10 @@ from scoreboard import Row, print_rows, say
 
 sys.path.insert(0, str(Path(__file__).parents[2]))  # for the blocks and mutants that the tests share
 
+from check_mutants import CHECK, Corpus, drawn_mutants
+
 from tests.codegen.calibration.test_check import changed_blocks, forms
 from tests.support.block_corners import corners
-from tests.support.check_mutants import CHECK, Corpus, drawn_mutants
 from tests.support.claimed_blocks import CLAIMS, Drawn, TriedBlocks, random_block, random_octets
 
 #: Blocks of which half and more are accepted; those that are tried; pairs of pressures of each.

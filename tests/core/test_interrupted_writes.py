@@ -17,9 +17,8 @@ import pytest
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_files, write_folder
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import RETIRED, UNPLACED
-from tests.support.paths import DEVICES
 
-HERE = DEVICES
+HERE = Path(__file__).parent
 COMPILER = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
 pytestmark = [
     pytest.mark.slow,

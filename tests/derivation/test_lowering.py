@@ -10,7 +10,7 @@ import sympy
 
 from dzdesign.derivation import plant, scaling
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account.implementation import IMPLEMENTATION
+from dzdesign.derivation.account.model_and_codes import IMPLEMENTATION
 from dzdesign.derivation.law import LAW_NAMES, law
 from dzdesign.derivation.lowering import lower
 

@@ -3,11 +3,7 @@
 import doctest
 import json
 import re
-import shlex
-import shutil
-import subprocess
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import pytest
 import sympy
@@ -21,11 +17,11 @@ from dzdesign.derivation.account.account import STATEMENTS, verify_statements
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.solving import agree
 from dzdesign.derivation.account.statement import Outcome
-from dzdesign.derivation.presentation import formulas, prose, report, writers
+from dzdesign.derivation.presentation import content, formulas, report, writers
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text
 from dzdesign.derivation.presentation.writers import HtmlWriter, anchor
-from tests.support.account_claims import BY_NUMBER
-from tests.support.paths import ROOT
+from tests.derivation.account.claims import BY_NUMBER
+from tests.support.html_pages import Page
 from tests.support.schema_checks import overlooked, problems
 
 MARKS = {Outcome.FOLLOWS: "follows", Outcome.FOLLOWS_IF: "follows if", Outcome.DOES_NOT_FOLLOW: "does not follow"}
@@ -122,31 +118,25 @@ def test_what_is_printed_is_what_was_proved(expressions):
     assert not agree(read_back(to_text(law).replace("1 - beta", "1 + beta")), law)
 
 
-class Elements(HTMLParser):
-    """The elements of a page, each with its attributes and the number of elements in it; fails on a mismatch."""
+class Elements(Page):
+    """A page whose elements end where they must, each with the number of elements in it."""
 
     def __init__(self, page):
-        super().__init__()
         self.open, self.elements = [], []
-        self.feed(page)
+        super().__init__(page)
         assert self.open == []
 
     def handle_starttag(self, tag, attrs):
+        super().handle_starttag(tag, attrs)
         assert (tag, "a") != ("a", *(one[0] for one in self.open if one[0] == "a")), "a link within a link"
         if self.open:
-            self.open[-1][2] += 1
-        self.elements.append([tag, dict(attrs), 0])
+            self.open[-1][1] += 1
         if tag != "meta":
-            self.open.append(self.elements[-1])
+            self.open.append([tag, 0])
+            self.elements.append(self.open[-1])
 
     def handle_endtag(self, tag):
         assert self.open.pop()[0] == tag
-
-    def links(self):
-        return {attrs["href"] for tag, attrs, _ in self.elements if tag == "a"}
-
-    def anchors(self):
-        return [attrs["id"] for _, attrs, _ in self.elements if "id" in attrs]
 
 
 def test_mathml_elements_have_the_parts_that_they_need(expressions):
@@ -154,7 +144,7 @@ def test_mathml_elements_have_the_parts_that_they_need(expressions):
     for expression in expressions:
         latex = to_latex(expression)
         page = Elements(f"<math>{to_mathml(latex)}</math>")
-        assert [e for e in page.elements if e[0] in needed and e[2] != needed[e[0]]] == [], expression
+        assert [e for e in page.elements if e[0] in needed and e[1] != needed[e[0]]] == [], expression
         assert latex.count("{") == latex.count("}") and latex.count(r"\left") == latex.count(r"\right")
 
 
@@ -236,25 +226,12 @@ def test_json_fits_its_schema_and_can_be_read_back(rendered, rows):
         assert set(re.findall(r"[A-Za-z]\w*", row["statement"])) - listed <= {"sqrt", "log", "Piecewise", "True"}
 
 
-def test_json_says_what_the_text_says(rows):
-    wrong, law, condition = rows["(29)"], rows["(18)"], rows["(27)"]
-    assert (wrong["outcome"], wrong["corrected_by"]) == ("does not follow", "(29c)")
-    assert wrong["figures"][0]["value"] == 13650
-    assert [premise["number"] for premise in law["premises"]] == ["u_O", "(17)"]
-    last = law["derivations"][-1]["lines"][-1]
-    assert last["words"] == "Together:" and last["formula"].removeprefix("u_O = ") in law["statement"]
-    assert law["section"].startswith("1.2") and "T1c" in law["see"] and condition["necessary"] is True
-    simulation, first, second = rows["T3b"]["figures"]
-    assert (simulation["ours"], simulation["paper"]) == ("0.9391 L/min", "0.95 L/min (ours -1.1 %)")
-    assert (first["ours"], second["paper"]) == ("1.12 L/min", "")
-
-
 def test_html_is_one_page_without_scripts_or_network(rendered):
     page = Elements(rendered["html"])
-    assert not {tag for tag, _, _ in page.elements} & {"script", "link", "img", "iframe", "object", "base"}
+    assert not {tag for tag, _ in page.tags} & {"script", "link", "img", "iframe", "object", "base"}
     assert not re.search(r"https?:|url\(|@import|\son\w+=", rendered["html"])
-    assert len(page.anchors()) == len(set(page.anchors()))
-    assert {"#eq-18", "#T3b"} <= page.links() <= {f"#{identifier}" for identifier in page.anchors()}
+    assert len(page.ids()) == len(set(page.ids()))
+    assert {"#eq-18", "#T3b"} <= {*page.links()} <= {f"#{identifier}" for identifier in page.ids()}
     marks = re.findall(r'<span class="mark [^"]*"><span aria-hidden="true">(.)</span> ([a-z: ]+)', rendered["html"])
     words = {"▫": "given", "✓": "follows", "◐": "follows if", "✗": "does not follow"}
     assert len(marks) > len(STATEMENTS)  # a sign and a word, not only a colour
@@ -289,7 +266,7 @@ def test_a_part_of_the_account_reads_like_the_whole(found, format):
     assert "29c" in part  # what it should read, without a link to what is not shown
     if format == "html":
         page = Elements(part)
-        assert page.links() <= {f"#{identifier}" for identifier in page.anchors()}
+        assert {*page.links()} <= {f"#{identifier}" for identifier in page.ids()}
 
 
 def test_several_equations_and_names_with_commas():
@@ -346,24 +323,11 @@ def test_a_unit_error_is_named(derive, verdicts):
     assert "but: follows; its units: a sum of m and V." in printed.out
 
 
-@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
-def test_make_docs_builds_the_page_with_the_products_own_command(derive, rendered, tmp_path):
-    command = ["make", "-n", "docs", f"DOCS={tmp_path}"]
-    recipe = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    lines = [shlex.split(line) for line in recipe.splitlines() if "bin/dzdesign derive" in line]
-    for _, derived, *arguments in lines:
-        assert (derived, derive(*arguments)[0]) == ("derive", 0)
-    built = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
-    assert built == {"index.html": rendered["html"], "derivation.json": rendered["json"]}
-    assert "/docs/derivation/" in (ROOT / ".gitignore").read_text().splitlines()
-    assert re.search(r"^clean:\n\t.*\$\(DOCS\)", (ROOT / "Makefile").read_text(), re.MULTILINE)
-
-
 # --- prose --------------------------------------------------------------------------------------------------
 
 
 def test_a_sentence_has_symbols_code_and_references():
-    words = prose.Words("`a` step $u_i' - k*x_max <= 1$ by Eqs. (18) and (19), 8-8.5 V; [[S|the definition of $S$]]")
+    words = content.Words("`a` step $u_i' - k*x_max <= 1$ by Eqs. (18) and (19), 8-8.5 V; [[S|the definition of $S$]]")
     assert str(words) == "`a` step u_i' - k*x_max <= 1 by Eqs. (18) and (19), 8-8.5 V; the definition of S"
     html = HtmlWriter({"(18)", "S"}).words(words)
     for part in ("<code>a</code>", "8–8.5 V", '<a href="#eq-18">(18)</a> and (19)', '<a href="#S">the definition of'):
@@ -379,7 +343,7 @@ def test_every_symbol_in_prose_is_declared():
             assert set(re.findall(r"[A-Za-z]\w*'?", formula)) <= known, text
 
 
-@pytest.mark.parametrize("module", [prose, report, writers, formulas], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("module", [content, report, writers, formulas], ids=lambda one: one.__name__)
 def test_examples_in_the_docstrings_run(module):
     outcome = doctest.testmod(module)
     assert outcome.attempted > 0 and outcome.failed == 0

@@ -23,7 +23,7 @@ from dzdesign.design.offset.above_tests import AboveChoice
 from dzdesign.design.offset.offset_ceiling import offset_ceiling
 from dzdesign.design.options import options_of
 from dzdesign.design.redesign_check import prove_certificates, prove_derived
-from tests.support.machine_oracle import worst_margin_mV
+from tests.design.machine_oracle import worst_margin_mV
 
 TARGET = target_named("f28335").inputs()
 CURRENT = {

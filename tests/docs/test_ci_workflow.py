@@ -35,6 +35,9 @@ def test_the_workflow_is_one():
     assert [step["run"] for step in job["steps"] if "run" in step] == steps()
     assert all({"run", "uses"} & set(step) for step in job["steps"])
     assert document[True]  # `on`, which YAML 1.1 reads so
+    commands = [step.split() for step in steps() if step.startswith("dzdesign ")]
+    assert [words[1] for words in commands] == ["derive", "identify", "design", "codegen", "verify"]
+    assert "--ramps" in commands[-1], "the valve is identified again"
 
 
 def test_no_page_installs_a_name_that_anybody_may_register():
@@ -45,16 +48,13 @@ def test_no_page_installs_a_name_that_anybody_may_register():
         assert not by_name.search(page.read_text("utf-8").replace("\n", " ")), page
 
 
-def test_the_workflow_derives_before_it_designs():
-    commands = [step.split()[1] for step in steps() if step.startswith("dzdesign ")]
-    assert commands == ["derive", "identify", "design", "codegen", "verify"]
-
-
 @pytest.fixture(scope="module")
 def repository(tmp_path_factory):
     """A user's repository as the page describes it, and a runner's environment."""
     folder = tmp_path_factory.mktemp("ci")
-    shutil.copytree(EXAMPLE / "ramps", folder / "ramps")
+    (folder / "ramps").mkdir()
+    for ramp in EXAMPLE.glob("ramps/ramp_dP[15]_1.csv.gz"):  # two pressure drops are enough to identify and design
+        shutil.copy(ramp, folder / "ramps")
     shutil.copy(EXAMPLE / "plant.toml", folder)
     (folder / "dzdesign.toml").write_text(OPTIONS, encoding="utf-8")
     for step in steps():
@@ -106,8 +106,3 @@ def test_the_workflow_stops_where_nobody_committed_an_artefact(tmp_path, missing
     assert run(start, tmp_path).returncode == 0
     failed = [step for step in steps() if step.startswith("git ") and run(step, tmp_path).returncode]
     assert failed == ["git diff --exit-code valve.json compensator.json"]
-
-
-def test_the_workflow_identifies_again():
-    (verify,) = (step for step in steps() if step.startswith("dzdesign verify "))
-    assert "--ramps ramps/*.csv*" in verify

@@ -6,7 +6,6 @@ import os
 import re
 import subprocess
 import sys
-from html.parser import HTMLParser
 from urllib.parse import unquote
 
 import pytest
@@ -15,15 +14,14 @@ from dzdesign.command_line.command_table import COMMANDS
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.commands.schema import SCHEMAS, schema_document, schema_text
 from dzdesign.core.version import __version__
-from dzdesign.identify.data_quality.catalogue import catalogue
-from tests.support.paths import ROOMS, ROOT
+from tests.support.html_pages import Page
+from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
 pytest.importorskip("sphinx", reason="the site needs the packages of the extra `docs`")
 pytest.importorskip("myst_parser", reason="the site needs the packages of the extra `docs`")
 
 DOCS = ROOT / "docs"
-FOLDERS = (*ROOMS, "tests", "examples", "docs")
 #: Tag -> attribute by which a page loads something; a link that a reader may follow is not among them.
 LOADS = {"link": "href", "script": "src", "img": "src", "source": "src", "iframe": "src", "object": "data"}
 
@@ -39,50 +37,20 @@ def site(tmp_path_factory):
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stderr) == (0, ""), done.stderr
-    (folder / "said.txt").write_text(done.stdout, encoding="utf-8")
     return folder / "html"
-
-
-def test_the_build_says_what_it_does(site):
-    """It takes two minutes, most of them for the figures."""
-    listed = (DOCS / "figures" / "draw.py").read_text(encoding="utf-8").partition("FIGURES = {")[2].partition("}")[0]
-    names = re.findall(r'"(\w+)":', listed)
-    said = (site.parent / "said.txt").read_text(encoding="utf-8").splitlines()
-    figures = [f"docs: figure {n} of {len(names)}: {name.replace('_', ' ')}" for n, name in enumerate(names, 1)]
-    pages = sum(1 for path in DOCS.rglob("*.md") if "_build" not in path.parts)
-    assert len(names) > 5 and said[:-2] == ["docs: identifying the bundled example", *figures]
-    assert said[-2:] == [
-        f"docs: reading {pages} pages, with the reference of commands, files and Python", "docs: writing the pages",
-    ]  # fmt: skip
-
-
-class Page(HTMLParser):
-    """What a page loads, where its links lead, and the places that a link may lead to."""
-
-    def __init__(self, path):
-        super().__init__()
-        self.loads, self.links, self.places = [], [], set()
-        self.feed(path.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
-        if given.get("id"):
-            self.places.add(given["id"])
-        if tag == "a" and given.get("href"):
-            self.links.append(given["href"])
-        if tag in LOADS and given.get(LOADS[tag]):
-            self.loads.append(given[LOADS[tag]])
 
 
 @pytest.fixture(scope="module")
 def pages(site):
-    return {path.resolve(): Page(path) for path in site.rglob("*.html") if "derivation" not in path.parts}
+    paths = (path.resolve() for path in site.rglob("*.html") if "derivation" not in path.parts)
+    return {path: Page(path.read_text(encoding="utf-8")) for path in paths}
 
 
 def test_nothing_is_loaded_from_elsewhere(site, pages):
     assert len(pages) > 20
-    loaded = {(path.name, what) for path, page in pages.items() for what in page.loads}
-    assert [each for each in loaded if re.match(r"([a-z]+:)?//", each[1])] == []
+    tags = [(path.name, *tag) for path, page in pages.items() for tag in page.tags]
+    loaded = {(name, given[LOADS[tag]]) for name, tag, given in tags if tag in LOADS and given.get(LOADS[tag])}
+    assert loaded and [each for each in loaded if re.match(r"([a-z]+:)?//", each[1])] == []
     styles = "".join(path.read_text(encoding="utf-8") for path in site.rglob("*.css"))
     assert styles and re.findall(r"@import|url\(\s*['\"]?(?:https?:)?//[^)]*", styles) == []
     assert list(site.rglob("*.woff*")) == [], "no web fonts"
@@ -90,9 +58,10 @@ def test_nothing_is_loaded_from_elsewhere(site, pages):
 
 def test_every_link_leads_somewhere(site, pages):
     broken, tried = [], 0
+    places = {path: {*page.ids()} for path, page in pages.items()}
     account = {"index.html", "derivation.json"}
     for path, page in pages.items():
-        for link in page.links:
+        for link in page.links():
             tried += 1
             target, _, place = unquote(link).partition("#")
             if re.match(r"[a-z]+:", target):
@@ -100,19 +69,9 @@ def test_every_link_leads_somewhere(site, pages):
             where = (path.parent / target).resolve() if target else path
             if where.parent.name == "derivation" and where.name in account:
                 continue
-            if not where.is_file() or (place and where in pages and place not in pages[where].places):
+            if not where.is_file() or (place and where in pages and place not in places[where]):
                 broken.append(f"{path.name}: {link}")
     assert broken == [] and tried > 500
-
-
-def test_make_docs_builds_the_account_that_the_pages_link_to():
-    recipe = (ROOT / "Makefile").read_text().partition("\ndocs:")[2].partition("\n\n")[0]
-    text = (DOCS / "derivation.md").read_text()
-    linked = re.findall(r'href="derivation/([^"]+)"', text)
-    assert len(linked) == 2 and [name for name in linked if f"$(DOCS)/{name}" not in recipe] == []
-    assert "sphinx-build -q -E -W" in recipe
-    ignored = (ROOT / ".gitignore").read_text().splitlines()
-    assert {"/docs/_build/", "/docs/_made/", "/docs/derivation/"} <= set(ignored)
 
 
 def test_the_reference_has_every_command_with_every_option(site):
@@ -152,14 +111,6 @@ def described_keys(schema):
             yield from described_keys(value)
 
 
-def test_the_page_of_warnings_is_the_catalogue(site):
-    """Of each code what it means and what to do, under its own heading."""
-    page = (site / "reference" / "warnings.html").read_text(encoding="utf-8")
-    for code in catalogue():
-        assert f'id="{code}"' in page, code
-    assert page.count("<strong>Meaning:</strong>") == page.count("<strong>What to do:</strong>") == len(catalogue())
-
-
 def test_every_note_of_assess_is_documented_and_none_is_invented():
     text = (DOCS / "reference" / "warnings.md").read_text(encoding="utf-8")
     made = {
@@ -174,47 +125,6 @@ def test_every_note_of_assess_is_documented_and_none_is_invented():
     assert set(re.findall(r"^\| `(\S+)` \|", text, re.MULTILINE)) == made
 
 
-def test_every_figure_is_shown_with_words_for_those_who_cannot_see_it(site):
-    sys.path.insert(0, str(DOCS))
-    from figures.draw import FIGURES
-
-    shown = "".join(path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md"))
-    for name in FIGURES:
-        block = shown.partition(f"_made/figures/{name}.svg\n")[2].partition("```")[0]
-        assert len(block.partition(":alt: ")[2].splitlines()[0]) > 40, name
-        assert (site / "_images" / f"{name}.svg").stat().st_size < 400_000
-
-
-def test_a_figure_is_drawn_again_with_the_same_bytes(site, tmp_path):
-    sys.path.insert(0, str(DOCS))
-    from figures.draw import FIGURES
-    from figures.example import read_example
-    from figures.frame import save, style
-
-    example = read_example()
-    for name in ("staircase", "residual"):
-        with style():
-            save(FIGURES[name](example), tmp_path / f"{name}.svg")
-        assert (tmp_path / f"{name}.svg").read_bytes() == (site / "_images" / f"{name}.svg").read_bytes()
-
-
-def test_the_pages_name_no_file_that_is_not_there():
-    """Paths of the repository in the pages, in README, CONTRIBUTING and CHANGELOG, and links of these three."""
-    tried = 0
-    for page in (*DOCS.rglob("*.md"), *ROOT.glob("*.md")):
-        text = page.read_text(encoding="utf-8")
-        named = set(re.findall(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]+)`", text))
-        if page.parent == ROOT:  # the site's pages have their links followed
-            named |= {link for link in re.findall(r"\]\(([^)#]+)", text) if "://" not in link}
-        # A how-to page shows the files that its reader adds, each below its path.
-        added = set(re.findall(r"^`([\w./-]+)`[^`]*\n\n```", text, re.MULTILINE)) if "add-" in page.name else set()
-        for path in named - added:
-            tried += 1
-            made = path.startswith(("docs/_", "docs/derivation")) or "mychip" in path
-            assert made or (ROOT / path).exists(), f"{page.name}: {path}"
-    assert tried > 40
-
-
 def test_every_page_shows_the_version(site, pages):
     for path in pages:
         assert f"dzdesign {__version__}" in path.read_text(encoding="utf-8"), path
@@ -222,20 +132,3 @@ def test_every_page_shows_the_version(site, pages):
         (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/index.md")
     ))  # fmt: skip
     assert len(named) >= 2 and {*named} == {__version__}
-
-
-def test_the_citation_is_of_the_format_and_of_this_version():
-    """The keys that Citation File Format 1.2.0 requires, and the paper by its DOI."""
-    import tomllib
-
-    yaml = pytest.importorskip("yaml", reason="PyYAML comes with the extra `docs`")
-    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    assert citation["cff-version"] == "1.2.0" and {"message", "title", "authors"} <= set(citation)
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    # A list of licences would say "one of them" there; of what is cited it is the first.
-    assert (citation["version"], citation["license"]) == (__version__, project["license"].partition(" AND ")[0])
-    assert re.fullmatch(r"\d{4}-\d\d-\d\d", str(citation["date-released"]))
-    (paper,) = citation["references"]
-    assert paper["doi"] == "10.11916/j.issn.1005-9113.20063" and (paper["start"], paper["end"]) == (45, 56)
-    assert [author["family-names"] for author in paper["authors"]] == ["Wu", "Ji", "Wang", "Hao", "Huang"]
-    assert "Apache License" in (ROOT / "LICENSE").read_text(encoding="utf-8")

@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import nbformat
@@ -18,26 +17,12 @@ from dzdesign import api
 from dzdesign.command_line.cli import main
 from dzdesign.command_line.parser import arguments_of_command
 from dzdesign.identify.valve.model import ValveModel
+from tests.support.html_pages import Page
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler
 
 NOTEBOOK = ROOT / "examples" / "notebook" / "ramps_to_firmware.ipynb"
 HOSTILE = '<script>alert("1")</script>&'
-
-
-class Tags(HTMLParser):
-    """The tags and the text of a page."""
-
-    def __init__(self, html):
-        super().__init__()
-        self.tags, self.text = set(), ""
-        self.feed(html)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.add(tag)
-
-    def handle_data(self, data):
-        self.text += data
 
 
 @pytest.fixture(scope="module")
@@ -222,7 +207,7 @@ def test_a_notebook_shows_what_the_command_prints(example_valve, capsys):
 
     print_valve(example_valve)
     printed = capsys.readouterr().out.split()
-    assert Tags(example_valve._repr_html_()).text.split() == printed
+    assert Page(example_valve._repr_html_()).text.split() == printed
     assert str(example_valve).partition("\n")[2].split() == printed
 
 
@@ -238,13 +223,13 @@ def test_what_a_notebook_shows_is_escaped(example_valve, example_compensator, ex
     manifest = replace(example_firmware.manifest, target=HOSTILE, law=HOSTILE)
     firmware = replace(example_firmware, files=files, manifest=manifest)
     for result, count in ((valve, 3), (replace(example_compensator, costs=(HOSTILE,)), 1), (firmware, 3)):
-        page = Tags(result._repr_html_())
-        assert page.tags <= {"pre", "span"}
+        page = Page(result._repr_html_())
+        assert {tag for tag, _ in page.tags} <= {"pre", "span"}
         assert page.text.count(HOSTILE) == count  # shown, as text
 
 
 def test_a_valve_shows_its_numbers(example_valve):
-    text = Tags(example_valve._repr_html_()).text
+    text = Page(example_valve._repr_html_()).text
     test = example_valve.positive.tests[0]
     for number in (f"{test.u_knee_rising_V:.3f}", f"{test.u_guard_lower_V:.3f}", "trend with dP: decreasing"):
         assert number in text
@@ -296,7 +281,7 @@ def test_the_notebook_gives_what_it_shows(tmp_path, request):
         NOTEBOOK.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     assert [cell["outputs"] for cell in cells] == found
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
-    shown = [Tags("".join(each[-1]["data"]["text/html"])).text for each in found if "text/html" in each[-1]["data"]]
+    shown = [Page("".join(each[-1]["data"]["text/html"])).text for each in found if "text/html" in each[-1]["data"]]
     assert len(shown) == 4 and found[-1][-1]["data"] == {"text/plain": ["True"]}
     assert "27250688 inputs checked, 0 wrong" in shown[3] and "core/dz_comp.c" in shown[2]
 

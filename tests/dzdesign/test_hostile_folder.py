@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from dzdesign.command_line.cli import main
-from tests.support.hostile_folder import RECORD, hostile_folder
+from tests.dzdesign.hostile_folder import RECORD, hostile_folder
 from tests.support.html_pages import Page
 from tests.support.paths import ROOT
 

@@ -5,6 +5,7 @@ import importlib
 import inspect
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -25,7 +26,6 @@ FLOORS = {
         "constants", "options", "valve", "reading", "ramps", "knees", "fitting", "data_quality", "results", "plots",
     ),
 }  # fmt: skip
-MOST_MODULES = 25
 
 
 def modules(root: Path = ROOT) -> dict[str, Path]:
@@ -100,22 +100,26 @@ def circle(graph: Mapping[str, set[str]]) -> list[str]:
     return []
 
 
-@pytest.mark.slow
-def test_the_whole_tree_is_seen():
-    graph = import_graph()
-    assert len(graph) > 200
-    assert sum(map(len, graph.values())) > 500
+@pytest.fixture(scope="module")
+def graph():
+    return import_graph()
+
+
+def test_a_room_imports_only_the_rooms_before_it(graph):
+    assert len(graph) > 200 and sum(map(len, graph.values())) > 500
     assert {room_of(name) for name in graph} == set(ROOMS)
+    assert against_the_order(graph) == []
 
 
-@pytest.mark.slow
-def test_a_room_imports_only_the_rooms_before_it():
-    assert against_the_order(import_graph()) == []
+def test_the_source_roots_of_all_tools_are_the_rooms():
+    tools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
+    roots = (tools["pyright"]["extraPaths"], tools["mypy"]["mypy_path"], tools["coverage"]["run"]["source"],
+             tools["hatch"]["build"]["dev-mode-dirs"])  # fmt: skip
+    assert {tuple(listed[: len(ROOMS)]) for listed in roots} == {ROOMS}
 
 
 @pytest.mark.parametrize("room", FLOORS)
-def test_inside_a_room_imports_run_down(room):
-    graph = import_graph()
+def test_inside_a_room_imports_run_down(graph, room):
     for name in FLOORS[room]:  # a floor that nobody stands on is a misspelled one
         assert any(module.startswith(f"dzdesign.{room}.{name}") for module in graph)
     assert against_the_floors(graph, room) == []
@@ -129,18 +133,11 @@ def test_inside_a_room_imports_run_down(room):
         ("dzdesign.identify.plots.frame", "from dzdesign.identify.identification import identify"),
     ],
 )
-def test_a_seeded_import_upwards_is_found(module, line):
-    graph = import_graph()
-    graph[module] |= set(imports(line, graph))
+def test_a_seeded_import_upwards_is_found(graph, module, line):
+    graph = {**graph, module: graph[module] | set(imports(line, graph))}
     assert [found for found in against_the_floors(graph, "identify") if module in found]
 
 
-@pytest.mark.slow
-def test_there_is_no_import_circle():
-    assert circle(import_graph()) == []
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "line"),
     [
@@ -150,25 +147,39 @@ def test_there_is_no_import_circle():
         ("dzdesign.assess.seeded", "import dzdesign.design.signals"),
     ],
 )
-def test_a_seeded_import_against_the_order_is_found(module, line):
-    graph = import_graph()
-    graph[module] = set(imports(line, graph))
+def test_a_seeded_import_against_the_order_is_found(graph, module, line):
+    graph = {**graph, module: set(imports(line, graph))}
     assert any(module in found for found in against_the_order(graph))
 
 
-@pytest.mark.slow
-def test_a_seeded_circle_is_found():
+def test_there_is_no_import_circle_and_a_seeded_one_is_found(graph):
+    assert circle(graph) == []
     source = "if TYPE_CHECKING:\n    from dzdesign.identify.identification import identify"
-    graph = import_graph()
-    graph["dzdesign.core.errors"] |= set(imports(source, graph))
-    assert "dzdesign.core.errors" in circle(graph)
+    errors = "dzdesign.core.errors"
+    assert errors in circle({**graph, errors: graph[errors] | set(imports(source, graph))})
 
 
-def test_no_folder_holds_more_modules_than_one_can_look_over():
-    folders: dict[Path, int] = {}
-    for path in modules().values():
-        folders[path.parent] = folders.get(path.parent, 0) + (path.name != "__init__.py")
-    assert {str(folder.relative_to(ROOT)): count for folder, count in folders.items() if count > MOST_MODULES} == {}
+def unresolved(source: str) -> Iterator[str]:
+    """Yield the imports of ours in a source, also those that no test runs, that name what is not there."""
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith(("dzdesign.", "tests.")):
+            continue
+        for name in (alias.name for alias in node.names if alias.name != "*"):
+            try:
+                if not hasattr(importlib.import_module(node.module), name):
+                    importlib.import_module(f"{node.module}.{name}")
+            except ImportError:
+                yield f"line {node.lineno}: from {node.module} import {name}"
+
+
+@pytest.mark.slow
+def test_every_import_of_ours_resolves():
+    """In benchmarks too, which no test runs."""
+    paths = [path for folder in (*ROOMS, "benchmarks", "docs", "release") for path in (ROOT / folder).rglob("*.py")]
+    found = {path.relative_to(ROOT).as_posix(): list(unresolved(path.read_text("utf-8"))) for path in paths}
+    assert {path: lines for path, lines in found.items() if lines} == {}
+    seed = "def f():\n    from dzdesign.core.errors import nothing\n    from tests.support.absent import paths"
+    assert len(list(unresolved(seed))) == 2
 
 
 def public_objects() -> Iterator[tuple[str, object]]:

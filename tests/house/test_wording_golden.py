@@ -21,17 +21,25 @@ def test_a_changed_text_is_seen_and_an_update_keeps_it(tmp_path):
         compare(name, f"{text} in FOLDER")
 
 
-def test_every_message_is_of_a_test():
-    """A name is ``group: case``; the group stands in the tests as it is written, or is the name of their file."""
-    groups = {name.partition(": ")[0] for name in read_messages()}
-    sources = [(path.stem, path.read_text(encoding="utf-8")) for path in TESTS.rglob("test_*.py")]
-    asked = set(re.findall(r"wording\(\s*f?[\"']([^:\"'{]+): ", "".join(text for _, text in sources)))
-    asked |= {name_of_tests(stem) for stem, text in sources if re.search(r"wording\.(refusal|of_test)\(", text)}
-    assert groups and groups == asked
-
-
-def test_a_message_is_short_enough_to_be_read():
-    """Under 200 characters where it can be; what is longer names alternatives or several files."""
+def test_every_message_is_of_a_test(request):
+    """A name is ``group: case``: that of a file of tests and one of them, or a test has it, its group at least."""
+    sources = {path: path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py")}
+    tests = {
+        f"{name_of_tests(path.stem)}: {name_of_tests(name)}"
+        for path, text in sources.items()
+        for name in re.findall(r"^ *def (test_\w+)", text, re.MULTILINE)
+    }
+    asked = "".join(sources.values())
+    groups = set(re.findall(r"f[\"']([^:\"'{]+): [^\"']*{", asked))
     messages = read_messages()
-    long = {name for name, text in messages.items() if len(text) > 400}
-    assert long == set()
+    of_no_test = {
+        name
+        for name in messages
+        if re.sub(r"( \[.*\])?( \(\d+\))?$", "", name, flags=re.DOTALL) not in tests
+        and f'"{name}"' not in asked
+        and name.partition(": ")[0] not in groups
+    }
+    if request.config.getoption("--update-goldens"):
+        write_messages({name: text for name, text in messages.items() if name not in of_no_test})
+    else:
+        assert messages and of_no_test == set()

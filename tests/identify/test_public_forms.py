@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from dzdesign.command_line.cli import main
-from tests.support import public_forms as forms
-from tests.support.public_forms import Bench, closing, csv, from_zero, levels, opening, plain, series, stamped, write
+from tests.identify import public_forms as forms
+from tests.identify.public_forms import Bench, closing, csv, from_zero, levels, opening, plain, series, stamped, write
 
 #: A knee is right within so many volts, or three of its standard errors.
 NEAR = 0.015

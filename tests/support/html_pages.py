@@ -30,3 +30,9 @@ class Page(HTMLParser):
 
     def of(self, tag: str) -> list[dict]:
         return [attributes for name, attributes in self.tags if name == tag]
+
+    def links(self) -> list[str]:
+        return [attributes["href"] for attributes in self.of("a") if attributes.get("href")]
+
+    def ids(self) -> list[str]:
+        return [attributes["id"] for _, attributes in self.tags if "id" in attributes]

@@ -47,10 +47,15 @@ def problems(name: str, document: Any, *, every_key_described: bool = True) -> l
     return [f"{error.json_path}: {error.message}" for error in found]
 
 
-def overlooked(name: str, document: Any) -> list[str]:
-    """Return the faults of `wrong_documents` that the schema lets pass; there must be some to try."""
-    tried = list(wrong_documents(name, document))
-    return [place for place, wrong in tried if validator(name, False).is_valid(wrong)] if tried else ["nothing tried"]
+def overlooked(name: str, document: Any, at_least: int = 1, apart: str = "") -> list[str]:
+    """Return the faults of `wrong_documents` that the schema lets pass; there must be enough to try.
+
+    Those within the key `apart`, which another schema has too, are not tried.
+    """
+    tried = [one for one in wrong_documents(name, document) if not apart or not one[0].startswith(f"{apart}.")]
+    if len(tried) < at_least:
+        return [f"{len(tried)} tried"]
+    return [place for place, wrong in tried if validator(name, False).is_valid(wrong)]
 
 
 def wrong_documents(name: str, document: Any) -> Iterator[tuple[str, Any]]:

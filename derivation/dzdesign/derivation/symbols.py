@@ -7,11 +7,13 @@ The paper uses three names for two things each. They are kept apart here: ``u_0`
 Eq. 11) and ``n_i`` (code of the command, which Eq. (29) calls u_i').
 """
 
+import re
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
 
 import sympy
+from sympy.core.function import AppliedUndef
 
 #: A symbol, or a Laplace transform such as I(s).
 Name: TypeAlias = sympy.Symbol | sympy.core.function.AppliedUndef
@@ -21,7 +23,7 @@ Name: TypeAlias = sympy.Symbol | sympy.core.function.AppliedUndef
 class Quantity:
     """What is known of a symbol."""
 
-    #: As pint reads it; counts are ``code``.
+    #: Such as ``m**3/s/V``; counts are ``code``.
     unit: str
     #: In a few words, which may name other symbols.
     meaning: str
@@ -30,6 +32,14 @@ class Quantity:
 
 
 QUANTITIES: dict[Name, Quantity] = {}
+#: Units in others of the same kind, as if metre, kilogram, second, ampere and count were other ones than they are.
+_METRE, _KILOGRAM, _SECOND, _AMPERE, _COUNT = 1.3, 0.7, 1.9, 0.6, 2.3
+_NEWTON = _KILOGRAM * _METRE / _SECOND**2
+_VOLT = _NEWTON * _METRE / _SECOND / _AMPERE
+_RESCALED = {
+    "m": _METRE, "kg": _KILOGRAM, "s": _SECOND, "A": _AMPERE, "code": _COUNT, "N": _NEWTON, "Pa": _NEWTON / _METRE**2,
+    "V": _VOLT, "ohm": _VOLT / _AMPERE, "H": _VOLT * _SECOND / _AMPERE, "dimensionless": 1.0,
+}  # fmt: skip
 
 
 def _declare(name: Name, unit: str, meaning: str, **more: Any) -> Any:
@@ -70,7 +80,7 @@ W = _positive("W", "m", "area gradient of the edge")
 rho = _positive("rho", "kg/m**3", "density of the oil")
 
 # Plant, Eqs. (19)-(24)
-K_a = _positive("K_a", "V/V", "gain of the amplifier, $K_e$ in the paper's (19)")
+K_a = _positive("K_a", "dimensionless", "gain of the amplifier, $K_e$ in the paper's (19)")
 K_i = _positive("K_i", "N/A", "force per current")
 K_fi = _positive("K_fi", "V/A", "gain of the current feedback")
 K_0 = _positive("K_0", f"{_FLOW}/V", "flow gain at the reference")
@@ -169,16 +179,16 @@ def _transform(name: str, unit: str, meaning: str) -> Any:
 X_e = _transform("X_e", "m*s", "transform of $x_e$")
 F_e = _transform("F_e", "N*s", "transform of $f_e$")
 F_eL = _transform("F_eL", "N*s", "transform of $f_eL$")
-U_e = _transform("U_e", "V*s", "transform of $u_e$")
-U_i = _transform("U_i", "V*s", "transform of $u_i$")
-U_if = _transform("U_if", "V*s", "transform of $u_if$")
+U_e = _transform("U_e", "s*V", "transform of $u_e$")
+U_i = _transform("U_i", "s*V", "transform of $u_i$")
+U_if = _transform("U_if", "s*V", "transform of $u_if$")
 I_s = _transform("I", "A*s", "transform of i")
 Q_s = _transform("Q", "m**3", "transform of $Q$")
 G = _transform("G", f"{_FLOW}/V", "transfer function from command to flow")
 
 # ... what an identification differentiates, ...
 dQ_dC_d = _real("dQ_dC_d", _FLOW, "sensitivity of the flow to $C_d$", latex=r"\frac{\partial Q}{\partial C_{d}}")
-dQ_dk = _real("dQ_dk", f"{_FLOW}*m/V", "sensitivity of the flow to $k$", latex=r"\frac{\partial Q}{\partial k}")
+dQ_dk = _real("dQ_dk", "m**4/s/V", "sensitivity of the flow to $k$", latex=r"\frac{\partial Q}{\partial k}")
 dQ_dx_max = _real(
     "dQ_dx_max", "m**2/s", "sensitivity of the flow to $x_max$", latex=r"\frac{\partial Q}{\partial x_{\text{max}}}"
 )
@@ -208,3 +218,30 @@ AT_PRESSURE_DROPS: dict[Name, tuple[Name, Name]] = {
     Q_w: (Q_O, Q_O_prime),
     s_flow: (s_flow0, s_flow1),
 }
+
+
+def unit_of(name: Name) -> str:
+    """Return the unit of a symbol; X_e(s + a) has that of X_e(s), and f(dP1) that of f(dP). KeyError if it has none."""
+    if isinstance(name, AppliedUndef):
+        name = name.func(dP if name.func == f else s)
+    return QUANTITIES[name].unit
+
+
+def print_unit(name: Name) -> str:
+    """Return the unit of a symbol as a person writes it.
+
+    Examples
+    --------
+    >>> print_unit(Q), print_unit(beta)
+    ('m^3/s', '1')
+    """
+    return unit_of(name).replace("**", "^").replace("code", "counts").replace("dimensionless", "1")
+
+
+def rescaled(name: Name) -> float:
+    """Return what one unit of a symbol is in other units."""
+    grown = 1.0
+    for sign, unit, power in re.findall(r"([*/]?)([a-zA-Z]+)(?:\*\*(\d))?", unit_of(name)):
+        factor = _RESCALED[unit] ** float(power or 1)
+        grown = grown / factor if sign == "/" else grown * factor
+    return grown

@@ -15,8 +15,7 @@ from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
 from dzdesign.derivation.law import law
-from dzdesign.derivation.scaling import drive, evaluate_line
-from dzdesign.derivation.transition import evaluate_law_command, evaluate_share, evaluate_transition
+from dzdesign.derivation.scaling import drive, evaluate_law_command, evaluate_line, evaluate_share, evaluate_transition
 from dzdesign.design.current.drive import CurrentDrive
 from dzdesign.design.design_choices import Above, BelowDp0
 from dzdesign.design.drive_functions import RAMPED_CODES, DriveFunctions

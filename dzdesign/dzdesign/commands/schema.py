@@ -1,10 +1,10 @@
 """`dzdesign schema`: the JSON Schemas of the artefacts, as their types state them."""
 
 from dataclasses import dataclass
+from json import dumps
 from pkgutil import resolve_name
 from typing import Annotated, Any
 
-from dzdesign.core.documents import to_json
 from dzdesign.core.errors import InputError, nearest
 from dzdesign.core.options import Option, Text
 from dzdesign.terminal.page import print_json
@@ -42,7 +42,36 @@ def schema_document(name: str) -> dict[str, Any]:
 
 def schema_text(name: str) -> str:
     """Return a schema as the text of its file."""
-    return to_json(schema_document(name))
+    return one_line_a_field(schema_document(name)) + "\n"
+
+
+def one_line_a_field(node: dict[str, Any], indent: str = "") -> str:
+    """Return a schema as JSON in which everything about a field stands on one line.
+
+    Examples
+    --------
+    >>> print(one_line_a_field({"type": "object", "properties": {"dp_MPa": {"type": "number", "unit": "MPa"}}}))
+    {
+     "type": "object",
+     "properties": {
+      "dp_MPa": {"type": "number", "unit": "MPa"}
+     }
+    }
+    """
+    inner = indent + " "
+    lines = []
+    for key, value in node.items():
+        if key in ("properties", "$defs"):  # named by what they describe
+            parts = (f"{inner} {dumps(name)}: {_of_part(part, inner + ' ')}" for name, part in value.items())
+            text = "{\n" + ",\n".join(parts) + f"\n{inner}}}"
+        else:
+            text = dumps(value)
+        lines.append(f"{inner}{dumps(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+
+
+def _of_part(part: Any, indent: str) -> str:
+    return one_line_a_field(part, indent) if "properties" in part else dumps(part)
 
 
 EXAMPLES = ("dzdesign schema", "dzdesign schema valve > valve.schema.json")

@@ -9,7 +9,7 @@ from dzdesign.derivation.account.account import SECTIONS, STATEMENTS
 from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.proof import judge, prove
 from dzdesign.derivation.account.statement import Kind, Outcome
-from tests.support.account_claims import BY_NUMBER, changed
+from tests.derivation.account.claims import BY_NUMBER, changed
 
 DERIVED = [statement for statement in STATEMENTS if not statement.kind.is_given]
 

@@ -9,12 +9,12 @@ import sympy
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation import plant
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account import solving, units
+from dzdesign.derivation.account import solving
 from dzdesign.derivation.account.account import STATEMENTS
+from dzdesign.derivation.account.model_and_codes import laplace
 from dzdesign.derivation.account.proof import prove
 from dzdesign.derivation.account.statement import Case, Condition, Ground, Outcome, Value
-from dzdesign.derivation.account.transfer import laplace
-from tests.support.account_claims import BY_NUMBER, FOREIGN, changed, claim, given, last_words
+from tests.derivation.account.claims import BY_NUMBER, FOREIGN, changed, claim, given, last_words
 
 IF, NOT = Outcome.FOLLOWS_IF, Outcome.DOES_NOT_FOLLOW
 CONTRADICTION = "does not follow: the premises contradict each other"
@@ -193,7 +193,7 @@ def test_units_find_the_mixed_sums_and_nothing_else(verdicts):
     ],
 )
 def test_wrong_units_are_seen(number, member, error):
-    assert units.find_unit_error(replace(BY_NUMBER[number], members=(member,))) == error
+    assert replace(BY_NUMBER[number], members=(member,)).unit_error() == error
 
 
 def test_roots_of_what_may_be_negative_are_not_merged():
@@ -207,3 +207,9 @@ def test_the_laplace_transform_needs_a_linear_equation(monkeypatch, wording):
     with pytest.raises(ValueError) as caught:
         laplace("(22)")
     wording("the account: not linear", str(caught.value))
+
+
+@pytest.mark.parametrize("given", [s.k * (s.u_1 - s.u_2), -s.k * (s.u_2 - s.u_1)])
+def test_of_a_difference_there_is_one_form(given):
+    """SymPy gives one or the other, from run to run."""
+    assert str(solving._turned(given)) == "k*(u_1 - u_2)"

@@ -9,10 +9,10 @@ import sympy
 from dzdesign.commands import derive
 from dzdesign.derivation import plant
 from dzdesign.derivation import symbols as s
-from dzdesign.derivation.account import published
+from dzdesign.derivation.account import account, published
 from dzdesign.derivation.account.account import STATEMENTS
 from dzdesign.derivation.account.published import FIRST, PRINTED, SIMULATION, find_misprints
-from tests.support.account_claims import BY_NUMBER
+from tests.derivation.account.claims import BY_NUMBER
 from tests.support.synthetic import SHARED
 
 #: The paper's text, for who has it.
@@ -46,7 +46,8 @@ def test_the_papers_numbers(number, label, expected, digits):
     assert round(figure(number, label), digits) == expected
 
 
-def test_numbers_are_looked_up_in_their_sections(monkeypatch, tmp_path, capsys):
+def test_numbers_are_looked_up_in_their_sections(verdicts, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(account, "verify_statements", lambda: tuple(verdicts.values()))
     text = "1 Approach\nA dead zone of 41.5%.\n2 Tests 2.1 Model\nAt 2 MPa.\n2.2 Analysis\nIts flow was 27.9 L/min.\n"
     monkeypatch.setattr(published, "PRINTED", [("41.5", "1"), ("27.9", "2.2")])
     assert find_misprints(text) == []
@@ -88,7 +89,7 @@ def test_the_account_takes_published_numbers_from_one_place():
         if isinstance(node.args[0], ast.Constant) and isinstance(node.args[0].value, str)
     }
     # Of our own: 1 % of u_max above the first valve's threshold.
-    assert typed == {("zero_command.py", "5.49")}
+    assert typed == {("law_theorems.py", "5.49")}
 
 
 def test_the_current_by_its_transfer_function_is_the_current_in_time():

@@ -35,7 +35,7 @@ from dzdesign.report.artefacts import read_chain
 from dzdesign.report.lot.table import read_manifest
 from dzdesign.stages.identify import IdentifyChoices
 from dzdesign.verify.requirements import RAMPS
-from tests.support.crashing_work import die_over_bad
+from tests.dzdesign.batch.crashing_work import die_over_bad
 from tests.support.many_valves import PRESSURES_MPa, lot_bench, write_lot
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler

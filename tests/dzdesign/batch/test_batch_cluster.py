@@ -26,7 +26,7 @@ from dzdesign.core.artefact_types import THIS_TOOL
 from dzdesign.core.errors import InputError
 from dzdesign.design.design_choices import DesignChoices
 from dzdesign.stages.identify import IdentifyChoices
-from tests.support.crashing_work import die_over_bad
+from tests.dzdesign.batch.crashing_work import die_over_bad
 from tests.support.many_valves import write_lot
 from tests.support.paths import ROOT
 from tests.support.synthetic import needs_compiler

@@ -11,7 +11,7 @@ from dzdesign.identify.reading.proposed_columns import propose_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.series_order import runs_back
 from dzdesign.identify.reading.time_stamps import start_of
-from tests.support.logger_files import DP, START, TIME, Q, U, rows, stamps, text
+from tests.identify.reading.logger_files import DP, START, TIME, Q, U, rows, stamps, text
 
 LATE = START.replace(hour=23, minute=59, second=50)
 FIRST = start_of("2026-11-22 23:59:50.123")

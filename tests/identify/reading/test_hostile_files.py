@@ -27,8 +27,8 @@ from dzdesign.identify.reading.binary import reader_process
 from dzdesign.identify.reading.binary.reader_server import Request
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text import encoding
+from tests.identify.reading.hostile_files import BINARIES, CSV, TEXTS, write
 from tests.identify.reading.test_file_formats import GOOD
-from tests.support.hostile_files import BINARIES, CSV, TEXTS, write
 
 #: More of what is random: make fuzz, or this many times as many examples.
 TIMES = int(os.environ.get("DZDESIGN_FUZZ", "1"))

@@ -14,7 +14,7 @@ from dzdesign.identify.reading.proposed_columns import propose_columns
 from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text import table_reader
 from tests.dzdesign.command_line.test_bad_input import csv
-from tests.support.logger_files import (
+from tests.identify.reading.logger_files import (
     DP,
     FILES,
     ROWS,

@@ -21,8 +21,7 @@ from typing import NamedTuple
 
 from dzdesign.core.errors import InputError
 from dzdesign.derivation.law import law
-from dzdesign.derivation.scaling import Line, evaluate_line
-from dzdesign.derivation.transition import evaluate_transition
+from dzdesign.derivation.scaling import Line, evaluate_line, evaluate_transition
 from dzdesign.design.compensator import Compensator
 
 INT32_MAX = 2**31 - 1

@@ -4,14 +4,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from dzdesign.derivation.account.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE
-from dzdesign.derivation.account.implementation import CODES, IMPLEMENTATION
+from dzdesign.derivation.account.law_theorems import FULL_COMMAND, SHAPE, TARGET, TIES, TRANSITION, ZERO_COMMAND
 from dzdesign.derivation.account.measured_flow import FLOW_OVER_PRESSURE, IDENTIFIABILITY, METER_FLOOR
+from dzdesign.derivation.account.model_and_codes import CODES, IMPLEMENTATION, SIMULATION_MODEL, TRANSFER_FUNCTION
 from dzdesign.derivation.account.proof import Verdict, prove
-from dzdesign.derivation.account.referee import hear
 from dzdesign.derivation.account.statement import Statement
-from dzdesign.derivation.account.target_flow import FULL_COMMAND, TARGET, TIES
-from dzdesign.derivation.account.transfer import SIMULATION_MODEL, TRANSFER_FUNCTION
-from dzdesign.derivation.account.zero_command import SHAPE, TRANSITION, ZERO_COMMAND
 
 SECTIONS = {
     "1 Proposed compensation approach": APPROACH,
@@ -45,4 +42,4 @@ def verify_statements(statements: Sequence[Statement] = STATEMENTS) -> tuple[Ver
     >>> all(verdict.as_expected for verdict in verify_statements())
     True
     """
-    return prove(statements, hear)
+    return prove(statements)

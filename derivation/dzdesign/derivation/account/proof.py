@@ -4,7 +4,7 @@ A premise has no grounds and is taken as given; anything else follows if its gro
 of its members exactly. Where they do not, the difference is factored: it says on which condition they would.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -13,10 +13,16 @@ import sympy
 from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
-from dzdesign.derivation.account.conditions import Finding, judge_condition
-from dzdesign.derivation.account.solving import NotDerivedError, Relation, Step, agree, solve_relations
+from dzdesign.derivation.account.solving import (
+    Finding,
+    NotDerivedError,
+    Relation,
+    Step,
+    agree,
+    judge_condition,
+    solve_relations,
+)
 from dzdesign.derivation.account.statement import Case, Ground, Kind, Outcome, Statement
-from dzdesign.derivation.account.units import find_unit_error
 from dzdesign.derivation.symbols import Name
 
 
@@ -67,14 +73,8 @@ class Verdict:
         return self.outcome is not Outcome.DOES_NOT_FOLLOW
 
 
-#: Tries a statement that was judged, of an account given by number, on numbers; returns what they say against it.
-Hear = Callable[[Verdict, Mapping[str, Statement]], str]
-
-
-def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Verdict, ...]:
+def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
     """Judge each statement from its grounds, in order; it holds only if everything it rests on holds.
-
-    What `hear` objects to does not follow, whatever its proof.
 
     Raises
     ------
@@ -89,12 +89,10 @@ def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Ve
         if statement.number in earlier:
             raise RequirementError(f"{statement.number} is stated twice")
         check_grounds(statement, earlier, order)
-        verdict, error = judge(statement, earlier, verdicts), find_unit_error(statement)
+        verdict, error = judge(statement, earlier, verdicts), statement.unit_error()
         # What does not follow may be wrong in its units too, nothing else may.
         verdict = replace(verdict, unit_error=error, as_expected=verdict.as_expected and not (error and verdict.holds))
         earlier[statement.number] = statement
-        if hear is not None and verdict.as_expected:
-            verdict = overrule(verdict, hear(verdict, earlier))
         verdicts[statement.number] = verdict
     return tuple(verdicts.values())
 
@@ -119,14 +117,6 @@ def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order:
         is_copy = premise.symbol == statement.symbol and agree(premise.members[-1], statement.members[-1])
         if is_copy and statement.kind is not Kind.LAW and ground.derivative is None:
             raise RequirementError(f"{statement.number} rests on a copy of itself, {ground.number}")
-
-
-def overrule(verdict: Verdict, objection: str) -> Verdict:
-    """Return a verdict after the referee; with an objection the statement does not follow."""
-    if not objection:
-        return verdict
-    words = f"does not follow: {objection}"
-    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False)
 
 
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:

@@ -25,7 +25,7 @@ BARE = Setting("drive", "the valve without compensator")
 FREE_BETA = Setting("drive", "the paper's law with any $beta$")
 #: The simulation model, Eqs. (19)-(24), which has no overlap.
 PLANT = Setting("drive", "the simulation model")
-#: What the firmware runs unless it is told otherwise (`transition.py`).
+#: What the firmware runs unless it is told otherwise (`scaling.py`).
 WITH_TRANSITION = Setting("drive", "the law `paper` with zero band and transition")
 FIXED_OPENING = Setting("spool", "a stop that fixes $x_max$ at every pressure drop (Assumption 3)")
 FREE_OPENING = Setting("spool", "a spool that does not meet its stop")
@@ -54,12 +54,6 @@ class Scope:
     def __and__(self, other: "Scope") -> "Scope":
         comparisons = sorted({*self.comparisons, *other.comparisons}, key=sympy.default_sort_key)
         return Scope(tuple(dict.fromkeys((*self.settings, *other.settings))), tuple(comparisons))
-
-    def admits(self, settings: frozenset[Setting]) -> bool:
-        """Whether what is set up is one of the settings named, of each aspect; one with a beta of its own if named."""
-        if settings & {FREE_BETA, WITH_TRANSITION} - set(self.settings):
-            return False
-        return {one.aspect for one in self.settings} == {one.aspect for one in self.settings if one in settings}
 
 
 EVERYWHERE = Scope()

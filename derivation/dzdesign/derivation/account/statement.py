@@ -10,7 +10,7 @@ from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
 
 from dzdesign.derivation.account.scope import EVERYWHERE, Scope, Setting, scope
-from dzdesign.derivation.symbols import AT_PRESSURE_DROPS, Name, dP, f, headroom
+from dzdesign.derivation.symbols import AT_PRESSURE_DROPS, Name, dP, f, headroom, print_unit, rescaled
 
 Replacements = tuple[tuple[Name, sympy.Expr], ...]
 
@@ -105,7 +105,7 @@ def _is_at_drop(name: Name, value: sympy.Expr) -> bool:
 
 
 class Case(NamedTuple):
-    """One of the cases by which a piecewise statement is proved; the referee tries what they may leave out."""
+    """One of the cases by which a piecewise statement is proved."""
 
     #: Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
     at: Replacements
@@ -256,7 +256,31 @@ class Statement:
         """Say what a reader should know beyond the verdict."""
         return replace(self, note=note)
 
+    def unit_error(self) -> str:
+        """Say what is wrong with its units: nothing if it is one equation in other units too."""
+        try:
+            for member in self.members:
+                for relation in member.atoms(Relational):
+                    if not _are_in_one_unit(relation.lhs, relation.rhs):
+                        return f"{sympy.sstr(relation)} compares two units"
+                for branch in [value for value, _ in member.args] if isinstance(member, sympy.Piecewise) else [member]:
+                    if branch != 0 and not _are_in_one_unit(branch, self.symbol):  # zero is of every unit
+                        return f"the right-hand side is not in {print_unit(self.symbol)}"
+        except KeyError as error:
+            return f"the unit of {error.args[0]} is not known"
+        return ""
+
     @property
     def published(self) -> sympy.Eq:
         """The statement in its last form, the one that other statements use."""
         return sympy.Eq(self.symbol, self.members[-1], evaluate=False)
+
+
+def _are_in_one_unit(left: sympy.Expr, right: sympy.Expr) -> bool:
+    """Whether two sides grow by one factor if every symbol is counted in other units; zero grows by any."""
+    names = {name for side in (left, right) for name in side.atoms(AppliedUndef)}
+    names |= {name for side in (left, right) for name in side.xreplace(dict.fromkeys(names, sympy.S.One)).free_symbols}
+    values = {name: sympy.sqrt(2 + n) for n, name in enumerate(sorted(names, key=str))}
+    grown = {name: value * rescaled(name) for name, value in values.items()}
+    ratios = [sympy.N(side.xreplace(grown)) / sympy.N(side.xreplace(values)) for side in (left, right) if side != 0]
+    return len(ratios) < 2 or bool(abs(ratios[0] / ratios[1] - 1) < 1e-9)

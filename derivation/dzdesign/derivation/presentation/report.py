@@ -12,12 +12,21 @@ from dzdesign.derivation.account.equations import PAPER_NUMBERS
 from dzdesign.derivation.account.proof import CaseProof, Verdict
 from dzdesign.derivation.account.published import PRINTED
 from dzdesign.derivation.account.statement import Condition, Ground, Outcome, Statement, Value
-from dzdesign.derivation.account.units import print_unit
-from dzdesign.derivation.presentation.content import Derivation, DerivationReport, Entry, Figure, Line, Premise, Term
+from dzdesign.derivation.presentation.content import (
+    Derivation,
+    DerivationReport,
+    Entry,
+    Figure,
+    Formula,
+    Line,
+    Premise,
+    Term,
+    Words,
+    inline,
+)
 from dzdesign.derivation.presentation.formulas import to_python, to_text
-from dzdesign.derivation.presentation.prose import Formula, Words, inline
 from dzdesign.derivation.presentation.writers import write_html, write_text
-from dzdesign.derivation.symbols import QUANTITIES
+from dzdesign.derivation.symbols import QUANTITIES, print_unit
 
 _FORMATS: dict[str, Callable[[DerivationReport], str]] = {
     "text": write_text,

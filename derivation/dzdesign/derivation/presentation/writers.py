@@ -13,9 +13,8 @@ import sympy
 
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.derivation.account.statement import Outcome
-from dzdesign.derivation.presentation.content import DerivationReport, Entry, Line
+from dzdesign.derivation.presentation.content import PARTS, DerivationReport, Entry, Formula, Line, Words
 from dzdesign.derivation.presentation.formulas import to_latex, to_mathml, to_text
-from dzdesign.derivation.presentation.prose import PARTS, Formula, Words
 from dzdesign.derivation.symbols import QUANTITIES
 
 if TYPE_CHECKING:

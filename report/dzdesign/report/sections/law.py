@@ -9,12 +9,11 @@ import numpy as np
 
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.derivation.account.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE
+from dzdesign.derivation.account.law_theorems import TARGET, TIES
 from dzdesign.derivation.account.proof import prove
 from dzdesign.derivation.account.statement import Outcome
-from dzdesign.derivation.account.target_flow import TARGET, TIES
 from dzdesign.derivation.law import law
-from dzdesign.derivation.presentation.content import DerivationReport, Entry
-from dzdesign.derivation.presentation.prose import Words
+from dzdesign.derivation.presentation.content import DerivationReport, Entry, Words
 from dzdesign.derivation.presentation.report import closure, compose
 from dzdesign.derivation.presentation.writers import HtmlWriter
 from dzdesign.design.compensator import Compensator

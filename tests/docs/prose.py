@@ -1,8 +1,11 @@
-"""The sentences of a text in Markdown, and the faults of prose whose sentences are too long to be read once."""
+"""The sentences of a text in Markdown, and what makes prose hard to read: sentences that are too long, a word twice."""
 
 import re
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
+from pathlib import Path
+
+from tests.support.paths import ROOT
 
 #: Words of a sentence, on average over a text and at most.
 MEAN, MOST = 18, 30
@@ -13,6 +16,13 @@ END = re.compile(r"(?<=[.!?])[)\"'\]]*\s+(?=[(\"'\[]*[^\W_a-z]|[a-z][\w-]*: )")
 #: What a message quotes: a file, a value. An apostrophe within a word begins none.
 QUOTATION = re.compile(r"(?<!\w)'[^']*'|\"[^\"]*\"")
 ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.|:)\s+")
+TWICE = re.compile(r"\b([a-z]{2,}) \1\b")
+
+
+def pages() -> list[Path]:
+    """Return all pages of the repository, without what is built of them."""
+    found = (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))
+    return sorted(page for page in found if not {"_build", "_made"} & {*page.parts})
 
 
 def blocks_of(markdown: str) -> Iterator[str]:
@@ -54,14 +64,14 @@ def sentences_of(block: str) -> list[str]:
 
 
 def clauses_of(message: str) -> list[str]:
-    """Return the parts of a message that are read at once: sentences, cut at a semicolon too; a quotation is one word.
+    """Return the parts of a message that are read at once: sentences, cut at a semicolon too; a quotation is a word.
 
     Examples
     --------
     >>> clauses_of("dzdesign: 'a b.csv' row 2 is empty, expected \\"1 V\\"; give one. See `a; b`.")
-    ['Quotation row 2 is empty, expected Quotation', 'give one.', 'See Code.']
+    ['Code row 2 is empty, expected Code', 'give one.', 'See Code.']
     """
-    lines = (QUOTATION.sub("Quotation", line.removeprefix("dzdesign: ")) for line in message.splitlines())
+    lines = (QUOTATION.sub("`quoted`", line.removeprefix("dzdesign: ")) for line in message.splitlines())
     return [clause for line in lines for sentence in sentences_of(line) for clause in sentence.split("; ")]
 
 
@@ -70,15 +80,12 @@ def words_of(text: str) -> list[str]:
     return [word for word in text.split() if re.search(r"\w", word)]
 
 
-def faults_of(blocks: Iterable[str]) -> list[str]:
-    """Return what makes a text hard to read: each sentence that is too long, and a mean that is too high."""
-    return too_long([sentence for block in blocks for sentence in sentences_of(block)], mean=MEAN, most=MOST)
-
-
-def too_long(sentences: list[str], *, mean: int, most: int) -> list[str]:
-    """Return each sentence of more than `most` words; and the mean number of words, if it is above `mean`."""
+def faults_of(blocks: Iterable[str], *, mean: int = MEAN, most: int = MOST) -> list[str]:
+    """Return what makes a text hard to read: a sentence of more than `most` words, a word twice, too high a mean."""
+    sentences = [sentence for block in blocks for sentence in sentences_of(block)]
     counts = [len(words_of(sentence)) for sentence in sentences]
     faults = [f"{count} words: {each}" for each, count in zip(sentences, counts, strict=True) if count > most]
+    faults += [f"'{found[0]}': {each}" for each in sentences for found in TWICE.finditer(each)]
     if sum(counts) > mean * len(counts):
         faults.append(f"{sum(counts) / len(counts):.1f} words in a sentence on average")
     return faults

@@ -3,8 +3,8 @@
 What is changed: formulas, conditions and sign claims; scopes and cases; grounds and the values at which they are taken.
 A changed premise must turn a verdict of a statement that rests on it, or be refuted by numbers; a changed result must
 turn its own. The units are not asked, so that the logic is measured by itself. A change that leaves the meaning as it
-is (``<`` for ``<=`` where both give the same) is no mutant: it is compared with the original first. Nor is another
-statement in place of a ground: where it is true, it gives another right proof.
+is (``<`` for ``<=`` where both give the same) is no mutant: it is compared with the original first, and left out. Nor
+is another statement in place of a ground: where it is true, it gives another right proof.
 """
 
 import math
@@ -19,11 +19,11 @@ from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.proof import Verdict, check_grounds, judge, relation_of
-from dzdesign.derivation.account.referee import hear
 from dzdesign.derivation.account.scope import EVERYWHERE
 from dzdesign.derivation.account.solving import agree
 from dzdesign.derivation.account.statement import Condition, Ground, Statement
 from dzdesign.derivation.symbols import AT_PRESSURE_DROPS, QUANTITIES, Name, u_max, u_min
+from tests.derivation.account.referee import hear
 
 #: Of what is changed.
 WAYS = ("formulas", "scopes", "grounds")
@@ -41,21 +41,15 @@ def names_of(expression: sympy.Expr) -> set[Name]:
     return set(expression.atoms(AppliedUndef) | expression.free_symbols)
 
 
-def formula_mutants(
-    statement: Statement, neighbours: Mapping[str, list[Name]]
-) -> Iterator[tuple[Statement | None, str]]:
-    """Yield mutated statements with their text, or None for a change that leaves the meaning."""
+def formula_mutants(statement: Statement, neighbours: Mapping[str, list[Name]]) -> Iterator[tuple[Statement, str]]:
+    """Yield mutated statements with their text."""
     said = _said(statement)
     for index, member in enumerate(statement.members):
         # A statement used as a ground gives its last member only; of a given one the others say nothing.
         for wrong in _mutated(member, neighbours):
-            text = f"{statement.symbol} = {sympy.sstr(wrong)}"
-            if wrong.has(statement.symbol):
-                continue
-            if _equivalent(member.xreplace(said), wrong.xreplace(said)):
-                yield None, text
-                continue
-            yield replace(statement, members=_with(statement.members, index, wrong)), text
+            if not wrong.has(statement.symbol) and not _equivalent(member.xreplace(said), wrong.xreplace(said)):
+                members = _with(statement.members, index, wrong)
+                yield replace(statement, members=members), f"{statement.symbol} = {sympy.sstr(wrong)}"
     if statement.condition is not None:
         yield from _mutated_conditions(statement, statement.condition, neighbours)
     if isinstance(statement.positive_if, Relational):
@@ -176,16 +170,14 @@ def _same_at_samples(original: sympy.Expr, mutant: sympy.Expr) -> bool:
 _DROPS = {names[index]: names[1 - index] for names in AT_PRESSURE_DROPS.values() for index in (0, 1)}
 
 
-def ground_mutants(statement: Statement, statements: Mapping[str, Statement]) -> Iterator[tuple[Statement | None, str]]:
-    """Yield a statement on other grounds, with its text, or None where the ground says the same."""
+def ground_mutants(statement: Statement, statements: Mapping[str, Statement]) -> Iterator[tuple[Statement, str]]:
+    """Yield a statement on other grounds, with its text."""
     for index, ground in enumerate(statement.grounds):
         others = statement.grounds[:index], statement.grounds[index + 1 :]
         if len(statement.grounds) > 1:
             yield replace(statement, grounds=(*others[0], *others[1])), f"without its ground {ground}"
         for wrong in _other_grounds(ground):
-            if _says_the_same(ground, wrong, statement, statements):
-                yield None, f"{wrong} for its ground {ground}"
-            else:
+            if not _says_the_same(ground, wrong, statement, statements):
                 yield replace(statement, grounds=(*others[0], wrong, *others[1])), f"{wrong} for its ground {ground}"
 
 
@@ -229,24 +221,27 @@ class _Account:
         statements = {**self.statements, mutant.number: mutant}
         return bool(hear(judge(mutant, statements, self.verdicts), statements))
 
+    def is_caught(self, mutant: Statement) -> bool:
+        """Whether its own verdict turns, or numbers speak against it."""
+        return self.shows(mutant, mutant) or self.is_refuted(mutant)
+
 
 class Tried(NamedTuple):
-    """Mutants of one statement in one way, each with its text (None: it changes nothing), and their judge."""
+    """Mutants of one statement in one way, each with its text, and their judge."""
 
     number: str
     changed: str
-    mutants: Iterable[tuple[Statement | None, str]]
+    mutants: Iterable[tuple[Statement, str]]
     is_caught: Callable[[Any], bool]
 
 
 class Score(NamedTuple):
-    """How many mutants of a statement were caught, the texts of the others, and those of changes without a meaning."""
+    """How many mutants of a statement were tried, and the texts of those that were not caught."""
 
     number: str
     changed: str
     mutants: int
     survivors: tuple[str, ...]
-    equivalent: tuple[str, ...]
 
 
 def score_mutations(verdicts: Sequence[Verdict], share: float = 1.0, seed: int = 0) -> list[Score]:
@@ -261,7 +256,7 @@ def score_mutations(verdicts: Sequence[Verdict], share: float = 1.0, seed: int =
     )
     ways = (_formulas, _scopes, _grounds)
     scores = [score(way(statement, account), share, seed) for way in ways for statement in account.statements.values()]
-    return [one for one in scores if one.mutants or one.equivalent]
+    return [one for one in scores if one.mutants]
 
 
 def _formulas(statement: Statement, account: _Account) -> Tried:
@@ -282,34 +277,21 @@ def _formulas(statement: Statement, account: _Account) -> Tried:
 
 
 def _scopes(statement: Statement, account: _Account) -> Tried:
-    return Tried(statement.number, "scopes", scope_mutants(statement), lambda one: _is_caught(one, account))
+    return Tried(statement.number, "scopes", scope_mutants(statement), account.is_caught)
 
 
 def _grounds(statement: Statement, account: _Account) -> Tried:
-    mutants = ground_mutants(statement, account.statements)
-    return Tried(statement.number, "grounds", mutants, lambda one: _is_caught(one, account))
-
-
-def _is_caught(mutant: Statement, account: _Account) -> bool:
-    return account.shows(mutant, mutant) or account.is_refuted(mutant)
+    return Tried(statement.number, "grounds", ground_mutants(statement, account.statements), account.is_caught)
 
 
 def score(these: Tried, share: float, seed: int) -> Score:
     """Try the mutants of one statement."""
     draw = random.Random(f"{seed} {these.changed} {these.number}")
     part = math.sqrt(share)
-    is_drawn = draw.random() < part
-    tried, equivalent, survivors = 0, [], []
-    for mutant, text in these.mutants if is_drawn else ():  # to make them is half the work
-        if draw.random() >= part:
-            continue
-        if mutant is None:
-            equivalent.append(text)
-            continue
-        tried += 1
-        if not these.is_caught(mutant):
-            survivors.append(text)
-    return Score(these.number, these.changed, tried, tuple(survivors), tuple(equivalent))
+    mutants = these.mutants if draw.random() < part else ()  # to make them is half the work
+    drawn = [each for each in mutants if draw.random() < part]
+    survivors = tuple(text for mutant, text in drawn if not these.is_caught(mutant))
+    return Score(these.number, these.changed, len(drawn), survivors)
 
 
 def _before(statement: Statement, statements: Mapping[str, Statement]) -> dict[str, Statement]:
