@@ -13,7 +13,7 @@ from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
-from dzdesign.report.artefacts import Chain, read_chain
+from dzdesign.report.artefacts import Chain, Place, read_chain
 from dzdesign.report.figure import PALETTE, figure_style
 from dzdesign.report.page import LARGEST_LOGO, logo_uri, whole
 from dzdesign.report.sections.closed_loop import loop_section, series_table
@@ -253,7 +253,8 @@ def test_a_report_with_a_logo_needs_nothing_from_outside(tmp_path):
     record = {"serial": HOSTILE[0], "type": HOSTILE[2], "note": HOSTILE[1]}
     valve = identify([synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)], record=record)
     (tmp_path / "logo.png").write_bytes(PNG)
-    html = make_report(Chain(valve=valve), logo=logo_uri(tmp_path / "logo.png")).html
+    chain = Chain(valve=valve, places={"valve": Place("valve.json", "0" * 64)})
+    html = make_report(chain, logo=logo_uri(tmp_path / "logo.png")).html
     (image,) = Page(html).of("img")
     assert base64.b64decode(image["src"].removeprefix("data:image/png;base64,")) == PNG
     assert not Page(html).of("script")

@@ -7,7 +7,9 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core import artefact_reading
+from dzdesign.report import valve_report
 from dzdesign.verify.untried import not_tried
+from tests.support.attacked_firmware import take_the_rest_as_held
 from tests.support.evidence import evidence_with
 from tests.support.synthetic import needs_compiler
 
@@ -32,7 +34,9 @@ def test_the_headers_of_ti_are_named_where_they_make_sense(target, said):
 
 def test_verify_reads_every_artefact_once(copied, tmp_path, monkeypatch):
     """Also compensator.json, of all checks and of the report."""
-    read = Counter()
+    read, with_report = Counter(), valve_report.with_report
+    take_the_rest_as_held(monkeypatch)
+    monkeypatch.setattr(valve_report, "with_report", with_report)
     convert = artefact_reading.convert
     monkeypatch.setattr(
         artefact_reading,
