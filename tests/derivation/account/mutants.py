@@ -19,11 +19,11 @@ from sympy.core.relational import Relational
 
 from dzdesign.core.errors import RequirementError
 from dzdesign.derivation.account.proof import Verdict, check_grounds, judge, relation_of
+from dzdesign.derivation.account.referee import hear
 from dzdesign.derivation.account.scope import EVERYWHERE
 from dzdesign.derivation.account.solving import agree
 from dzdesign.derivation.account.statement import Condition, Ground, Statement
 from dzdesign.derivation.symbols import AT_PRESSURE_DROPS, QUANTITIES, Name, u_max, u_min
-from tests.derivation.account.referee import hear
 
 #: Of what is changed.
 WAYS = ("formulas", "scopes", "grounds")

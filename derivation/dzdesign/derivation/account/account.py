@@ -8,6 +8,7 @@ from dzdesign.derivation.account.law_theorems import FULL_COMMAND, SHAPE, TARGET
 from dzdesign.derivation.account.measured_flow import FLOW_OVER_PRESSURE, IDENTIFIABILITY, METER_FLOOR
 from dzdesign.derivation.account.model_and_codes import CODES, IMPLEMENTATION, SIMULATION_MODEL, TRANSFER_FUNCTION
 from dzdesign.derivation.account.proof import Verdict, prove
+from dzdesign.derivation.account.referee import hear
 from dzdesign.derivation.account.statement import Statement
 
 SECTIONS = {
@@ -42,4 +43,4 @@ def verify_statements(statements: Sequence[Statement] = STATEMENTS) -> tuple[Ver
     >>> all(verdict.as_expected for verdict in verify_statements())
     True
     """
-    return prove(statements)
+    return prove(statements, hear)

@@ -4,7 +4,7 @@ A premise has no grounds and is taken as given; anything else follows if its gro
 of its members exactly. Where they do not, the difference is factored: it says on which condition they would.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -73,8 +73,14 @@ class Verdict:
         return self.outcome is not Outcome.DOES_NOT_FOLLOW
 
 
-def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
+#: Tries a statement that was judged, of an account given by number, on numbers; returns what they say against it.
+Hear = Callable[[Verdict, Mapping[str, Statement]], str]
+
+
+def prove(statements: Sequence[Statement], hear: Hear | None = None) -> tuple[Verdict, ...]:
     """Judge each statement from its grounds, in order; it holds only if everything it rests on holds.
+
+    What `hear` objects to does not follow, whatever its proof.
 
     Raises
     ------
@@ -93,6 +99,8 @@ def prove(statements: Sequence[Statement]) -> tuple[Verdict, ...]:
         # What does not follow may be wrong in its units too, nothing else may.
         verdict = replace(verdict, unit_error=error, as_expected=verdict.as_expected and not (error and verdict.holds))
         earlier[statement.number] = statement
+        if hear is not None and verdict.as_expected:
+            verdict = overrule(verdict, hear(verdict, earlier))
         verdicts[statement.number] = verdict
     return tuple(verdicts.values())
 
@@ -117,6 +125,14 @@ def check_grounds(statement: Statement, earlier: Mapping[str, Statement], order:
         is_copy = premise.symbol == statement.symbol and agree(premise.members[-1], statement.members[-1])
         if is_copy and statement.kind is not Kind.LAW and ground.derivative is None:
             raise RequirementError(f"{statement.number} rests on a copy of itself, {ground.number}")
+
+
+def overrule(verdict: Verdict, objection: str) -> Verdict:
+    """Return a verdict after the referee; with an objection the statement does not follow."""
+    if not objection:
+        return verdict
+    words = f"does not follow: {objection}"
+    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False)
 
 
 def judge(statement: Statement, earlier: Mapping[str, Statement], verdicts: Mapping[str, Verdict]) -> Verdict:

@@ -55,6 +55,12 @@ class Scope:
         comparisons = sorted({*self.comparisons, *other.comparisons}, key=sympy.default_sort_key)
         return Scope(tuple(dict.fromkeys((*self.settings, *other.settings))), tuple(comparisons))
 
+    def admits(self, settings: frozenset[Setting]) -> bool:
+        """Whether what is set up is one of the settings named, of each aspect; one with a beta of its own if named."""
+        if settings & {FREE_BETA, WITH_TRANSITION} - set(self.settings):
+            return False
+        return {one.aspect for one in self.settings} == {one.aspect for one in self.settings if one in settings}
+
 
 EVERYWHERE = Scope()
 

@@ -105,7 +105,7 @@ def _is_at_drop(name: Name, value: sympy.Expr) -> bool:
 
 
 class Case(NamedTuple):
-    """One of the cases by which a piecewise statement is proved."""
+    """One of the cases by which a piecewise statement is proved; the referee tries what they may leave out."""
 
     #: Replacements that make the case, such as ``((dP1, dP0 + above),)`` with a positive `above`.
     at: Replacements

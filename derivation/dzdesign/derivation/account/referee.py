@@ -7,7 +7,6 @@ else; one that does not follow must be false somewhere.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import lru_cache
 
 import sympy
@@ -15,10 +14,10 @@ from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
 
 from dzdesign.derivation.account.proof import Verdict, relation_of
-from dzdesign.derivation.account.scope import FREE_BETA, WITH_TRANSITION, Scope, Setting
-from dzdesign.derivation.account.statement import Ground, Outcome, Statement
+from dzdesign.derivation.account.scope import Scope
+from dzdesign.derivation.account.situations import Situation, situations
+from dzdesign.derivation.account.statement import Ground, Statement
 from dzdesign.derivation.symbols import Name, dP, u_i
-from tests.derivation.account.situations import Situation, situations
 
 
 def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
@@ -67,14 +66,6 @@ def hear(verdict: Verdict, statements: Mapping[str, Statement]) -> str:
     return ""
 
 
-def overrule(verdict: Verdict, objection: str) -> Verdict:
-    """Return a verdict after the referee; with an objection the statement does not follow."""
-    if not objection:
-        return verdict
-    words = f"does not follow: {objection}"
-    return replace(verdict, outcome=Outcome.DOES_NOT_FOLLOW, words=words, as_expected=False)
-
-
 def _left_free(scope: Scope) -> set[Name]:
     """Return which of command and pressure drop a scope leaves free: no equation of it says a value."""
     said = {name for one in scope.comparisons if isinstance(one, sympy.Eq) for name in one.free_symbols}
@@ -84,16 +75,9 @@ def _left_free(scope: Scope) -> set[Name]:
 def _admits(statement: Statement, place: Situation) -> bool:
     said = (*statement.scope.comparisons, *statement.provided)
     try:
-        return _is_set_up(statement.scope, place.settings) and all(holds(one, place) for one in said)
+        return statement.scope.admits(place.settings) and all(holds(one, place) for one in said)
     except NoNumberError:
         return False
-
-
-def _is_set_up(scope: Scope, settings: frozenset[Setting]) -> bool:
-    """Whether what is set up is one of the settings named, of each aspect; one with a beta of its own if named."""
-    if settings & {FREE_BETA, WITH_TRANSITION} - set(scope.settings):
-        return False
-    return {one.aspect for one in scope.settings} == {one.aspect for one in scope.settings if one in settings}
 
 
 def _conditions_hold(verdict: Verdict, statements: Mapping[str, Statement], place: Situation) -> bool:

@@ -11,6 +11,14 @@ from typing import Any
 import sympy
 
 from dzdesign.derivation import symbols as s
+from dzdesign.derivation.account.machines import (
+    PlainPlant,
+    PlainValve,
+    drawn_commands,
+    drawn_drops,
+    drawn_plants,
+    drawn_valves,
+)
 from dzdesign.derivation.account.scope import (
     BARE,
     CODES_AT_PIN,
@@ -25,14 +33,6 @@ from dzdesign.derivation.account.scope import (
 )
 from dzdesign.derivation.law import law
 from dzdesign.derivation.laws import LAW_NAMES
-from tests.derivation.account.machines import (
-    PlainPlant,
-    PlainValve,
-    drawn_commands,
-    drawn_drops,
-    drawn_plants,
-    drawn_valves,
-)
 
 _STEP = 1e-5  # of a difference quotient
 _JUST_ABOVE = 1 + 1e-12  # times dP0: the limit from above
