@@ -232,7 +232,7 @@ def test_the_report_leads_with_them(valve):
     for figure in figures:
         assert not numbers_as_computed(figure.description + figure.caption), figure.name
     assert ">pressure drop dP (bar)<" in figures[0].svg and "(mA)<" in figures[0].svg
-    assert "knee_V" in figures[0].csv.splitlines()[0]  # a file is in V
+    assert "knee_opening_V" in figures[0].csv.splitlines()[0]  # a file is in V
     assert not numbers_as_computed(" ".join(sections["data"].lines))
     found = characteristic_quantities(valve, None, (), characteristic_curves(valve, None, {}))
     assert not any(numbers_as_computed(f"{each.value} {each.note}") for each in key_figures(Chain(valve=valve), found))

@@ -241,7 +241,7 @@ def test_each_valve_has_the_parameters_of_its_amplifier(made, tmp_path, monkeypa
     assert files[0] != files[1] and all(content.startswith(b"MIN:A ") for content in files)
     assert (out / "valves" / "V0000" / "amplifier_evidence" / "evidence.json").is_file()
     html = report_of_lot(out).html
-    assert '<td class="text">amplifier</td><td class="text">device west</td>' in html
+    assert "output amplifier, device west: made for 2 of 2 valves; verified, and holds for 2" in html
     (out / "valves" / "V0001" / "amplifier" / "west.txt").write_bytes(files[0])
     with pytest.raises(InputError, match=r"V0001/amplifier: changed or missing: west\.txt"):
         read_lot(out)
