@@ -19,7 +19,7 @@ from pathlib import Path
 #: One input takes no longer, s; no input is longer, bytes; and no reader takes more memory, MB.
 SLOWEST_S, LONGEST, MEMORY_MB = 5, 65536, 2048
 NAMES = (
-    "text", "recording", "low-flow", "valve", "compensator", "artefacts", "lot-table", "curves",
+    "text", "recording", "low-flow", "valve", "compensator", "artefacts", "curves",
     "options", "plant", "tolerances", "words",
     "amplifier", "telemetry", "loading-frames", "loading", "calibration-file", "calibration-block",
 )  # fmt: skip

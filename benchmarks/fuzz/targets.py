@@ -28,7 +28,6 @@ from dzdesign.identify.reading.ramp_files import read_ramp_file
 from dzdesign.identify.reading.text.table_reader import read_text_table
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.summary import ValveManifest
-from dzdesign.report.lot.table import TABLE, read_table
 from dzdesign.verify.closed_loop.plant import read_plant
 from dzdesign.verify.closed_loop.population import read_tolerances
 from dzdesign.verify.closed_loop.ramps import read_curves
@@ -85,14 +84,6 @@ def _curves(data: bytes) -> None:
     read_curves(data.decode(errors="replace"))
 
 
-def _lot_seed() -> bytes:
-    from dzdesign.report.lot.table import frame_of, table_files
-
-    figures = {"dp0_MPa": 1.0, "offset_V": 4.9, "trend": "decreasing"}
-    rows = [{"name": name, "status": "ok", **figures, "record.serial": name} for name in ("a", "=1+1")]
-    return table_files(frame_of(rows))[TABLE]
-
-
 def _artefact_seeds() -> list[bytes]:
     short = [json.dumps({"schema": schema_of(kind), "files": {}, "checks": [], "made_from": []}).encode()
              for kind in ARTEFACTS]  # fmt: skip
@@ -125,7 +116,6 @@ TARGETS = {
         seeds=lambda: [(GOLDENS / "compensator.json").read_bytes()],
     ),
     "artefacts": Target(run=_artefacts, seeds=_artefact_seeds),
-    "lot-table": Target(run=lambda data: read_table(data, TABLE), seeds=lambda: [_lot_seed()]),
     "curves": Target(
         run=_curves, seeds=lambda: [b"dp_code,drive_V\n0,1.5\n1,2.5\n"], refusals=(ValueError,)
     ),

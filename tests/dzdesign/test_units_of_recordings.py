@@ -20,8 +20,7 @@ from dzdesign.identify.reading.units_of_columns import units_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain
 from dzdesign.report.figure import figure_style
-from dzdesign.report.sections.curves import characteristic_curves
-from dzdesign.report.sections.quantities import characteristic_quantities
+from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
 from dzdesign.report.sections.valve import valve_sections
 from dzdesign.report.summary import key_figures
 from tests.support.synthetic import needs_compiler
@@ -232,8 +231,8 @@ def test_the_report_leads_with_them(valve):
     figures = [figure for section in sections.values() for figure in section.figures if figure]
     for figure in figures:
         assert not numbers_as_computed(figure.description + figure.caption), figure.name
-    assert ">valve command u (mA)<" in figures[0].svg and ">pressure drop dP (bar)<" in figures[1].svg
-    assert "knee_V" in figures[0].csv.splitlines()[0]  # a file is in V
+    assert ">pressure drop dP (bar)<" in figures[0].svg and "(mA)<" in figures[0].svg
+    assert "knee_opening_V" in figures[0].csv.splitlines()[0]  # a file is in V
     assert not numbers_as_computed(" ".join(sections["data"].lines))
     found = characteristic_quantities(valve, None, (), characteristic_curves(valve, None, {}))
     assert not any(numbers_as_computed(f"{each.value} {each.note}") for each in key_figures(Chain(valve=valve), found))

@@ -16,9 +16,8 @@ from dzdesign.identify.options import IdentifyOptions
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.figure import figure_style
 from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
-from dzdesign.report.sections.conditions import conditions_section
-from dzdesign.report.sections.curves import characteristic_curves
-from dzdesign.report.sections.quantities import characteristic_quantities
+from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
+from dzdesign.report.sections.valve import conditions_section
 from dzdesign.report.summary import measured_figures
 from tests.support.bench_recordings import AFTER, BEFORE, L_MIN, record
 from tests.support.synthetic import Truth, synthetic_ramp

@@ -1,6 +1,6 @@
 """What a stranger reads first is true of this valve and says something: warnings, cards, counts, names, numbers."""
 
-import html
+import json
 import re
 import tomllib
 from dataclasses import replace
@@ -15,12 +15,12 @@ from dzdesign.design.options import options_of
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain, standing_warnings
 from dzdesign.report.sections.closed_loop import scenarios_table
-from dzdesign.report.sections.conditions import RECORDED, conditions_section
-from dzdesign.report.sections.curves import characteristic_curves
 from dzdesign.report.sections.provenance import warnings_section
-from dzdesign.report.sections.quantities import characteristic_quantities
-from dzdesign.report.summary import key_figures, valve_name
-from dzdesign.report.valve_report import report_of_folder
+from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
+from dzdesign.report.sections.valve import RECORDED, conditions_section
+from dzdesign.report.summary import key_figures, unrequired_flow, valve_name
+from dzdesign.report.valve_report import REPORT_NAME
+from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
 from dzdesign.verify.closed_loop.scene import NO_CORE_CAN_KNOW
 from dzdesign.verify.loop_results import ScenarioResult
 from tests.support.evidence import LOOP, evidence_with, pressure_result, read_evidence
@@ -113,13 +113,6 @@ def test_rows_of_one_scenario_say_which_runs_they_are_of():
     ]
 
 
-@needs_compiler
-def test_every_number_of_a_page_has_a_decimal_point(reported_demo):
-    page = report_of_folder(reported_demo).html
-    text = html.unescape(re.sub(r"<svg.*?</svg>|<style.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL))
-    assert re.search(r"\d\.\d", text) and not re.findall(r"\d,\d", text)
-
-
 def test_init_names_every_entry_of_the_record_that_a_report_asks_for(example_valve):
     """Seeded: the report missed a filter of which the file that `init` writes knew nothing."""
     template = ROOT / "dzdesign" / "dzdesign" / "initial_options" / "templates" / "dzdesign.toml.jinja"
@@ -130,3 +123,52 @@ def test_init_names_every_entry_of_the_record_that_a_report_asks_for(example_val
     filled = replace(example_valve, record={name: str(text) for name, text in record.items()})
     assert conditions_section(filled, None).missing == ""
     assert valve_name(filled.record) == f"{record['type']}, serial number {record['serial']}"
+
+
+# --- the largest flow at zero command that no requirement forbids stands with the verdict ---
+
+COLD = replace(
+    RUN, name="coil 40 K colder", dp_MPa=5.0, unseen_below_L_min=0.6, q_zero_L_min=5.02, must_shut=False,
+    not_required=NOT_DECLARED,
+)  # fmt: skip
+BOTH = replace(COLD, name="coil 40 K colder, supply voltage 20% higher", q_zero_L_min=11.52)
+STUCK = replace(COLD, name="dP above the tests", q_zero_L_min=0.9, not_required=NO_CORE_CAN_KNOW)
+
+
+def said(*scenarios: ScenarioResult) -> str:
+    return unrequired_flow(replace(evidence_with(), scenarios=scenarios), AS_COMPUTED)
+
+
+def test_the_largest_flow_leads_with_its_remedy():
+    text = said(COLD, BOTH, STUCK)
+    assert f"up to 11.5 L/min at zero command ({BOTH.name}; in the runs for 5.00 MPa)" in text
+    assert "--coil-temperature" in text and "5.02" not in text
+
+
+def test_what_no_declaration_changes_has_its_reason():
+    assert said(STUCK).endswith(f"Reason: {NO_CORE_CAN_KNOW}.") and "--coil-temperature" not in said(STUCK)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"must_shut": True, "not_required": ""},  # a failure, which the verdict names itself
+        {"q_zero_L_min": 0.59},  # hidden by the meter
+        {"unseen_below_L_min": None, "q_zero_L_min": 0.0},
+        {"leak_L_min": 5.02},  # no compensator can stop it
+        {"allowed_at_zero_L_min": 6.0},
+        {"figures": {"flow_after_zero_command_L_min": 26.0}},  # of full command at a restart
+    ],
+)
+def test_what_is_no_unrequired_flow_is_not_said(change):
+    assert said(replace(COLD, **change)) == ""
+
+
+@needs_compiler
+def test_it_stands_open_with_a_good_verdict_and_follows_from_the_scenarios(reported_demo):
+    html = (reported_demo / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
+    evidence = json.loads((reported_demo / "evidence" / "verification.json").read_bytes())
+    passing = [each["q_zero_L_min"] for each in evidence["scenarios"] if not each["must_shut"]]
+    verdict = html[html.index('<div class="verdict good"') :].partition("<details")[0]
+    (line,) = re.findall(r'<li class="unrequired">(.*?)</li>', verdict)
+    assert f"{max(passing):.3g} L/min" in line and max(passing) > 1

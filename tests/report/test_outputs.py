@@ -13,10 +13,9 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareOrigin
-from dzdesign.report.artefacts import Chain, Place
-from dzdesign.report.outputs import change_in, outputs_in, outputs_sections, with_outputs
-from dzdesign.report.page import Headline, MadeOutput, MadeOutputs
-from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
+from dzdesign.report.artefacts import Chain, MadeOutput, MadeOutputs, Place, change_in, outputs_in
+from dzdesign.report.page import Headline
+from dzdesign.report.valve_report import REPORT_NAME, outputs_sections, with_outputs
 from dzdesign.verify.evidence import OutputEvidence, TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
 from dzdesign.verify.verification import evidence_manifest
@@ -91,24 +90,15 @@ def test_evidence_is_found_by_the_hash_of_the_manifest(folder, digest, name):
     assert found["plc/"].evidence == f"{name}/evidence.json" and found["firmware/"].holds is None
 
 
-def test_of_two_pieces_of_evidence_the_one_that_does_not_hold_counts(folder, digest):
-    put_evidence(folder / "a", folder / "plc", holds=False, text="7 wrong")
-    put_evidence(folder / "b", folder / "plc")
-    found = listed(folder, digest)["plc/"]
-    assert found.verdict == "DOES NOT HOLD" and "7 wrong" in found.fault and found.is_wrong
-
-
-def test_what_was_not_checked_is_neither_right_nor_wrong(folder, digest):
+def test_of_several_pieces_of_evidence_the_worst_counts(folder, digest):
     """Such as a function of MATLAB where Octave is missing."""
     put_evidence(folder / "b", folder / "plc")
     put_evidence(folder / "a", folder / "plc", holds=None, text="Octave not found")
     found = listed(folder, digest)["plc/"]
     assert (found.verdict, found.is_wrong) == ("NOT CHECKED", False) and "Octave not found" in found.fault
-    good, chain = Headline(kind="good", text="yes"), Chain(evidence=evidence_with())
-    said = with_outputs(good, MadeOutputs(listed=(found,)), chain)
-    assert (said.kind, said.text) == ("open", "NOT CHECKED: plc/. yes") and "Octave not found" in said.reasons[0]
     put_evidence(folder / "c", folder / "plc", holds=False, text="7 wrong")
-    assert listed(folder, digest)["plc/"].verdict == "DOES NOT HOLD"
+    found = listed(folder, digest)["plc/"]
+    assert found.verdict == "DOES NOT HOLD" and "7 wrong" in found.fault and found.is_wrong
 
 
 def test_changed_evidence_is_not_used_and_said(folder, digest):
@@ -180,51 +170,36 @@ def test_the_page_lists_them_and_the_command_leaves_the_output_as_it_is(folder, 
     assert document["other_outputs"] == []
 
 
-def test_without_another_output_than_the_firmware_there_is_no_such_section(folder):
-    for path in (folder / "plc").iterdir():
-        path.unlink()
-    assert 'id="outputs"' not in report_of_folder(folder).html
-
-
 WRONG = MadeOutput(kind="fmu", settings="", place="fmu/", sha256="0" * 64, holds=False, fault="inputs: 3 wrong")
 
 
-@pytest.mark.parametrize("kind", ["good", "open", "bad"])
-def test_a_wrong_output_takes_the_verdict_and_is_named(kind):
-    said = Headline(kind=kind, text="as it was", reasons=("one",))
-    chain = Chain(evidence=evidence_with())
-    right = MadeOutputs(listed=(replace(WRONG, holds=True),))
-    assert with_outputs(said, right, chain) == said
-    found = with_outputs(said, MadeOutputs(listed=(WRONG,)), chain)
-    assert found.kind == "bad" and found.reasons == ("one", "DOES NOT HOLD: fmu/ (fmu): inputs: 3 wrong")
-    assert ("fmu/" in found.text) == (kind != "bad") and found.text.endswith("as it was")
+RIGHT, UNTRIED = replace(WRONG, holds=True, fault="", place="plc/"), replace(WRONG, holds=None, fault="")
+FIRMWARE = Chain(evidence=evidence_with())
+ITSELF = replace(FIRMWARE, places={"firmware": Place("fmu/manifest.json", WRONG.sha256)})  # whose evidence it is
 
 
-def test_a_verdict_is_not_good_while_an_output_is_not_verified():
-    untried = MadeOutputs(listed=(replace(WRONG, holds=None, fault=""),))
-    chain, good = Chain(evidence=evidence_with()), Headline(kind="good", text="as it was")
-    found = with_outputs(good, untried, chain)
-    assert (found.kind, found.text) == ("open", "NOT VERIFIED: fmu/. as it was")
-    open_ = replace(good, kind="open")
-    assert with_outputs(open_, untried, chain) == open_
-    itself = replace(chain, places={"firmware": Place("fmu/manifest.json", WRONG.sha256)})  # whose evidence it is
-    assert with_outputs(good, untried, itself) == good
-
-
-def test_the_firmware_of_the_report_is_judged_once():
-    chain = Chain(places={"firmware": Place("firmware/manifest.json", WRONG.sha256)}, evidence=evidence_with())
-    said = Headline(kind="bad", text="DOES NOT HOLD", reasons=("inputs: 3 wrong",))
-    made = MadeOutputs(listed=(WRONG,))
-    assert with_outputs(said, made, chain) == said and outputs_sections(chain, made) == {}
-
-
-def test_without_a_firmware_the_verdict_is_of_the_outputs():
-    said = Headline(kind="open", text="NOT VERIFIED: there is no evidence here", cautions=("SIMULATED",))
-    good, open_ = replace(WRONG, place="plc/", holds=True, fault=""), replace(WRONG, holds=None, fault="")
-    found = with_outputs(said, MadeOutputs(listed=(good,)), Chain())
-    assert (found.kind, found.text, found.cautions) == (
-        "good", "Every requirement holds of plc/; no C firmware is here", ("SIMULATED",),
-    )  # fmt: skip
-    found = with_outputs(said, MadeOutputs(listed=(good, open_)), Chain())
-    assert (found.kind, found.text) == ("open", "NOT VERIFIED: fmu/; every requirement holds of plc/")
-    assert with_outputs(said, MadeOutputs(), Chain()) == said
+@pytest.mark.parametrize(
+    ("kind", "listed", "chain", "found", "text"),
+    [
+        ("good", RIGHT, FIRMWARE, "good", "as it was"),
+        ("good", WRONG, FIRMWARE, "bad", "1 output NOT to be used: fmu/. as it was"),
+        ("open", WRONG, FIRMWARE, "bad", "1 output NOT to be used: fmu/. as it was"),
+        ("bad", WRONG, FIRMWARE, "bad", "as it was"),
+        ("good", UNTRIED, FIRMWARE, "open", "NOT VERIFIED: fmu/. as it was"),
+        ("open", UNTRIED, FIRMWARE, "open", "as it was"),
+        ("good", UNTRIED, ITSELF, "good", "as it was"),
+        ("bad", WRONG, ITSELF, "bad", "as it was"),
+        ("open", RIGHT, Chain(), "good", "Every requirement holds of plc/; no C firmware is here"),
+        ("open", UNTRIED, Chain(), "open", "NOT VERIFIED: fmu/"),
+        ("open", None, Chain(), "open", "as it was"),
+    ],
+)
+def test_the_verdict_speaks_of_the_outputs(kind, listed, chain, found, text):
+    """A wrong output takes it, one that was not verified makes it open; the firmware of the report is judged once."""
+    said = Headline(kind=kind, text="as it was", reasons=("one",), cautions=("SIMULATED",))
+    made = MadeOutputs(listed=(listed,) if listed else ())
+    judged = with_outputs(said, made, chain)
+    assert (judged.kind, judged.text, judged.cautions) == (found, text, ("SIMULATED",))
+    wrong = listed is WRONG and chain is FIRMWARE
+    assert ("DOES NOT HOLD: fmu/ (fmu): inputs: 3 wrong" in judged.reasons) is wrong
+    assert (outputs_sections(chain, made) == {}) is (listed is None or chain is ITSELF)

@@ -1,38 +1,39 @@
 """report.html: what it leads with, where its files come from, and that nobody's text becomes markup."""
 
+import base64
 import json
 import re
-import shutil
-from dataclasses import asdict, replace
+from dataclasses import replace
+from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
 
-from dzdesign.command_line.cli import main
-from dzdesign.core.artefact_types import to_json_bytes
+from dzdesign.core.errors import InputError
 from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.designing import design
 from dzdesign.identify.identification import identify
-from dzdesign.report.cells import whole
-from dzdesign.report.figure import PALETTE
-from dzdesign.report.summary import worst_of
-from dzdesign.report.valve_report import REPORT_NAME, report_of_folder
+from dzdesign.report.artefacts import Chain, Place, read_chain
+from dzdesign.report.figure import PALETTE, figure_style
+from dzdesign.report.page import LARGEST_LOGO, logo_uri, whole
+from dzdesign.report.sections.closed_loop import loop_section
+from dzdesign.report.sections.inputs import inputs_section
+from dzdesign.report.sections.quantities import characteristic_quantities
+from dzdesign.report.sections.valve import valve_sections
+from dzdesign.report.summary import headline, key_figures, worst_of
+from dzdesign.report.valve_report import REPORT_NAME, make_report
 from dzdesign.verify.closed_loop.plant import Plant
-from dzdesign.verify.loop_results import PressureResult
 from dzdesign.verify.requirements import AS_STATED
-from tests.support.attacked_firmware import sealed
+from tests.support.evidence import pressure_result
 from tests.support.html_pages import HOSTILE, Page
-from tests.support.reported import change_evidence, change_json
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp
 
 pytestmark = needs_compiler
 
 
-@pytest.fixture
-def copied(reported_demo, tmp_path):
-    folder = tmp_path / "demo"
-    shutil.copytree(reported_demo, folder)
-    return folder
+@pytest.fixture(scope="module")
+def chain(reported_demo):
+    return read_chain(reported_demo)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +64,7 @@ def test_every_section_is_there_with_its_figures_and_tables(html):
         "characteristic", "conditions", "loop", "thresholds", "beta", "remaining", "checks", "warnings",
         "data", "budget", "law", "integers", "inputs", "provenance",
     ]  # fmt: skip
-    figures = ("dead-zone", "loop", "thresholds", "beta", "fit", "budget", "law", "map", "zero")
+    figures = ("loop", "thresholds", "beta", "law", "map", "zero")
     of_sections = [f"figure-{name}-positive" for name in figures]
     assert ["figure-characteristic", *of_sections] == [name for name in ids if name.startswith("figure-")]
     links = [each["href"] for each in page.of("a")]
@@ -88,7 +89,7 @@ def test_the_page_needs_nothing_from_outside_and_runs_nothing(html):
 
 def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
     links = {each["download"]: each["href"] for each in Page(html).of("a") if "download" in each}
-    assert len(links) == 12  # ten figures, the constants, and the budget's components
+    assert len(links) == 9  # seven figures, the constants, and the budget's components
     tables = {name: unquote(link.removeprefix("data:text/csv;charset=utf-8,")) for name, link in links.items()}
     evidence = reported_demo / "evidence"
     assert tables["loop-positive.csv"] == (evidence / "closed_loop_positive.csv").read_text()
@@ -102,7 +103,7 @@ def test_the_numbers_of_every_figure_can_be_downloaded(html, reported_demo):
 
 def test_figures_take_their_colours_from_the_page(html):
     drawings = re.findall(r'<svg [^>]*class="drawing".*?</svg>', html, re.DOTALL)
-    assert len(drawings) == 10
+    assert len(drawings) == 7
     light = {shade for shade, _ in PALETTE.values()}
     for drawing in drawings:
         assert not {shade for shade in light if shade in drawing}
@@ -110,62 +111,46 @@ def test_figures_take_their_colours_from_the_page(html):
     assert html.count("--fig-ink: ") == 2  # light and dark
 
 
-# --- a verdict that is not good ---------------------------------------------------------------------------------
+# --- the verdict ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_a_requirement_that_does_not_hold_is_loud(copied):
-    def fail(evidence):
-        evidence["holds"] = False
-        check = next(one for one in evidence["checks"] if one["id"] == "exact-law")
-        check.update(holds=False, text="33550336 inputs checked, 7 wrong")
-        evidence["inputs"][0].update(wrong=7, first_wrong="command code 9")
-
-    change_evidence(copied, fail)
-    assert main(["report", str(copied)]) == 1
-    html = (copied / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
-    assert '<div class="verdict bad"' in html and "DOES NOT HOLD: 1 of" in html
-    assert "First wrong: command code 9" in html
-    assert "requirements that were checked hold" not in html
+def judged(chain, **changes):
+    """Return the verdict on evidence of which the named requirements have other outcomes."""
+    checks = tuple(replace(one, **changes.get(one.id.replace("-", "_"), {})) for one in chain.evidence.checks)
+    return headline(replace(chain, evidence=replace(chain.evidence, checks=checks)))
 
 
-@pytest.mark.slow
-def test_what_was_not_checked_is_not_green(copied):
-    def leave_open(evidence):
-        evidence["holds"] = False
-        check = next(one for one in evidence["checks"] if one["name"].endswith("after any required scenario"))
-        check.update(holds=None, text="no falling branch was recorded")
+def test_a_requirement_that_does_not_hold_is_loud_and_what_was_not_checked_is_not_green(chain):
+    wrong = judged(chain, exact_law={"holds": False, "text": "33550336 inputs checked, 7 wrong"})
+    assert wrong.kind == "bad" and wrong.text.startswith("DOES NOT HOLD: 1 of ")
+    assert wrong.reasons == ("DOES NOT HOLD: equals the exactly rounded law: 33550336 inputs checked, 7 wrong",)
+    unknown = judged(chain, exact_law={"holds": None, "text": "no compiler"})
+    assert unknown.kind == "open" and unknown.text.startswith("NOT CHECKED in full: 1 of ")
+    assert unknown.reasons == ("NOT CHECKED: equals the exactly rounded law: no compiler",)
+    both = judged(chain, exact_law={"holds": None}, reproduced={"holds": False})
+    assert both.kind == "bad" and [line.split(":")[0] for line in both.reasons] == ["DOES NOT HOLD", "NOT CHECKED"]
+    inputs = replace(chain.evidence.inputs[0], wrong=7, first_wrong="command code 9")
+    seen = replace(chain, evidence=replace(chain.evidence, inputs=(inputs,)))
+    with figure_style():
+        assert "First wrong: command code 9." in inputs_section(seen).lines
+    assert {"7 wrong"} & {each.value for each in key_figures(seen, characteristic_quantities(None, None, (), ()))}
 
-    change_evidence(copied, leave_open)
-    assert main(["report", str(copied)]) == 1
-    html = (copied / "evidence" / REPORT_NAME).read_text(encoding="utf-8")
-    assert '<div class="verdict open"' in html and 'class="verdict good"' not in html
-    assert "NOT CHECKED: no flow at zero command after any required scenario: no falling branch was recorded" in html
-    assert '<td class="open">? NOT CHECKED</td>' in html
 
-
-@pytest.mark.slow
-def test_what_was_not_tried_is_said(copied):
+def test_what_was_not_tried_is_said(chain):
     """Without --plant the closed loop is of a stand-in, which has load steps where there are several pressure drops."""
-    report = report_of_folder(copied)
-    assert report.kind == "good"
-    said = report.html[report.html.index('class="verdict good"') : report.html.index('<dl class="numbers">')]
-    command = '<code>verify <span class="tied">--plant</span></code>'
-    assert f"the closed-loop requirements hold with the machine&#39;s plant: {command}" in said
-    assert "load steps" not in said  # of recordings at several pressure drops
-    assert "machine code of other processors" in said
-
-    def with_plant(evidence):
-        evidence["closed_loop"].update(plant={**asdict(Plant()), "K_a": 1.0}, plant_sha256="5" * 64, dynamics=None)
-        of_avr = {"id": "machine-code", "name": "machine code of AVR", "holds": True, "text": "", "not_required": []}
-        evidence["checks"].append(of_avr)
-        evidence["tool"]["version"] = "0.0.9"  # which had words of its own
-
-    change_evidence(copied, with_plant)
-    html = report_of_folder(copied).html
-    said = html[html.index('class="verdict good"') : html.index('<dl class="numbers">')]
-    assert "machine&#39;s own" not in said and "machine code" not in said
-    assert f"SHA-256 {'5' * 64}" in html and "m_e_kg" in html[html.index('id="loop"') :]
+    said = " ".join(headline(chain).untried)
+    assert "the closed-loop requirements hold with the machine's plant: `verify --plant" in said
+    assert "load steps" not in said and "machine code of other processors" in said
+    loop = replace(chain.evidence.closed_loop, plant=Plant(), plant_sha256="5" * 64, dynamics=None)
+    tried = replace(chain.evidence.checks[0], id="machine-code", name="machine code of AVR")
+    kept = tuple(one for one in chain.evidence.checks if one.name != "the drive follows its model")
+    evidence = replace(chain.evidence, closed_loop=loop, checks=(*kept, tried))
+    said = " ".join(headline(replace(chain, evidence=evidence)).untried)
+    assert "machine's plant" not in said and "machine code" not in said and "the drive follows its model" in said
+    with figure_style():
+        section = loop_section(replace(chain, evidence=evidence))
+    assert f"SHA-256 {'5' * 64}" in section.lines[0]
+    assert any(cell.text == "m_e_kg" for table in section.tables if table for row in table.rows for cell in row)
 
 
 # --- hostile text -------------------------------------------------------------------------------------------------
@@ -177,84 +162,56 @@ def is_of_the_number_of_texts(tag, given):
 
 
 @pytest.mark.slow
-def test_nobodys_text_becomes_markup(copied):
+def test_nobodys_text_becomes_markup(chain, html):
     name = " ".join(HOSTILE)
-
-    def poison(evidence):
-        evidence["closed_loop"]["plant_source"] = name
-        evidence["checks"][0].update(name=name, text=name)
-        evidence["scenarios"][0]["name"] = name
-        evidence["inputs"][0]["first_wrong"] = name
-
-    def poison_valve(valve):
-        valve["made_from"][0]["source"] = name
-        valve["warnings"].append({"code": name, "text": name, "source": name})
-        for test in valve["sides"]["positive"]["tests"]:
-            test["source"] = name
-
-    change_evidence(copied, lambda evidence: evidence["tool"].update(version="0.0.9"))  # which had words of its own
-    clean = Page(report_of_folder(copied).html)
-    change_evidence(copied, poison)
-    page = Page(report_of_folder(copied).html)
-    folder = copied / "alone"
-    folder.mkdir()
-    shutil.copy(copied / "valve.json", folder)
-    clean_valve = Page(report_of_folder(folder).html)
-    change_json(folder / "valve.json", poison_valve)
-    change_json(folder / "valve.json", sealed)
-    valve = Page(report_of_folder(folder).html)
-    for dirty, before in ((page, clean), (valve, clean_valve)):
-        words, expected = ([tag for tag, given in each.tags if not is_of_the_number_of_texts(tag, given)] for each in (
-            dirty, before,
-        ))  # fmt: skip
-        assert words == expected
-        assert not [key for _, attributes in dirty.tags for key in attributes if key.startswith("on")]
-        assert " ".join(name.split()) in " ".join(dirty.text.split())
+    evidence = chain.evidence
+    poisoned = replace(
+        evidence,
+        checks=(replace(evidence.checks[0], name=name, text=name), *evidence.checks[1:]),
+        inputs=(replace(evidence.inputs[0], first_wrong=name),),
+        scenarios=(replace(evidence.scenarios[0], name=name), *evidence.scenarios[1:]),
+        closed_loop=replace(evidence.closed_loop, plant_source=name),
+    )
+    side, valve = chain.valve.sides["positive"], chain.valve
+    tests = (replace(side.tests[0], ramps=(name,)), *side.tests[1:])
+    warning = replace(valve.warnings[0], code=name, text=name, source=name)
+    source = replace(valve.made_from[0], source=name)
+    hostile = replace(
+        valve, sides={"positive": replace(side, tests=tests)}, warnings=(*valve.warnings, warning),
+        made_from=(source, *valve.made_from[1:]),
+    )  # fmt: skip
+    dirty = Page(make_report(replace(chain, evidence=poisoned, valve=hostile)).html)
+    words, expected = (
+        [tag for tag, given in each.tags if not is_of_the_number_of_texts(tag, given)] for each in (dirty, Page(html))
+    )
+    assert words == expected
+    assert not [key for _, attributes in dirty.tags for key in attributes if key.startswith("on")]
+    assert " ".join(name.split()) in " ".join(dirty.text.split())
 
 
 # ---- few tests, and two sides ----
 
 
-@pytest.fixture(scope="module")
-def reports(tmp_path_factory):
-    """Reports of a valve of one ramp test, and of one with two sides of two tests each, without firmware."""
-
+def test_one_ramp_test_is_one_and_figures_of_two_sides_say_which_they_are_of(chain):
     one, other = (synthetic_ramp(dp, Truth(), seed=7, rate_Hz=10.0) for dp in (1.0, 4.0))
     mirrored = [replace(test, source=f"minus_{test.source}", u=-test.u, q=-test.q) for test in (one, other)]
-    found = {}
-    for name, ramps in (("one", [one]), ("both", [one, other, *mirrored])):
-        folder = tmp_path_factory.mktemp(name)
-        (folder / "valve.json").write_bytes(to_json_bytes(identify(ramps)))
-        found[name] = report_of_folder(folder).html
-    return found
-
-
-@pytest.mark.slow
-def test_one_ramp_test_is_one(reports):
-    text = Page(reports["one"]).text
-    assert "1 ramp test; full command" in text and "1 ramp tests" not in text and "1 pressure drops" not in text
-    assert "staircase" not in text and "One pressure drop was tested, and nothing is certified at another." in text
-
-
-def test_an_assumed_repeatability_stands_beside_the_certificate(html, tmp_path):
-    one = identify([synthetic_ramp(1.0, Truth(), seed=7, rate_Hz=10.0)])
-    valve_json = to_json_bytes(one)
-    (tmp_path / "valve.json").write_bytes(valve_json)
-    (tmp_path / "compensator.json").write_bytes(to_json_bytes(design(one)))
-    page = report_of_folder(tmp_path).html
-    heads = [text[: text.index('<section id="data">')] for text in (page, html)]
-    certificate, of_repeats = (head[head.index("Certificate") :] for head in heads)
-    assert "repeats to 25 mV" in certificate and "(assumed-scatter)" in certificate
-    assert "assumed-scatter" not in of_repeats
-    assert "from ramp to ramp: standard deviation 25.0 mV (assumed" in page
-    assert "degrees of freedom), included in the bounds" in html
-
-
-def test_figures_of_two_sides_say_which_they_are_of(reports):
-    for side in ("positive", "negative"):
-        start = reports["both"].index(f'id="figure-fit-{side}"')
-        assert f"{side} commands</text>" in reports["both"][start : reports["both"].index("</svg>", start)]
-    assert "commands</text>" not in reports["one"]
+    alone = identify([one])
+    with figure_style():
+        of_one, of_both = (valve_sections(valve, None) for valve in (alone, identify([one, other, *mirrored])))
+    (figure,) = of_one["thresholds"].figures
+    assert of_one["data"].lines[0].startswith("1 ramp test; full command")
+    assert "One pressure drop was tested, and nothing is certified at another." in figure.caption
+    assert "commands</text>" not in figure.svg
+    for side, drawn in zip(("positive", "negative"), of_both["thresholds"].figures, strict=True):
+        assert drawn.name == f"thresholds-{side}" and f"{side} commands</text>" in drawn.svg
+    # An assumed repeatability stands beside the certificate.
+    nothing = characteristic_quantities(None, None, (), ())
+    notes = [
+        next(each.note for each in key_figures(of, nothing) if each.label.startswith("Certificate"))
+        for of in (Chain(compensator=design(alone), valve=alone), replace(chain, evidence=None))
+    ]
+    assert "repeats to 25 mV" in notes[0] and "(assumed-scatter)" in notes[0] and "assumed-scatter" not in notes[1]
+    assert any("from ramp to ramp: standard deviation 25.0 mV (assumed" in line for line in of_one["data"].lines)
 
 
 @pytest.mark.parametrize(
@@ -268,12 +225,44 @@ def test_figures_of_two_sides_say_which_they_are_of(reports):
     ],
 )
 def test_of_how_many_runs_a_figure_is_the_worst(sides, said):
-    one = PressureResult(
-        side="positive", dp_MPa=1.0, dead_zone_opening=0.5, dead_zone_closing=0.5, residual_opening=0.1,
-        residual_closing=0.1, reading_flow_L_min=0.6, reading_opening_without=0.5, reading_closing_without=0.5,
-        reading_opening=0.1, reading_closing=0.1, ideal_line=0.04, unseen_below_L_min=None, flow_miss=0.0,
-        flow_miss_at=0.0, leak_L_min=0.0, allowed_at_zero_L_min=None, q_zero_L_min=0.0, q_zero_without_beta_L_min=0.0,
-        q_max_direct_L_min=1.0, q_max_L_min=1.0,
-    )  # fmt: skip
-    runs = [replace(one, side=side, dp_MPa=1.0 + n) for side, count in sides.items() for n in range(count)]
+    runs = [pressure_result(side=side, dp_MPa=1.0 + n) for side, count in sides.items() for n in range(count)]
     assert worst_of(runs, AS_COMPUTED) == said
+
+
+# ---- a logo ----
+
+PNG = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
+
+
+def test_a_report_with_a_logo_needs_nothing_from_outside(tmp_path):
+    """And a record of somebody's own stands in the sheet's header with every sign of it escaped."""
+    record = {"serial": HOSTILE[0], "type": HOSTILE[2], "note": HOSTILE[1]}
+    valve = identify([synthetic_ramp(1.0, Truth(noise=0.02), ramp_s=20, rate_Hz=25)], record=record)
+    (tmp_path / "logo.png").write_bytes(PNG)
+    chain = Chain(valve=valve, places={"valve": Place("valve.json", "0" * 64)})
+    html = make_report(chain, logo=logo_uri(tmp_path / "logo.png")).html
+    (image,) = Page(html).of("img")
+    assert base64.b64decode(image["src"].removeprefix("data:image/png;base64,")) == PNG
+    assert not Page(html).of("script")
+    style = html[html.index("<style>") + len("<style>") : html.index("</style>")]
+    assert "<" not in style and "alert\\28 1\\29 " in style
+    assert "counter(page)" in style and "counter(pages)" in style
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("logo.svg", b"<svg xmlns='http://www.w3.org/2000/svg' onload='alert(1)'/>"),
+        ("logo.png", b"<script>alert(1)</script>"),
+        ("large.png", PNG + bytes(LARGEST_LOGO)),
+        ("empty.png", b""),
+    ],
+    ids=["SVG", "no image", "too large", "empty"],
+)
+def test_what_is_no_raster_image_is_refused(tmp_path, name, content):
+    path: Path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="--logo"):
+        logo_uri(path)

@@ -69,7 +69,10 @@ def write_lot_folder(folder: Path, rows: Sequence[Mapping[str, Cell]], *, verifi
     files = table_files(frame)
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    summary = summary_of(frame, files=files, verified=verified, why_no_setting="made on paper", made_from={})
+    summary = summary_of(
+        frame, files=files, made_from={}, verified=verified, anomalies=(), lot_setting=None,
+        why_no_lot_setting="made on paper",
+    )  # fmt: skip
     results.write_summary(summary)
     (folder / "valves").rmdir()
     return folder

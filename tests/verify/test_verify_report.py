@@ -7,6 +7,8 @@ import pytest
 
 from dzdesign.command_line.cli import main
 from dzdesign.core import artefact_reading
+from dzdesign.report import valve_report
+from tests.support.attacked_firmware import take_the_rest_as_held
 from tests.support.synthetic import needs_compiler
 
 pytestmark = [pytest.mark.slow, needs_compiler]
@@ -25,7 +27,9 @@ def copied(reported_demo, tmp_path):
 
 def test_verify_reads_every_artefact_once(copied, tmp_path, monkeypatch):
     """Also compensator.json, of all checks and of the report."""
-    read = Counter()
+    read, with_report = Counter(), valve_report.with_report
+    take_the_rest_as_held(monkeypatch)
+    monkeypatch.setattr(valve_report, "with_report", with_report)
     convert = artefact_reading.convert
     monkeypatch.setattr(
         artefact_reading,

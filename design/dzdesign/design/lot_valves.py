@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated
 
-import numpy as np
-
 from dzdesign.core.artefact_types import RuleError, Sha256, quantity
 from dzdesign.identify.constants import Premise
 from dzdesign.identify.valve.certified_bound import CertifiedBound
@@ -91,8 +89,6 @@ class LotValve:
 
 #: Tests nearer than this share are at one pressure drop of the lot: no bench sets it to a percent.
 SAME = 0.05
-#: Trends of which a test between two others raises the bound: of another, the lowest of all holds everywhere.
-SLOPING = ("decreasing", "increasing")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,9 +101,6 @@ class Lacking:
     sign: int
     #: Which, as the others' tests have it in the middle.
     dp_MPa: tuple[float, ...]
-    #: By how much its bound there lies under the straight line between its bounds at the tests beside, at most: what a
-    #: test there would gain, about. 0 where its threshold has no trend, or lies outside its tests.
-    coarser_V: float = 0.0
 
 
 def common_interval(lot: Sequence[LotValve]) -> tuple[float, float] | None:
@@ -129,8 +122,7 @@ def lacking_in(lot: Sequence[LotValve]) -> tuple[Lacking, ...]:
             missing = [(low, high) for low, high in wanted if not any(low <= dp <= high for dp in side.dp_MPa)]
             if missing:
                 middles = tuple(round((low + high) / 2, 6) for low, high in missing)
-                coarser = max(_coarser_V(side, dp) for dp in middles)
-                found.append(Lacking(name=name, sign=sign, dp_MPa=middles, coarser_V=coarser))
+                found.append(Lacking(name=name, sign=sign, dp_MPa=middles))
     return tuple(found)
 
 
@@ -152,14 +144,6 @@ def without_narrow(
     if before and after and before[0] <= after[0] * (1 + SAME) and after[1] <= before[1] * (1 + SAME):
         return frozenset(), None  # the other side of command, or another valve, ends there too
     return frozenset(names), after if names else None
-
-
-def _coarser_V(side: LotSide, dp_MPa: float) -> float:
-    """Return how far a bound between two tests lies under the straight line through theirs, V."""
-    if side.trend not in SLOPING or not side.dp_MPa[0] < dp_MPa < side.dp_MPa[-1]:
-        return 0.0
-    straight = np.interp(dp_MPa, side.dp_MPa, side.u_lower_V)
-    return max(float(straight) - float(side.bound().in_doubles(np.array([dp_MPa]))[0]), 0.0)
 
 
 def _pressures_of_lot(tested: Sequence[Sequence[float]]) -> list[tuple[float, float]]:

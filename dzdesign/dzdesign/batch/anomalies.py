@@ -4,11 +4,12 @@ import os
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
+from dzdesign.batch.valve_folders import ValveFolder
 from dzdesign.batch.valves import Valve
 from dzdesign.codegen.calibration.block import entry_of_record
 from dzdesign.core.errors import InputError, and_more, quoted
 from dzdesign.report.lot.summary import VALVES
-from dzdesign.report.lot.table import ValveFolder, by_name
+from dzdesign.report.lot.table import by_name
 
 #: Names in a sentence.
 NAMED = 5

@@ -10,31 +10,24 @@ from pathlib import Path
 from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Outcome, Task
-from dzdesign.batch.lot_firmware import firmware_left, needing_another, write_lot_firmware
-from dzdesign.batch.odd_blocks import foreign_block
+from dzdesign.batch.lot_firmware import firmware_left, foreign_block, needing_another, write_lot_firmware
 from dzdesign.batch.outputs import WantedOutput, lot_outputs, wanted_outputs
 from dzdesign.batch.results import Results
 from dzdesign.batch.runners import run_local, run_on_cluster
-from dzdesign.batch.summary import (
-    SETTING_NAME,
-    lot_budget,
-    lot_setting_of,
-    setting_files,
-    setting_summary,
-    summary_of,
-    units_of_lot,
-)
+from dzdesign.batch.summary import SETTING_NAME, lot_setting_of, setting_summary, summary_of, units_of_lot
+from dzdesign.batch.valve_folders import ValveFolder, table_of_valves
 from dzdesign.batch.valves import Valve, valves_of
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, write_file, write_files
+from dzdesign.core.artefact_types import to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.core.folder_swap import alone_in
 from dzdesign.core.input_files import read_recording
 from dzdesign.core.options import arguments_of, paths_of, read_options
 from dzdesign.design.design_choices import DEFAULTS, DesignChoices
 from dzdesign.design.firmware_manifest import form_named
-from dzdesign.report.lot.report import report_of_lot
+from dzdesign.report.lot.page import report_of_lot
 from dzdesign.report.lot.summary import LotSummary
-from dzdesign.report.lot.table import ValveFolder, table_files, table_of_valves
+from dzdesign.report.lot.table import table_files
 from dzdesign.report.valve_report import REPORT_NAME
 from dzdesign.stages.design import design_options
 from dzdesign.stages.identify import IdentifyChoices, identify_options, record_of
@@ -70,7 +63,7 @@ def calibrate_lot(args: BatchArguments) -> LotSummary:
         outcomes = run_on_cluster(tasks, args.dask) if args.dask else run_local(tasks, useful_jobs(jobs, len(waiting)))
         unwritten = _write_all(results, outcomes, len(waiting))
         summary = _finished(args, valves, results, unwritten, wanted)
-        _write_report(output)
+        write_file(output / REPORT_NAME, report_of_lot(output).html)
     return summary
 
 
@@ -127,26 +120,26 @@ def _finished(
         frame,
         files=table,
         verified=args.verify,
-        setting=setting_summary(setting, designed) if setting else None,
-        why_no_setting=why_not,
+        lot_setting=setting_summary(setting) if setting else None,
+        why_no_lot_setting=why_not,
         made_from={
             valve.name: read_bytes(results.of(valve.name) / MANIFEST_NAME, "manifest")
             for valve in valves
             if valve.name not in unwritten
         },
-        anomalies=[
+        anomalies=(
             *anomalies_of(found, output, valves),
             *firmware_left(output, firmware),
             *foreign_block(firmware, len(designed)),
-        ],
-        budget=lot_budget(designed),
+        ),
+        certified_of=tuple(sorted({each.certified_of for each in designed.values()})),
         firmware=firmware,
         outputs=lot_outputs(wanted, found),
-        units=units_of_lot(designed),
+        recorded_units=units_of_lot(designed),
     )
     if setting is None:
         (output / SETTING_NAME).unlink(missing_ok=True)  # of an earlier run with other valves
-    write_files(output, {**table, **(setting_files(setting) if setting else {})}, "-o")
+    write_files(output, {**table, **({SETTING_NAME: to_json_bytes(setting.compensator)} if setting else {})}, "-o")
     results.write_summary(summary)
     return summary
 
@@ -157,16 +150,6 @@ def _with_one_firmware(results: Results, found: list[ValveFolder]) -> list[Valve
     for name, reason in reasons.items():
         results.refuse(name, reason)
     return [results.read(each.name, {}) if each.name in reasons else each for each in found]
-
-
-def _write_report(output: Path) -> None:
-    """Write the report of the lot from the files, as `dzdesign report` does; a lot too large for one has its table."""
-    path = output / REPORT_NAME
-    try:
-        write_file(path, report_of_lot(output).html)
-    except InputError as error:
-        path.unlink(missing_ok=True)  # of an earlier run: it would pass for one of this
-        say(f"no {REPORT_NAME}: {error}")
 
 
 def useful_jobs(jobs: int, waiting: int) -> int:

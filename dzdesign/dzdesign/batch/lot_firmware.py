@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from dzdesign.batch.blocks import BLOCK_IMAGE
+from dzdesign.batch.valve_folders import ValveFolder
 from dzdesign.core.artefact_files import MANIFEST_NAME, read_bytes, sha256_of
 from dzdesign.design.firmware_manifest import BLOCK_FILE
 from dzdesign.report.lot.summary import FIRMWARE, LOT_SETTING, LotFirmware
-from dzdesign.report.lot.table import ValveFolder, by_name
+from dzdesign.report.lot.table import by_name
 
 if TYPE_CHECKING:
     from dzdesign.codegen.calibration.layout import BuiltFor
@@ -100,4 +101,14 @@ def firmware_left(output: Path, firmware: LotFirmware | None) -> list[str]:
     return [
         f"the folder '{LOT}/{FIRMWARE}' is left of an earlier run with --calibration block, and none of these valves "
         "has a block for it; take it away, or give --calibration block again"
+    ]
+
+
+def foreign_block(firmware: LotFirmware | None, valves: int) -> Sequence[str]:
+    """Say of the firmware of a lot of so many calibrated valves that it drives each of them by the block of one."""
+    if firmware is None or firmware.block_of == LOT_SETTING or valves < 2:
+        return ()
+    return [
+        f"'{firmware.folder}' drives every valve by the block of {firmware.block_of} until its own is loaded, which "
+        "may over-compensate the others: there is no lot setting; load each valve's own block before it is driven"
     ]

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dzdesign.batch.arguments import BatchArguments
+from dzdesign.batch.valve_folders import ValveFolder
 from dzdesign.core.artefact_files import write_folder
 from dzdesign.core.errors import DzdesignError, InputError, nearest
 from dzdesign.core.options import flag_of
@@ -18,7 +19,6 @@ from dzdesign.report.lot.summary import (
     OutputVerdict,
     ValveOutput,
 )
-from dzdesign.report.lot.table import ValveFolder
 from dzdesign.stages.generate import chosen_of_outputs
 
 if TYPE_CHECKING:

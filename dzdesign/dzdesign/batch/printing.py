@@ -5,17 +5,17 @@ from pathlib import Path
 
 from dzdesign.core.errors import and_more
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.design.firmware_manifest import setting_words
-from dzdesign.report.lot.summary import LOT_SETTING, VALVES, LotFirmware, LotSummary
-from dzdesign.report.lot.words import checked_line, cost_lines, lot_budget_lines, span, untested_lines
+from dzdesign.report.lot.page import certified_lines, checked_line, cost_lines, output_lines, span, untested_lines
+from dzdesign.report.lot.summary import LOT_SETTING, LotFirmware, LotSummary
+from dzdesign.report.valve_report import REPORT_NAME
 from dzdesign.terminal.page import Table, new_console, put_line, put_table
 
-#: Valves that are named of one warning, of those that hold the lot setting down, and of an output.
-NAMED, BINDING_NAMED, OUTPUTS_NAMED = 3, 5, 20
+#: Valves that are named of one warning, and of those that hold the lot setting down.
+NAMED, BINDING_NAMED = 3, 5
 
 
-def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
-    """Print what a lot came to, where it was written, and its report if there is one."""
+def print_lot(summary: LotSummary, folder: Path) -> None:
+    """Print what a lot came to, and where it was written."""
     console = new_console()
     count = summary.calibrated
     title = f"{count} calibrated valve{'' if count == 1 else 's'} of {summary.valves}"
@@ -24,9 +24,9 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
         values = (at.least, at.q05, at.median, at.q95, at.largest)
         table.add_row(_in_words(column, summary.recorded_units), *_numbers(column, values, summary.recorded_units))
     put_table(console, table)
-    for line in (*lot_budget_lines(summary.budget), *_setting_lines(summary)):
+    for line in (*certified_lines(summary.certified_of), *_setting_lines(summary)):
         put_line(console, line)
-    for line in _output_lines(summary):
+    for line in output_lines(summary):
         put_line(console, line)
     if summary.firmware:
         put_line(console, _firmware_line(summary.firmware, folder))
@@ -41,7 +41,7 @@ def print_lot(summary: LotSummary, folder: Path, report: Path | None) -> None:
     put_line(
         console,
         f"{count} of {summary.valves} valves calibrated, {len(summary.failed)} not. Table: {folder}/valves.csv, "
-        f"valves.parquet; {f'to be read: {report}' if report else 'no report.html'}",
+        f"valves.parquet; to be read: {folder / REPORT_NAME}",
     )
 
 
@@ -80,19 +80,3 @@ def _setting_lines(summary: LotSummary) -> list[str]:
         *untested_lines(setting, summary.recorded_units),
         *cost_lines(summary),
     ]
-
-
-def _output_lines(summary: LotSummary) -> list[str]:
-    """Return one sentence for each output, for the terminal."""
-    lines = []
-    for target, output in summary.outputs.items():
-        words = [f"made for {output.made} of {summary.valves} valves"]
-        words += [f"verified, and holds for {len(output.holds)}"] if summary.verified else ["not verified"]
-        words += [f"does not hold for {and_more(output.does_not_hold, OUTPUTS_NAMED)}"] if output.does_not_hold else []
-        words += [f"NOT VERIFIED for {and_more(output.not_verified, OUTPUTS_NAMED)}"] * bool(
-            summary.verified and output.not_verified
-        )
-        words += [f"not made for {and_more(output.not_made, OUTPUTS_NAMED)}"] if output.not_made else []
-        settings = "".join(f", {word}" for word in setting_words(output.settings))
-        lines.append(f"output {target}{settings}: {'; '.join(words)}; in {VALVES}/NAME/{output.folder}")
-    return lines

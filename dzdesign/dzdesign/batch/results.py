@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dzdesign.batch.calibration import Outcome
+from dzdesign.batch.valve_folders import ValveFolder, read_valve_folder
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of, write_file, write_folder
 from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.disk_sync import make_folder
@@ -13,16 +14,8 @@ from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.lot.folder import is_lot
-from dzdesign.report.lot.summary import (
-    FAILED,
-    FIRMWARE,
-    SUMMARY_NAME,
-    VALVES,
-    LotSummary,
-    UnfinishedLot,
-    ValveManifest,
-)
-from dzdesign.report.lot.table import ValveFolder, read_manifest, read_valve_folder
+from dzdesign.report.lot.summary import FAILED, FIRMWARE, SUMMARY_NAME, VALVES, LotSummary, UnfinishedLot, ValveManifest
+from dzdesign.report.lot.table import read_manifest
 
 
 class Results:

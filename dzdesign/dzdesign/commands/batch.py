@@ -24,11 +24,10 @@ def run(arguments: Arguments, json: bool) -> int:
     from dzdesign.report.valve_report import REPORT_NAME
 
     output, summary = Path(arguments.output), batch(arguments)
-    report = output / REPORT_NAME if (output / REPORT_NAME).is_file() else None
     if json:
-        print_json({**as_document(summary), "report": report and str(report)})
+        print_json({**as_document(summary), "report": str(output / REPORT_NAME)})
     else:
-        print_lot(summary, output, report)
+        print_lot(summary, output)
     if summary.failed:
         raise RequirementError(
             f"{len(summary.failed)} of {summary.valves} valves are not calibrated; their reasons are in "

@@ -43,7 +43,7 @@ def report(arguments: ReportArguments) -> "Report":
         is not an error.
     """
     from dzdesign.report.lot.folder import is_lot, refuse_uncalibrated
-    from dzdesign.report.lot.report import report_of_lot
+    from dzdesign.report.lot.page import report_of_lot
     from dzdesign.report.page import logo_uri
     from dzdesign.report.valve_report import report_of_folder
 

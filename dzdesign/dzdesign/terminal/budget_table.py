@@ -45,7 +45,7 @@ def _sources(compensator: "Compensator") -> list[str]:
 
 
 def _table(title: str, budget: "Budget", units: "RecordedUnits") -> Table:
-    from dzdesign.report.sections.budget import shown_places
+    from dzdesign.report.page import shown_places
 
     millivolts, places = units.label("mV"), shown_places(len(budget.dp_MPa))
     at = [units.text(budget.dp_MPa[place], ".3g MPa") for place in places]

@@ -7,7 +7,7 @@ from dzdesign.terminal.page import new_console, put_line, put_rows
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from dzdesign.report.page import MadeOutputs
+    from dzdesign.report.artefacts import MadeOutputs
 
 #: Digits of a hash that tell two outputs apart.
 SHORT = 12

@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 from xml.etree import ElementTree
 
-from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.style import HUES, plot_style
 
 if TYPE_CHECKING:
-    import numpy as np
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -42,13 +40,10 @@ PALETTE = {name: (light, DARK[name]) for name, light in LIGHT.items()}
 #: As a page has them; without, each name in the markup would get a prefix of its own.
 for prefix, address in (("", "http://www.w3.org/2000/svg"), ("xlink", "http://www.w3.org/1999/xlink")):
     ElementTree.register_namespace(prefix, address)
-WIDTH = 7.4
-#: Left margin, and the width of numbers on the axis for which it has room: of ``5.150``.
-LEFT, TICKS_IN_MARGIN = 0.6, 0.345
-#: Of the numbers on axes, points.
-TICK_SIZE = LEGEND_SIZE = 8.5
-#: How often the words of a legend that is too wide are made smaller, by 7 % each.
-SMALLER = 6
+#: Inches, and points of the numbers on axes and of the words of a legend.
+WIDTH, TICK_SIZE, LEGEND_SIZE = 7.4, 8.5, 8.5
+#: Room that a label at a line's end takes, of the height of the axes.
+LABEL_HEIGHT = 0.055
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +51,7 @@ class ReportFigure:
     """A figure as the page shows it: markup in which every text is escaped, and the numbers that were drawn.
 
     The caption says what it shows and how to read it, the description what is found there, for who can't see it. The
-    name is that of its anchor and of the CSV file. `narrow_svg` is the same for a narrow page, where there is one.
+    name is that of its anchor and of the CSV file.
     """
 
     name: str
@@ -64,7 +59,6 @@ class ReportFigure:
     description: str
     svg: str
     csv: str
-    narrow_svg: str = ""
 
 
 def data_uri(text: str) -> str:
@@ -101,31 +95,19 @@ def figure_style() -> Iterator[None]:
         yield
 
 
-def new_figure(
-    height: float, *, legend_rows: int = 0, right: float = 0.2, top: float = 0.12, width: float = WIDTH
-) -> "Figure":
-    """Return an empty figure; sizes in inches.
-
-    Its margins are stated, because laying it out by itself takes as long as drawing it: room for the rows of a legend
-    below the axes, at the right for labels at the lines' ends, at the top for titles.
-    """
+def new_figure(height: float) -> "Figure":
+    """Return an empty figure of this height, inches, which lays itself out around its words."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), facecolor="none")
+    figure = Figure(figsize=(WIDTH, height), facecolor="none", layout="constrained")
     FigureCanvasSVG(figure)
-    bottom = 0.5 + (0.1 + 0.2 * legend_rows if legend_rows else 0.0)
-    figure.subplots_adjust(
-        left=LEFT / width, right=1 - right / width, bottom=bottom / height, top=1 - top / height
-    )
     return figure
 
 
-def titled_axes(
-    height: float, name: str, both: bool, *, legend_rows: int = 0, right: float = 0.2
-) -> "tuple[Figure, Axes]":
+def titled_axes(height: float, name: str, both: bool) -> "tuple[Figure, Axes]":
     """Return an empty figure of one panel; of a valve with two sides its title says which it is of."""
-    figure = new_figure(height, legend_rows=legend_rows, right=right, top=0.3 if both else 0.12)
+    figure = new_figure(height)
     axes = figure.subplots()
     if both:
         axes.set_title(f"{name} commands")
@@ -137,31 +119,34 @@ def side_words(name: str, both: bool) -> str:
     return f", {name} commands" if both else ""
 
 
-def span(values: "Sequence[float] | np.ndarray", form: str, units: RecordedUnits) -> str:
-    """Return from where to where values run, with their unit."""
-    return f"{units.number(min(values), form)} to {units.text(max(values), form)}"
-
-
 def legend_below(figure: "Figure", columns: int) -> None:
-    """Put a legend of all axes below them, each label once, in a figure made with `legend_rows`."""
+    """Put a legend of all axes below them, each label once, in as many of these columns as there is room for."""
     found: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
-    figure.legend(
-        found.values(), found.keys(), loc="lower center", ncols=columns, columnspacing=1.2, borderpad=0.1,
-        borderaxespad=0.1,
-    )  # fmt: skip
+    for count in range(columns, 0, -1):
+        legend = figure.legend(
+            found.values(), found.keys(), loc="outside lower center", ncols=count, columnspacing=1.2, borderpad=0.1
+        )
+        if count == 1 or legend.get_window_extent().width <= 0.97 * figure.bbox.width:
+            break
+        legend.remove()
 
 
 def label_ends(axes: "Axes", labels: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names at lines' ends (x, y, text, hue; in the axes' units), moved apart where one would cover another."""
-    labels = sorted(labels, key=lambda label: label[1])
-    room = 0.055 * max((label[1] for label in labels), default=1.0)
-    places = apart([label[1] for label in labels], room)
-    for (x, _, text, hue), place in zip(labels, places, strict=True):
-        axes.annotate(text, (x, place), xytext=(5, 0), textcoords="offset points", va="center", fontsize=8,
-                      color=hue, annotation_clip=False)  # fmt: skip
+    """Write names beside lines' ends (x, y, text, hue; in the axes' units), moved apart where one would cover another.
+
+    Of an end at negative x the name stands at its left.
+    """
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high)
+    for sign, align in ((1, "left"), (-1, "right")):
+        ends = sorted((label for label in labels if (label[0] < 0) is (sign < 0)), key=lambda label: label[1])
+        places = apart([end[1] for end in ends], LABEL_HEIGHT * (high - low))
+        for (x, _, text, hue), place in zip(ends, places, strict=True):
+            axes.annotate(text, (x, place), xytext=(5 * sign, 0), textcoords="offset points", va="center", ha=align,
+                          fontsize=8, color=hue, annotation_clip=False)  # fmt: skip
 
 
 def apart(places: Sequence[float], room: float) -> list[float]:
@@ -181,48 +166,14 @@ def apart(places: Sequence[float], room: float) -> list[float]:
     return [base + room * index for index, base in enumerate(kept)]
 
 
-def to_report_figure(
-    figure: "Figure", name: str, caption: str, description: str, csv: str, narrow: "Figure | None" = None
-) -> ReportFigure:
+def to_report_figure(figure: "Figure", name: str, caption: str, description: str, csv: str) -> ReportFigure:
     """Return a figure as the page shows it; see `ReportFigure`."""
-    for each in (figure, narrow):
-        if each is not None:
-            _make_room_for_ticks(each)
-            _make_room_for_legend(each)
     return ReportFigure(
-        name=name,
-        caption=caption,
-        description=description,
-        svg=_svg_of(figure, name, description),
-        csv=csv,
-        narrow_svg=_svg_of(narrow, f"{name}-narrow", description, "drawing narrow") if narrow else "",
+        name=name, caption=caption, description=description, svg=_svg_of(figure, name, description), csv=csv
     )
 
 
-def _make_room_for_ticks(figure: "Figure") -> None:
-    """Widen the margin of a single panel whose numbers are wider than the usual ones: counts, or many digits."""
-    if len(figure.axes) != 1:
-        return
-    low, high = sorted(figure.axes[0].get_ylim())
-    ticks = [tick for tick in figure.axes[0].get_yticks() if low <= tick <= high]
-    labels = figure.axes[0].yaxis.get_major_formatter().format_ticks(ticks)
-    em = max((sum(0.32 if sign in ".," else 0.64 for sign in label) for label in labels), default=0.0)
-    surplus = TICK_SIZE * em / 72 - TICKS_IN_MARGIN
-    if surplus > 0:
-        figure.subplots_adjust(left=(LEFT + surplus + 0.04) / figure.get_figwidth())
-
-
-def _make_room_for_legend(figure: "Figure") -> None:
-    """Make the words of a legend below the axes smaller where it is wider than the figure."""
-    for legend in figure.legends:
-        for step in range(1, SMALLER + 1):
-            if legend.get_window_extent().width <= figure.bbox.width:
-                break
-            for text in legend.get_texts():
-                text.set_fontsize(LEGEND_SIZE * 0.93**step)
-
-
-def _svg_of(figure: "Figure", name: str, description: str, kind: str = "drawing") -> str:
+def _svg_of(figure: "Figure", name: str, description: str) -> str:
     """Return a figure, drawn in the colours of `LIGHT`, as markup whose ids follow from its name."""
     from matplotlib import rc_context
 
@@ -232,7 +183,7 @@ def _svg_of(figure: "Figure", name: str, description: str, kind: str = "drawing"
     drawing = ElementTree.fromstring(out.getvalue())
     box = drawing.get("viewBox", "")
     size = dict(zip(("width", "height"), box.split()[2:], strict=True))
-    drawing.attrib = {"class": kind, "role": "img", "aria-label": description, "viewBox": box, **size}
+    drawing.attrib = {"class": "drawing", "role": "img", "aria-label": description, "viewBox": box, **size}
     for part in [each for each in drawing if each.tag.endswith("metadata")]:
         drawing.remove(part)
     for group in drawing.iter("{http://www.w3.org/2000/svg}g"):

@@ -6,17 +6,18 @@ engine; only figures and formulas, made here, are markup.
 
 import re
 from base64 import b64encode
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from dzdesign.core.artefact_files import TOOL, read_bytes
 from dzdesign.core.errors import InputError
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.strict_templates import strict_templates
 from dzdesign.core.verdicts import verdict_words
 from dzdesign.derivation.presentation.writers import anchor
-from dzdesign.report.cells import Table
+from dzdesign.report.artefacts import MadeOutputs
 from dzdesign.report.figure import PALETTE, ReportFigure, data_uri
 
 if TYPE_CHECKING:
@@ -26,13 +27,168 @@ if TYPE_CHECKING:
 LONGEST_WORD = 18
 #: An option of the command line, and a command between backticks.
 OPTION, COMMAND = r"(?<![\w-])--[a-z][\w-]*", r"`([^`<>\s][^`<>]*)`"
-#: Kind of a verdict -> the sign before it.
-SIGNS = {"good": "✓", "bad": "✗", "open": "?"}
 #: First bytes of a format -> its media type. SVG is none of them: it can hold scripts and addresses.
 SIGNATURES = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"GIF87a": "image/gif",
               b"GIF89a": "image/gif"}  # fmt: skip
 #: Bytes of a logo: a page is sent by mail.
 LARGEST_LOGO = 512 * 1024
+#: Pressure drops with a column of their own; all of them stand in the CSV.
+COLUMNS = 6
+#: The sign beside a verdict, so that its colour is not its only carrier, and its kind.
+VERDICTS = {True: ("✓", "good"), False: ("✗", "bad"), None: ("?", "open")}
+SIGNS = {kind: sign for sign, kind in VERDICTS.values()}
+Item = TypeVar("Item")
+
+
+# --- tables: cells with a meaning, not with markup -----------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One cell, `more` on a second line, smaller.
+
+    Its kind is text, finding (a sentence, in which backticks stand about commands), number, code, symbol (code on one
+    line), hash (on two), or the verdict good, bad or open.
+    """
+
+    text: str
+    kind: str = "text"
+    more: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table; `csv` holds all its rows, to be downloaded under its name, `notes` what marks in its cells point to."""
+
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    csv: str = ""
+    name: str = ""
+    notes: tuple[str, ...] = ()
+
+
+def table_of(
+    caption: str,
+    items: Iterable[Item],
+    *columns: tuple[str, Callable[[Item], Cell | str]],
+    csv: str = "",
+    name: str = "",
+    notes: Sequence[str] = (),
+) -> Table:
+    """Return a table with a row an item; a column is its heading and what makes a cell of an item."""
+    return Table(
+        caption=caption,
+        columns=tuple(heading for heading, _ in columns),
+        rows=tuple(tuple(_as_cell(made(item)) for _, made in columns) for item in items),
+        csv=csv,
+        name=name,
+        notes=tuple(notes),
+    )
+
+
+def table_of_rows(caption: str, columns: Sequence[str], rows: Iterable[Sequence[Cell | str]]) -> Table:
+    """Return a table of rows whose cells are there already."""
+    return Table(caption=caption, columns=tuple(columns), rows=tuple(tuple(map(_as_cell, row)) for row in rows))
+
+
+def _as_cell(cell: Cell | str) -> Cell:
+    return cell if isinstance(cell, Cell) else Cell(text=cell)
+
+
+def shown_places(count: int) -> tuple[int, ...]:
+    """Return which of so many pressure drops have a column: all, or some from the lowest to the highest.
+
+    Examples
+    --------
+    >>> shown_places(3), shown_places(11)
+    ((0, 1, 2), (0, 2, 4, 6, 8, 10))
+    """
+    if count <= COLUMNS:
+        return tuple(range(count))
+    return tuple(round(place * (count - 1) / (COLUMNS - 1)) for place in range(COLUMNS))
+
+
+def number(value: float | None, digits: int, sign: str = "") -> Cell:
+    """Return a number with so many decimals, ``+`` before it to show its sign always; a dash for None.
+
+    Examples
+    --------
+    >>> number(1.25, 1).text, number(None, 1).text, number(-0.01, 1).text
+    ('1.2', '–', '0.0')
+    """
+    if value is None:
+        return in_number_font("–")
+    text = f"{value:{sign}.{digits}f}"
+    if float(text) == 0:
+        text = f"{0.0:{sign}.{digits}f}"
+    return in_number_font(text.replace("-", "−"))
+
+
+def recorded(value: float | None, form: str, units: RecordedUnits) -> Cell:
+    """Return a number in the unit of the recordings; `form` is that of `RecordedUnits.number`.
+
+    Examples
+    --------
+    >>> recorded(1.25, ".1f V", RecordedUnits()).text, recorded(None, ".1f V", RecordedUnits()).text
+    ('1.2', '–')
+    """
+    if value is None:
+        return in_number_font("–")
+    text = units.number(value, form)
+    return in_number_font(text.replace("-", "−") if text.strip("-0.") else text.removeprefix("-"))
+
+
+def in_units(heading: str, attribute: str, form: str, units: RecordedUnits) -> tuple[str, Callable[[Any], Cell]]:
+    """Return a column of numbers in the unit of the recordings, which stands in its heading."""
+    label = units.label(form.partition(" ")[2])
+    return f"{heading} ({label})", lambda item: recorded(getattr(item, attribute), form, units)
+
+
+def percent(heading: str, attribute: str, digits: int = 1) -> tuple[str, Callable[[Any], Cell]]:
+    """Return a column of shares, in percent."""
+    return f"{heading} (%)", lambda item: number(100 * getattr(item, attribute), digits)
+
+
+def finding(text: str) -> Cell:
+    """Return a sentence that states a finding: what stands between backticks is a command."""
+    return Cell(text=text, kind="finding")
+
+
+def in_number_font(text: str) -> Cell:
+    """Return a text set as numbers are: such as a number with its unit, or a range."""
+    return Cell(text=text, kind="number")
+
+
+def whole(value: int) -> str:
+    """Return a whole number with a thin gap at each thousand.
+
+    Examples
+    --------
+    >>> whole(33550336)
+    '33\\u202f550\\u202f336'
+    """
+    return f"{value:,}".replace(",", "\u202f")
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun, in the plural where it is not one.
+
+    Examples
+    --------
+    >>> counted(1, "ramp test"), counted(6, "ramp test")
+    ('1 ramp test', '6 ramp tests')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def verdict(holds: bool | None) -> Cell:
+    """Return a verdict with its sign; None: not checked."""
+    sign, kind = VERDICTS[holds]
+    return Cell(text=f"{sign} {verdict_words(holds)}", kind=kind)
+
+
+# --- what a page holds ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,9 +234,8 @@ class Section:
     """What a section holds, in the order in which it is shown.
 
     None stands for a figure or a table of which there is nothing to show. `groups` are further lines, each group under
-    a heading of its own. `missing` says what the section lacks and which
-    command makes it; the page is whole without an `optional` one. Of a lot setting a section may be of one valve, the
-    carrier.
+    a heading of its own. `missing` says what the section lacks and which command makes it; the page is whole without an
+    `optional` one.
     """
 
     figures: Sequence[ReportFigure | None] = ()
@@ -89,7 +244,6 @@ class Section:
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     missing: str = ""
     optional: bool = False
-    of_valve: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +254,7 @@ class Page:
     `missing` what is not there or not used, and which command makes it; `record` who and what, in the engineer's words.
     `not_counted` is what of a machine no certificate here counts. Of a lot setting `lot` stands before all other
     figures, and `carrier` is the one valve that `record` and `figures` are of. `subtitle` says what the report is of,
-    where the title names the valve; `lead` is the figure of the first page, `logo` a
-    data: address.
+    where the title names the valve; `lead` is the figure of the first page, `logo` a data: address.
     """
 
     title: str
@@ -118,50 +271,6 @@ class Page:
     subtitle: str = ""
     lead: ReportFigure | None = None
     logo: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MadeOutput:
-    """One output of the compensator that a report is of."""
-
-    #: "C firmware", or the target of another output.
-    kind: str
-    #: What was chosen of it, in words; empty if nothing is to be chosen.
-    settings: str
-    #: Folder, below the folder of the report.
-    place: str
-    #: SHA-256 of its manifest.json.
-    sha256: str
-    #: What evidence about these bytes says; None without such evidence, or where a requirement was not checked.
-    holds: bool | None = None
-    #: How many inputs were compared with the exact law.
-    inputs: int = 0
-    #: Where that evidence stands; empty without one.
-    evidence: str = ""
-    #: Which requirement does not hold, or was not checked.
-    fault: str = ""
-    #: What differs from the manifest: the files are no longer those that were generated.
-    changed: str = ""
-
-    @property
-    def verdict(self) -> str:
-        """In words, as the terminal prints it."""
-        if self.changed:
-            return "CHANGED"
-        return verdict_words(self.holds) if self.evidence or self.holds is not None else "NOT VERIFIED"
-
-    @property
-    def is_wrong(self) -> bool:
-        """Whether nobody should use it: it was changed, or its evidence says that it does not hold."""
-        return bool(self.changed) or self.holds is False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MadeOutputs:
-    """The outputs of one compensator in a folder; `others` are sentences on those that were not listed."""
-
-    listed: tuple[MadeOutput, ...] = ()
-    others: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,7 +298,7 @@ class Report:
     holds: bool | None
     verdict: str
     missing: tuple[str, ...]
-    outputs: MadeOutputs = MadeOutputs()
+    outputs: MadeOutputs = field(default_factory=MadeOutputs)
 
 
 def report_of(page: Page) -> Report:

@@ -13,10 +13,8 @@ from dzdesign.design.certificate import reach_of_certificate
 from dzdesign.design.compensator import Compensator
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import Chain, laws_of
-from dzdesign.report.cells import counted, whole
-from dzdesign.report.page import Figure, Headline
-from dzdesign.report.sections.curves import BRANCHES, ORIGIN_WORDS, origin_of
-from dzdesign.report.sections.quantities import CharacteristicQuantities
+from dzdesign.report.page import Figure, Headline, counted, whole
+from dzdesign.report.sections.quantities import BRANCHES, ORIGIN_WORDS, CharacteristicQuantities, entry_of, origin_of
 from dzdesign.verify.closed_loop.drive_corners import NOT_DECLARED
 from dzdesign.verify.closed_loop.loop import NO_FLOW_L_MIN
 from dzdesign.verify.closed_loop.loop_checks import in_which_runs
@@ -54,40 +52,26 @@ def _cautions(chain: Chain) -> Iterator[str]:
 
 
 def _verdict(chain: Chain) -> Headline:
-    evidence = chain.evidence
+    """Return the verdict on requirements and limits, and what the certificate among them is of."""
+    evidence, limits = chain.evidence, _limits(chain)
+    checks = [*(evidence.all_checks if evidence else ()), *limits]
+    missed, unknown = ([check for check in checks if check.holds is holds] for holds in (False, None))
+    reasons = tuple(f"{verdict_words(check.holds)}: {check.name}: {check.text}" for check in (*missed, *unknown))
+    kind = "bad" if missed else "open" if unknown or evidence is None else "good"
     if evidence is None:
-        if missed := [check for check in _limits(chain) if check.holds is not True]:
-            count = len(_limits(chain))
-            text = f"NOT VERIFIED, and {len(missed)} of {count} limits of the recordings are missed or not checked"
-            reasons = tuple(f"{verdict_words(check.holds)}: {check.name}: {check.text}" for check in missed)
-            return Headline(kind="bad" if any(check.holds is False for check in missed) else "open", text=text,
-                            reasons=reasons)  # fmt: skip
-        what = "a design" if chain.compensator else "an identified valve"
-        return Headline(kind="open", text=f"NOT VERIFIED: there is no evidence here, only {what}")
-    judged = _judged([*evidence.checks, *_limits(chain)], chain.compensator)
-    if judged.kind != "good":
-        return judged
-    absent = "" if chain.firmware else "the firmware that was verified is not here"
-    return replace(judged, text="; ".join(filter(None, [judged.text, evidence.reservation, absent])))
-
-
-def _judged(checks: Sequence[Check], compensator: Compensator | None) -> Headline:
-    """Return the verdict on requirements, and what the certificate among them is of."""
-    missed = [check for check in checks if check.holds is False]
-    unknown = [check for check in checks if check.holds is None]
-    reasons = tuple(
-        f"{word}: {check.name}: {check.text}"
-        for word, group in ((DOES_NOT_HOLD, missed), (NOT_CHECKED, unknown))
-        for check in group
-    )
-    if missed:
+        what = f"there is no evidence here, only {'a design' if chain.compensator else 'an identified valve'}"
+        text = f"{len(reasons)} of {len(limits)} limits of the recordings are missed or not checked"
+        text = f"NOT VERIFIED, and {text}" if reasons else f"NOT VERIFIED: {what}"
+    elif missed:
         text = f"{DOES_NOT_HOLD}: {len(missed)} of {len(checks)} requirements not met"
-        return Headline(kind="bad", text=text, reasons=reasons)
-    if unknown:
+    elif unknown:
         text = f"{NOT_CHECKED} in full: {len(unknown)} of {len(checks)} requirements are open"
-        return Headline(kind="open", text=text, reasons=reasons)
-    of = f"; the certificate covers {compensator.certified_of}" if compensator else ""
-    return Headline(kind="good", text=f"All {len(checks)} requirements that were checked hold{of}")
+    else:
+        of = f"the certificate covers {chain.compensator.certified_of}" if chain.compensator else ""
+        absent = "" if chain.firmware else "the firmware that was verified is not here"
+        held = f"All {len(checks)} requirements that were checked hold"
+        text = "; ".join(filter(None, [held, of, evidence.reservation, absent]))
+    return Headline(kind=kind, text=text, reasons=reasons)
 
 
 def _limits(chain: Chain) -> list[Check]:
@@ -159,16 +143,18 @@ def _read(loops: Sequence[PressureResult], branch: str, units: RecordedUnits) ->
     return f". Read at {flow}: {read:.1f} % at most, where an ideal line reads {100 * worst.ideal_line:.1f} %"
 
 
-def worst_of(loops: Sequence[PressureResult], units: RecordedUnits) -> str:
+def worst_of(items: Sequence[PressureResult | PressureAssessment], units: RecordedUnits, most: str = "worst") -> str:
     """Say of how many runs a figure is the worst: of two sides the pressure drops of each."""
-    if len(loops) == 1:
-        return f"at {units.text(loops[0].dp_MPa, '.2f MPa')}, the one pressure drop tested"
-    counts = Counter(each.side for each in loops)
+    if len(items) == 1:
+        only = items[0].dp_MPa
+        at = "" if only is None else f"at {units.text(only, '.2f MPa')}, "
+        return f"{at}the one pressure drop tested"
+    counts = Counter(each.side for each in items)
     if len(counts) == 1:
-        return f"the worst of {len(loops)} pressure drops"
+        return f"the {most} of {len(items)} pressure drops"
     if len(set(counts.values())) == 1:
-        return f"the worst of {counted(len(loops) // len(counts), 'pressure drop')} on each side"
-    return "the worst of " + " and ".join(f"{counted(n, 'pressure drop')} {side}" for side, n in counts.items())
+        return f"the {most} of {counted(len(items) // len(counts), 'pressure drop')} on each side"
+    return f"the {most} of " + " and ".join(f"{counted(n, 'pressure drop')} {side}" for side, n in counts.items())
 
 
 def _at_zero(loops: Sequence[PressureResult], units: RecordedUnits) -> Figure:
@@ -282,7 +268,7 @@ def measured_figures(assessment: Assessment | None) -> tuple[Figure, ...]:
     if not after or assessment is None:
         return ()
     of = "measured" if origin_of(assessment) == "recorded" else "simulated recordings"
-    found = [_measured_dead_zone(after, branch, of) for branch in BRANCHES]
+    found = [_measured_dead_zone(after, branch, of, assessment.recorded_units) for branch in BRANCHES]
     return (*(each for each in found if each), *_measured_at_zero(after, assessment, of))
 
 
@@ -292,7 +278,9 @@ def with_span(driven: Sequence[float]) -> str:
     return f". With: {' to '.join(ends)} %" if len(ends) > 1 else ""
 
 
-def _measured_dead_zone(items: Sequence[PressureAssessment], branch: str, of: str) -> Figure | None:
+def _measured_dead_zone(
+    items: Sequence[PressureAssessment], branch: str, of: str, units: RecordedUnits
+) -> Figure | None:
     """Return the dead zone before and after: at the onset where the meter shows it, else at the reading flow."""
     for key, where in ((f"onset_{branch}", "at the onset of flow"), (f"dead_zone_{branch}", "at the reading flow")):
         driven = _values(items, key, "after")
@@ -303,7 +291,7 @@ def _measured_dead_zone(items: Sequence[PressureAssessment], branch: str, of: st
             return Figure(
                 label=f"Dead zone on {branch}, {of}",
                 value=both,
-                note=f"of command {where}, {sets}; the worst of {_places(items)}{with_span(driven)}",
+                note=f"of command {where}, {sets}; {worst_of(items, units)}{with_span(driven)}",
             )
     return None
 
@@ -323,17 +311,10 @@ def _measured_at_zero(items: Sequence[PressureAssessment], assessment: Assessmen
             label=f"Flow at zero command, {of}",
             value=f"≤ {units.text(unseen, '.2f L/min')}" if hidden else units.text(worst, ".2g L/min"),
             note=("with the compensator, after closing: the meter shows none, and nothing below that" if hidden
-                  else "with the compensator, after closing") + f"; the largest of {_places(items)}",
+                  else "with the compensator, after closing") + f"; {worst_of(items, units, 'largest')}",
             kind="bad" if any(limit.holds is False for limit in limited) else "text",
         ),
     )
-
-
-def _places(items: Sequence[PressureAssessment]) -> str:
-    counts = Counter(item.side for item in items)
-    if len(counts) > 1 and len(set(counts.values())) == 1:
-        return f"{counted(len(items) // len(counts), 'pressure drop')} on each side"
-    return counted(len(items), "pressure drop") + (" and sides" if len(counts) > 1 else "")
 
 
 def _values(items: Sequence[PressureAssessment], key: str, name: Set) -> list[float]:
@@ -391,12 +372,8 @@ def valve_name(record: Mapping[str, str]) -> str:
     >>> valve_name({"S/N": "4711"}), valve_name({"valve": "bench example"})
     ('Valve, serial number 4711', 'Valve: bench example')
     """
-    serial, kind = (_first(record, names) for names in (SERIAL, TYPE))
+    serial, kind = (entry_of(record, names) for names in (SERIAL, TYPE))
     if serial:
         return f"{kind or 'Valve'}, serial number {serial}"
     return f"Valve: {kind}" if kind else ""
 
-
-def _first(record: Mapping[str, str], names: tuple[str, ...]) -> str:
-    known = {" ".join(name.lower().replace("-", " ").replace("_", " ").split()): text for name, text in record.items()}
-    return next((known[name] for name in names if name in known), "")

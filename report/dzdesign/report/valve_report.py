@@ -1,36 +1,34 @@
 """report.html: one page, from the verdict to the hashes, of whatever artefacts there are."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from dzdesign.core.verdicts import verdict_words
 from dzdesign.design.certificate import not_counted
-from dzdesign.report.artefacts import Chain, chain_of_evidence, read_chain
+from dzdesign.report.artefacts import Chain, MadeOutput, MadeOutputs, chain_of_evidence, outputs_in, read_chain
 from dzdesign.report.figure import figure_style
-from dzdesign.report.outputs import outputs_in, outputs_sections, with_outputs
-from dzdesign.report.page import MadeOutputs, Page, Report, Section, report_of
-from dzdesign.report.sections.budget import budget_section
+from dzdesign.report.page import Cell, Headline, Page, Report, Section, counted, report_of, table_of, verdict, whole
 from dzdesign.report.sections.characteristic import characteristic_figure, characteristic_section
 from dzdesign.report.sections.closed_loop import loop_section
-from dzdesign.report.sections.conditions import conditions_section
-from dzdesign.report.sections.curves import characteristic_curves
 from dzdesign.report.sections.inputs import inputs_section
-from dzdesign.report.sections.law import account_of, integers_section, law_section
-from dzdesign.report.sections.lot_setting import carrier_of, lot_figures, lot_section
+from dzdesign.report.sections.law import account_of, budget_section, integers_section, law_section
 from dzdesign.report.sections.provenance import (
+    carrier_of,
     checks_section,
+    lot_figures,
+    lot_section,
     provenance_section,
     remaining_section,
     warnings_section,
 )
-from dzdesign.report.sections.quantities import characteristic_quantities
-from dzdesign.report.sections.valve import valve_sections
+from dzdesign.report.sections.quantities import characteristic_curves, characteristic_quantities
+from dzdesign.report.sections.valve import conditions_section, valve_sections
 from dzdesign.report.summary import headline, key_figures, valve_name
 from dzdesign.verify.verification import Verification, evidence_files
 
 REPORT_NAME = "report.html"
 NO_OUTPUTS = MadeOutputs()
-#: Of a lot setting, these are of the one valve that its file holds.
-OF_A_VALVE = ("characteristic", "conditions", "data", "thresholds", "beta", "remaining", "budget", "loop")
 
 
 def report_of_folder(folder: Path, logo: str = "", firmware: Path | None = None) -> Report:
@@ -69,8 +67,6 @@ def make_report(chain: Chain, outputs: MadeOutputs = NO_OUTPUTS, logo: str = "")
             "characteristic": characteristic_section(found, chain.recorded_units),
             "conditions": conditions_section(chain.valve, chain.assessment),
         }
-        if compensator and compensator.lot:
-            sections |= {name: replace(sections[name], of_valve=True) for name in OF_A_VALVE}
         lead = characteristic_figure(curves, chain.recorded_units)
     name = valve_name(chain.valve.record) if chain.valve else ""
     page = Page(
@@ -121,3 +117,76 @@ def _title(chain: Chain) -> str:
     if chain.compensator:
         return what
     return "Valve, identified from ramp tests" if chain.valve else "Evidence of a dead-zone compensator"
+
+
+# --- other outputs of the same compensator ------------------------------------------------------------------
+
+
+def outputs_sections(chain: Chain, made: MadeOutputs) -> dict[str, Section]:
+    """Return the section by its anchor; none where the firmware that the report is of is all there is."""
+    if not (_beside_firmware(made, chain) or made.others):
+        return {}
+    table = None
+    if made.listed:
+        table = table_of(
+            "Every output made of this compensator.json, with the SHA-256 of its manifest",
+            made.listed,
+            ("output", lambda each: Cell(text=each.kind, more=each.settings)),
+            ("folder", lambda each: each.place),
+            ("SHA-256", lambda each: Cell(text=each.sha256, kind="hash")),
+            ("check", _check),
+        )
+    return {"outputs": Section(tables=(table,), groups=(("Not listed here", made.others),))}
+
+
+def _beside_firmware(made: MadeOutputs, chain: Chain) -> list[MadeOutput]:
+    """Return the outputs other than the firmware that the report is of, on which its verdict speaks already."""
+    firmware = chain.places.get("firmware")
+    return [each for each in made.listed if firmware is None or each.sha256 != firmware.sha256]
+
+
+def _check(output: MadeOutput) -> Cell:
+    if output.changed:
+        return Cell(text="✗ CHANGED", kind="bad", more=output.changed)
+    if output.holds is None and not output.evidence:
+        return Cell(text="? NOT VERIFIED", kind="open")
+    tried = f"{whole(output.inputs)} {'input' if output.inputs == 1 else 'inputs'} tried"
+    more = "; ".join(filter(None, [output.fault, tried, output.evidence]))
+    return replace(verdict(output.holds), more=more)
+
+
+def with_outputs(headline: Headline, made: MadeOutputs, chain: Chain) -> Headline:
+    """Return the verdict of a report, which speaks of a C firmware, with what is to be said of the outputs.
+
+    It is not good if one of them is wrong, or was not verified; each is named. Where there is no C firmware and no
+    evidence of one, the verdict is of the outputs.
+    """
+    others = _beside_firmware(made, chain)
+    if wrong := [each for each in others if each.is_wrong]:
+        text = headline.text
+        if headline.kind != "bad":
+            names = ", ".join(each.place for each in wrong)
+            text = f"{counted(len(wrong), 'output')} NOT to be used: {names}. {text}"
+        return replace(headline, kind="bad", text=text, reasons=(*headline.reasons, *map(_reason, wrong)))
+    untried = [each for each in others if each.holds is None]
+    reasons = tuple(_reason(each) for each in untried if each.fault)
+    if made.listed and not (chain.firmware or chain.evidence):
+        held = ", ".join(each.place for each in made.listed if each.holds)
+        if not untried:
+            return replace(headline, kind="good", text=f"Every requirement holds of {held}; no C firmware is here")
+        text = _named(untried) + (f"; every requirement holds of {held}" if held else "")
+        return replace(headline, kind="open", text=text, reasons=reasons)
+    if headline.kind != "good" or not untried:
+        return headline
+    return replace(headline, kind="open", text=f"{_named(untried)}. {headline.text}", reasons=reasons)
+
+
+def _reason(output: MadeOutput) -> str:
+    return f"{output.verdict}: {output.place} ({output.kind}): {output.changed or output.fault}"
+
+
+def _named(untried: Sequence[MadeOutput]) -> str:
+    """Return the outputs by their verdict, those without evidence first."""
+    by_verdict = {verdict: [each.place for each in untried if each.verdict == verdict]
+                  for verdict in ("NOT VERIFIED", verdict_words(None))}  # fmt: skip
+    return "; ".join(f"{verdict}: {', '.join(places)}" for verdict, places in by_verdict.items() if places)

@@ -11,6 +11,7 @@ import pytest
 
 from dzdesign.batch.anomalies import anomalies_of
 from dzdesign.batch.lot_firmware import firmware_left
+from dzdesign.batch.valve_folders import read_valve_folder
 from dzdesign.block_checks import blocks_checked, given_blocks
 from dzdesign.codegen.calibration.block import built_for
 from dzdesign.codegen.calibration.packing import pack, read_block_file, text_of, unpack
@@ -21,7 +22,6 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import SourceFile, to_json_bytes
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.summary import LOT_SETTING
-from dzdesign.report.lot.table import read_valve_folder
 from dzdesign.verify.exhaustive.block_check import BlockFirmware
 from dzdesign.verify.toolchain import host_compiler
 from tests.dzdesign.batch.test_batch import tree

@@ -13,6 +13,7 @@ from dzdesign.batch import outputs as outputs_module
 from dzdesign.batch.arguments import BatchArguments
 from dzdesign.batch.calibration import Task, calibrate
 from dzdesign.batch.outputs import ForOutputs, WantedOutput, lot_outputs, make_output, may_end_otherwise, wanted_outputs
+from dzdesign.batch.valve_folders import ValveFolder
 from dzdesign.codegen import other_targets
 from dzdesign.command_line.cli import main
 from dzdesign.core.artefact_files import MANIFEST_NAME, sha256_of
@@ -21,9 +22,9 @@ from dzdesign.core.artefact_types import THIS_TOOL, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.report.lot.folder import read_lot
-from dzdesign.report.lot.report import report_of_lot
+from dzdesign.report.lot.page import report_of_lot
 from dzdesign.report.lot.summary import LotSummary, ValveManifest, ValveOutput
-from dzdesign.report.lot.table import ValveFolder, read_manifest
+from dzdesign.report.lot.table import read_manifest
 from dzdesign.stages import verify as verify_stage
 from dzdesign.verify.evidence import TriedInputs
 from dzdesign.verify.requirements import REPRODUCED
@@ -240,7 +241,7 @@ def test_each_valve_has_the_parameters_of_its_amplifier(made, tmp_path, monkeypa
     assert files[0] != files[1] and all(content.startswith(b"MIN:A ") for content in files)
     assert (out / "valves" / "V0000" / "amplifier_evidence" / "evidence.json").is_file()
     html = report_of_lot(out).html
-    assert '<td class="text">amplifier</td><td class="text">device west</td>' in html
+    assert "output amplifier, device west: made for 2 of 2 valves; verified, and holds for 2" in html
     (out / "valves" / "V0001" / "amplifier" / "west.txt").write_bytes(files[0])
     with pytest.raises(InputError, match=r"V0001/amplifier: changed or missing: west\.txt"):
         read_lot(out)

@@ -11,8 +11,8 @@ import pytest
 
 from dzdesign.batch.valves import valves_of
 from dzdesign.command_line.cli import main
-from dzdesign.report.lot.report import report_of_lot
-from dzdesign.report.lot.table import by_name, frame_of, read_table, safe, table_files
+from dzdesign.report.lot.page import report_of_lot
+from dzdesign.report.lot.table import by_name, frame_of, read_table, table_files
 from tests.support.html_pages import Page
 from tests.support.many_valves import write_lot
 from tests.support.synthetic_lots import lot_rows, write_lot_folder
@@ -80,9 +80,12 @@ def test_no_cell_is_a_formula_and_every_text_comes_back(tmp_path):
     content = table_files(frame)["valves.csv"]
     for line in csv.reader(io.StringIO(content.decode())):
         assert not any(cell.startswith(("=", "+", "-", "@")) for cell in line)
-    assert read_table(content, "valves.csv").equals(frame)
-    assert safe("-1") == "'-1" and safe("'-1") == "''-1" and safe("'a") == "'a"
-    html = report_of_lot(write_lot_folder(tmp_path / "out", rows)).html
+    first = next(csv.DictReader(io.StringIO(content.decode())))
+    marked = {text: first[f"record.{text}"] for text in HOSTILE}
+    assert marked["-1"] == "'-1" and marked["'=1"] == "''=1" and marked["''"] == "''" and marked["0815"] == "0815"
+    folder = write_lot_folder(tmp_path / "out", rows)
+    assert read_table(folder / "valves.parquet").equals(frame)
+    html = report_of_lot(folder).html
     assert "=cmd|" in html and "<b>x</b>" not in html
 
 

@@ -63,7 +63,7 @@ def test_the_headline_of_a_batch_counts_calibrated_valves(capsys):
         anomalies=("two share a recording",),
         warnings={"onset-hidden": ("V1", "V2", "V3", "V4"), "pressure-stuck": ("V3",)},
     )
-    print_lot(summary, Path("out"), None)
+    print_lot(summary, Path("out"))
     said = capsys.readouterr().out
     assert "3 calibrated valves of 4" in said and "odd: two share a recording" in said
     assert "warnings: pressure-stuck 1 (V3), onset-hidden 4" in said

@@ -15,7 +15,7 @@ from dzdesign.design.design_choices import Above
 from dzdesign.design.firmware_manifest import FirmwareOrigin
 from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.loop_results import ClosedLoopResult, Count, Population, ScenarioResult, Side, about
-from dzdesign.verify.requirements import AS_STATED, RAMPS, Check
+from dzdesign.verify.requirements import ALWAYS, AS_STATED, CURRENT_VALVE, OF_CURRENT, RAMPS, Check
 
 Sign = Literal[1, -1]
 Names = tuple[str, ...]
@@ -235,12 +235,22 @@ class Evidence(Artefact):
     ] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "holds", all(check.holds for check in self.checks))
+        object.__setattr__(self, "holds", all(check.holds for check in self.all_checks))
+
+    @property
+    def all_checks(self) -> tuple[Check, ...]:
+        """All checks. What every run tries and is absent here counts as not checked, unless a failure explains it."""
+        if any(check.holds is False for check in self.checks):
+            return self.checks
+        tried = {check.id for check in self.checks}
+        text = "the evidence has no check of it; run `dzdesign verify` again"
+        needed = ALWAYS if self.current_loop is None else (*ALWAYS, *OF_CURRENT, CURRENT_VALVE)
+        return (*self.checks, *(each.check(holds=None, text=text) for each in needed if each.id not in tried))
 
     @property
     def verdict(self) -> str:
         """The verdict in one sentence: what does not hold, then what could not be checked."""
-        return missed_in(self.checks) or "Every requirement holds."
+        return missed_in(self.all_checks) or "Every requirement holds."
 
     @property
     def reservation(self) -> str:

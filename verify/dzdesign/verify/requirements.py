@@ -181,6 +181,8 @@ OF_CURRENT = (CURRENT_STATES, CURRENT_MARGINS, CURRENT_SETTLES, CURRENT_STEP, CU
 OF_LOOP = (
     PLANT_OPENS, PLANT_IS_THE_VALVE, ZERO_FLOW, ZERO_FLOW_AFTER_SCENARIOS, CURRENT_VALVE, NATIVE_PLANT,
 )  # fmt: skip
+#: What every run tries; evidence that lacks one of them is not that of a firmware that holds.
+ALWAYS = (REPRODUCED, COMPILES, *OF_INPUTS, DRIVE, *(each for each in OF_LOOP if each is not CURRENT_VALVE))
 #: What the closed loop tries beside it, if it is given what that takes.
 OF_GIVEN_LOOP = (OWN_PLANT, LOAD_STEPS, POPULATION)
 #: What a verdict adds where the ramp tests were not there.

@@ -14,9 +14,8 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import schema_of
 from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.folder_contents import digest_of
-from dzdesign.core.input_files import MOST_DOCUMENT
 from dzdesign.core.recorded_units import RecordedUnits
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.report.artefacts import change_in
 from dzdesign.report.lot.summary import AGAIN, OK, SUMMARY_NAME, VALVES, LotSummary, UnfinishedLot, ValveManifest
 from dzdesign.report.lot.table import (
     HASHED,
@@ -24,22 +23,19 @@ from dzdesign.report.lot.table import (
     OUTPUT,
     OUTPUT_HASH,
     TABLE,
+    TYPED_TABLE,
     Cell,
     frame_of,
     read_manifest,
     read_table,
     sides_of,
 )
-from dzdesign.report.outputs import change_in
 
 if TYPE_CHECKING:
     from polars import DataFrame
 
-#: Largest table of which a report is made: beyond it, some 25 000 valves, no browser would show the page.
-MOST_TABLE = MOST_DOCUMENT
 #: Files or valves that a sentence names.
 NAMED = 10
-Row = Mapping[str, Cell]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,8 +43,7 @@ class Lot:
     """What a report of a lot is of.
 
     `frame` is the table, empty where it is not there, and `text` that of valves.csv; `hashes` are the name and SHA-256
-    of each file that was read. `compared` says whether the valves' folders are there and were compared with the table,
-    `warning_texts` has for each code of a warning its text in the first valve that has it.
+    of each file that was read.
     """
 
     summary: LotSummary
@@ -56,8 +51,6 @@ class Lot:
     text: str
     hashes: tuple[tuple[str, str], ...]
     missing: tuple[str, ...]
-    compared: bool
-    warning_texts: Mapping[str, str]
 
     @property
     def units(self) -> RecordedUnits:
@@ -111,46 +104,33 @@ def read_lot(folder: Path) -> Lot:
         raise InputError(
             f"the batch in '{folder}' did not come to its end; give the same `dzdesign batch` again, which takes it up"
         )
-    path, hashes = folder / TABLE, [(SUMMARY_NAME, sha256_of(content))]
-    missing: list[str] = []
-    if path.is_file() and path.stat().st_size > MOST_TABLE:
-        raise InputError(
-            f"the table of {summary.valves} valves, '{path}', is larger than {MOST_TABLE >> 20} MiB, too large for one "
-            "page; read the table itself, or calibrate the lot in parts, each with a folder of its own"
-        )
-    if TABLE not in summary.files:
-        raise InputError(f"'{folder / SUMMARY_NAME}' lacks the key 'files.{TABLE}'; {AGAIN}")
-    stated = {name: digest for name, digest in summary.files.items() if NAME.fullmatch(name)}
+    stated = {name: summary.files.get(name, "not stated") for name in (TABLE, TYPED_TABLE)}
     if summary.lot_setting:
         stated[summary.lot_setting.file] = summary.lot_setting.sha256
     if summary.firmware:
         stated[f"{summary.firmware.folder}/{MANIFEST_NAME}"] = summary.firmware.manifest_sha256
+    hashes, missing = {SUMMARY_NAME: sha256_of(content)}, []
     for name, digest in stated.items():
         if not (folder / name).is_file():
             missing.append(f"{name}: `dzdesign batch` makes it, from the folders that are done")
         elif digest_of(folder / name) != digest:
             raise InputError(f"'{folder / name}' was changed since `dzdesign batch` wrote it; {AGAIN}")
-        elif name != "valves.parquet":
-            hashes.append((name, digest))
-    table = read_bytes(path, "table of the lot") if path.is_file() else None
-    frame = frame_of([]) if table is None else read_table(table, str(path))
-    if table is not None and (len(frame), int((frame["status"] == OK).sum())) != (summary.valves, summary.calibrated):
+        else:
+            hashes[name] = digest
+    frame = read_table(folder / TYPED_TABLE) if TYPED_TABLE in hashes else frame_of([])
+    if len(frame) and (len(frame), int((frame["status"] == OK).sum())) != (summary.valves, summary.calibrated):
         raise InputError(f"'{folder / SUMMARY_NAME}' counts other valves than the table has; {AGAIN}")
-    compared, texts = (folder / VALVES).is_dir(), {}
-    if compared:
-        texts = _compared(folder / VALVES, summary, frame)
+    if (folder / VALVES).is_dir():
+        _compare(folder / VALVES, summary, frame)
     else:
         missing.append("the folders of the valves: they are not beside this table, so their hashes were not compared")
-    return Lot(
-        summary=summary, frame=frame, text=(table or b"").decode("utf-8"), hashes=tuple(hashes), compared=compared,
-        warning_texts=texts, missing=tuple(missing),
-    )  # fmt: skip
+    text = read_bytes(folder / TABLE, "table of the lot").decode() if TABLE in hashes else ""
+    return Lot(summary=summary, frame=frame, text=text, hashes=tuple(hashes.items()), missing=tuple(missing))
 
 
-def _compared(valves: Path, summary: LotSummary, frame: "DataFrame") -> dict[str, str]:
-    """Compare each valve's artefacts with the table's hashes; return a text of each warning."""
+def _compare(valves: Path, summary: LotSummary, frame: "DataFrame") -> None:
+    """Refuse valves whose artefacts have other hashes than the table states."""
     other: list[str] = []
-    texts: dict[str, str] = {}
     for row in frame.iter_rows(named=True):
         if not NAME.fullmatch(row["name"]):
             other.append(row["name"])
@@ -161,16 +141,12 @@ def _compared(valves: Path, summary: LotSummary, frame: "DataFrame") -> dict[str
                 other.append(f"{row['name']}/{file}")
             elif stated and path.name == MANIFEST_NAME and (change := change_in(path.parent)):
                 other.append(f"{row['name']}/{path.parent.name}: {change}")
-            elif stated and file == ValveModel.FILE_NAME and not texts.keys() >= set(row["warnings"].split()):
-                valve = read_artefact(read_bytes(path, "valve"), ValveModel, str(path))
-                texts = {**{each.code: each.text for each in reversed(valve.warnings)}, **texts}
     if other:
         what = f"{len(other)} files of '{valves}' are not as the table has them"
         raise InputError(f"{what}: {and_more(other, NAMED)}; {AGAIN}")
-    return texts
 
 
-def _stated(row: Row, summary: LotSummary) -> Iterator[tuple[str, Cell]]:
+def _stated(row: Mapping[str, Cell], summary: LotSummary) -> Iterator[tuple[str, Cell]]:
     """Yield each file of a valve whose hash the table may state, with that hash."""
     yield from ((file, row[column]) for column, file in HASHED.items())
     for target, output in summary.outputs.items():

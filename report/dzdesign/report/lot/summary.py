@@ -22,13 +22,10 @@ LARGEST = 1e6
 
 Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 Pressure = Annotated[float, Meta(ge=0, le=LARGEST)]
-Distance = Annotated[float, Meta(ge=0, le=LARGEST)]
 Pressures = tuple[Pressure, Pressure]
 Count = Annotated[int, Meta(ge=0, le=10**9)]
 Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$", max_length=64)]
 Names = tuple[str, ...]
-Millivolts = Annotated[float, quantity("mV", "Largest of any valve at any pressure drop.", ge=-1e6, le=1e6)]
-Price = Annotated[float, Meta(ge=-1e3, le=1e3)]
 #: A folder stands beside what it belongs to: no path.
 FolderName = Annotated[
     str, Meta(description="Folder of the output, within the folder of a valve.", pattern=r"^\w{1,40}$")
@@ -51,9 +48,7 @@ class Quantiles:
 
     least: Annotated[Number, about("Minimum.")]
     q05: Annotated[Number, about("5 % quantile.")]
-    q25: Annotated[Number, about("25 % quantile.")]
     median: Annotated[Number, about("Median.")]
-    q75: Annotated[Number, about("75 % quantile.")]
     q95: Annotated[Number, about("95 % quantile.")]
     largest: Annotated[Number, about("Maximum.")]
 
@@ -77,16 +72,6 @@ class UntestedPressures:
     name: Annotated[str, about("Name of the valve.")]
     side: Annotated[Literal["positive", "negative"], about("Sign of the command.")]
     dp_MPa: Annotated[tuple[Pressure, ...], quantity("MPa", "Pressure drops at which the valve was not tested.")]
-    narrows: Annotated[bool, about("Whether the missing tests narrow the interval of the lot setting.")]
-    coarser_V: Annotated[
-        Distance,
-        quantity("V", "Estimated gain of a test: distance of the valve's bound below the straight line between its "
-                 "bounds at the neighbouring tests. 0 outside its tests or without a trend."),
-    ]
-    cost_percent: Annotated[
-        Distance,
-        quantity("%", "Estimated gain in percent of command if this valve limits the lot setting; otherwise 0."),
-    ]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,19 +89,6 @@ class SmallestMargin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SettingOfOthers:
-    """The lot setting of the remaining valves, if those that limit it kept their own settings."""
-
-    left_out: Annotated[Names, about("Valves that keep their own settings.")]
-    quantiles: Annotated[
-        Mapping[str, Quantiles],
-        about("Additional dead zone against each valve's own setting, in percent of command; empty if there is no "
-              "setting."),
-    ]  # fmt: skip
-    why_not: Annotated[str | None, about("Reason why there is no such setting; null if there is one.")] = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class LotSettingSummary:
     """Setting that is safe for each calibrated valve."""
 
@@ -129,7 +101,7 @@ class LotSettingSummary:
     ]
     untested: Annotated[
         tuple[UntestedPressures, ...],
-        about("Valves without a test at a pressure drop at which half of the lot was tested."),
+        about("Valves that narrow the interval: they lack a test at a pressure drop where half of the lot has one."),
     ]
     dp_without_MPa: Annotated[
         Pressures | None,
@@ -137,17 +109,7 @@ class LotSettingSummary:
     ]
     carrier: Annotated[str, about("Valve that the compensator contains: the one nearest to the lot's minimum.")]
     binding: Annotated[Names, about("Valves that limit the offset.")]
-    smallest_margin_V: Annotated[
-        Mapping[str, tuple[Number, ...]],
-        quantity("V", "Smallest margin, over these valves and sides, of the offset below the valve's own ceiling. The "
-                 "ceiling is the largest piecewise linear offset below the valve's bounds. Half a count is reserved "
-                 "for rounding."),
-    ]  # fmt: skip
     checked: Annotated[SmallestMargin, about("Smallest margin below the bounds of all valves.")]
-    without_binding: Annotated[
-        SettingOfOthers | None,
-        about("Cost if the limiting valves kept their own settings; null if fewer than two valves would remain."),
-    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,31 +126,6 @@ class LotFirmware:
         about("Source of the calibration block until another is loaded: the lot setting, or the valve of this name."),
     ]
     blocks: Annotated[Names, about("Files with a valve's own block, in the valve's folder.")]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LotBudgetLine:
-    """One component of the budgets of the calibrated valves."""
-
-    side: Annotated[str, about("Side of the valve: positive or negative.")]
-    component: Annotated[str, about("Source of the uncertainty.")]
-    origin: Annotated[Names, about("Measured, declared or default: each origin that occurs in a valve's budget.")]
-    contribution_mV: Millivolts
-    price_percent: Annotated[
-        tuple[Price, Price, Price], about("Least, median and largest price, in percent of command.")
-    ]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LotBudget:
-    """What the certificates of a lot cover, and the components of their budgets."""
-
-    certified_of: Annotated[
-        Names,
-        about("What the certificates cover: the valve as recorded, alone or with the declared machine. Each that "
-              "occurs."),
-    ]  # fmt: skip
-    lines: Annotated[tuple[LotBudgetLine, ...], about("Components, with those of each side together.")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -238,10 +175,11 @@ class LotSummary(Artefact):
         about("Setting that is safe for every calibrated valve; null if there is none."),
     ]
     why_no_lot_setting: Annotated[str | None, about("Reason why there is no such setting; null if there is one.")]
-    budget: Annotated[
-        LotBudget | None,
-        about("Uncertainty budgets of the calibrated valves; null if there is no calibrated valve."),
-    ] = None
+    certified_of: Annotated[
+        Names,
+        about("What the certificates cover: the valve as recorded, alone or with the declared machine. Each that "
+              "occurs."),
+    ] = ()  # fmt: skip
     firmware: Annotated[
         LotFirmware | None,
         about("Common firmware of valves with calibration blocks; null if each valve has its own firmware."),

@@ -1,6 +1,6 @@
-"""Table of the characteristic, in terms of ISO 10770-1: each quantity at each pressure drop of each side."""
+"""Table and figure of the characteristic, in terms of ISO 10770-1: each quantity at each pressure drop of each side."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -8,31 +8,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dzdesign.assess.limits import LIMITED, LimitResult
+from dzdesign.assess.options import SETS
 from dzdesign.assess.quantities import LOSS, QUANTITIES
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.identify.plots.style import CYCLE
-from dzdesign.report.cells import Cell, Table, in_number_font, number, recorded
-from dzdesign.report.figure import (
-    LIGHT,
-    WIDTH,
-    ReportFigure,
-    apart,
-    csv_text,
-    new_figure,
-    to_report_figure,
-)
-from dzdesign.report.page import Section
-from dzdesign.report.sections.curves import ORIGIN_WORDS, CharacteristicCurve, same_pressure
+from dzdesign.report.figure import LIGHT, ReportFigure, csv_text, label_ends, legend_below, new_figure, to_report_figure
+from dzdesign.report.page import Cell, Section, Table, in_number_font, number, recorded
 from dzdesign.report.sections.quantities import (
     KEYS,
+    ORIGIN_WORDS,
+    CharacteristicCurve,
     CharacteristicQuantities,
     Found,
     PressureQuantities,
+    same_pressure,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 #: Key -> name in the table. The terms are those of valve tests; the dead zone at a flow says at which.
@@ -81,17 +74,10 @@ def characteristic_section(found: CharacteristicQuantities, units: RecordedUnits
             *(f"{NAMES[key]}: {QUANTITIES[key].formula}." for key in EXPLAINED),
         ),
     )
-    return Section(
-        tables=tables,
-        lines=(" ".join((f"{arrow}.", *origins, *_reading_flows(found.pressures, units))),),
-    )
-
-
-def _reading_flows(pressures: Sequence[PressureQuantities], units: RecordedUnits) -> Iterator[str]:
-    flows = [each.reading_flow_L_min for each in pressures if each.reading_flow_L_min > 0]
-    if flows:
-        ends = dict.fromkeys(units.text(end, ".2f L/min") for end in (min(flows), max(flows)))
-        yield f"Reading flow: {' … '.join(ends)}."
+    flows = [each.reading_flow_L_min for each in found.pressures if each.reading_flow_L_min > 0]
+    ends = dict.fromkeys(units.text(end(flows), ".2f L/min") for end in (min, max)) if flows else ()
+    reading = [f"Reading flow: {' … '.join(ends)}."] if flows else []
+    return Section(tables=tables, lines=(" ".join((f"{arrow}.", *origins, *reading)),))
 
 
 def _side_table(pressures: Sequence[PressureQuantities], side: str, units: RecordedUnits) -> Table:
@@ -164,10 +150,6 @@ def _verdict(limits: Sequence[LimitResult]) -> Cell:
 DASHES = {"before": ((0, (4, 1.8)), 1.2), "after": ("-", 1.5)}
 SAMPLE: dict[str, Any] = {"marker": "o", "linestyle": "", "ms": 2.8, "mfc": "none", "mew": 0.6}
 WITH_WORDS = {"before": "without the compensator", "after": "with the compensator"}
-#: Height of the figure, inches; room for the pressure drops at the ends of the curves; of a label, per axis height.
-HEIGHT, LABEL_ROOM, LABEL_HEIGHT = 3.75, 0.62, 0.055
-#: Width and height for a narrow page, and the room below the axes, inches.
-NARROW, NARROW_HEIGHT, NARROW_BOTTOM = 3.7, 2.8, 0.98
 #: Room in the axes for the pressure drops at the ends of negative commands, per cent of command.
 LEFT_ROOM = 16
 
@@ -177,39 +159,29 @@ def characteristic_figure(curves: Sequence[CharacteristicCurve], units: Recorded
     curves = [curve for curve in curves if curve.branches]
     if not curves:
         return None
-    return to_report_figure(
-        _drawn(curves, units), "characteristic", _caption(curves), _description(curves, units), _csv(curves),
-        narrow=_drawn(curves, units, narrow=True),
-    )  # fmt: skip
-
-
-def _drawn(curves: Sequence[CharacteristicCurve], units: RecordedUnits, *, narrow: bool = False) -> "Figure":
-    """Draw the curves; narrow for a page as wide as a telephone, where the words of a wide one would be too small."""
     hues = _hues(curves)
     low, high = ("negative" in {curve.side for curve in curves}, "positive" in {curve.side for curve in curves})
-    handles = 1 + len({curve.set for curve in curves})
-    figure = new_figure(
-        NARROW_HEIGHT if narrow else HEIGHT, width=NARROW if narrow else WIDTH, legend_rows=handles if narrow else 1,
-        right=LABEL_ROOM if high else 0.2, top=0.16,
-    )  # fmt: skip
-    if narrow:
-        figure.subplots_adjust(bottom=NARROW_BOTTOM / NARROW_HEIGHT)
+    figure = new_figure(3.75)
     axes = figure.subplots()
     for curve in curves:
         _draw(axes, curve, hues[id(curve)], units)
     axes.set(
         xlabel="command (% of full)", ylabel=f"flow Q ({units.label('L/min')})",
-        xlim=(-100 - (1 + narrow) * LEFT_ROOM if low else 0, 100 if high else 0),
-        xticks=range(-100 if low else 0, 101 if high else 1, 50 if narrow and low and high else 20),
+        xlim=(-100 - LEFT_ROOM if low else 0, 100 if high else 0),
+        xticks=range(-100 if low else 0, 101 if high else 1, 20),
     )  # fmt: skip
     if low and high:
         for line in (axes.axhline, axes.axvline):
             line(0, color=LIGHT["soft"], lw=0.8, zorder=1)
     elif high:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]) if any(curve.samples for curve in curves) else 0.0)
-    _label_ends(axes, curves, hues, units, LABEL_HEIGHT * (1 + 0.7 * narrow))
-    _legend(figure, axes, curves, 1 if narrow else handles)
-    return figure
+    if ends := _ends(curves, hues, units):
+        label_ends(axes, ends)
+        axes.annotate(f"dP ({units.label('MPa')})", (1 if high else 0, 1), xycoords="axes fraction", xytext=(5, 4),
+                      textcoords="offset points", fontsize=8, color=LIGHT["soft"], annotation_clip=False)  # fmt: skip
+    _name_lines(axes, curves)
+    legend_below(figure, 3)
+    return to_report_figure(figure, "characteristic", _caption(curves), _description(curves, units), _csv(curves))
 
 
 def _hues(curves: Sequence[CharacteristicCurve]) -> Mapping[int, str]:
@@ -233,46 +205,28 @@ def _draw(axes: "Axes", curve: CharacteristicCurve, hue: str, units: RecordedUni
                   zorder=2)  # fmt: skip
 
 
-def _label_ends(
-    axes: "Axes", curves: Sequence[CharacteristicCurve], hues: Mapping[int, str], units: RecordedUnits, room: float
-) -> None:
-    """Write the pressure drop beside the far end of each curve: at the right, and of negative commands at the left."""
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high)
-    for side in ("positive", "negative"):
-        ends: dict[str, tuple[float, str]] = {}
-        for curve in curves:
-            if curve.side == side and curve.dp_MPa is not None:
-                flow = units.convert(curve.end[1], "L/min")
-                ends.setdefault(units.number(curve.dp_MPa, ".2f MPa"), (flow, hues[id(curve)]))
-        names = sorted(ends, key=lambda name: ends[name][0])
-        places = apart([ends[name][0] for name in names], room * (high - low))
-        right = side == "positive"
-        for name, place in zip(names, places, strict=True):
-            axes.annotate(
-                name, (100 if right else -100, place), xytext=(5 if right else -5, 0), textcoords="offset points",
-                va="center", ha="left" if right else "right", fontsize=8, color=ends[name][1], annotation_clip=False,
-            )  # fmt: skip
-    if any(curve.dp_MPa is not None for curve in curves):
-        right = any(curve.side == "positive" for curve in curves)
-        axes.annotate(f"dP ({units.label('MPa')})", (1 if right else 0, 1), xycoords="axes fraction",
-                      xytext=(5, 4), textcoords="offset points", fontsize=8, color=LIGHT["soft"],
-                      annotation_clip=False)  # fmt: skip
+def _ends(
+    curves: Sequence[CharacteristicCurve], hues: Mapping[int, str], units: RecordedUnits
+) -> list[tuple[float, float, str, str]]:
+    """Return the far end of a curve at each pressure drop of each side, with that pressure drop and its hue."""
+    ends: dict[tuple[str, str], tuple[float, float, str, str]] = {}
+    for curve in curves:
+        if curve.dp_MPa is not None:
+            name, flow = units.number(curve.dp_MPa, ".2f MPa"), units.convert(curve.end[1], "L/min")
+            place = 100.0 if curve.side == "positive" else -100.0
+            ends.setdefault((curve.side, name), (place, flow, name, hues[id(curve)]))
+    return list(ends.values())
 
 
-def _legend(figure: "Figure", axes: "Axes", curves: Sequence[CharacteristicCurve], columns: int) -> None:
-    handles = []
-    for name in ("before", "after"):
+def _name_lines(axes: "Axes", curves: Sequence[CharacteristicCurve]) -> None:
+    for name in SETS:
         of_set = [curve for curve in curves if curve.set == name]
         if of_set:
             dash, width = DASHES[name]
-            origin = ORIGIN_WORDS[of_set[0].origin]
-            label = f"{WITH_WORDS[name]} ({origin})"
-            handles += axes.plot([], [], linestyle=dash, lw=width, color=LIGHT["soft"], label=label)
+            label = f"{WITH_WORDS[name]} ({ORIGIN_WORDS[of_set[0].origin]})"
+            axes.plot([], [], linestyle=dash, lw=width, color=LIGHT["soft"], label=label)
     if any(curve.samples for curve in curves):
-        handles += axes.plot([], [], color=LIGHT["soft"], label="samples", **SAMPLE)
-    figure.legend(handles=handles, loc="lower center", ncols=columns, columnspacing=1.4, borderpad=0.1,
-                  borderaxespad=0.1)  # fmt: skip
+        axes.plot([], [], color=LIGHT["soft"], label="samples", **SAMPLE)
 
 
 def _caption(curves: Sequence[CharacteristicCurve]) -> str:

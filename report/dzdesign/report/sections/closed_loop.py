@@ -1,8 +1,7 @@
-"""Sections on the evidence: every input, closed loop, requirements."""
+"""Section on the closed loop, and on the current loop of a drive by current."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,26 +9,18 @@ from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import NOT_CHECKED
 from dzdesign.identify.plots.style import CYCLE
 from dzdesign.report.artefacts import Chain
-from dzdesign.report.cells import (
+from dzdesign.report.figure import LIGHT, ReportFigure, label_ends, side_words, titled_axes, to_report_figure
+from dzdesign.report.page import (
     Cell,
+    Section,
     Table,
     in_number_font,
+    in_units,
     number,
-    recorded,
+    percent,
     table_of,
+    table_of_rows,
 )
-from dzdesign.report.figure import (
-    LIGHT,
-    ReportFigure,
-    csv_text,
-    label_ends,
-    legend_below,
-    new_figure,
-    side_words,
-    titled_axes,
-    to_report_figure,
-)
-from dzdesign.report.page import Section
 from dzdesign.verify.closed_loop.ramps import Curves, closed_loop_name, csv_of
 from dzdesign.verify.current.results import CurrentLoopResult
 from dzdesign.verify.loop_results import (
@@ -37,10 +28,6 @@ from dzdesign.verify.loop_results import (
     PressureResult,
     ScenarioResult,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 #: Parameters of a plant that count where its edge does not.
 COIL_AND_SPOOL = (
@@ -60,7 +47,6 @@ def loop_section(chain: Chain) -> Section:
     figures, units = [], chain.recorded_units
     for side in sides:
         of_side = [each for each in loop.pressures if each.side == side]
-        figures.append(dead_zone_figure(of_side, side, len(sides) > 1, units))
         unseen = max((each.unseen_below_L_min for each in of_side if each.unseen_below_L_min), default=None)
         figures.append(loop_figure(chain.curves[closed_loop_name(side)], side, len(sides) > 1, units, unseen))
     return Section(
@@ -99,10 +85,10 @@ def plant_table(loop: ClosedLoopResult) -> Table | None:
     half = -(-len(cells) // 2)  # in two columns, or they would take a page of paper
     right = [*cells[half:], (Cell(text=""), Cell(text=""))]
     of = "" if loop.plant else ": its coil and spool; the flow is the recorded one"
-    return Table(
-        caption=f"The plant's parameters; the unit is in the name{of}",
-        columns=("parameter", "value", "parameter", "value"),
-        rows=tuple((*left, *beside) for left, beside in zip(cells[:half], right, strict=False)),
+    return table_of_rows(
+        f"The plant's parameters; the unit is in the name{of}",
+        ("parameter", "value", "parameter", "value"),
+        [(*left, *beside) for left, beside in zip(cells[:half], right, strict=False)],
     )
 
 
@@ -114,12 +100,12 @@ def readings_table(pressures: Sequence[PressureResult], units: RecordedUnits) ->
         "rises straight from zero command",
         pressures,
         ("side", lambda one: one.side),
-        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
-        ("opening without (%)", lambda one: number(100 * one.reading_opening_without, 1)),
-        ("opening with (%)", lambda one: number(100 * one.reading_opening, 1)),
-        ("closing without (%)", lambda one: number(100 * one.reading_closing_without, 1)),
-        ("closing with (%)", lambda one: number(100 * one.reading_closing, 1)),
-        ("ideal line (%)", lambda one: number(100 * one.ideal_line, 1)),
+        in_units("dP", "dp_MPa", ".2f MPa", units),
+        percent("opening without", "reading_opening_without"),
+        percent("opening with", "reading_opening"),
+        percent("closing without", "reading_closing_without"),
+        percent("closing with", "reading_closing"),
+        percent("ideal line", "ideal_line"),
     )
 
 
@@ -130,15 +116,15 @@ def loops_table(pressures: Sequence[PressureResult], units: RecordedUnits) -> Ta
         f"Dead zones at the onset of flow in per cent of command, flows in {flow}",
         pressures,
         ("side", lambda one: one.side),
-        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
-        ("opening without (%)", lambda one: number(100 * one.dead_zone_opening, 1)),
-        ("opening with (%)", lambda one: number(100 * one.residual_opening, 1)),
-        ("closing without (%)", lambda one: number(100 * one.dead_zone_closing, 1)),
-        ("closing with (%)", lambda one: number(100 * one.residual_closing, 1)),
+        in_units("dP", "dp_MPa", ".2f MPa", units),
+        percent("opening without", "dead_zone_opening"),
+        percent("opening with", "residual_opening"),
+        percent("closing without", "dead_zone_closing"),
+        percent("closing with", "residual_closing"),
         (f"at zero without β ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_without_beta_L_min, units))),
         (f"at zero ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
-        (f"largest without ({flow})", lambda one: recorded(one.q_max_direct_L_min, ".2f L/min", units)),
-        (f"largest with ({flow})", lambda one: recorded(one.q_max_L_min, ".2f L/min", units)),
+        in_units("largest without", "q_max_direct_L_min", ".2f L/min", units),
+        in_units("largest with", "q_max_L_min", ".2f L/min", units),
     )
 
 
@@ -154,8 +140,8 @@ def scenarios_table(scenarios: Sequence[ScenarioResult], units: RecordedUnits) -
         "Beside ramps: each scenario at the pressures where it is worst",
         [worst[key] for key in dict.fromkeys((each.name, each.not_required) for each in scenarios)],
         ("scenario", lambda one: Cell(text=one.name, more=_where(one, scenarios, units))),
-        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
-        (f"behind the edge ({units.label('MPa')})", lambda one: recorded(one.back_MPa, ".2f MPa", units)),
+        in_units("dP", "dp_MPa", ".2f MPa", units),
+        in_units("behind the edge", "back_MPa", ".2f MPa", units),
         (f"at zero, at the end ({flow})", lambda one: in_number_font(one.in_words(one.q_zero_L_min, units))),
         (f"on the way, at most ({flow})", lambda one: in_number_font(one.in_words(one.q_peak_at_zero_L_min, units))),
         ("required", lambda one: _required(one, units) if one.must_shut else f"{one.not_required}: not required"),
@@ -185,18 +171,14 @@ def _required(scenario: ScenarioResult, units: RecordedUnits) -> str:
 
 
 def current_tables(result: CurrentLoopResult | None) -> tuple[Table, ...]:
-    """Return the tables; none of a drive by duty."""
+    """Return the tables of a drive by current, corners and faults; none of one by duty."""
     if result is None:
         return ()
-    return (_corners(result), _faults(result))
 
+    def known(value: float | None, factor: float, missing: str = "not carried") -> Cell:
+        return Cell(text=missing) if value is None else number(factor * value, 1)
 
-def _optional(value: float | None, places: int, factor: float = 1.0) -> Cell:
-    return Cell(text="not carried") if value is None else number(factor * value, places)
-
-
-def _corners(result: CurrentLoopResult) -> Table:
-    return table_of(
+    corners = table_of(
         "Current loop: margins of its equations, and the C code with the coil, at every corner",
         result.corners,
         ("resistance (ohm)", lambda one: number(one.resistance_ohm, 2)),
@@ -207,85 +189,35 @@ def _corners(result: CurrentLoopResult) -> Table:
         ("limit cycle (codes)", lambda one: number(one.limit_cycle_codes, 2)),
         ("steady error (codes)", lambda one: number(one.steady_error_codes, 2)),
         ("beyond the set point on release (codes)", lambda one: number(one.release_overshoot_codes, 2)),
-        ("10 to 90 % (ms)", lambda one: _optional(one.rise_s, 1, 1e3)),
-        ("switch on all the time (ms)", lambda one: _optional(one.least_rise_s, 1, 1e3)),
-        ("overshoot (%)", lambda one: _optional(one.overshoot, 1, 100.0)),
+        ("10 to 90 % (ms)", lambda one: known(one.rise_s, 1e3)),
+        ("switch on all the time (ms)", lambda one: known(one.least_rise_s, 1e3)),
+        ("overshoot (%)", lambda one: known(one.overshoot, 100.0)),
     )
-
-
-def _faults(result: CurrentLoopResult) -> Table:
-    return table_of(
+    faults = table_of(
         "Current loop: faults of the circuit, put in and taken away again",
         result.faults,
         ("fault", lambda one: one.name),
         ("bit", lambda one: Cell(text=f"DZ_CURRENT_{one.expected}", kind="symbol")),
-        (
-            "seen after (ms)",
-            lambda one: Cell(text="not seen") if one.seen_after_s is None else number(1e3 * one.seen_after_s, 1),
-        ),
+        ("seen after (ms)", lambda one: known(one.seen_after_s, 1e3, "not seen")),
         ("at most (ms)", lambda one: number(1e3 * one.limit_s, 1)),
         ("output stays off", lambda one: "yes" if one.latched else "no"),
     )
+    return corners, faults
 
 
-#: Where the enlarged panel ends, percent of full command.
+#: Where the drawn part ends, percent of full command.
 NEAR_ZERO = 15.0
 
 
 def loop_figure(
     curves: Curves, side: str, both: bool, units: RecordedUnits, unseen_below_L_min: float | None = None
 ) -> ReportFigure:
-    """Draw flow against command without and with the compensator, whole and near zero, from closed_loop_<side>.csv.
+    """Draw flow against command near zero, with the compensator, from closed_loop_<side>.csv.
 
     Below `unseen_below_L_min` nothing of the flow was recorded: the lines go on there as the first flows do.
     """
     ends = [name.removeprefix("q_with_") for name in curves if name.startswith("q_with_")]
-    figure = new_figure(3.9, top=0.3, right=0.5)
-    wide, near = figure.subplots(1, 2, width_ratios=(1.35, 1), gridspec_kw={"wspace": 0.36})
-    _draw_whole(wide, curves, ends, units)
-    _draw_near_zero(near, curves, ends, units)
-    hidden = ""
-    if unseen_below_L_min is not None:
-        near.axhspan(0, units.convert(unseen_below_L_min, "L/min"), color=LIGHT["soft"], alpha=0.15, lw=0, zorder=0)
-        shown = units.text(unseen_below_L_min, ".2f L/min")
-        hidden = f" Shaded: below {shown} the recordings show no flow, and the first flows are continued."
-    starts = {
-        which: [_first_flow(curves, f"q_{which}_{end}") for end in ends] for which in ("without", "with")
-    }
-    return to_report_figure(
-        figure,
-        f"loop-{side}",
-        f"Closed loop: a ramp up and down, the generated C driving the simulated valve{side_words(side, both)}. Of "
-        f"two branches the one at lower commands is closing; what lies between is the valve's hysteresis.{hidden}",
-        f"Flow against command at {len(ends)} pressure drops. First flow on the ramp up: without the "
-        f"compensator at {_percents(starts['without'])}, with it at {_percents(starts['with'])} of full command.",
-        csv_of(curves),
-    )
-
-
-def _percents(values: Sequence[float]) -> str:
-    return f"{min(values):.1f} to {max(values):.1f} %"
-
-
-def _draw_whole(axes: "Axes", curves: Curves, ends: Sequence[str], units: RecordedUnits) -> None:
-    command, labels = curves["command_percent"], []
-    for index, end in enumerate(ends):
-        hue = LIGHT[CYCLE[index % len(CYCLE)]]
-        bare, driven = (
-            units.convert(curves[f"q_{which}_{end}"], "L/min") for which in ("without", "with")
-        )
-        axes.plot(command, bare, ":", color=hue, lw=1.4)
-        axes.plot(command, driven, "-", color=hue, lw=1.5)
-        labels.append((100.0, float(driven.max()), _pressure(end, units), hue))
-    label_ends(axes, labels)
-    axes.plot([], [], "-", color=LIGHT["soft"], label="with")
-    axes.plot([], [], ":", color=LIGHT["soft"], label="without")
-    axes.legend(loc="upper left", title="the compensator", alignment="left")
-    axes.set(xlabel="command (% of full)", ylabel=f"flow Q ({units.label('L/min')})", xlim=(0, 100), ylim=(0, None),
-             title=f"whole range; dP in {units.label('MPa')} at the end")  # fmt: skip
-
-
-def _draw_near_zero(axes: "Axes", curves: Curves, ends: Sequence[str], units: RecordedUnits) -> None:
+    figure, axes = titled_axes(3.6, side, both)
     command, labels, top = curves["command_percent"], [], 0.0
     opening = np.arange(command.size) <= int(np.argmax(command))
     for index, end in enumerate(ends):
@@ -295,54 +227,34 @@ def _draw_near_zero(axes: "Axes", curves: Curves, ends: Sequence[str], units: Re
             axes.plot(command[inside], driven[inside], dash, color=hue, lw=1.5)
             top = max(top, float(driven[inside].max()))
             if dash == "-":
-                labels.append((NEAR_ZERO, float(driven[inside][-1]), _pressure(end, units), hue))
-    label_ends(axes, labels)
+                pressure = units.number(float(end.removesuffix("_MPa_L_min")), ".2f MPa")
+                labels.append((NEAR_ZERO, float(driven[inside][-1]), pressure, hue))
     for dash, word in (("-", f"opening, dP in {units.label('MPa')} at the end"), ("--", "closing")):
         axes.plot([], [], dash, color=LIGHT["soft"], label=word)
     axes.legend(loc="upper left")
     flow = f"flow Q ({units.label('L/min')})"
-    axes.set(xlabel="command (% of full)", ylabel=flow, xlim=(0, NEAR_ZERO), ylim=(0, 1.1 * top or 1),
-             title="with the compensator, near zero")  # fmt: skip
-
-
-def _pressure(end: str, units: RecordedUnits) -> str:
-    return units.number(float(end.removesuffix("_MPa_L_min")), ".2f MPa")
+    axes.set(xlabel="command (% of full)", ylabel=flow, xlim=(0, NEAR_ZERO), ylim=(0, 1.1 * top or 1))
+    label_ends(axes, labels)
+    hidden = ""
+    if unseen_below_L_min is not None:
+        axes.axhspan(0, units.convert(unseen_below_L_min, "L/min"), color=LIGHT["soft"], alpha=0.15, lw=0, zorder=0)
+        shown = units.text(unseen_below_L_min, ".2f L/min")
+        hidden = f" Shaded: below {shown} the recordings show no flow, and the first flows are continued."
+    bare, starts = ([_first_flow(curves, f"q_{which}_{end}") for end in ends] for which in ("without", "with"))
+    return to_report_figure(
+        figure,
+        f"loop-{side}",
+        "Closed loop near zero: a ramp up and down, the generated C driving the simulated valve"
+        f"{side_words(side, both)}. Of two branches the one at lower commands is closing; what lies between is the "
+        f"valve's hysteresis. The CSV has the whole ramp, without the compensator too.{hidden}",
+        f"Flow against command at {len(ends)} pressure drops. First flow on the ramp up: without the "
+        f"compensator at {min(bare):.1f} to {max(bare):.1f} %, with it at {min(starts):.1f} to {max(starts):.1f} % "
+        "of full command.",
+        csv_of(curves),
+    )
 
 
 def _first_flow(curves: Curves, column: str) -> float:
     """Return the first command at which there is flow, percent."""
     flowing = curves["command_percent"][curves[column] > 0]
     return float(flowing[0]) if flowing.size else 100.0
-
-
-def dead_zone_figure(
-    pressures: Sequence[PressureResult], side: str, both: bool, units: RecordedUnits
-) -> ReportFigure:
-    """Draw the dead zone of one side on both branches against the pressure drop, before and after."""
-    figure, axes = titled_axes(3.0, side, both, legend_rows=1)
-    dp = [each.dp_MPa for each in pressures]
-    lines = {
-        "dead_zone_opening": ("without, opening", "^", "-", "vermilion"),
-        "dead_zone_closing": ("without, closing", "v", "--", "vermilion"),
-        "residual_opening": ("with, opening", "^", "-", "blue"),
-        "residual_closing": ("with, closing", "v", "--", "blue"),
-    }
-    percent = {key: [100 * getattr(each, key) for each in pressures] for key in lines}
-    at = units.convert(np.array(dp), "MPa")
-    for key, (label, marker, dash, hue) in lines.items():
-        axes.plot(at, percent[key], dash, marker=marker, ms=5.5, lw=1.6, color=LIGHT[hue], label=label)
-    axes.set(xlabel=f"pressure drop dP ({units.label('MPa')})", ylabel="dead zone (% of command)", ylim=(0, None))
-    legend_below(figure, 4)
-    worst = {key: max(values) for key, values in percent.items()}
-    return to_report_figure(
-        figure,
-        f"dead-zone-{side}",
-        f"Dead zone in the closed loop, without and with the compensator{side_words(side, both)}.",
-        f"The dead zone on opening falls from at most {worst['dead_zone_opening']:.1f} % to at most "
-        f"{worst['residual_opening']:.1f} % of command, on closing from {worst['dead_zone_closing']:.1f} % to "
-        f"{worst['residual_closing']:.1f} %.",
-        csv_text(
-            ("dp_MPa", *(f"{key}_percent" for key in lines)),
-            zip(dp, *([round(value, 4) for value in values] for values in percent.values()), strict=True),
-        ),
-    )

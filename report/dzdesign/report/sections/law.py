@@ -1,12 +1,13 @@
-"""Sections on the compensator: its law in exact numbers, the integers of the C code and what they cost."""
+"""Sections on the compensator: its law in exact numbers, the integers of the C code, and the uncertainty budget."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 
 import numpy as np
 
+from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.derivation.account.equations import APPROACH, AT_REFERENCE, OFF_REFERENCE
 from dzdesign.derivation.account.law_theorems import TARGET, TIES
 from dzdesign.derivation.account.proof import prove
@@ -15,18 +16,30 @@ from dzdesign.derivation.law import law
 from dzdesign.derivation.presentation.content import DerivationReport, Entry, Words
 from dzdesign.derivation.presentation.report import closure, compose
 from dzdesign.derivation.presentation.writers import HtmlWriter
-from dzdesign.design.certificate import above_in_words, below_in_words
+from dzdesign.design.certificate import above_in_words, below_in_words, reach_of_certificate
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.firmware_manifest import FirmwareConstant, FirmwareManifest
+from dzdesign.design.side_law import ADDED_IN_FULL, Budget, BudgetLine
 from dzdesign.identify.valve.model import SIDES
 from dzdesign.report.artefacts import laws_of
-from dzdesign.report.cells import Cell, Table, recorded, table_of
 from dzdesign.report.figure import LIGHT, ReportFigure, csv_text, side_words, titled_axes, to_report_figure
-from dzdesign.report.page import Section
+from dzdesign.report.page import (
+    Cell,
+    Section,
+    Table,
+    in_number_font,
+    number,
+    recorded,
+    shown_places,
+    table_of,
+    table_of_rows,
+)
 from dzdesign.verify.exhaustive.exact_law import ExactLaw
 
 #: Rows of a constant's table that stand in the page; all of them stand in the CSV.
 MOST_ROWS = 3
+#: Units of a half-width that a person may see in another one, and how many digits.
+SHOWN_UNITS = {"mV": ".3g mV", "MPa": ".3g MPa"}
 BELOW_DP0 = {"hold": "β = 1, as in the paper", "extend": "β as tested"}
 
 
@@ -112,32 +125,28 @@ def _origin(constant: FirmwareConstant) -> str:
 def rounding_table(compensator: Compensator) -> Table:
     """Return what turning the law into integers costs."""
     u_max, units = compensator.u_max_V, compensator.valve.recorded_units
-    rows: list[tuple[str, str, str, float]] = []
+    rows: list[tuple[Cell | str, ...]] = []
+
+    def add(what: str, in_c: str, exact: str, difference_mV: float) -> None:
+        rows.append((what, in_c, exact, recorded(difference_mV, "+.3f mV", units)))
+
     for name, side in laws_of(compensator).items():
         certificate = side.certificate
         offset = side.u_min0_over_u_max * u_max
-        node = offset / compensator.beta_denominator
         of = f" ({name})" if len(laws_of(compensator)) > 1 else ""
         if not compensator.transition_codes:  # which counts from the opening threshold, the valve's curve does not
             wanted = Fraction(repr(compensator.valve.sides[name].certified[certificate.guard].u_min0_V))
             in_c, exact = (units.of_side(name).text(float(value), ".6f V") for value in (offset, wanted))
-            rows.append(("u_min0" + of, in_c, exact, 1e3 * float(offset - wanted)))
-        rows += [
-            ("one step of a node of β" + of, f"1/{compensator.beta_denominator}", "rounded down", -1e3 * float(node)),
-            (
-                "offset under the certified curve, mean" + of, "few nodes, rounding to codes and to counts",
-                f"largest {units.text(1e3 * certificate.largest_loss_V, '.2f mV')}", -1e3 * certificate.mean_loss_V,
-            ),
-        ]  # fmt: skip
-    half_count = u_max / compensator.signals.compare_max / 2
-    rows.append(("compare value", "a whole count", "half a count", 1e3 * float(half_count)))
-    return table_of(
-        "What the integers cost",
-        rows,
-        ("number", lambda row: row[0]),
-        ("in the C code", lambda row: row[1]),
-        ("exact, or what is done", lambda row: row[2]),
-        (f"difference, at most ({units.label('mV')})", lambda row: recorded(row[3], "+.3f mV", units)),
+            add("u_min0" + of, in_c, exact, 1e3 * float(offset - wanted))
+        denominator = compensator.beta_denominator
+        add("one step of a node of β" + of, f"1/{denominator}", "rounded down", -1e3 * float(offset / denominator))
+        largest = f"largest {units.text(1e3 * certificate.largest_loss_V, '.2f mV')}"
+        how = "few nodes, rounding to codes and to counts"
+        add("offset under the certified curve, mean" + of, how, largest, -1e3 * certificate.mean_loss_V)
+    add("compare value", "a whole count", "half a count", 1e3 * float(u_max / compensator.signals.compare_max / 2))
+    difference = f"difference, at most ({units.label('mV')})"
+    return table_of_rows(
+        "What the integers cost", ("number", "in the C code", "exact, or what is done", difference), rows
     )
 
 
@@ -213,3 +222,85 @@ def law_figure(compensator: Compensator, name: str, both: bool) -> ReportFigure:
         f"{units.text(rows[-1][2], '.3f V')}.",
         csv_text(("dp_MPa", "command_percent", "output_V"), rows),
     )
+
+
+# --- what is counted between the recorded threshold and the largest offset ----------------------------------
+
+
+def budget_section(compensator: Compensator | None) -> Section:
+    """Return the section on the budget of each side."""
+    if compensator is None:
+        return Section(missing="No compensator is here: `dzdesign design` makes compensator.json with its budget.")
+    laws, units = laws_of(compensator), compensator.valve.recorded_units
+    budgets = {name: law.budget for name, law in laws.items() if law.budget is not None}
+    lines = [reach_of_certificate(compensator), f"The components are {ADDED_IN_FULL}."]
+    if not budgets:
+        return Section(lines=tuple(lines[:1]))
+    both = len(budgets) > 1
+    return Section(
+        lines=tuple(lines),
+        tables=[budget_table(budget, name, both, units.of_side(name)) for name, budget in budgets.items()],
+    )
+
+
+def budget_table(budget: Budget, name: str, both: bool, units: RecordedUnits) -> Table:
+    """Return the components: origin, half-width, sensitivity, contribution at the pressure drops, and price."""
+    millivolts, places = units.label("mV"), shown_places(len(budget.dp_MPa))
+
+    def contribution(at: int) -> tuple[str, Callable[[BudgetLine], Cell]]:
+        heading = f"{units.text(budget.dp_MPa[at], '.2f MPa')} ({millivolts})"
+        return heading, lambda line: recorded(line.contribution_mV[at], ".2f mV", units)
+
+    def component(line: BudgetLine) -> Cell:
+        known = line.source.startswith(line.origin)
+        return Cell(text=line.component, more=line.source if known else f"{line.origin}: {line.source}")
+
+    table = table_of(
+        f"Uncertainty budget{f', {name} commands' if both else ''}",
+        budget.lines,
+        ("component", component),
+        ("half-width", lambda line: in_number_font(_half_width(line, units))),
+        (f"sensitivity ({millivolts} per unit of it)", lambda line: in_number_font(_sensitivity(line, units))),
+        *map(contribution, places),
+        ("price (% of command)", lambda line: number(100 * line.price, 3)),
+        csv=csv_text(
+            ("component", "origin", "source", "half_width", "unit", "dp_MPa", "sensitivity_mV", "contribution_mV",
+             "price_percent"),
+            _budget_rows(budget),
+        ),
+        name=f"budget-components-{name}",
+        notes=(
+            "Contribution: by how much the component alone lowers what is certified. Sensitivity: that for one unit of "
+            "its half-width, from the least to the most over the pressure drops.",
+            "Price: the dead zone that the component costs, that is by how much the offset would rise without it.",
+            "All together may differ from the sum: the drive, oil and ageing multiply what the others leave.",
+        ),
+    )  # fmt: skip
+    combined = (recorded(budget.combined_mV[at], ".2f mV", units) for at in places)
+    dash = in_number_font("–")
+    return replace(table, rows=(*table.rows, (Cell(text="all together"), dash, dash, *combined, dash)))
+
+
+def _half_width(line: BudgetLine, units: RecordedUnits) -> str:
+    form = SHOWN_UNITS.get(line.unit)
+    if form is not None:
+        return units.text(line.half_width, form)
+    return f"{line.half_width:.4g} {line.unit}"
+
+
+def _sensitivity(line: BudgetLine, units: RecordedUnits) -> str:
+    """Return from where to where the sensitivity runs, for one unit of the half-width as it is shown."""
+    if line.unit == "mV":  # of the threshold itself
+        return "–"
+    one = units.convert(1.0, line.unit) if line.unit in SHOWN_UNITS else 1.0
+    ends = (units.number(end(line.sensitivity_mV) / one, ".3g mV") for end in (min, max))
+    return " to ".join(dict.fromkeys(ends))
+
+
+def _budget_rows(budget: Budget) -> Iterator[tuple[object, ...]]:
+    for line in budget.lines:
+        for at, dp_MPa in enumerate(budget.dp_MPa):
+            yield (
+                line.component, line.origin, line.source, line.half_width, line.unit, dp_MPa, line.sensitivity_mV[at],
+                line.contribution_mV[at], 100 * line.price,
+            )  # fmt: skip

@@ -1,10 +1,10 @@
-"""Sections on what the report was made from, and on what it does not cover."""
+"""Sections on requirements, warnings, costs and hashes, and on the lot of which a lot setting is."""
 
 from collections.abc import Callable, Iterator, Sequence
 
 from dzdesign.core.artefact_types import Artefact, schema_of
 from dzdesign.core.documents import written_by
-from dzdesign.core.errors import InputError
+from dzdesign.core.errors import InputError, and_more
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.verdicts import NOT_CHECKED, NOT_REQUIRED
 from dzdesign.design.compensator import Compensator
@@ -14,21 +14,27 @@ from dzdesign.design.pressure_inputs import signals_in_words
 from dzdesign.design.signals import SIDE_NAMES
 from dzdesign.identify.valve.model import ValveModel
 from dzdesign.report.artefacts import ROLES, Chain, standing_warnings
-from dzdesign.report.cells import (
+from dzdesign.report.page import (
     Cell,
+    Figure,
+    Section,
     Table,
     counted,
     finding,
     in_number_font,
-    recorded,
+    in_units,
     table_of,
-    unasked,
+    table_of_rows,
     verdict,
     whole,
 )
-from dzdesign.report.page import Section
+from dzdesign.report.sections.quantities import BRANCHES
 from dzdesign.verify.evidence import Evidence
 from dzdesign.verify.verification import label_of_untried, untried_requirements
+
+NEVER = "never"
+#: Valves of a lot that the page names.
+ROWS = 40
 
 
 def warnings_section(valve: ValveModel | None, compensator: Compensator | None) -> Section:
@@ -51,13 +57,33 @@ def warnings_section(valve: ValveModel | None, compensator: Compensator | None) 
 
 
 def provenance_section(chain: Chain) -> Section:
-    """Return the section with every hash."""
-    return Section(tables=(_provenance_table(chain), _recordings_table(chain), _hashes_table(chain)))
+    """Return the section with every hash: of artefacts, recordings, the firmware's files and what was tried."""
+    tried = [
+        row
+        for each in (chain.evidence.inputs if chain.evidence else ())
+        for row in (
+            (f"C of the {each.side} core that was compiled", each.core_sha256),
+            (f"object of the {each.side} core that was tried", each.object_sha256),
+            (f"compare values of all {whole(each.inputs)} inputs, 64 bits", each.outputs_hash),
+        )
+    ]
+    tried += chain.firmware.files.items() if chain.firmware else ()
+    recordings = [(each.source, each.sha256) for each in chain.valve.made_from] if chain.valve else []
+    of_hashes = (
+        ("Recordings that the valve was identified from", "file", recordings),
+        ("Hashes of the firmware's files and of what was tried", "what", tried),
+    )
+    tables = [
+        table_of_rows(caption, (what, "SHA-256"), [(name, Cell(text=digest, kind="code")) for name, digest in rows])
+        for caption, what, rows in of_hashes
+        if rows
+    ]
+    return Section(tables=(_artefacts_table(chain), *tables))
 
 
-def _provenance_table(chain: Chain) -> Table:
+def _artefacts_table(chain: Chain) -> Table:
     """Return which file made which, from the firmware's evidence back to the recordings."""
-    rows: list[tuple[str, Cell | str, Cell | str, str, str]] = []
+    rows: list[tuple[Cell | str, ...]] = []
     for role, (label, kind) in ROLES.items():
         artefact: Artefact | None = getattr(chain, role)
         if artefact:
@@ -65,58 +91,12 @@ def _provenance_table(chain: Chain) -> Table:
             sources = ", ".join(each.source for each in artefact.made_from) or "–"
             if role == "valve":
                 sources = counted(len(artefact.made_from), "recording")
-            rows.append((label, place.name, _hash(place.sha256), f"{tool.name} {tool.version}", sources))
+            digest = Cell(text=place.sha256, kind="hash")
+            rows.append((label, place.name, digest, f"{tool.name} {tool.version}", sources))
         elif written_by(schema_of(kind)):
             rows.append((label, Cell(text="missing or not used", kind="open"), "", "", ""))
-    return table_of(
-        "Each artefact with the SHA-256 of its bytes, and what it was made from",
-        rows,
-        ("artefact", lambda row: row[0]),
-        ("file", lambda row: row[1]),
-        ("SHA-256", lambda row: row[2]),
-        ("made by", lambda row: row[3]),
-        ("made from", lambda row: row[4]),
-    )
-
-
-def _recordings_table(chain: Chain) -> Table | None:
-    """Return the recordings that the valve was identified from; there may be many, so each takes one line."""
-    if chain.valve is None:
-        return None
-    return table_of(
-        "Recordings that the valve was identified from",
-        chain.valve.made_from,
-        ("file", lambda row: row.source),
-        ("SHA-256", lambda row: Cell(text=row.sha256, kind="code")),
-    )
-
-
-def _hash(digest: str) -> Cell:
-    return Cell(text=digest, kind="hash")
-
-
-def _hashes_table(chain: Chain) -> Table | None:
-    """Return the hashes of what was tried: sources, object, outputs; and of the firmware's files."""
-    rows = []
-    for each in chain.evidence.inputs if chain.evidence else ():
-        rows += [
-            (f"C of the {each.side} core that was compiled", each.core_sha256),
-            (f"object of the {each.side} core that was tried", each.object_sha256),
-            (f"compare values of all {whole(each.inputs)} inputs, 64 bits", each.outputs_hash),
-        ]
-    rows += chain.firmware.files.items() if chain.firmware else ()
-    if not rows:
-        return None
-    return table_of(
-        "Hashes of the firmware's files and of what was tried",
-        rows,
-        ("what", lambda row: row[0]),
-        ("SHA-256", lambda row: Cell(text=row[1], kind="code")),
-    )
-
-
-BRANCHES = ("opening", "closing")
-NEVER = "never"
+    columns = ("artefact", "file", "SHA-256", "made by", "made from")
+    return table_of_rows("Each artefact with the SHA-256 of its bytes, and what it was made from", columns, rows)
 
 
 def remaining_section(compensator: Compensator) -> Section:
@@ -146,8 +126,8 @@ def _table(compensator: Compensator, sign: int, costs: Sequence[CostAtTest]) -> 
     if compensator.negative is not None:
         caption += f"; {SIDE_NAMES[sign]} commands"
     columns: list[tuple[str, Callable[[CostAtTest], Cell]]] = [
-        (f"dP ({units.label('MPa')})", lambda one: recorded(one.dp_MPa, ".2f MPa", units)),
-        (f"offset ({units.label('V')})", lambda one: recorded(one.offset_V, ".3f V", units)),
+        in_units("dP", "dp_MPa", ".2f MPa", units),
+        in_units("offset", "offset_V", ".3f V", units),
         *((f"onset, {branch} (%)", _onset(branch, units)) for branch in BRANCHES),
         *((f"read, {branch} (%)", _read(branch)) for branch in BRANCHES),
         ("ideal line (%)", lambda one: _percent(one.ideal)),
@@ -155,8 +135,7 @@ def _table(compensator: Compensator, sign: int, costs: Sequence[CostAtTest]) -> 
     if compensator.machine is not None:
         columns.insert(4, ("opening at the machine's other end (%)", lambda one: _percent(one.last_opening)))
     if compensator.transition_codes > 0:
-        flow = f"flow on closing at the transition's end ({units.label('L/min')})"
-        columns.append((flow, lambda one: recorded(one.at_end_L_min, ".2f L/min", units)))
+        columns.append(in_units("flow on closing at the transition's end", "at_end_L_min", ".2f L/min", units))
     columns.append(("drive at full command (%)", _drive))
     return table_of(caption, costs, *columns)
 
@@ -193,20 +172,68 @@ def checks_section(evidence: Evidence | None) -> Section:
     """Return the section with every requirement."""
     if evidence is None:
         return Section(missing=f"{NOT_CHECKED}: no evidence is here; `dzdesign verify` makes it.")
-    tried: list[tuple[Cell | str, str, str]] = []
+    rows: list[tuple[Cell | str, ...]] = []
     for check in evidence.checks:
-        tried.append((verdict(check.holds), check.name, check.text))
-        tried += [(NOT_REQUIRED, check.name, found) for found in check.not_required]
+        rows.append((verdict(check.holds), check.name, finding(check.text)))
+        rows += [(NOT_REQUIRED, check.name, finding(found)) for found in check.not_required]
     untried = untried_requirements(evidence)
-    how = [f"to try it: {each.how}" for each in untried]
-    labels = [unasked(label_of_untried(each)) for each in untried]
-    titles = [each.title for each in untried]
-    rows = [*tried, *zip(labels, titles, how, strict=True)]
-    table = table_of(
-        f"{len(evidence.checks)} requirements tried, {len(untried)} not",
-        rows,
-        ("verdict", lambda row: row[0]),
-        ("requirement", lambda row: row[1]),
-        ("figures", lambda row: finding(row[2])),
+    for each in untried:
+        label = label_of_untried(each)
+        sign = Cell(text=f"? {label}", kind="open" if label == NOT_CHECKED else "")
+        rows.append((sign, each.title, finding(f"to try it: {each.how}")))
+    caption = f"{len(evidence.checks)} requirements tried, {len(untried)} not"
+    return Section(tables=(table_of_rows(caption, ("verdict", "requirement", "figures"), rows),))
+
+
+# --- of how many valves a lot setting is, and the worst of them ----------------------------------------------
+
+
+def carrier_of(compensator: Compensator) -> str:
+    """Return the name, in the lot, of the valve that the file of a lot setting holds."""
+    names = (each.name for each in compensator.lot if each.valve_sha256 == compensator.valve_json_sha256)
+    return next(names, "the valve in compensator.json")
+
+
+def lot_figures(chain: Chain) -> tuple[Figure, ...]:
+    """Return what the page of a lot setting leads with; none of a valve's own."""
+    compensator = chain.compensator
+    if compensator is None or not compensator.lot:
+        return ()
+    first = Figure(
+        label="Lot setting",
+        value=f"of {len(compensator.lot)} valves",
+        note=f"one law for all; the file holds one of them, {carrier_of(compensator)}, its carrier",
     )
-    return Section(tables=(table,))
+    return (first, _worst(chain.evidence, chain.recorded_units))
+
+
+def _worst(evidence: Evidence | None, units: RecordedUnits) -> Figure:
+    found = [each.lot for each in evidence.inputs if each.lot] if evidence else []
+    if not found:
+        return Figure(
+            label="Worst valve of the lot", value=NOT_CHECKED, kind="open",
+            note="no evidence here compares the C code with the bounds of each valve",
+        )  # fmt: skip
+    worst = min(found, key=lambda each: each.smallest_margin_V)
+    over = {name for each in found for name in each.over_compensated}
+    return Figure(
+        label=f"Worst valve of the lot: {worst.worst}",
+        value=units.text(1e3 * worst.smallest_margin_V, ".3f mV"),
+        note="margin of the C code's compare values at zero command under its own lower bound, at "
+        f"{units.text(worst.worst_dp_MPa, '.2f MPa')}; {len(over)} of {min(each.valves for each in found)} valves "
+        "over-compensated",
+        kind="bad" if over else "text",
+    )
+
+
+def lot_section(compensator: Compensator) -> Section:
+    """Return the section on the lot of a lot setting."""
+    return Section(
+        lines=(
+            f"One setting for {len(compensator.lot)} valves, each with bounds of its own in compensator.json: "
+            f"{and_more([valve.name for valve in compensator.lot], ROWS)}. Lot SHA-256 {compensator.lot_sha256}.",
+            f"All else in this report that is of one valve (recordings, thresholds, β, certificate, closed loop) is of "
+            f"{carrier_of(compensator)}, the carrier.",
+            "What the setting costs each valve stands in the report of dzdesign batch.",
+        )
+    )

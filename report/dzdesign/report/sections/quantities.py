@@ -1,23 +1,37 @@
-"""What the characteristic comes to: dead zones, hysteresis, linearity, symmetry, gain and flow, per side and pressure.
+"""Flow against command without and with the compensator, and what it comes to: dead zones, hysteresis, gain and flow.
 
-Measured ones lead. Without an assessment those without the compensator are the valve's, as identified, and those with
-it are the simulated closed loop's.
+Measured ones lead: an assessment of recordings. Without one, those without the compensator are the valve's, as recorded
+and identified, and those with it are the simulated closed loop's.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
+from msgspec import UnsetType
 
 from dzdesign.assess.assessment import Assessment, PressureAssessment
 from dzdesign.assess.limits import LimitResult
-from dzdesign.assess.quantities import LOSS, Reading
+from dzdesign.assess.measured_curves import MeasuredCurve
+from dzdesign.assess.options import SETS, Set
+from dzdesign.assess.quantities import LOSS
 from dzdesign.assess.thinned_curves import Line, gain_of, hysteresis_of, linearity_of
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.ramps.pooling import SAME_PRESSURE
+from dzdesign.identify.valve.model import SIDES, ValveModel
 from dzdesign.identify.valve.ramp_result import TestResult
-from dzdesign.report.sections.curves import CharacteristicCurve, Origin, origin_of, same_pressure
+from dzdesign.identify.valve.recorded_curve import RecordedBranch
+from dzdesign.verify.closed_loop.ramps import Curves, closed_loop_name
 from dzdesign.verify.loop_results import PressureResult
 
+#: Where a curve is from: recordings of a valve, recordings that are simulated themselves, or a simulated closed loop.
+Origin = Literal["recorded", "example", "simulated"]
+ORIGIN_WORDS: Mapping[Origin, str] = {
+    "recorded": "recorded", "example": "simulated recordings", "simulated": "simulated closed loop",
+}  # fmt: skip
+BRANCHES = ("opening", "closing")
+#: Command and flow, and those of the samples.
+Branch = tuple[Sequence[float], Sequence[float], Sequence[float], Sequence[float]]
 #: Keys in the order of a test report.
 KEYS = (
     "onset_opening", "onset_closing", "dead_zone_opening", "dead_zone_closing", "hysteresis", "linearity", "symmetry",
@@ -27,6 +41,135 @@ KEYS = (
 
 #: Share of full command below which a ramp has come to zero command.
 NEAR_ZERO = 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """Flow (N,) in L/min over command (N,) as a share of full command, both with the sign of their side."""
+
+    command: np.ndarray
+    q_L_min: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CharacteristicCurve:
+    """The curve of one side at one pressure drop, before or after the compensator was put in.
+
+    `branches` by their names, opening and closing, as far as there are any; `samples` are single readings.
+    """
+
+    side: str
+    dp_MPa: float | None
+    set: Set
+    origin: Origin
+    branches: Mapping[str, Points]
+    samples: tuple[Points, ...] = ()
+
+    @property
+    def end(self) -> tuple[float, float]:
+        """Command and flow at its far end."""
+        ends = [
+            (float(each.command[at]), float(each.q_L_min[at]))
+            for each in self.branches.values()
+            for at in [int(np.argmax(np.abs(each.command)))]
+        ]
+        return max(ends, key=lambda end: abs(end[1]))
+
+
+def characteristic_curves(
+    valve: ValveModel | None, assessment: Assessment | None, loops: Mapping[str, Curves]
+) -> tuple[CharacteristicCurve, ...]:
+    """Return the curves of all sides and pressure drops; `loops` are the evidence's, by the names of their files."""
+    if assessment and (measured := tuple(_measured(assessment))):
+        return measured
+    return (*(_recorded(valve) if valve else ()), *_simulated(loops))
+
+
+def origin_of(recordings: ValveModel | Assessment) -> Origin:
+    """Return what the recordings of a valve or of an assessment are."""
+    warnings = recordings.warnings if isinstance(recordings, ValveModel) else recordings.notes
+    return "example" if any(warning.code == "simulated" for warning in warnings) else "recorded"
+
+
+def _measured(assessment: Assessment) -> Iterator[CharacteristicCurve]:
+    for item in assessment.pressures:
+        for name in SETS:
+            if curve := measured_curve_of(item, name):
+                found = [
+                    (one.command_percent, one.q_L_min, one.sample_command_percent, one.sample_q_L_min) if one else None
+                    for one in (curve.rising, curve.falling)
+                ]
+                yield _curve(item.side, item.dp_MPa, name, origin_of(assessment), found, 100.0)
+
+
+def measured_curve_of(item: PressureAssessment, name: Set) -> MeasuredCurve | None:
+    """Return the curve of a set at one pressure drop; None where there is none, or none was kept."""
+    ramps = item.before if name == "before" else item.after
+    return None if ramps is None or isinstance(ramps.curve, UnsetType) else ramps.curve
+
+
+def _recorded(valve: ValveModel) -> Iterator[CharacteristicCurve]:
+    def branch(one: RecordedBranch | None) -> Branch | None:
+        if one is None:
+            return None
+        samples = one.samples
+        return (one.u_V, one.q_L_min, *(((), ()) if isinstance(samples, UnsetType) else (samples.u_V, samples.q_L_min)))
+
+    for name, test in ((name, test) for name, side in valve.sides.items() for test in side.tests):
+        found = [branch(test.recorded.rising), branch(test.recorded.falling)]
+        yield _curve(name, test.dp_MPa, "before", origin_of(valve), found, valve.u_max_V)
+
+
+def _curve(
+    side: str, dp_MPa: float | None, name: Set, origin: Origin, found: Sequence[Branch | None], full: float
+) -> CharacteristicCurve:
+    """Return a recorded curve from command, in units of `full` command, flow, and samples of both, of each branch."""
+    sign = SIDES[side]
+    branches = {word: each for word, each in zip(BRANCHES, found, strict=True) if each}
+    return CharacteristicCurve(
+        side=side,
+        dp_MPa=dp_MPa,
+        set=name,
+        origin=origin,
+        branches={word: _points(each[0], each[1], sign / full, sign) for word, each in branches.items()},
+        samples=tuple(_points(each[2], each[3], sign / full, sign) for each in branches.values() if each[2]),
+    )
+
+
+def _simulated(loops: Mapping[str, Curves]) -> Iterator[CharacteristicCurve]:
+    """Return the curves of the closed loop, with the compensator."""
+    for side, sign in SIDES.items():
+        columns = loops.get(closed_loop_name(side), {})
+        for column in columns:
+            if column.startswith("q_with_"):
+                command, flow = columns["command_percent"] / 100, columns[column]
+                top = int(np.argmax(command))
+                yield CharacteristicCurve(
+                    side=side,
+                    dp_MPa=float(column.removeprefix("q_with_").removesuffix("_MPa_L_min")),
+                    set="after",
+                    origin="simulated",
+                    branches={
+                        "opening": _points(command[: top + 1], flow[: top + 1], sign, sign),
+                        "closing": _points(command[top:][::-1], flow[top:][::-1], sign, sign),
+                    },
+                )
+
+
+def _points(command: object, flow: object, per_command: float, per_flow: float) -> Points:
+    return Points(
+        command=np.asarray(command, dtype=float) * per_command, q_L_min=np.asarray(flow, dtype=float) * per_flow
+    )
+
+
+def same_pressure(one: float | None, other: float | None) -> bool:
+    """Return whether two pressure drops count as one, as recordings are compared."""
+    if one is None or other is None:
+        return one is other
+    return abs(one - other) <= SAME_PRESSURE * max(one, other)
+
+
+# --- what they come to -----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +221,12 @@ def _of_assessment(assessment: Assessment) -> Iterator[PressureQuantities]:
     for item in assessment.pressures:
         place = item.place(assessment.recorded_units)
         before, after = (
-            {key: _found(reading) for key, reading in item.readings(name).items()} for name in ("before", "after")
+            {key: Found(reading.value, reading.at_most) for key, reading in item.readings(name).items()}
+            for name in SETS
         )
-        if loss := _loss(item):
-            after[LOSS] = loss
+        old, new = (each.get("largest_flow", Found(None)).value for each in (before, after))
+        if old and new is not None:
+            after[LOSS] = Found(100 * (1 - new / old))
         yield PressureQuantities(
             side=item.side,
             dp_MPa=item.dp_MPa,
@@ -90,19 +235,6 @@ def _of_assessment(assessment: Assessment) -> Iterator[PressureQuantities]:
             after=after,
             limits={limit.quantity: limit for limit in assessment.limits if limit.place == place},
         )
-
-
-def _found(reading: Reading) -> Found:
-    return Found(reading.value, reading.at_most)
-
-
-def _loss(item: PressureAssessment) -> Found | None:
-    """Return by how much the largest flow fell, percent."""
-    both = item.quantities.get("largest_flow")
-    old, new = (both.before, both.after) if both else (None, None)
-    if old is None or new is None or not old.value or new.value is None:
-        return None
-    return Found(100 * (1 - new.value / old.value))
 
 
 def _of_valve_and_loop(
@@ -180,22 +312,25 @@ def _of_loop(loop: PressureResult) -> dict[str, Found]:
 
 def _with_symmetry(found: Sequence[PressureQuantities]) -> tuple[PressureQuantities, ...]:
     """Add the symmetry of both sides' gains to the positive side."""
-    def gains(name: str, one: PressureQuantities, other: PressureQuantities | None) -> dict[str, Found]:
-        if other is None:
-            return {}
-        over, under = (getattr(each, name).get("gain", Found(None)).value for each in (one, other))
-        return {"symmetry": Found(100 * (over / under - 1))} if over and under else {}
+
+    def symmetric(one: Mapping[str, Found], other: Mapping[str, Found]) -> dict[str, Found]:
+        over, under = (each.get("gain", Found(None)).value for each in (one, other))
+        return {**one, "symmetry": Found(100 * (over / under - 1))} if over and under else {**one}
 
     made = []
     for one in found:
         other = next(
             (each for each in found if each.side != one.side and same_pressure(each.dp_MPa, one.dp_MPa)), None
         )
-        if one.side == "positive":
+        if one.side == "positive" and other:
             one = replace(
-                one,
-                before={**one.before, **gains("before", one, other)},
-                after={**one.after, **gains("after", one, other)},
+                one, before=symmetric(one.before, other.before), after=symmetric(one.after, other.after)
             )
         made.append(one)
     return tuple(made)
+
+
+def entry_of(record: Mapping[str, str], names: Sequence[str]) -> str:
+    """Return the first entry of a record that has one of these names; case, dashes and blanks do not count."""
+    known = {" ".join(name.lower().replace("-", " ").replace("_", " ").split()): text for name, text in record.items()}
+    return next((known[name] for name in names if name in known), "")

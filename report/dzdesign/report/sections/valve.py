@@ -1,34 +1,53 @@
-"""Sections on the identified valve: data and fit, thresholds, beta over the pressure drop."""
+"""Sections on the identified valve: test conditions, data and fit, thresholds, beta over the pressure drop."""
 
 from collections.abc import Sequence
 
 import numpy as np
+from msgspec import UnsetType
 
+from dzdesign.assess.assessment import Assessment
+from dzdesign.assess.options import SETS
 from dzdesign.core.recorded_units import RecordedUnits
 from dzdesign.core.units import chance
 from dzdesign.design.compensator import Compensator
-from dzdesign.identify.plots.style import CYCLE
-from dzdesign.identify.plots.valve_curves import BOUND_NAMES, BRANCHES, draw_beta, draw_thresholds
+from dzdesign.identify.plots.valve_curves import BOUND_NAMES, draw_beta, draw_thresholds
 from dzdesign.identify.valve.low_flow import IN_WORDS
-from dzdesign.identify.valve.model import ValveModel
+from dzdesign.identify.valve.model import ValveModel, lag_in_words
 from dzdesign.identify.valve.side_model import SideModel
 from dzdesign.report.artefacts import laws_of
-from dzdesign.report.cells import Cell, Table, counted, recorded, table_of
 from dzdesign.report.figure import (
     LIGHT,
     ReportFigure,
     csv_text,
-    label_ends,
     legend_below,
     side_words,
-    span,
     titled_axes,
     to_report_figure,
 )
-from dzdesign.report.page import Section
+from dzdesign.report.page import (
+    Cell,
+    Section,
+    Table,
+    counted,
+    in_number_font,
+    in_units,
+    recorded,
+    table_of,
+    table_of_rows,
+)
+from dzdesign.report.sections.quantities import entry_of, measured_curve_of
 
 #: Warnings about the order of the recordings, which bear on the bounds.
 ORDER = ("order", "time-stamps")
+#: What a record may tell -> words in the names of its entries; the first entry that has one counts.
+RECORDED = {
+    "Oil": ("oil", "fluid", "öl", "druckflüssigkeit", "hydraulic oil", "hydrauliköl"),
+    "Oil temperature": (
+        "oil temperature", "temperature", "oil temp", "fluid temperature", "öltemperatur", "temperatur",
+        "temperatur der druckflüssigkeit",
+    ),
+    "Filter": ("filter", "flow filter", "signal filter", "messfilter"),
+}  # fmt: skip
 
 
 def valve_sections(valve: ValveModel | None, compensator: Compensator | None) -> dict[str, Section]:
@@ -37,11 +56,10 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
         gap = Section(missing="The valve is not here: `dzdesign identify` makes valve.json.")
         return {"data": gap, "thresholds": gap, "beta": gap}
     both = len(valve.sides) > 1
-    fits, thresholds, tables, betas = [], [], [], []
+    thresholds, tables, betas = [], [], []
     for name, side in valve.sides.items():
         law, units = laws_of(compensator).get(name), valve.recorded_units.of_side(name)
         guard = law.certificate.guard if law else side.certificate.guard
-        fits.append(lines_figure(side, name, both, units))
         thresholds.append(thresholds_figure(side, guard, name, both, units))
         tables.append(thresholds_table(side, guard, f"Thresholds, {name} commands", units))
         if side.low_flow:
@@ -51,7 +69,6 @@ def valve_sections(valve: ValveModel | None, compensator: Compensator | None) ->
     shown = units.in_words()
     return {
         "data": Section(
-            figures=fits,
             lines=(
                 f"{_ramp_tests(valve)}; full command {units.text(valve.u_max_V, 'g V')}.",
                 *([f"Units: {shown}; the files and the curves as CSV are in V, MPa and L/min."] if shown else []),
@@ -95,16 +112,15 @@ def _ramp_tests(valve: ValveModel) -> str:
 
 def low_flow_table(side: SideModel, title: str, units: RecordedUnits) -> Table:
     """Return the readings of flows below the meter's floor."""
-    command, dp, flow = (units.label(unit) for unit in ("V", "MPa", "L/min"))
     return table_of(
         title,
         side.low_flow,
         ("reading", lambda row: row.source),
         ("branch", lambda row: IN_WORDS[row.branch]),
-        (f"command ({command})", lambda row: recorded(row.u_V, ".3f V", units)),
-        (f"dP ({dp})", lambda row: recorded(row.dp_MPa, ".3f MPa", units)),
-        (f"flow ({flow})", lambda row: recorded(row.q_L_min, ".4f L/min", units)),
-        (f"error ({flow})", lambda row: recorded(row.q_error_L_min, ".4f L/min", units)),
+        in_units("command", "u_V", ".3f V", units),
+        in_units("dP", "dp_MPa", ".3f MPa", units),
+        in_units("flow", "q_L_min", ".4f L/min", units),
+        in_units("error", "q_error_L_min", ".4f L/min", units),
     )
 
 
@@ -131,77 +147,26 @@ def _first_of(ramps: Sequence[str]) -> str:
 
 def thresholds_table(side: SideModel, guard: str, title: str, units: RecordedUnits) -> Table:
     """Return the thresholds of each ramp test, with the lower bounds of the guarded one."""
-    command, dp, flow = (units.label(unit) for unit in ("V", "MPa", "L/min"))
-
-    def cell(value: float | None, form: str) -> Cell:
-        return recorded(value, form, units)
-
-    allowed = (
-        (f"allowed at zero ({flow})", lambda row: cell(row[0].zero_flow_L_min, ".2f L/min")),
-    )
-    leaks = ((f"leak ({flow})", lambda row: cell(row[0].leak_L_min, ".2f L/min")),)
+    bounds = dict(zip(map(id, side.tests), side.certified[guard].u_lower_V, strict=True))
+    leaks = [in_units("leak", "leak_L_min", ".2f L/min", units)]
+    allowed = [in_units("allowed at zero", "zero_flow_L_min", ".2f L/min", units)]
     return table_of(
         title,
-        zip(side.tests, side.certified[guard].u_lower_V, strict=True),
-        (f"dP ({dp})", lambda row: cell(row[0].dp_MPa, ".3f MPa")),
-        (f"knee opening ({command})", lambda row: cell(row[0].u_knee_rising_V, ".3f V")),
-        (f"knee closing ({command})", lambda row: cell(row[0].u_knee_falling_V, ".3f V")),
-        (f"onset opening ({command})", lambda row: cell(row[0].u_onset_rising_V, ".3f V")),
-        (f"onset closing ({command})", lambda row: cell(row[0].u_onset_falling_V, ".3f V")),
-        (f"s.e. of knee ({units.label('mV')})", lambda row: cell(1e3 * row[0].u_knee_se_V, ".1f mV")),
-        (f"lower bound, {guard} ({command})", lambda row: cell(row[1], ".3f V")),
-        (f"slope ({units.label('L/min/V')})", lambda row: cell(row[0].slope_L_min_V, ".3f L/min/V")),
-        (f"largest flow ({flow})", lambda row: cell(row[0].q_max_L_min, ".2f L/min")),
-        (f"noise ({flow})", lambda row: cell(row[0].noise_L_min, ".3f L/min")),
-        (f"noise level ({flow})", lambda row: cell(row[0].noise_level_L_min, ".2f L/min")),
+        side.tests,
+        in_units("dP", "dp_MPa", ".3f MPa", units),
+        in_units("knee opening", "u_knee_rising_V", ".3f V", units),
+        in_units("knee closing", "u_knee_falling_V", ".3f V", units),
+        in_units("onset opening", "u_onset_rising_V", ".3f V", units),
+        in_units("onset closing", "u_onset_falling_V", ".3f V", units),
+        (f"s.e. of knee ({units.label('mV')})", lambda test: recorded(1e3 * test.u_knee_se_V, ".1f mV", units)),
+        (f"lower bound, {guard} ({units.label('V')})", lambda test: recorded(bounds[id(test)], ".3f V", units)),
+        in_units("slope", "slope_L_min_V", ".3f L/min/V", units),
+        in_units("largest flow", "q_max_L_min", ".2f L/min", units),
+        in_units("noise", "noise_L_min", ".3f L/min", units),
+        in_units("noise level", "noise_level_L_min", ".2f L/min", units),
         *(leaks if any(test.leak_L_min for test in side.tests) else ()),
         *(allowed if side.certificate.zero_flow_L_min is not None else ()),
-        ("ramp test", lambda row: _first_of(row[0].ramps)),
-    )
-
-
-def lines_figure(side: SideModel, name: str, both: bool, units: RecordedUnits) -> ReportFigure:
-    """Draw the straight parts that were fitted, and the knees that they give, one hue a pressure drop."""
-    figure, axes = titled_axes(3.5, name, both, right=0.65)
-    rows, labels = [], []
-    for index, test in enumerate(side.tests):
-        hue = LIGHT[CYCLE[index % len(CYCLE)]]
-        far = (0.0, 0.0)
-        for branch, word, marker, dash, _ in BRANCHES:
-            knee, share = getattr(test, f"u_knee_{branch}_V"), getattr(test, f"straight_{branch}")
-            if knee is None:
-                continue
-            flows = np.array(share) * test.q_max_L_min
-            ends = knee + flows / test.slope_L_min_V
-            far = max(far, (float(ends[1]), float(flows[1])))
-            shown, shown_knee = units.convert(ends, "V"), units.convert(knee, "V")
-            shown_flows = units.convert(flows, "L/min")
-            axes.plot([shown_knee, shown[0]], [0, shown_flows[0]], ":", color=hue, lw=1.2)
-            axes.plot(shown, shown_flows, dash, color=hue, lw=1.8)
-            axes.plot(shown_knee, 0, marker, color=hue, ms=5, clip_on=False, zorder=4)
-            rows.append([test.dp_MPa, word, knee, *ends.round(4).tolist(), *flows.round(4).tolist()])
-        place = units.convert(far[0], "V"), units.convert(far[1], "L/min")
-        labels.append((*place, "dP not recorded" if test.dp_MPa is None else units.text(test.dp_MPa, ".2f MPa"), hue))
-    label_ends(axes, labels)
-    for _, word, marker, dash, _ in BRANCHES:
-        axes.plot([], [], dash, marker=marker, color=LIGHT["soft"], label=word)
-    axes.plot([], [], ":", color=LIGHT["soft"], label="extrapolated to the knee")
-    axes.legend(loc="upper left")
-    axes.set(
-        xlabel=f"valve command u ({units.label('V')})", ylabel=f"flow Q ({units.label('L/min')})", ylim=(0, None)
-    )
-    if units.falling:
-        axes.invert_xaxis()
-    return to_report_figure(
-        figure,
-        f"fit-{name}",
-        "The straight part of each branch, where the fit looked, and its extrapolation to zero flow: the knee"
-        + side_words(name, both)
-        + ". Samples and residuals are drawn by dzdesign identify --plots: the recordings are not part of an "
-        "artefact folder.",
-        f"Straight lines of flow against command of {counted(len(side.tests), 'pressure drop')}; they meet zero "
-        f"flow at the knees, {span([row[2] for row in rows], '.3f V', units)}.",
-        csv_text(("dp_MPa", "branch", "knee_V", "from_V", "to_V", "from_L_min", "to_L_min"), rows),
+        ("ramp test", lambda test: _first_of(test.ramps)),
     )
 
 
@@ -209,9 +174,13 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units:
     """Draw the thresholds against the pressure drop, and what is certified of the guarded one."""
     curve = side.certified[guard]
     several = len(side.tests) > 1
+
+    def span(values: Sequence[float]) -> str:
+        return units.span(min(values), max(values), ".3f V")
+
     pieces = curve.bound(side.trend or "flat").pieces if several else ()
     least_to_next = [round(float(piece.least(piece.from_MPa, piece.to_MPa)), 7) for piece in pieces]
-    figure, axes = titled_axes(3.8, name, both, legend_rows=2)
+    figure, axes = titled_axes(3.8, name, both)
     draw_thresholds(axes, side, curve, units)
     legend_below(figure, 4)
     return to_report_figure(
@@ -225,9 +194,8 @@ def thresholds_figure(side: SideModel, guard: str, name: str, both: bool, units:
             if several
             else "its lower bound. One pressure drop was tested, and nothing is certified at another."
         ),
-        f"Thresholds against the pressure drop: the {guard} threshold lies at "
-        f"{span(curve.u_threshold_V, '.3f V', units)}, its lower bound at {span(curve.u_lower_V, '.3f V', units)}, the "
-        f"largest certified offset at {span(curve.u_offset_V, '.3f V', units)}.",
+        f"Thresholds against the pressure drop: the {guard} threshold lies {span(curve.u_threshold_V)}, its lower "
+        f"bound {span(curve.u_lower_V)}, the largest certified offset {span(curve.u_offset_V)}.",
         csv_text(
             ("dp_MPa", "knee_opening_V", "knee_closing_V", "onset_opening_V", "onset_closing_V", "threshold_V",
              "lower_bound_V", "offset_V", "certified_up_to_next_V"),
@@ -255,7 +223,7 @@ def beta_figure(
     if len(curve.dp_MPa) < 2:
         return None
     dp, u_min0 = np.array(curve.dp_MPa), side.reference.u_min_V
-    figure, axes = titled_axes(3.6, name, both, legend_rows=2)
+    figure, axes = titled_axes(3.6, name, both)
     draw_beta(axes, side, curve, units)
     rows: list[list[str | float | None]] = [
         [f"identified {branch}", at, value, se, volts]
@@ -285,7 +253,7 @@ def beta_figure(
         f"β against the pressure drop{side_words(name, both)}: the identified thresholds over that at dP0, u_min0 = "
         f"{units.text(u_min0, '.4f V')} (Eq. 5), with their error; and over the same u_min0 what is certified of the "
         f"{guard} threshold, under which the law puts out its offset at zero command." + _about_the_table(compensator),
-        f"Identified beta lies between {low:.4f} and {high:.4f} over {span(dp, '.2f MPa', units)}, the largest "
+        f"Identified beta lies between {low:.4f} and {high:.4f} {units.span(dp[0], dp[-1], '.2f MPa')}, the largest "
         f"certified offset at {min(shares):.4f} to {max(shares):.4f} of u_min0.",
         csv_text(("of", "dp_MPa", "beta", "beta_se", "u_V"), rows),
     )
@@ -305,3 +273,55 @@ def _beta_table(compensator: Compensator, name: str) -> tuple[np.ndarray, np.nda
     nodes = np.array(law.beta)
     where = np.arange(nodes.size) * compensator.beta_step_codes * float(compensator.signals.pressure_a.per_code_MPa)
     return where, nodes / compensator.beta_denominator, float(law.u_min0_over_u_max * compensator.u_max_V)
+
+
+# --- test conditions -------------------------------------------------------------------------------------------
+
+
+def conditions_section(valve: ValveModel | None, assessment: Assessment | None) -> Section:
+    """Return the section on how, with which meter and oil the ramps were recorded, with the compensator apart."""
+    if assessment:
+        heads: tuple[str, ...] = ("without the compensator", "with the compensator")
+        sets = [
+            [curve.conditions for item in assessment.pressures if (curve := measured_curve_of(item, name))]
+            for name in SETS
+        ]
+        units, floor = assessment.recorded_units, assessment.meter.floor_L_min
+        meter = lag_in_words(assessment.meter.lag_s, assessment.meter.lag_is)
+    elif valve:
+        heads = ("recordings",)
+        found = [test.conditions for side in valve.sides.values() for test in side.tests]
+        sets = [[each for each in found if not isinstance(each, UnsetType)]]
+        units, floor, meter = valve.recorded_units, valve.meter.floor_L_min, valve.meter.lag_in_words()
+    else:
+        return Section(missing="No recordings are here: `dzdesign identify` makes valve.json.")
+    entries = {name: entry_of(valve.record if valve else {}, known) for name, known in RECORDED.items()}
+    alike = [
+        ("Flow meter", f"{meter}; floor {units.text(floor, '.2f L/min')}"),
+        *([("Dither", valve.dither_in_words)] if valve and valve.dither else []),
+        *entries.items(),
+    ]
+    rows = [
+        ("Ramp rate", [_range([each.rate_V_s for each in of], ".3g V/s", units) for of in sets]),
+        ("Sampling", [_range([each.sampling_Hz for each in of], ".4g Hz", units) for of in sets]),
+        ("Samples", [str(sum(each.samples for each in of)) if of else "" for of in sets]),
+        *((name, [text] * len(sets)) for name, text in alike),
+    ]
+    missing = [name.lower() for name, text in entries.items() if not text]
+    hint = "".join(f"`identify --record \"{name} = ...\"` writes it into valve.json." for name in missing[:1])
+    hint = f"Not recorded: {', '.join(missing)}. {hint}" if missing else ""
+    table = table_of_rows("Recordings", ("", *heads), [(name, *map(_condition, texts)) for name, texts in rows])
+    return Section(tables=(table,), missing=hint, optional=True)
+
+
+def _condition(text: str) -> Cell:
+    return in_number_font(text) if text[:1].isdigit() else Cell(text=text or "not recorded")
+
+
+def _range(values: Sequence[float | None], form: str, units: RecordedUnits) -> str:
+    known = [value for value in values if value is not None]
+    if not known:
+        return ""
+    spec, _, unit = form.partition(" ")
+    ends = (format(end, spec) if unit == "Hz" else units.number(end, form) for end in (min(known), max(known)))
+    return f"{' … '.join(dict.fromkeys(ends))} {unit if unit == 'Hz' else units.label(unit)}"

@@ -1,8 +1,7 @@
-"""The uncertainty budget as a person meets it: report, C, README; and what is said where there is no machine."""
+"""Tables of the uncertainty budget, and of a drive by current."""
 
 import csv
 import io
-import re
 from dataclasses import replace
 
 import pytest
@@ -13,8 +12,14 @@ from dzdesign.core.recorded_units import AS_COMPUTED
 from dzdesign.design.certificate import not_counted
 from dzdesign.design.designing import design
 from dzdesign.design.options import options_of
-from dzdesign.report.figure import figure_style
-from dzdesign.report.sections.budget import budget_section
+from dzdesign.report.sections.closed_loop import current_tables
+from dzdesign.report.sections.law import budget_section
+from dzdesign.verify.current.results import (
+    ControllerStates,
+    CurrentCorner,
+    CurrentLoopResult,
+    FaultRun,
+)
 
 DECLARED = {"coil_temperature": "-20..80 degC", "supply": "18..32 V", "oil": "0.4 %"}
 
@@ -30,17 +35,18 @@ def machine(example_valve):
 
 @pytest.fixture(scope="module")
 def section(machine):
-    with figure_style():
-        return budget_section(machine)
+    return budget_section(machine)
 
 
 def test_every_component_stands_in_the_table_with_its_origin(machine, section):
     table, budget = section.tables[0], machine.positive.budget
-    assert [row[0].text for row in table.rows] == [line.component for line in budget.lines]
-    known = {row[0].text: row[0].more for row in table.rows}
+    *components, together = table.rows
+    assert [row[0].text for row in components] == [line.component for line in budget.lines]
+    assert [cell.text for cell in together[3:-1]] == [f"{value:.2f}" for value in budget.combined_mV]
+    known = {row[0].text: row[0].more for row in components}
     assert known["oil"].startswith("declared: --oil") and known["ageing"].startswith("default: ")
     assert "default: default" not in "".join(known.values()) and known["recording"].startswith("measured: ")
-    for row, line in zip(table.rows, budget.lines, strict=True):
+    for row, line in zip(components, budget.lines, strict=True):
         shown = [cell.text for cell in row[3:-1]]
         assert shown == [f"{value:.2f}" for value in line.contribution_mV]
         assert float(row[-1].text) == pytest.approx(100 * line.price, abs=6e-4)
@@ -53,8 +59,7 @@ def test_a_sensitivity_times_its_half_width_is_the_contribution_in_any_units(mac
     chosen = read_units("bar", "--units").over(AS_COMPUTED, 10.0)
     of_bar = designed(replace(example_valve, recorded_units=chosen), DECLARED)
     for compensator, unit in ((machine, "MPa"), (of_bar, "bar")):
-        with figure_style():
-            table = budget_section(compensator).tables[0]
+        table = budget_section(compensator).tables[0]
         row = next(row for row in table.rows if row[0].text == "pressure sensor A")
         half_width, _, shown_unit = row[1].text.partition(" ")
         largest = max(float(cell.text) for cell in row[3:-1])
@@ -62,20 +67,37 @@ def test_a_sensitivity_times_its_half_width_is_the_contribution_in_any_units(mac
         assert shown_unit == unit and float(half_width) * steepest == pytest.approx(largest, rel=0.02)
 
 
-def test_the_bars_are_the_contributions_and_the_line_is_their_sum_as_certified(machine, section):
-    figure, budget = section.figures[0], machine.positive.budget
-    rows = list(csv.reader(io.StringIO(figure.csv)))
-    assert [float(row[-1]) for row in rows[1:]] == pytest.approx(budget.combined_mV)
-    parts = re.findall(r">([^<>]+ \((?:measured|declared|default)\))<", figure.svg)
-    assert {"coil temperature (default)", "supply (default)", "recording (measured)"} <= set(parts)
-    assert ">taken off the threshold (mV)<" in figure.svg and "smaller ones, in the table<" in figure.svg
-
-
 def test_without_a_machine_the_budget_is_that_of_the_recording(example_compensator):
-    with figure_style():
-        section = budget_section(example_compensator)
+    section = budget_section(example_compensator)
     assert "no machine was declared" in section.lines[0]
     known = [row[0].text for row in section.tables[0].rows]
     assert "recording" in known and not {"coil temperature", "supply", "pressure sensor A", "oil"} & set(known)
     assert any("machine" in line for line in not_counted(example_compensator))
     assert not_counted(None) == not_counted(example_compensator)
+
+
+# --- a drive by current ---
+
+CORNER = CurrentCorner(
+    resistance_ohm=4.0, inductance_H=0.04, supply_V=24.0, phase_margin_deg=55.0, gain_margin=2.8, limit_cycle_codes=0.3,
+    steady_error_codes=0.02, current_error_codes=0.6, release_overshoot_codes=0.2,
+    rise_s=0.006, least_rise_s=0.0028, overshoot=0.05, faults=0,
+)  # fmt: skip
+RESULT = CurrentLoopResult(
+    states=ControllerStates(states=1000, seed=1, wrong=0, first_wrong=None),
+    seconds=10.0, shares=(0.5, 1.0), not_carried=1,
+    corners=(CORNER, replace(CORNER, rise_s=None, least_rise_s=None, overshoot=None)),
+    offset_codes=(), offset_error_codes=0.0, dither_above_counts=0.0, dither_below_counts=0.0,
+    faults=(FaultRun(name="the wire breaks", expected="OPEN", seen_after_s=None, limit_s=0.04, latched=False),),
+)  # fmt: skip
+
+
+def texts(table) -> list[list[str]]:
+    return [[getattr(cell, "text", cell) for cell in row] for row in table.rows]
+
+
+def test_every_corner_and_fault_has_a_row_and_by_duty_there_is_nothing():
+    corners, faults = current_tables(RESULT)
+    assert [row[-3:] for row in texts(corners)] == [["6.0", "2.8", "5.0"], ["not carried"] * 3]
+    assert texts(faults)[0][1:3] == ["DZ_CURRENT_OPEN", "not seen"] and texts(faults)[0][-1] == "no"
+    assert current_tables(None) == ()
