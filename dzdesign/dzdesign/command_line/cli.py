@@ -80,10 +80,9 @@ def main(argv: list[str] | None = None) -> int:
 
 def _tell(text: str) -> None:
     """Say something on stderr; where that takes nothing, as on a full disk, the exit status alone says it."""
-    try:
-        print(f"dzdesign: {text}", file=sys.stderr, flush=True)
-    except OSError:
-        return
+    from dzdesign.terminal.progress import say_on_stderr
+
+    say_on_stderr(text)
 
 
 def _reason_in_the_system(error: Exception) -> str | None:
@@ -114,5 +113,6 @@ def _what_was_written() -> str:
 
 
 def _print_nothing_more() -> None:
-    """Lead the standard output nowhere: Python would try once more to print, at its end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    from dzdesign.terminal.progress import lead_nowhere
+
+    lead_nowhere(sys.stdout)

@@ -5,7 +5,7 @@ import os
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sized
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from dzdesign.core.errors import clear_line
 
@@ -66,8 +66,20 @@ def say(text: str) -> None:
     """Report progress on stderr; stdout is for results."""
     if not _Verbosity.quiet:
         since = f"{time.perf_counter() - _Verbosity.begin:8.3f} s  " if _Verbosity.verbose else ""
-        with contextlib.suppress(OSError):  # a log on a full disk, or that nobody reads any more, ends no work
-            print(f"dzdesign: {since}{clear_line(text)}", file=sys.stderr, flush=True)
+        say_on_stderr(f"{since}{clear_line(text)}")
+
+
+def say_on_stderr(text: str) -> None:
+    """Print a line on stderr; one on a full disk, or that nobody reads any more, ends no work: it is given up."""
+    try:
+        print(f"dzdesign: {text}", file=sys.stderr, flush=True)
+    except OSError:
+        lead_nowhere(sys.stderr)
+
+
+def lead_nowhere(stream: TextIO) -> None:
+    """Lead a standard stream nowhere: Python would try once more to print what it holds, at its end, and fail."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def is_quiet() -> bool:

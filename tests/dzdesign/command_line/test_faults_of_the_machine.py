@@ -19,10 +19,11 @@ RAMPS = ROOT / "examples" / "paper_valve" / "ramps"
 
 
 def run(words: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a line of a shell, in which ``dz`` is the program."""
+    """Run a line of a shell, in which ``dz`` is the program, with the buffers that Python has by default."""
     line = words.replace("dz ", f"'{DZDESIGN}' ", 1)
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.run(
-        ["bash", "-c", line], cwd=folder, env={**os.environ, **environment}, text=True, errors="replace",
+        ["bash", "-c", line], cwd=folder, env={**inherited, **environment}, text=True, errors="replace",
         capture_output=True, timeout=100, check=False,
     )  # fmt: skip
 
