@@ -12,17 +12,17 @@ from tests.support.paths import ROOT
 #: Of a room: lines of Python, files of Python, lines of templates, C programs, headers and tables.
 ROOM_SIZES = {
     "core": (3500, 29, 0),
-    "derivation": (4760, 34, 325),
+    "derivation": (4760, 28, 325),
     "identify": (19790, 148, 1121),
     "assess": (1705, 13, 0),
-    "design": (7330, 43, 0),
-    "codegen": (8350, 72, 8150),
-    "verify": (12300, 87, 2910),
-    "report": (5840, 28, 540),
-    "dzdesign": (11880, 104, 167),
+    "design": (6890, 30, 0),
+    "codegen": (7890, 51, 7290),
+    "verify": (11000, 56, 2890),
+    "report": (4450, 20, 535),
+    "dzdesign": (11840, 104, 167),
 }
 #: Lines of Python of what is not shipped, and of the files that the tests compare with.
-TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 52000, 23800, 9200
+TEST_LINES, GOLDEN_LINES, BENCHMARK_LINES = 49300, 18000, 9200
 #: Options of all commands together; an option of two commands counts twice.
 OPTIONS = 304
 #: What a number may be above what is there, before it is to be lowered.
@@ -58,7 +58,8 @@ def test_a_room_does_not_grow(room):
 
 
 def test_what_is_not_shipped_does_not_grow():
-    goldens = [path for path in (ROOT / "tests" / "goldens").rglob("*") if path.is_file()]
+    roots = (ROOT / "tests" / "goldens", ROOT / "tests" / "goldens_full")
+    goldens = [path for root in roots for path in root.rglob("*") if path.is_file()]
     sizes = {
         "tests": (lines(sorted((ROOT / "tests").rglob("*.py"))), TEST_LINES),
         "goldens": (lines(goldens), GOLDEN_LINES),

@@ -36,8 +36,6 @@ KEPT = {
 KEPT |= {(GOLDENS, name): (folder_of(name),) for name in TARGET_NAMES if name not in {target for _, target in KEPT}}
 #: Not compared: it is what goes in.
 INPUT = "compensator.json"
-#: Beside the targets.
-SCHEMAS = GOLDENS / "schemas"
 LINES_SHOWN = 60
 
 

@@ -28,7 +28,7 @@ from dzdesign.verify.analysis.mutation import (
     mutation_score,
 )
 from dzdesign.verify.exhaustive.drive_check import FIELDS, CompiledDrive, PreparedDrive
-from tests.support.golden_firmware import FULL, GOLDENS, INPUT
+from tests.support.golden_firmware import FULL, GOLDENS, INPUT, generated, write
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -37,7 +37,7 @@ TRIED, SEED = 12, 5
 
 
 def bench_of(root, target: str, folder) -> MutationBench:
-    shutil.copytree(root / target, folder)
+    write(folder, generated(target, root))
     shutil.copy(root / INPUT, folder / INPUT)
     return MutationBench(folder)
 

@@ -33,7 +33,7 @@ from dzdesign.verify.toolchain import machines
 from dzdesign.verify.toolchain.compiled_core import COUNTED, CompiledCore, Findings
 from dzdesign.verify.toolchain.host_compiler import host_compiler
 from dzdesign.verify.toolchain.machines import AVR, CORTEX_M4
-from tests.support.golden_firmware import FULL, GOLDENS, INPUT
+from tests.support.golden_firmware import FULL, GOLDENS, INPUT, generated, write
 from tests.support.synthetic import needs_compiler
 
 pytestmark = needs_compiler
@@ -46,7 +46,7 @@ def needs(machine):
 
 
 def copy_of(root, target: str, folder):
-    shutil.copytree(root / target, folder)
+    write(folder, generated(target, root))
     shutil.copy(root / INPUT, folder / INPUT)
     return folder
 
