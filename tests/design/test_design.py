@@ -23,7 +23,7 @@ from dzdesign.design.signals import CommandSignal, Signals
 from dzdesign.identify.options import IdentifyOptions
 from dzdesign.regeneration import regenerated
 from dzdesign.verify.closed_loop.loop import RampSequence
-from dzdesign.verify.verification import verify
+from dzdesign.verify.verification import Asked, verify
 from tests.support.designs import designed as designed_for
 from tests.support.repeatable_valves import identify
 from tests.support.synthetic import Truth, needs_compiler, synthetic_ramp, with_side
@@ -218,7 +218,7 @@ def test_the_closed_loop_has_no_leak_one_per_cent_of_dead_zone_and_reads_what_de
     firmware = generate(compensator, "f28335")
     write_folder(tmp_path / "fw", firmware.files, firmware.manifest)
     again = regenerated(tmp_path / "fw")
-    found = verify(tmp_path / "fw", again=again, sequence=RampSequence(rest=0.5, ramp=40.0, top=0.5))
+    found = verify(tmp_path / "fw", Asked(sequence=RampSequence(rest=0.5, ramp=40.0, top=0.5)), again)
     assert found.holds, [check for check in found.evidence.checks if not check.holds]
     for test, loop in zip(example_valve.positive.tests, found.loops, strict=True):
         result, said = loop.result, read_dead_zone(compensator, test)

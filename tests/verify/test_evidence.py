@@ -24,7 +24,7 @@ def test_every_requirement_has_its_id_its_title_and_a_way_to_have_it_checked():
     stated = [each for each in vars(requirements).values() if isinstance(each, Requirement)]
     of_outputs = {each for row in outputs.REQUIREMENTS for each in row.requirements}
     assert {*stated} == {*DECLARED} | of_outputs and len(DECLARED) == len({*DECLARED}) > 20
-    assert {*DECLARED} >= {*ALWAYS, *OPTIONAL}
+    assert {*DECLARED} >= {*ALWAYS, *OPTIONAL} and {*ALWAYS} == {*requirements.ALWAYS}
     for values in ({each.id for each in stated}, {each.title for each in stated}):
         assert len(values) == len(stated)
     assert all("`verify" in each.how for each in stated)
@@ -62,6 +62,8 @@ def test_what_holds_follows_from_the_checks():
     assert with_checks(EVIDENCE, unknown).verdict == f"{NOT_CHECKED}: c"
     both = with_checks(EVIDENCE, unknown, failed, passed)
     assert not both.holds and both.verdict == f"{DOES_NOT_HOLD}: b; {NOT_CHECKED}: c"
+    short = replace(EVIDENCE, checks=EVIDENCE.checks[1:])
+    assert not short.holds and short.verdict == f"{NOT_CHECKED}: {EVIDENCE.checks[0].name}"
 
 
 def test_evidence_is_read_as_it_was_written_and_not_where_it_contradicts_itself(wording):

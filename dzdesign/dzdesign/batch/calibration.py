@@ -217,7 +217,7 @@ def _firmware(
     verification = verify_firmware(arguments, identified=valve)
     if verification.holds:
         return OK, ""
-    check = next(check for check in verification.evidence.checks if not check.holds)
+    check = next(check for check in verification.evidence.all_checks if not check.holds)
     return DOES_NOT_HOLD, f"{check.name}: {check.text}"
 
 

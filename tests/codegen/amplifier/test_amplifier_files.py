@@ -17,7 +17,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.errors import InputError
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.fixed_offset import dead_zones
-from dzdesign.verify.outputs.amplifier import checks
+from dzdesign.verify.outputs.amplifier import file_checks
 from dzdesign.verify.requirements import SAFE
 from tests.support.paths import GOLDENS, GOLDENS_FULL
 
@@ -57,7 +57,7 @@ def found(compensator, device, change=lambda text: text):
         for sign, drives in setting.characteristics.items()
     }
     text = amplifier_file(setting, compensator, DIGEST).decode()
-    read = checks(device, change(text).encode(), compensator, stated)
+    read = file_checks(device, change(text).encode(), compensator, stated)
     return {check.id for check in read if not check.holds}
 
 

@@ -244,7 +244,7 @@ def test_the_supply_scales_the_output():
 @pytest.mark.parametrize(
     "changed",
     [
-        {"proportional": 8192}, {"samples": 3}, {"current_gain": 30000}, {"over_sum": 100}, {"offset_tolerance": 65500},
+        {"samples": 3}, {"current_gain": 30000}, {"over_sum": 100}, {"offset_tolerance": 65500},
         {"integral_limit": 65535, "gain_shift": 14}, {"open_ticks": 0}, {"release": 60001},
     ],
 )  # fmt: skip
