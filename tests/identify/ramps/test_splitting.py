@@ -12,7 +12,7 @@ from dzdesign.core.artefact_reading import read_artefact
 from dzdesign.core.artefact_types import as_document, to_json_bytes
 from dzdesign.core.errors import InputError
 from dzdesign.identify.options import IdentifyOptions
-from dzdesign.identify.ramps.splitting import split_ramps
+from dzdesign.identify.ramps.splitting import nominal_dp, split_ramps
 from dzdesign.identify.reading.ramp_files import ramp_file_bytes, read_ramp_file
 from dzdesign.identify.reading.ramp_test import RampTest
 from dzdesign.identify.valve.model import ValveModel
@@ -344,3 +344,14 @@ class TestStepsFromOneLevel:
         (test,) = side.tests
         # At 1 V/s the lag of 50 ms, which is not taken out, opens 50 mV late and closes 50 mV early.
         assert (test.u_knee_rising_V, test.u_knee_falling_V) == pytest.approx((5.35, 5.05), abs=0.025)
+
+
+@pytest.mark.parametrize("period_s", [12.0, 25.0, 40.0])
+def test_the_level_of_a_slow_swing_is_not_where_the_zero_command_met_it(period_s):
+    """Near zero a slow swing stays at its crest; its level is what it swings about, wherever the valve is shut."""
+    test = ramp(dp=5.0)
+    for phase in np.linspace(0, 2 * np.pi, 8, endpoint=False):
+        swing = 1 + 0.1 * np.sin(2 * np.pi * test.time / period_s + phase)
+        swinging = dataclasses.replace(test, dp=test.dp * swing, q=test.q * swing**0.5)
+        assert nominal_dp(swinging) == pytest.approx(5.0 * MPA, rel=0.035)
+        assert [part.dp for part in split_ramps(swinging, 0.0)] == pytest.approx([5.0 * MPA], rel=0.035)

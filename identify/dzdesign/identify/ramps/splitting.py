@@ -266,17 +266,17 @@ def nominal_dp(test: RampTest) -> float | None:
     """Return the pressure drop at (almost) no flow, Pa; None if it is unknown.
 
     Read where the command is near zero; a fragment that never comes there is read at its smallest flows. One that
-    swings is read wherever the valve is shut: near zero there may be no whole swing.
+    swings is seen and read wherever the valve is shut: near zero a slow swing may stay at its crest.
     """
     if test.dp is None:
         return None
     shut = test.dp[(test.u >= 0) & (test.u <= SHUT * max(test.u.max(), 0))]
     if shut.size < 5:
         return median(test.dp[test.q <= np.quantile(test.q, 0.1)])
-    level = median(shut)
-    if not swings_about(level, spread_of(shut)):
-        return level
-    return level_of_swings(test.dp[(test.u >= 0) & (np.abs(test.q) <= SHUT_FLOW * np.abs(test.q).max())])
+    wherever_shut = test.dp[(test.u >= 0) & (np.abs(test.q) <= SHUT_FLOW * np.abs(test.q).max())]
+    if swings_about(median(wherever_shut), spread_of(wherever_shut)):
+        return level_of_swings(wherever_shut)
+    return median(shut)
 
 
 def dp_under_flow(test: RampTest) -> float | None:

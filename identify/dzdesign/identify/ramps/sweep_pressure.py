@@ -105,9 +105,11 @@ def sweep_level(test: RampTest, nominal: float | None, shut_share: float) -> Swe
         near_edge = test.dp[goes_with]
     dp = float(np.median(near_edge))
     spread = spread_of(near_edge)
-    moves, swings = False, swings_about(dp, spread)
+    # A slow swing may stay at its crest near the edge.
+    below = test.dp[goes_with]
+    moves, swings = False, swings_about(median(below), max(spread, spread_of(below)))
     if swings:
-        dp = level_of_swings(test.dp[goes_with])
+        dp, spread = level_of_swings(below), max(spread, spread_of(below))
     if near_zero.size >= FIRST_SAMPLES:
         at_zero = float(np.median(near_zero))
         error = 3 * spread / (1.0 if swings else math.sqrt(min(near_zero.size, near_edge.size)))
