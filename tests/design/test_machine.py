@@ -12,12 +12,12 @@ from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.recorded_units import CommandUnit, RecordedUnits
 from dzdesign.design import ceiling
 from dzdesign.design.ceiling import offset_ceiling
-from dzdesign.design.certificate import guarded_curve
+from dzdesign.design.certificate import guarded_curve, with_certificates
 from dzdesign.design.costs import colder_coil
 from dzdesign.design.designing import design
 from dzdesign.design.lot_setting import lot_margins, lot_setting, prove_lot
 from dzdesign.design.machine import check_bench_current, dither_reserve, recorded_full_A
-from dzdesign.design.redesign import prove_certificates, prove_derived
+from dzdesign.design.redesign import prove_derived
 from tests.design.machine_oracle import worst_margin_mV
 from tests.support import designs
 from tests.support.designs import CURRENT, MACHINES
@@ -147,7 +147,7 @@ def test_an_edited_machine_or_budget_is_refused(example_valve):
     none = replace(made, sides=replace(made.sides, positive=replace(made.positive, budget=None)))
     for wrong in (machine, budget, none, replace(made, machine=None)):
         with pytest.raises(InputError):
-            prove_certificates(wrong)
+            prove_derived(wrong)
     # Designed for other words than it states: every number agrees with the machine, and the machine with no option.
     other = replace(options(MACHINES["amplifier"]), machine=machine.machine)
     with pytest.raises(InputError):
@@ -159,8 +159,8 @@ def test_a_table_edited_beyond_the_tests_is_refused(example_valve):
     made = made_for(example_valve, MACHINES["amplifier"] | {"transition": "off"})
     node = int(made.signals.dp_code(Fraction(5))) // made.beta_step_codes + 2
     table = tuple(made.positive.beta[0] if place == node else each for place, each in enumerate(made.positive.beta))
-    with pytest.raises(InputError):
-        prove_certificates(replace(made, sides=replace(made.sides, positive=replace(made.positive, beta=table))))
+    with pytest.raises(RequirementError):
+        with_certificates(replace(made, sides=replace(made.sides, positive=replace(made.positive, beta=table))))
 
 
 def test_a_recorded_dither_is_stronger_where_a_drive_gives_more_current():

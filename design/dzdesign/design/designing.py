@@ -217,7 +217,7 @@ def _recorded_widths(compensator: Compensator, sign: int) -> Iterator[list[tuple
         if test.u_knee_rising_V is None or test.u_knee_falling_V is None:
             continue
         opening, closing = test.recorded.opening, test.recorded.closing
-        corners = corners_of(compensator, round(compensator.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+        corners = corners_of(compensator, compensator.signals.code_at(test.dp_MPa), sign)
         found = []
         for level in LEVELS:
             up, down = (each.command_at(level * test.recorded.q_max_L_min) for each in (opening, closing))

@@ -230,7 +230,7 @@ def dead_zones(compensator: Compensator, characteristic: Characteristic, sign: i
 
 def _at_test(compensator: Compensator, characteristic: Characteristic, test: TestResult, sign: int) -> FixedDeadZone:
     end_code, signals = compensator.transition_end, compensator.signals
-    dp_code = round(signals.dp_code(Fraction(repr(test.dp_MPa))))
+    dp_code = signals.code_at(test.dp_MPa)
     knees = {"opening": test.u_knee_rising_V, "closing": test.u_knee_falling_V}
     by_law = falling_corners(compensator, dp_code, sign).at_end
     by_fixed = float(characteristic.drive(Fraction(end_code, signals.command.span(sign))))

@@ -1,8 +1,8 @@
 """One setting for many valves: the largest offset that over-compensates none of them, and the proof of that.
 
-Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That is proved as for one
-valve, by `certify`, for every valve that comes within `CLEAR` of the least ceiling where one was tested. That it lies
-under the bounds of every valve is proved of each of them, by `prove_lot`, here and by `verify`.
+Its offset lies, at every pressure code, under the least of the valves' certified ceilings. That it lies under the
+bounds of every valve is proved of each of them, by `prove_lot`, here and where a compensator from a file is designed
+again.
 
 A compensator's file holds the valve that its certificate follows from. The common one holds a real valve of the batch,
 its *carrier*, and never an invented one with the least thresholds of all: no ramp test ever showed that.
@@ -19,7 +19,7 @@ from dzdesign.core.errors import InputError, RequirementError, and_more
 from dzdesign.core.worded import worded
 from dzdesign.design.beta_table import between_nodes, choose_beta_table
 from dzdesign.design.ceiling import OffsetCeiling, OffsetCurve, deepest_MPa, offset_ceiling
-from dzdesign.design.certificate import certified, guarded_curve
+from dzdesign.design.certificate import guarded_curve, with_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.designing import design, prove_monotone
@@ -28,7 +28,7 @@ from dzdesign.design.lot_valves import LotValve
 from dzdesign.design.machine import Allowance
 from dzdesign.design.options import options_of
 from dzdesign.design.side_design import finest_units, left_by_machine, offset_at_reference, over, travel
-from dzdesign.design.side_law import Certificate, SideLaw, Sides
+from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import SIDE_NAMES, Signals
 from dzdesign.identify.valve.certified_bound import BoundPiece, CertifiedBound
 from dzdesign.identify.valve.side_model import SideModel
@@ -70,11 +70,9 @@ class LotSetting:
     carrier: str
     #: Pressure drops that every valve was tested over: inside, the setting is certified for each of them.
     dp_MPa: tuple[float, float]
-    #: Valves that hold the offset down where one was tested, or below; for these `proved` has an exact certificate.
-    #: Above all tests, where the offset falls anyway, the steepest would: that costs no tested pressure drop anything.
+    #: Valves that hold the offset down where one was tested, or below. Above all tests, where the offset falls anyway,
+    #: the steepest would: that costs no tested pressure drop anything.
     binding: tuple[str, ...]
-    #: Name to a certificate per sign of command.
-    proved: Mapping[str, tuple[Certificate, ...]]
     #: Of every valve of the batch: how far the offset stays under its bound.
     margins: tuple[LotMargin, ...]
 
@@ -125,16 +123,8 @@ def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
     )
     for side in sides:
         prove_monotone(compensator, side.sign)
-        certificate, budget = certified(compensator, side.models[carrier], side.sign)
-        laws[side.sign] = replace(laws[side.sign], certificate=certificate, budget=budget)
-    compensator = replace(compensator, sides=Sides(positive=laws[1], negative=laws.get(-1)))
+    compensator = with_certificates(compensator)
     margins = prove_lot(compensator)
-    proved = {
-        name: tuple(
-            certified(compensator, side.models[name], side.sign)[0] for side in sides if name in side.binding
-        )
-        for name in batch if any(name in side.binding for side in sides)
-    }
     line = (
         f"lot setting of {len(batch)} valves: under the bounds of each, with that valve's own confidence; this file "
         f"holds the valve {carrier}, for which the lines above are"
@@ -144,8 +134,7 @@ def lot_setting(batch: Mapping[str, Compensator]) -> LotSetting:
         compensator=compensator,
         carrier=carrier,
         dp_MPa=_common_interval(side.curves for side in sides),
-        binding=tuple(proved),
-        proved=proved,
+        binding=tuple(name for name in batch if any(name in side.binding for side in sides)),
         margins=margins,
     )
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from dzdesign.core.errors import InputError, RequirementError, quoted
 from dzdesign.core.value_differences import differences
-from dzdesign.design.certificate import prove_certificates
+from dzdesign.core.worded import errors_in
+from dzdesign.design.certificate import with_certificates
 from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs_at_tests import between_tests, corners_of, read_dead_zone, remaining_dead_zone
 from dzdesign.design.designing import LEVELS, design
@@ -49,8 +50,9 @@ def refuse_without_options(compensator: Compensator, source: str) -> None:
 def prove_derived(compensator: Compensator) -> None:
     """Design the compensator again from the valve and the options in it; refuse the first key that does not follow.
 
-    Of a lot's setting the sides are not those of the one valve in the file: their certificates are proved, and that the
-    setting over-compensates no valve. Of a file that does not say what was asked for nothing can be told.
+    Of a lot's setting the sides are not those of the one valve in the file: only their certificates and budgets follow
+    from it, and it is proved that the setting over-compensates no valve. Of a file that does not say what was asked for
+    nothing can be told.
     """
     if compensator.target is None or compensator.options is None:
         return
@@ -59,13 +61,14 @@ def prove_derived(compensator: Compensator) -> None:
     except InputError as error:
         raise InputError(f"its valve can't be designed with its options: {error}; {Compensator.REMEDY}") from error
     if compensator.lot:
-        prove_certificates(compensator)
         try:
-            prove_lot(compensator)
+            with errors_in(compensator.valve.recorded_units):
+                sides = with_certificates(compensator).sides
+                prove_lot(compensator)
         except RequirementError as error:
             raise InputError(f"{error}; make it again with `dzdesign batch`") from error
         _prove_lot_setting(compensator, redesigned)
-        redesigned = replace(redesigned, sides=compensator.sides, lot=compensator.lot, costs=compensator.costs)
+        redesigned = replace(redesigned, sides=sides, lot=compensator.lot, costs=compensator.costs)
     redesigned = replace(redesigned, tool=compensator.tool)
     for found in differences(compensator, redesigned):
         stated, follows = _from_where_they_differ(found.stated, found.follows)
@@ -205,7 +208,7 @@ def hysteresis_left(made: Compensator, test: TestResult, sign: int = 1) -> np.nd
     """
     if test.recorded.rising is None or test.recorded.falling is None or test.dp_MPa is None:
         return np.zeros(0)
-    corners = corners_of(made, round(made.signals.dp_code(Fraction(repr(test.dp_MPa)))), sign)
+    corners = corners_of(made, made.signals.code_at(test.dp_MPa), sign)
     functions, span = made.drive_functions, made.signals.command.span(sign)
     share = np.arange(span + 1) / span
     ends = ([0.0, corners.zero_band, corners.end, 1.0], [corners.offset, corners.offset, corners.at_end, corners.full])
