@@ -67,16 +67,6 @@ def test_a_component_ten_times_too_small_is_seen(example_valve, drive, key):
     assert worst_margin_mV(design(example_valve, wrong), truth, CONVERTER) < 0
 
 
-def test_the_offset_of_a_converter_no_longer_lifts_the_law_over_the_bound(example_valve, example_compensator):
-    """15 codes on each pressure channel, nothing else: over the bound of the recording, and under it once declared."""
-    exact = options({"amplifier": "0 %", "oil": "0 %", "ageing": "0 %", "pressure_error": "0 %"}).machine
-    only = replace(exact, bench_pressure_error_MPa=0.0, pressure_gain_codes=0, pressure_noise_codes=0)
-    assert only.pressure_offset_codes == 15
-    assert worst_margin_mV(example_compensator, only, CONVERTER) < -9
-    declared = made_for(example_valve, MACHINES["amplifier"])
-    assert worst_margin_mV(declared, only, CONVERTER) >= 0
-
-
 def test_the_factors_of_the_budget_are_those_of_copper_and_voltage():
     machine = options(MACHINES["duty"]).machine
     assert machine.drive_factor(-20.0, 32.0) == Fraction("0.8428") * 24 / 32
