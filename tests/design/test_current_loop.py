@@ -12,11 +12,9 @@ from dzdesign.design.current import drive as current_drive
 from dzdesign.design.current.circuit import Corner, CurrentSampling, CurrentSensor
 from dzdesign.design.current.drive import (
     LEAST_PHASE_DEG,
-    CurrentRequest,
     choose_loop,
     design_current_drive,
     gains_of,
-    sensor_line,
     worst_step,
 )
 from dzdesign.design.current.responses import (
@@ -30,7 +28,7 @@ from dzdesign.design.current.responses import (
 )
 from dzdesign.verify.exhaustive.zero_command import counted_dither
 from tests.support.designs import CURRENT, designed
-from tests.support.example_coil import COIL, CONVERTER, SAMPLING, SENSORS, example_loop
+from tests.support.example_coil import COIL, SAMPLING, SENSORS, asked, example_loop
 
 on_both = pytest.mark.parametrize("name", SENSORS)
 RISE_S = {"supply unknown": 10e-3, "supply measured": 5e-3}
@@ -41,7 +39,7 @@ def test_every_corner_has_its_margins_step_and_little_overshoot(name):
     loop = example_loop(name)
     phase, gain = worst_margins(COIL, SAMPLING, gains_of(loop, COIL))
     assert phase.phase_deg >= LEAST_PHASE_DEG and gain.gain > 2
-    steps = step_responses(loop, COIL, SAMPLING, sensor_line(SENSORS[name], CONVERTER))
+    steps = step_responses(loop, asked(SENSORS[name]))
     slowest, largest = worst_step(steps)
     assert len(steps) == 27
     assert slowest.rise_s <= RISE_S[name] and largest.overshoot <= 0.10
@@ -51,13 +49,13 @@ def test_every_corner_has_its_margins_step_and_little_overshoot(name):
 @on_both
 def test_no_corner_overshoots_as_it_is_released_and_none_is_held_down_for_nothing(name):
     """Every fortieth of the rated current: less than a code. Beginning at the integral it is dozens of codes."""
-    loop, line = example_loop(name), sensor_line(SENSORS[name], CONVERTER)
-    corners, code_A = list(COIL.corners()), 1 / (line.V_per_A * line.codes_per_V)
+    loop, request = example_loop(name), asked(SENSORS[name])
+    corners, code_A = list(COIL.corners()), 1 / (request.sensor.V_per_A * request.codes_per_V)
     for share in np.arange(0.025, 1.01, 0.025):
-        means, _ = run_loop(loop, COIL, corners, SAMPLING, line, [round(share * 60000)] * 300)
+        means, _ = run_loop(loop, request, corners, [round(share * 60000)] * 300)
         assert means.max() <= share + code_A
-    assert released_overshoot_A(replace(loop, release=0), COIL, SAMPLING, line) > 50 * code_A
-    assert released_overshoot_A(replace(loop, release=loop.release // 2), COIL, SAMPLING, line) > code_A
+    assert released_overshoot_A(replace(loop, release=0), request) > 50 * code_A
+    assert released_overshoot_A(replace(loop, release=loop.release // 2), request) > code_A
 
 
 def test_an_overshoot_that_no_beginning_prevents_is_stated_and_warned_of(example_compensator, wording, monkeypatch):
@@ -67,8 +65,7 @@ def test_an_overshoot_that_no_beginning_prevents_is_stated_and_warned_of(example
         monkeypatch.setattr(current_drive, name, lambda *_, found=found, **__: found)
     step = StepResponse(corner=COIL.nominal, rise_s=2e-3, least_s=1e-3, overshoot=0.05)
     monkeypatch.setattr(current_drive, "worst_step", lambda _: (step, step))
-    request = CurrentRequest(circuit=COIL, sensor=SENSORS["supply unknown"], sampling=SAMPLING)
-    drive = design_current_drive(request, CONVERTER, 60000)
+    drive = design_current_drive(asked(SENSORS["supply unknown"]), 60000)
     assert drive.release_overshoot_A == 0.0331
     warned = replace(example_compensator, current_drive=drive)
     (text,) = design_warnings(warned)
@@ -94,9 +91,7 @@ def test_every_delay_is_counted():
 
 
 def test_a_wider_supply_costs_speed():
-    wide = choose_loop(
-        replace(COIL, supply_V=(12.0, 40.0)), SENSORS["supply unknown"], CONVERTER, SAMPLING, compare_max=60000
-    )
+    wide = choose_loop(asked(SENSORS["supply unknown"], replace(COIL, supply_V=(12.0, 40.0))), 60000)
     assert gains_of(wide, COIL).proportional * 24 < gains_of(example_loop("supply unknown"), COIL).proportional * 24
 
 
@@ -111,7 +106,7 @@ def test_a_wider_supply_costs_speed():
 )
 def test_a_sensor_beyond_the_converter_is_refused(sensor):
     with pytest.raises(InputError):
-        choose_loop(COIL, sensor, CONVERTER, SAMPLING, compare_max=60000)
+        choose_loop(asked(sensor), 60000)
 
 
 @pytest.mark.parametrize("changed", [{"rated_A": 50.0}, {"supply_V": (1.0, 1000.0)}])
@@ -119,7 +114,7 @@ def test_a_current_that_no_supply_drives_in_time_is_refused(changed):
     circuit = replace(COIL, **changed)
     sensor = CurrentSensor(V_per_A=2.0 / circuit.rated_A, offset_V=0.15)
     with pytest.raises(InputError, match=r"carries|reach"):
-        design_current_drive(CurrentRequest(circuit=circuit, sensor=sensor, sampling=SAMPLING), CONVERTER, 60000)
+        design_current_drive(asked(sensor, circuit), 60000)
 
 
 def test_corners_that_cannot_carry_the_rated_current_are_said():
@@ -127,8 +122,7 @@ def test_corners_that_cannot_carry_the_rated_current_are_said():
 
     def words(rated_A, V_per_A):
         sensor = CurrentSensor(V_per_A=V_per_A, offset_V=0.15)
-        request = CurrentRequest(circuit=replace(COIL, rated_A=rated_A), sensor=sensor, sampling=SAMPLING)
-        return design_current_drive(request, CONVERTER, 60000).in_words(RecordedUnits())
+        return design_current_drive(asked(sensor, replace(COIL, rated_A=rated_A)), 60000).in_words(RecordedUnits())
 
     assert len(words(1.0, 2.0)) == 2 and "3.44 A" in words(5.0, 0.4)[2]
 

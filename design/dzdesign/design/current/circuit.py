@@ -6,7 +6,6 @@ from itertools import product
 from math import log, sqrt
 from typing import Annotated, NamedTuple
 
-import numpy as np
 from msgspec import Meta
 
 from dzdesign.core.artefact_types import RuleError, quantity
@@ -153,22 +152,6 @@ class CurrentSensor:
             raise RuleError(
                 "the current's sensor needs a positive gain, an offset of zero or more, a divider below one"
             )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensorLine:
-    """The straight lines from a current, and from the supply's voltage, to a code before it is rounded down."""
-
-    V_per_A: float
-    offset_V: float
-    codes_per_V: float
-    code_max: int
-    supply_divider: float
-
-    def codes(self, volts: np.ndarray) -> np.ndarray:
-        """Return the codes of voltages at the pin."""
-        rounded: np.ndarray = np.clip(np.floor(volts * self.codes_per_V), 0, self.code_max)
-        return rounded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
