@@ -107,23 +107,6 @@ class Machine:
             if "_error" in name and value is not None and not 0 <= value <= limit:
                 raise RuleError(f"{name} is {value:g}, expected 0 to {limit:g}")
 
-    def drive_factor(
-        self, temperature_C: float = float(REFERENCE_C), supply_V: float = 0.0, current_ratio: float = 1.0
-    ) -> Fraction:
-        """Return the threshold as a drive on the machine over that on the bench, exactly.
-
-        Parameters
-        ----------
-        temperature_C, supply_V : float
-            Of the machine; they count where the duty goes straight to the coil.
-        current_ratio : float
-            Current for a drive over that on the bench; it counts with an amplifier or a controlled current.
-        """
-        if self.drive != "duty":
-            return 1 / _exact(current_ratio)
-        bench_C, bench_V = _exact(self.bench_coil_C or 0.0), _exact(self.bench_supply_V or 0.0)
-        return _resistance(_exact(temperature_C)) / _resistance(bench_C) * bench_V / _exact(supply_V)
-
     @property
     def least_factors(self) -> dict[Component, Fraction]:
         """The least threshold over that on the bench, component by component; the bench itself is a machine too."""

@@ -7,7 +7,6 @@ table and advice of `dzdesign design`.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import takewhile
 
 import numpy as np
 
@@ -26,8 +25,6 @@ from dzdesign.identify.valve.ramp_result import TestResult
 
 #: Coarsest unit of the law's coefficients, see `dzdesign.design.side_design`.
 COARSEST = Fraction(1, 2**12)
-#: Characters before the first difference of two texts that a message shows.
-CONTEXT = 12
 #: The choices, simplest first: what is given to `design` beside the options that were.
 WAYS: Mapping[str, Mapping[str, str]] = {
     "--transition off": {"transition": "off", "hysteresis": "keep"},
@@ -71,10 +68,9 @@ def prove_derived(compensator: Compensator) -> None:
         redesigned = replace(redesigned, sides=sides, lot=compensator.lot, costs=compensator.costs)
     redesigned = replace(redesigned, tool=compensator.tool)
     for found in differences(compensator, redesigned):
-        stated, follows = _from_where_they_differ(found.stated, found.follows)
         raise InputError(
-            f"'{found.place}' is {_words(stated)}, but {_words(follows)} follows from its valve and its options; "
-            f"{Compensator.REMEDY}"
+            f"'{found.place}' is {_words(found.stated)}, but {_words(found.follows)} follows from its valve and its "
+            f"options; {Compensator.REMEDY}"
         )
 
 
@@ -102,16 +98,6 @@ def _prove_lot_setting(compensator: Compensator, redesigned: Compensator) -> Non
                 f"the lot has no valve with the hash and the {name} bounds of the valve in the file; make it again "
                 "with `dzdesign batch`"
             )
-
-
-def _from_where_they_differ(stated: object, follows: object) -> tuple[object, object]:
-    """Return two values, of long texts what stands about their first difference: a message shows only so much."""
-    if not (isinstance(stated, str) and isinstance(follows, str)):
-        return stated, follows
-    alike = takewhile(lambda pair: pair[0] == pair[1], zip(stated, follows, strict=False))
-    same = sum(1 for _ in alike)
-    begin = stated.rfind(" ", 0, max(same - CONTEXT, 0)) + 1
-    return stated[begin:], follows[begin:]
 
 
 def _words(value: object) -> str:

@@ -130,11 +130,6 @@ class CurrentSampling:
         """Length of a PWM period."""
         return 1 / self.tick_Hz
 
-    @property
-    def delay_s(self) -> float:
-        """From the middle of the samples to the middle of the period in which the output acts."""
-        return (1.5 - (self.before / self.samples - 0.5)) * self.period_s
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurrentSensor:
