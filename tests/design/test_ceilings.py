@@ -111,7 +111,6 @@ def test_the_least_of_windows_and_of_rows_is_exact():
     assert list(row.at_least(CLOSE[0])) == [max(value, CLOSE[0]) for value in values]
     factor, less = Fraction(-3, 7), Fraction(1, 9)
     assert list(row.line(factor, less)) == [value * factor - less for value in values]
-    assert list(row.plus(other)) == [one + two for one, two in zip(values, values[::-1], strict=True)]
 
 
 def test_doubles_alone_would_be_wrong(monkeypatch):

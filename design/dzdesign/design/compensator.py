@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
-from threading import local
 from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta
 
-from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of, to_json_bytes
+from dzdesign.core.artefact_types import Artefact, RuleError, as_document, quantity, schema_of
 from dzdesign.core.documents import sha256_of, to_json
 from dzdesign.core.errors import InputError, RequirementError
 from dzdesign.core.result_display import ShownInNotebooks
@@ -31,17 +30,6 @@ from dzdesign.design.side_law import SideLaw, Sides
 from dzdesign.design.signals import Signals
 from dzdesign.design.target_inputs import CommandError, TargetInputs
 from dzdesign.identify.valve.model import ValveModel
-
-#: The last valve and its hash: a design makes several compensators of one valve, each of which states the hash.
-LAST = local()
-
-
-def sha256_of_valve(valve: ValveModel) -> str:
-    """Return the SHA-256 of the valve.json of a valve; known again by its identity, for a valve never changes."""
-    if getattr(LAST, "valve", None) is not valve:
-        LAST.sha256, LAST.valve = sha256_of(to_json_bytes(valve)), valve
-    digest: str = LAST.sha256
-    return digest
 
 
 @lru_cache(maxsize=64)

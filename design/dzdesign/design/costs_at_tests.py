@@ -27,10 +27,6 @@ class LawCorners:
     end: float
     leaves: float
 
-    def lowered(self, at_end: float, at_full: float) -> "LawCorners":
-        """Return the branch of a falling command: lower by so much at the transition's end, and at full command."""
-        return replace(self, at_end=self.at_end - at_end, full=self.full - at_full)
-
     def command_at(self, drive: float) -> float:
         """Return the command at which the drive reaches a threshold."""
         if drive <= self.at_end and self.end:
@@ -218,7 +214,7 @@ def falling_corners(compensator: Compensator, dp_code: int, sign: int) -> LawCor
     codes = (compensator.transition_end, compensator.signals.command.span(sign))
     widths = np.interp(codes, np.arange(len(nodes)) * functions.play_step_codes, nodes)
     at_end, at_full = (float(width) / compensator.signals.compare_max for width in widths)
-    return corners.lowered(at_end, at_full)
+    return replace(corners, at_end=corners.at_end - at_end, full=corners.full - at_full)
 
 
 def _commands_at(

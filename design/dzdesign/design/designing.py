@@ -14,14 +14,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from dzdesign.core.artefact_types import THIS_TOOL, SourceFile
+from dzdesign.core.artefact_types import THIS_TOOL, SourceFile, to_json_bytes
+from dzdesign.core.documents import sha256_of
 from dzdesign.core.errors import InputError
 from dzdesign.core.worded import errors_in
 from dzdesign.derivation.law import Law, law
 from dzdesign.derivation.laws import LAW_NAMES
 from dzdesign.derivation.presentation.formulas import to_text
 from dzdesign.design.beta_table import STEP_CODES
-from dzdesign.design.compensator import Compensator, sha256_of_valve
+from dzdesign.design.compensator import Compensator
 from dzdesign.design.costs import costs_of
 from dzdesign.design.costs_at_tests import corners_of
 from dzdesign.design.machine import allowance_of, check_bench_current, dither_reserve
@@ -88,7 +89,7 @@ def _designed(valve: ValveModel, options: DesignOptions) -> Compensator:
         laws[sign] = side_law(side, options, u_max, units, transition_codes, allowance)
     compensator = Compensator(
         tool=THIS_TOOL,
-        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=sha256_of_valve(valve)),),
+        made_from=(SourceFile(source=ValveModel.FILE_NAME, sha256=sha256_of(to_json_bytes(valve))),),
         target=options.target,
         options=options.texts,
         law=options.law,

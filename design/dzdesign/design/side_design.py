@@ -165,11 +165,10 @@ def opening_ceiling(
     limit = offset_row(opening, signals, 0, last)
     if guarded.above is not None and tested.stop <= last:
         let_go = min(released_from(above, tested) or last + 1, last + 1)
-        height = limit[tested.stop :].line(Fraction(1), guarded.offset_V[-1])
-        held = height[: let_go - tested.stop]
-        if held:
-            held = held.plus(offset_row(guarded, signals, tested.stop, let_go - 1))
-        limit = limit[: tested.stop].followed_by(held).followed_by(height[len(held) :])
+        height = opening.offset_V[-1] - guarded.offset_V[-1]
+        held = offset_row(guarded, signals, tested.stop, let_go - 1).line(Fraction(1), -height)
+        left = ExactRow.joined([([height.numerator] * (last + 1 - let_go), height.denominator)])
+        limit = limit[: tested.stop].followed_by(held).followed_by(left)
     return OffsetCeiling(limit=limit.line(1 / u_max), certified=tested)
 
 
