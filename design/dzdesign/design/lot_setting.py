@@ -292,6 +292,10 @@ class _Drive:
         self.kept_V = self.allowance.kept * compensator.u_max_V
         self.unit_V = law.u_min0_over_u_max * compensator.u_max_V / scale
         self.numerators = between_nodes(law.beta, count, compensator.beta_step_codes)
+        low, high = self.allowance.window
+        around = np.pad(self.numerators, (high, -low), mode="edge")
+        #: The largest that may be read at a pressure whose code is whole.
+        self.highest = np.lib.stride_tricks.sliding_window_view(around, high - low + 1).max(axis=1).tolist()
 
     def nearest(self, piece: BoundPiece) -> Iterator[tuple[Fraction, Fraction]]:
         """Yield the margin, V, and the pressure drop, MPa, of places one of which comes nearest to a piece's bound."""
@@ -303,15 +307,14 @@ class _Drive:
             bounds, unit = at_codes(piece, signals.dp_MPa(1), codes)
             up, down = self.allowance.factor / unit, self.unit_V
             one, other = up.numerator * down.denominator, down.numerator * up.denominator
-            padded = np.pad(self.numerators, (high, -low), mode="edge")
-            highest = np.lib.stride_tricks.sliding_window_view(padded, high - low + 1).max(axis=1).tolist()
-            left = [bound * one - highest[code] * other for bound, code in zip(bounds, codes, strict=True)]
+            left = [bound * one - self.highest[code] * other for bound, code in zip(bounds, codes, strict=True)]
             places.append(signals.dp_MPa(codes[left.index(min(left))]))
         for place in places:
             code = signals.dp_code(place)
-            read = self.numerators[max(ceil(code) - high, 0) : max(floor(code) - low, 0) + 1]
-            if read.size:
-                yield self.allowance.factor * piece.at(place) - int(read.max()) * self.unit_V - self.kept_V, place
+            first, last = sorted((ceil(code) - high, floor(code) - low))  # between two codes both count
+            first = max(min(first, self.numerators.size - 1), 0)
+            read = int(self.numerators[first : max(last, first) + 1].max())
+            yield self.allowance.factor * piece.at(place) - read * self.unit_V - self.kept_V, place
 
 
 def prove_lot(compensator: Compensator) -> tuple[LotMargin, ...]:
