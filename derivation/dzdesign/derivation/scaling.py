@@ -142,16 +142,15 @@ def evaluate_share(command: Any, *, zero_band: Any, end: Any) -> Any:
     return min(max(lower(SHARE, (s.u_i, s.u_z, s.u_t))(command, zero_band, end), 0), 1)
 
 
-def evaluate_law_command(command: Any, *, zero_band: Any, end: Any) -> Any:
-    """Return the command that the opening law is given: 0 in the zero band, the command itself beyond the transition.
+def evaluate_law_command(share_of_transition: Any, *, end: Any) -> Any:
+    """Return the command that the opening law is given within the transition: from 0 on, at its end the command itself.
 
     Examples
     --------
-    >>> evaluate_law_command(21, zero_band=19, end=51)
+    >>> evaluate_law_command(evaluate_share(21, zero_band=19, end=51), end=51)
     Fraction(51, 16)
     """
-    passed = evaluate_share(command, zero_band=zero_band, end=end)
-    return command if passed == 1 else lower(LAW_COMMAND, (s.share, s.u_t))(passed, end)
+    return lower(LAW_COMMAND, (s.share, s.u_t))(share_of_transition, end)
 
 
 def evaluate_transition(

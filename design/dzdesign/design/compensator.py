@@ -236,15 +236,15 @@ class Compensator(ShownInNotebooks, Artefact):
 
         if from_zero >= self.transition_end:
             return line(from_zero)
-        ends = {"zero_band": self.zero_band_codes, "end": self.transition_end}
+        share = evaluate_share(from_zero, zero_band=self.zero_band_codes, end=self.transition_end)
         lowered = evaluate_transition(
             beta_opening=beta,
             beta_closing=self.beta(dp_code, sign),
             u_min0_over_u_max=u_min0,
-            share_of_transition=evaluate_share(from_zero, **ends),
+            share_of_transition=share,
             n_full=signals.compare_max,
         )
-        return Fraction(line(evaluate_law_command(from_zero, **ends)) - lowered)
+        return Fraction(line(evaluate_law_command(share, end=self.transition_end)) - lowered)
 
     def drive(self, command_code: int, dp_code: int, sign: int = 1) -> Fraction:
         """Return the exact u_O/u_max of the law at a code pair, before limiting to 0...1."""
